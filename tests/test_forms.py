@@ -196,7 +196,7 @@ def templates() -> dict[str, Template]:
 def test_forms_leave_no_robot_without_a_hand() -> None:
     project = read(EXAMPLES / "truck.pag")
     assert not project.no_grips
-    found = allocated(project, Aim(robots=20, seconds=10))
+    found = allocated(project, Aim(robots=20, effort=20))
     assert all(grip.shared for grip in found.no_grips)
     assert len(found.plain.robots) <= 20
     certificate = found.layout.certificate

@@ -87,7 +87,7 @@ def test_a_front_has_what_it_must_have(front: ParetoFront) -> None:
 
 
 def test_no_point_is_worse_than_the_form_of_the_paper(quick: Project) -> None:
-    front = pareto(quick, Effort(seconds=5))
+    front = pareto(quick, Effort(factories=12))
     paper = front.written
     assert paper is not None
     assert {node.operation for node in quick.pag.nodes} == {"mate", "atomic"}
@@ -101,7 +101,7 @@ def test_no_point_is_worse_than_the_form_of_the_paper(quick: Project) -> None:
 def test_estimates_alone_take_no_layout(quick: Project, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Project, "layout", property(lambda _: pytest.fail("a layout")))
     fresh = replace(quick)
-    front = pareto(fresh, Effort(layouts=False, seconds=4))
+    front = pareto(fresh, Effort(layouts=False, factories=12))
     assert front.written is None
     assert front.laid_out == 0
     assert all(p.predicted is p.area is p.bound is None for p in front.points)
@@ -170,7 +170,7 @@ def read_back(file: Path, relay: bool) -> Project:
 def test_files_stand_alone_and_stay_in_their_folder(out: Path, own_folder: Path) -> None:
     """Meshes and operations of the user's are copied, by names that lead nowhere else."""
     project = read(own_folder / "pag" / "s.pag", [own_folder / "ops"], Settings(hands=0))
-    front = pareto(project, Effort(seconds=5))
+    front = pareto(project, Effort(factories=12))
     files = point_files(front, out / "a" / "b")
     assert all(out / "a" / "b" in path.parents and ".." not in path.parts for path in files)
     for path, content in files.items():

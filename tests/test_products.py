@@ -59,7 +59,7 @@ def test_large_products_are_made(run: Terminal, name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "robots"), [(SMALL[0], 7), (SMALL[1], 17)])
 def test_magazines_of_lines_are_solid(run: Terminal, name: str, robots: int) -> None:
-    words = ("--robots", robots, "--seconds", 30, "--seeds", 1, "--units", 2, "--no-convergence")
+    words = ("--robots", robots, "--effort", 40, "--seeds", 1, "--units", 2, "--no-convergence")
     done = run("fidelity", product(name), *words, "--jobs", 1, "--json")
     assert done.json["figures"]["hidden_penetration_max_mm"]["worst"] < 0.1
 
@@ -71,7 +71,7 @@ def test_magazines_of_lines_are_solid(run: Terminal, name: str, robots: int) -> 
 )
 def test_few_robots_take_the_time_that_is_predicted(run: Terminal, file: Path, hands: str) -> None:
     robots = 7 if file.parent == FOLDER else 17
-    words = ("--robots", robots, "--seconds", 25, "--units", 12, hands, "--json")
+    words = ("--robots", robots, "--effort", 40, "--units", 12, hands, "--json")
     done = run("run", file, *words).json
     assert done["cycle_time_s"] == pytest.approx(done["predicted_cycle_time_s"], rel=0.02)
 

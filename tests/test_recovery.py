@@ -182,7 +182,7 @@ def folded() -> Layout:
     from factory.study.allocation.aim import Aim
     from factory.study.allocation.search import allocated
 
-    return allocated(read(PAPER), Aim(3, seconds=3.0)).layout
+    return allocated(read(PAPER), Aim(3)).layout
 
 
 @pytest.mark.parametrize(("world", "seed"), [("mujoco", 1), *(("ideal", n) for n in range(4))])

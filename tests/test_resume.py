@@ -470,7 +470,7 @@ FACTORIES: tuple[tuple[object, ...], ...] = (
     (PAPER, "--units", 60, "--jitter", 0.3),
     (EXAMPLES / "truck.pag", "--units", 4, "--fuse"),
     (EXAMPLES / "gearbox.pag", "--units", 3, "--jitter", 0.2),
-    (PAPER, "--units", 60, "--robots", 3, "--no-hands", "--seconds", 5),
+    (PAPER, "--units", 60, "--robots", 3, "--no-hands"),
 )
 
 

@@ -252,7 +252,15 @@ RELAY = options(
         "--deputies", is_flag=True, help="Robots can take over for others, where there is room."
     ),
     click.option(
-        "--seconds", "effort", type=SECONDS, help="To look for few robots [s]; 60 by default."
+        "--effort",
+        type=click.IntRange(1, 10**6),
+        help="To look for few robots: so many factories are laid out; 8 to 100 by default.",
+    ),
+    click.option(
+        "--seconds",
+        "limit",
+        type=SECONDS,
+        help="No factory is laid out after so long [s]; it is said where that ends the search.",
     ),
 )
 WIP = click.option(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -38,10 +39,15 @@ PAGE_NAME = "pareto.html"
     "-o", "--output", type=PATH, help="A folder for a page, and for the files of each point."
 )
 @click.option(
+    "--effort",
+    type=click.IntRange(1, 10**6),
+    help="So many factories are laid out; by default 16 to 200, by the size of the product.",
+)
+@click.option(
     "--seconds",
-    "effort",
+    "limit",
     type=SECONDS,
-    help="To look for points [s]; 300 by default, 60 with --no-layouts.",
+    help="Nothing more is looked at after so long [s]; that is said.",
 )
 @click.option(
     "--layouts/--no-layouts",
@@ -71,7 +77,7 @@ def pareto(
     writable_folder(output)
     project = given.project(out.silent)
     warnings = announced(project.warnings, out)
-    front, stopped = _found(project, Effort(layouts, given.effort), trials, out)
+    front, stopped = _found(project, Effort(layouts, given.effort, given.limit or inf), trials, out)
     commands, files = _written(front, project, output)
     if out.as_json:
         points = zip(front.points, commands, strict=True)
@@ -99,7 +105,7 @@ def _found(
     from factory.support.progress import StepBar
 
     front = None
-    with StepBar("looking for the front", out.silent, effort.limit) as bar:
+    with StepBar("looking for the front", out.silent) as bar:
 
         def seen(step: Step) -> None:
             bar.show(step.what, step.done, step.total, f"{step.points} points" * bool(step.points))
@@ -162,7 +168,7 @@ def _tell(front: ParetoFront, commands: Sequence[str | None]) -> None:
 
 def _looked_at(front: ParetoFront) -> str:
     laid_out = f", {front.laid_out} layouts" if front.laid_out else ""
-    rest = "" if front.complete else "; not all was looked at (--seconds)"
+    rest = "" if front.complete else "; not all was looked at (--effort, --seconds)"
     return f"{front.estimated} estimates{laid_out}{rest}"
 
 

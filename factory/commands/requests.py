@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import count
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -57,7 +58,8 @@ class ProjectOptions:
     relay: bool = False
     cycle: float | None = None
     robots: int | Literal["least"] | None = None
-    effort: float | None = None
+    effort: int | None = None
+    limit: float | None = None
     parallel: tuple[tuple[str, int], ...] = ()
     deputies: bool = False
 
@@ -111,17 +113,22 @@ class ProjectOptions:
         project = read(self.file, self.folders, settings or self.settings(), self.ground())
         if self.robots is None and self.cycle is None:
             return project
-        from factory.study.allocation.aim import SECONDS, Aim
+        from factory.study.allocation.aim import Aim, usual_effort
         from factory.study.allocation.search import allocated
+        from factory.support.console import warn
         from factory.support.progress import StepBar
 
-        aim, looked_at = Aim(self.robots, self.cycle, self.effort or SECONDS), count(1)
-        with StepBar("looking for few robots", silent, aim.seconds) as steps:
+        effort = self.effort or usual_effort(len(project.pag))
+        aim = Aim(self.robots, self.cycle, effort, self.limit or inf)
+        looked_at, warnings = count(1), list[Diagnostic]()
+        with StepBar("looking for few robots", silent) as steps:
 
             def seen(_: Candidate, best: Candidate) -> None:
-                steps.show("looking for few robots", next(looked_at), None, f"best: {best}")
+                steps.show("looking for few robots", next(looked_at), effort, f"best: {best}")
 
-            return allocated(project, aim, seen)
+            made = allocated(project, aim, seen, warnings.append)
+        warn(warnings, silent)
+        return made
 
 
 @dataclass(frozen=True, slots=True)

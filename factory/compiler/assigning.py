@@ -3,11 +3,11 @@ one.
 
 A factory as Compile makes it has one *tour* a robot, from empty hands to empty hands. A *period*
 has one turn or several, a unit is made in each, and an assignment gives for each turn and each
-robot of that factory the robot that does its tours. Each robot does what it has, turn by turn, in the
-*postorder* of the operations, the pile first. That order depends on what is made, not on the robots
-that make it, and is a witness (Theorem 1): every program ascends in it, so the net is live whatever
-is assigned (Theorem 2). Which assignments robots can do, where they stand, is what `folding`,
-`parallel` and `deputies` say.
+robot of that factory the robot that does its tours. Each robot does what it has, turn by turn, in
+the *postorder* of the operations, the pile first. That order depends on what is made, not on the
+robots that make it, and is a witness (Theorem 1): every program ascends in it, so the net is live
+whatever is assigned (Theorem 2). Which assignments robots can do, where they stand, is what
+`folding`, `parallel` and `deputies` say.
 """
 
 from __future__ import annotations

@@ -26,14 +26,14 @@ JITTER, UNITS = 0.3, 6
 
 @dataclass(frozen=True)
 class Wanted:
-    """A product with a number of robots, and the cycle time that is aimed at [s]; how long is
-    looked for it [s], how many seeds are run."""
+    """A product with a number of robots, and the cycle time that is aimed at [s]; with what
+    `effort` it is looked for, how many seeds are run."""
 
     file: Path
     robots: int
     cycle: float
     hands: int = 0
-    seconds: float = 60.0
+    effort: int | None = None
     seeds: int = 5
     units: int = UNITS
 
@@ -41,19 +41,19 @@ class Wanted:
     def command(self) -> str:
         """What makes this factory."""
         words = f"factory run {self.file.name} --robots {self.robots}"
-        words += f" --seconds {self.seconds:g}" if self.seconds != 60 else ""
+        words += f" --effort {self.effort}" if self.effort else ""
         return words if self.hands else f"{words} --no-hands"
 
 
 ROWS = (
     Wanted(EXAMPLES / "paper.pag", 3, 4.1, hands=1),
     Wanted(BRICKS / "889-1-RadarTruck.pag", 18, 7.3),
-    Wanted(BRICKS / "889-1-RadarTruck.pag", 18, 7.3, hands=1, seconds=50, seeds=3),
+    Wanted(BRICKS / "889-1-RadarTruck.pag", 18, 7.3, hands=1, seeds=3),
     Wanted(BRICKS / "30023-1-Lighthouse.pag", 7, 15.4),
-    Wanted(BRICKS / "30023-1-Lighthouse.pag", 7, 15.4, hands=1, seconds=40, seeds=3),
+    Wanted(BRICKS / "30023-1-Lighthouse.pag", 7, 15.4, hands=1, seeds=3),
     Wanted(BRICKS / "5935-1-IslandHopper.pag", 12, 150.0, seeds=1),
     Wanted(BRICKS / "4494-1-Imperial_Shuttle-Mini.pag", 50, 7.1, seeds=2),
-    Wanted(BRICKS.parent / "rocket.pag", 250, 120.0, seconds=150, seeds=1, units=1),
+    Wanted(BRICKS.parent / "rocket.pag", 250, 120.0, seeds=1, units=1),
 )
 
 
@@ -71,7 +71,7 @@ def measure(quick: bool = False) -> dict[str, Any]:
 def _measured(wanted: Wanted) -> dict[str, Any]:
     project = read(wanted.file, settings=Settings(hands=wanted.hands))
     begin = perf_counter()
-    found = allocated(project, Aim(wanted.robots, seconds=wanted.seconds))
+    found = allocated(project, Aim(wanted.robots, effort=wanted.effort))
     layout, looked = found.layout, perf_counter() - begin
     runs = []
     for seed in range(wanted.seeds):

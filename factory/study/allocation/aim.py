@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import Literal
 
 from factory.support.settings import LEAST
@@ -10,19 +11,27 @@ from factory.support.settings import LEAST
 STEP = 1.15
 """The bounds on estimated cycles that are tried: each is the one before divided by this."""
 
-SECONDS = 60.0
-"""How long is looked for few robots, where nothing else is said [s]."""
+LABELS, EFFORTS = 3000, (8, 100)
+"""So many labels are laid out in a search, in so many factories: a large product's layout takes as
+long as many of a small one's."""
+
+
+def usual_effort(labels: int) -> int:
+    """How many factories a search lays out at most for a product of so many labels, where nothing
+    else is said."""
+    return min(max(LABELS // labels, EFFORTS[0]), EFFORTS[1])
 
 
 @dataclass(frozen=True, slots=True)
 class Aim:
     """How many `robots` there are, LEAST for as few as found, None for as many as it takes; the
-    `cycle` time to be reached [s], None for the shortest; how many `seconds` may be spent on the
-    choice."""
+    `cycle` time to be reached [s], None for the shortest. `effort`: how many factories are laid
+    out at most, None for as many as is usual; none is begun after `seconds`."""
 
     robots: int | Literal["least"] | None = None
     cycle: float | None = None
-    seconds: float = SECONDS
+    effort: int | None = None
+    seconds: float = inf
 
     @property
     def asks(self) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
@@ -26,6 +26,7 @@ from factory.study.allocation.forms import (
     written_forms,
 )
 from factory.study.allocation.lines import SLACKS, Shift, labels_on
+from factory.support.allowance import Allowance
 
 WIDE = 1.3
 """The same for LARGE products."""
@@ -94,35 +95,32 @@ class Estimator:
             project = project.with_pag(project.pag, replace(project.ground, lines=lines))
         return Candidate(project, forms, filling)
 
-    def front(
-        self, robots: float = inf, late: Callable[[], bool] = lambda: False
-    ) -> list[Estimate]:
+    def front(self, budget: Allowance, robots: float = inf) -> list[Estimate]:
         """The estimates of which no other is clearly better, with at most so many `robots`, and no
-        more operations blocked than as the product is written; as many as are found until it is
-        `late`."""
+        more operations blocked than as the product is written; of so many forms as the budget
+        allows."""
         found: list[Estimate] = []
-        for one in self.estimates(robots, late):
+        for one in self.estimates(budget, robots):
             if one.filling is not None and not any(other.beats(one) for other in found):
                 found = [other for other in found if not one.beats(other)] + [one]
         return found
 
-    def estimates(
-        self, robots: float = inf, late: Callable[[], bool] = lambda: False
-    ) -> Iterator[Estimate]:
+    def estimates(self, budget: Allowance, robots: float = inf) -> Iterator[Estimate]:
         """All estimates with at most so many `robots` and no more operations blocked than as the
-        product is written, until it is `late`: of each forms, those as they are written first, that
-        with a robot for each label, then those with lines."""
+        product is written, of so many forms as the budget allows: of each, those as they are
+        written first, that with a robot for each label, then those with lines."""
         tried = {tuple(self.written.values())}
         yield from self.of_forms(self.written, robots)
         for task in self._tasks():
             for bound in self.bounds(task, robots):
-                if late():
+                if budget.over():
                     return
                 forms, _ = best_forms(task, bound)
                 key = tuple(forms.values())
                 if key in tried:
                     continue
                 tried.add(key)
+                budget.spend()
                 yield from self.of_forms(forms, robots)
 
     def of_forms(self, forms: Mapping[str, int], robots: float = inf) -> Iterator[Estimate]:

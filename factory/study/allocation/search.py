@@ -9,20 +9,21 @@ those of the slowest robot first, as long as that makes it better. All are judge
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from math import inf
-from time import monotonic
 
 from factory.compiler.folding import kept_apart, lines_of_labels
 from factory.compiler.mating.mating import judged
 from factory.pipeline import Project
-from factory.study.allocation.aim import Aim
+from factory.study.allocation.aim import Aim, usual_effort
 from factory.study.allocation.blame import blamed, joins_of
+from factory.study.allocation.bundles import Filling
 from factory.study.allocation.candidate import Candidate
 from factory.study.allocation.estimating import Estimator
 from factory.study.allocation.forms import THIRD, best_forms
 from factory.study.allocation.least import least_robots
+from factory.support.allowance import Allowance
 from factory.support.errors import Diagnostic, FactoryError, InputError
 
 ROUNDS = 8
@@ -31,23 +32,25 @@ ROUNDS = 8
 CHANGES = 60
 """So many changes are tried in a row, none of which is better, before the search ends."""
 
-LOOKED_AT = 60
-"""So many of the most promising estimates are laid out."""
-
-SINGLE, ESTIMATED, SHARED = 0.3, 0.5, 0.8
-"""Shares of the time after which nothing more is tried with a robot for each label, nothing more is
-estimated, and no more estimates are laid out."""
+SINGLE, SHARED = 0.3, 0.8
+"""Shares of the effort after which nothing more is tried with a robot for each label, and no more
+estimates are laid out."""
 
 Seen = Callable[[Candidate, Candidate], None]
 """Told of each candidate, and of the best so far."""
 
 
-def allocated(project: Project, aim: Aim, seen: Seen = lambda *_: None) -> Project:
+def allocated(
+    project: Project,
+    aim: Aim,
+    seen: Seen = lambda *_: None,
+    warn: Callable[[Diagnostic], None] = lambda _: None,
+) -> Project:
     """The project with forms and lines chosen for an aim: as few robots as found for a cycle time,
     or the shortest cycle time found with so many robots; `project` itself where it asks for
-    neither. Where nothing found is fast enough, with relays. Each candidate is `seen`. Raises
-    InputError (TooFewRobots) where more robots are needed, or none of the factories found has as
-    few."""
+    neither. Where nothing found is fast enough, with relays. Each candidate is `seen`; that the
+    time ended the search (OutOfTime) is a warning. Raises InputError (TooFewRobots) where more
+    robots are needed, or none of the factories found has as few."""
     if not aim.asks:
         return project
     if isinstance(aim.robots, int):
@@ -58,9 +61,14 @@ def allocated(project: Project, aim: Aim, seen: Seen = lambda *_: None) -> Proje
     search = Search(project, aim)
     search.look(seen)
     best = search.best
+    if search.cut_off:
+        message = f"the search ended after {aim.seconds:g} s, with {search.budget.spent} factories"
+        hint = f"it would look at {search.budget.effort:g}: more --seconds, or less --effort"
+        warn(Diagnostic("OutOfTime", message, None, hint))
     if isinstance(aim.robots, int) and best.robots > aim.robots:
         message = f"{aim.robots} robots are too few: found with {best.robots}{search.why()}"
-        hint = f"--robots {best.robots}; with more --seconds fewer may be found"
+        more = "--seconds" if search.cut_off else "--effort"
+        hint = f"--robots {best.robots}; with more {more} fewer may be found"
         raise InputError(Diagnostic("TooFewRobots", message, None, hint))
     if aim.robots is None and aim.cycle is not None and best.seconds > aim.cycle:
         plain = best if best.filling is None else search.written
@@ -74,14 +82,17 @@ class Search:
     """Looks for the best forms and lines for an aim; `best`: what was found."""
 
     def __init__(self, project: Project, aim: Aim, estimator: Estimator | None = None) -> None:
-        self.aim, self.begun = aim, monotonic()
+        self.aim, effort = aim, aim.effort or usual_effort(len(project.pag))
+        self.budget = Allowance(effort, aim.seconds)
+        self.forms = Allowance(effort, aim.seconds)
         bare = replace(project.ground, relay=False, cycle=None)
         self.estimator = estimator or Estimator(project.with_pag(project.pag, bare))
         self.written = self.best = self.estimator.candidate(self.estimator.written)
 
-    def late(self, share: float = 1.0) -> bool:
-        """Whether a share of the time is over."""
-        return monotonic() - self.begun > share * self.aim.seconds
+    @property
+    def cut_off(self) -> bool:
+        """Whether the time ended the search."""
+        return self.budget.cut_off or self.forms.cut_off
 
     def rank(self, one: Candidate) -> tuple[float, ...]:
         """What a candidate is judged by, the less the better."""
@@ -89,8 +100,8 @@ class Search:
         return self.aim.rank(one.robots, one.seconds, troubles)
 
     def look(self, seen: Seen = lambda *_: None) -> None:
-        """For forms and lines, as long as there is time and something better may be found. Each
-        candidate is `seen`."""
+        """For forms and lines, as long as there is effort left and something better may be found.
+        Each candidate is `seen`."""
         seen(self.written, self.best)
         for found in (self.singles(), self._shared()):
             for one in found:
@@ -115,9 +126,9 @@ class Search:
         for bound in estimator.bounds(task) if task.free else ():
             for _ in range(ROUNDS):
                 forms, _ = best_forms(task, bound)
-                if forms == before or self.late(SINGLE):
+                if forms == before or self.budget.over(SINGLE):
                     break
-                one, before = estimator.candidate(forms), forms
+                one, before = self._candidate(forms), forms
                 refused = task.refused | frozenset(blamed(task, one.project, forms))
                 if one.troubles <= self.written.troubles or refused == task.refused:
                     yield one
@@ -129,14 +140,19 @@ class Search:
         first."""
         aim, most = self.aim, self.aim.robots
         robots = most if isinstance(most, int) else inf
-        front = self.estimator.front(robots, lambda: self.late(ESTIMATED))
+        front = self.estimator.front(self.forms, robots)
         if not front:
-            front = self.estimator.front(inf, lambda: self.late(ESTIMATED))
+            self.forms.spent = 0
+            front = self.estimator.front(self.forms)
         front.sort(key=lambda one: aim.rank(one.robots, one.seconds))
-        for one in front[:LOOKED_AT]:
-            if self.late(SHARED):
+        for one in front:
+            if self.budget.over(SHARED):
                 return
-            yield self.estimator.candidate(one.forms, one.filling)
+            yield self._candidate(one.forms, one.filling)
+
+    def _candidate(self, forms: Mapping[str, int], filling: Filling | None = None) -> Candidate:
+        self.budget.spend()
+        return self.estimator.candidate(forms, filling)
 
     def _judge(self, one: Candidate) -> bool:
         """Whether it is better than the best so far; then it is the best."""
@@ -151,8 +167,8 @@ class Search:
     def _better(self, changed: Iterator[Candidate], seen: Seen) -> bool:
         """Whether one of the first changes is better than the best, which it is then."""
         for _ in range(CHANGES):
-            one = next(changed, None)
-            if one is None or self.late():
+            one = None if self.budget.over() else next(changed, None)
+            if one is None:
                 return False
             better = self._judge(one)
             seen(one, self.best)
@@ -171,4 +187,4 @@ class Search:
         for label in order:
             for form in (THIRD, 0, 1):
                 if form != best.forms[label]:
-                    yield self.estimator.candidate({**best.forms, label: form}, best.filling)
+                    yield self._candidate({**best.forms, label: form}, best.filling)

@@ -15,12 +15,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from time import monotonic
+from math import ceil, inf
 
 from factory.pipeline import Project
 from factory.problem.pag import Assembly
 from factory.problem.shapes import SHAPED
-from factory.study.allocation.aim import Aim
+from factory.study.allocation.aim import Aim, usual_effort
 from factory.study.allocation.candidate import Candidate
 from factory.study.allocation.estimating import Estimate, Estimator
 from factory.study.allocation.forms import THIRD
@@ -33,21 +33,13 @@ from factory.study.pareto.front import (
     point_of,
     undominated,
 )
+from factory.support.allowance import Allowance
 
-SECONDS = 300.0
-"""How long is looked for points with layouts, where nothing else is said [s]."""
-
-BRIEF = 60.0
-"""The same without layouts [s]."""
-
-ESTIMATED = 0.4
-"""The share of that after which nothing more is estimated, where layouts are made."""
-
-CHANGED = 0.15
-"""The same for forms of the best with one changed."""
+WIDE = 2
+"""A front takes so many times the effort of a search for one factory."""
 
 HELD = 0.15
-"""The share of the time for forms that leave no robot without a hand."""
+"""The share of the effort for forms that leave no robot without a hand."""
 
 NEXT = 1.5
 """Estimates up to so many times the cycle of the front's are laid out."""
@@ -62,16 +54,13 @@ with relays."""
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """What is spent on a front: whether `layouts` are made, and how many `seconds` it may take,
-    None for SECONDS, or BRIEF without layouts."""
+    """What is spent on a front: whether `layouts` are made; how many, at most (`factories`), and of
+    how many forms there are estimates, None for as many as is usual; nothing is begun after
+    `seconds`."""
 
     layouts: bool = True
-    seconds: float | None = None
-
-    @property
-    def limit(self) -> float:
-        """How long it may take [s]."""
-        return self.seconds or (SECONDS if self.layouts else BRIEF)
+    factories: int | None = None
+    seconds: float = inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +95,10 @@ class FrontSweep:
 
     def __init__(self, project: Project, effort: Effort, seen: Seen = lambda _: None) -> None:
         self.project, self.effort, self.seen = project, effort, seen
-        self.begun = monotonic()
+        factories = effort.factories or WIDE * usual_effort(len(project.pag))
+        self.forms = Allowance(factories, effort.seconds)
+        self.changes = Allowance(factories, effort.seconds)
+        self.budget = Allowance(factories, effort.seconds)
         bare = replace(project.ground, relay=False, cycle=None, lines=())
         self.estimator = Estimator(project.with_pag(project.pag, bare))
         self.written: FrontPoint | None = None
@@ -118,10 +110,6 @@ class FrontSweep:
     def troubles(self) -> int:
         """How many operations are in trouble as the product is written."""
         return self.estimator.candidate(self.estimator.written).troubles
-
-    def late(self, share: float = 1.0) -> bool:
-        """Whether a share of the time is over."""
-        return monotonic() - self.begun > share * self.effort.limit
 
     def front(self) -> ParetoFront:
         """What was found so far."""
@@ -138,11 +126,11 @@ class FrontSweep:
         )
 
     def look(self) -> None:
-        """For points, as long as there is time."""
+        """For points, as long as there is effort left."""
         layouts = self.effort.layouts
         if layouts:
             self.written = self._added(Candidate(self.project, self.estimator.written))
-        whole = self._estimate(ESTIMATED if layouts else 1.0)
+        whole = self._estimate()
         if layouts:
             if self.project.settings.hands:
                 self._hold()
@@ -151,12 +139,12 @@ class FrontSweep:
                 self.project.layout  # noqa: B018 (says why there is none)
         self.complete = whole
 
-    def _estimate(self, share: float) -> bool:
-        """Estimate what is swept until a share of the time is over; whether there was time for all
-        of it. Then what has one form other than those of the best, as there is time."""
-        for one in self.estimator.estimates(late=lambda: self.late(share)):
+    def _estimate(self) -> bool:
+        """Estimate what is swept; whether that is all. Then what has one form other than those of
+        the best."""
+        for one in self.estimator.estimates(self.forms):
             self._note(one)
-        whole = not self.late(share)
+        whole = not self.forms.over()
         for one in self._changed():
             self._note(one)
         return whole
@@ -173,8 +161,9 @@ class FrontSweep:
             changed = {**forms, label: form}
             key = tuple(changed.values())
             if key not in tried:
-                if self.late(CHANGED):
+                if self.changes.over():
                     return
+                self.changes.spend()
                 tried.add(key)
                 yield from self.estimator.of_forms(changed)
 
@@ -190,17 +179,17 @@ class FrontSweep:
 
     def _hold(self) -> None:
         """Lay out those with a robot for each label in which each robot has a hand."""
-        aim = Aim(seconds=HELD * self.effort.limit / SINGLE)
+        aim = Aim(effort=ceil(HELD * self.budget.effort / SINGLE), seconds=self.budget.left)
         search = Search(self.project, aim, self.estimator)
         for number, one in enumerate(search.singles()):
             self._say("fitting hands", number, None)
             self._added(one)
 
     def _lay_out(self) -> bool:
-        """Lay out what is promising; whether there was time for all of it."""
+        """Lay out what is promising; whether that is all."""
         chosen = list(self._promising())
         for number, one in enumerate(chosen):
-            if self.late():
+            if self.budget.over():
                 return False
             self._say("laying out", number, len(chosen))
             self._added(self._candidate(one), one.seconds)
@@ -217,15 +206,15 @@ class FrontSweep:
                 yield one
 
     def _relay(self) -> bool:
-        """Lay out the fastest with a robot for each label anew, with relays; whether there was time
-        for all of it."""
+        """Lay out the fastest with a robot for each label anew, with relays; whether that is
+        all."""
         plain = sorted(
             (one for one in self.estimates if one.filling is None), key=lambda one: -one.seconds
         )
         fast = {one.robots: one for one in plain}.values()  # of those with as many robots the best
         every = [*map(self._candidate, sorted(fast, key=lambda one: one.seconds)[:RELAYED])]
         for number, one in enumerate(every):
-            if self.late():
+            if self.budget.over():
                 return False
             self._say("with relays", number, len(every))
             ground = replace(one.project.ground, relay=True)
@@ -246,6 +235,7 @@ class FrontSweep:
         """The point of a candidate, which is then on the front unless others are as good; None
         where it has no layout, or more operations in trouble than as the product is written."""
         self.laid_out += 1
+        self.budget.spend()
         point = None if one.troubles > self.troubles else point_of(one, estimated)
         if point is None:
             return None
