@@ -48,7 +48,13 @@ def test_what_cannot_be_joined_is_refused(name: str, tmp_path: Path) -> None:
     model = MODELS[name]
     found = plan(model_source(tmp_path, model.parts), QUICK)
     assert isinstance(found, CannotAssemble)
-    assert [set(one.labels) for one in found.interlocks] == [model.stuck]
+    (lock,) = found.interlocks
+    assert set(lock.labels) == model.stuck
+    (clash,) = lock.clashes
+    assert {clash.one, clash.other} == model.stuck and clash.depth > 0
+    allowed = PlanOptions(lay_out=False, allow=(f"{clash.other}:{clash.one}",))
+    best = plan(model_source(tmp_path, model.parts), allowed)
+    assert isinstance(best, Planned) and best.figures.blocked == 1
 
 
 def leaving(found: Planned, label: str) -> tuple[float, ...]:

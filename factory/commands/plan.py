@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from factory.commands.asking import UNITS, asked
+from factory.commands.interlocking import refuse
 from factory.commands.options import OUTPUT, PATH, SECONDS
 from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions
 from factory.commands.warnings import announced
-from factory.nets.verdict import listing
 from factory.support.console import emit, say
-from factory.support.errors import Diagnostic, InputError, MissingError
+from factory.support.errors import MissingError
 from factory.support.progress import StepBar, Waiting
 
 if TYPE_CHECKING:
@@ -37,9 +37,6 @@ UPS = {
 
 LOOKS = ("exploded.png", "assembly.mp4")
 """How the names of the still and of the film end."""
-
-DRAWN = 6
-"""So many sets of parts that interlock, the first ones, get a picture."""
 
 KINDS: tuple[Kind, ...] = ("slide", "lower", "blocked")
 
@@ -64,7 +61,8 @@ KINDS: tuple[Kind, ...] = ("slide", "lower", "blocked")
 @click.option(
     "--allow",
     multiple=True,
-    help="A part that may pass through others, where there is no other way (repeatable).",
+    help="A part that may pass through others, or two, A:B, through each other, where there is no"
+    " other way (repeatable).",
 )
 @click.option(
     "--up",
@@ -132,7 +130,7 @@ def plan(
     search = PlanOptions(aim, seconds, allow, hulls, UPS[up] if up else None, templates=templates)
     planned = _sought(found, search, out)
     if isinstance(planned, CannotAssemble):
-        return _refuse(found, planned, folder, look, out)
+        return refuse(found, planned, folder, look, out)
     made = planned_product(found, planned.tree, planned.orientation, source.name)
     files = {folder / name: content for name, content in made.files.items()}
     own_names(folder, files, [source])
@@ -156,61 +154,6 @@ def _sought(found: InPlace, asked: PlanOptions, out: OutputOptions) -> Planned |
 
     with Interruption() as stop, StepBar("looking for a tree", out.silent, asked.seconds) as bar:
         return sought(found, replace(asked, told=bar.show, stopped=lambda: stop.noted))
-
-
-def _refuse(
-    found: InPlace, why: CannotAssemble, folder: Path, look: bool, out: OutputOptions
-) -> int:
-    """Say that there is no tree, and why, with pictures; gives the exit status."""
-    from factory.support.console import fail
-
-    pictures = _interlocked(found, why, folder, out) if look else []
-    details = {
-        "interlocks": [lock.as_json() for lock in why.interlocks],
-        "removal": {"labels": list(why.removal.labels), "smallest": why.removal.smallest},
-        "files": [str(path) for path in pictures],
-    }
-    return fail(InputError(cannot(why, pictures)), out.as_json, details)
-
-
-def cannot(found: CannotAssemble, pictures: list[Path]) -> Diagnostic:
-    """That parts interlock, what shows it, and what would help."""
-    stuck = "; ".join(listing(lock.labels) for lock in found.interlocks)
-    more = " and ".join(found.removal.labels)
-    fewest = "no fewer parts do" if found.removal.smallest else "fewer may do"
-    options = " ".join(f"--allow {name}" for name in found.removal.labels)
-    shown = f" (see {listing(map(str, pictures), 2)})" if pictures else ""
-    message = f"no straight motion along x, y or z divides these parts: {stuck}{shown}"
-    hint = f"without {more} the rest can be joined ({fewest}); {options} lets parts clash"
-    if found.needs:
-        from factory.planning.posing import in_words
-
-        ways = [f"{listing(labels)} along {in_words(way)}" for labels, way in found.needs]
-        hint = f"no turn brings all ways along axes ({'; '.join(ways)}); {hint}"
-    return Diagnostic("CannotAssemble", message, None, hint)
-
-
-def _interlocked(
-    found: InPlace, why: CannotAssemble, folder: Path, out: OutputOptions
-) -> list[Path]:
-    """A picture of each of the first few sets of parts that interlock; none where the machine has
-    no GL, which is said."""
-    from factory.importing.labels import file_stem
-    from factory.render.interlocked import InterlockedView
-    from factory.support.files import own_names
-
-    locks = why.interlocks[:DRAWN]
-    ends = ["", *(f"-{n}" for n in range(2, len(locks) + 1))]
-    paths = [folder / f"{file_stem(found.name)}-interlocked{end}.png" for end in ends]
-    own_names(folder, paths)
-    try:
-        with Waiting("drawing what interlocks", out.silent):
-            for lock, path in zip(locks, paths, strict=True):
-                InterlockedView(found, lock).still(path)
-    except MissingError as error:
-        announced(error.diagnostics, out)
-        return []
-    return paths
 
 
 def _looks(project: Project, out: OutputOptions) -> list[Path]:

@@ -54,7 +54,8 @@ class Blocking:
 
     `levels` (3, n, n): how much j is in the way of i that goes out along +x, +y or +z; what goes
     the other way has the transpose. `locks` (3, n, n): whether it may not go out past j. `touch`
-    (n, n): which units touch. `low`, `high` (n, 3): their boxes [m]. `hidden`: the parts of two
+    (n, n): which units touch. `low`, `high` (n, 3): their boxes [m]. `depths` (3, n, n): how deep
+    the first gets into the second [m], none where that is not known. `hidden`: the parts of two
     units that overlap when finished, as far as the hull of an open mesh shows, the deepest first.
     """
 
@@ -64,19 +65,33 @@ class Blocking:
     touch: NDArray[np.bool_] = field(repr=False)
     low: Array = field(repr=False)
     high: Array = field(repr=False)
+    depths: Array = field(default_factory=lambda: np.zeros((3, 0, 0)), repr=False)
     hidden: tuple[Drawn, ...] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
-        for array in (self.levels, self.locks, self.touch, self.low, self.high):
+        for array in (self.levels, self.locks, self.touch, self.low, self.high, self.depths):
             array.setflags(write=False)
 
     def __len__(self) -> int:
         return len(self.labels)
 
-    def allowing(self, labels: Sequence[str]) -> Blocking:
-        """The same, where whatever units with these labels pass through is accepted."""
-        free = np.isin(self.labels, labels)
-        return replace(self, locks=self.locks & ~(free[:, None] | free))
+    def allowing(self, allowed: Sequence[str]) -> Blocking:
+        """The same, where it is accepted that units with these labels pass through whatever there
+        is, or two (`a:b`) through each other."""
+        free = np.isin(self.labels, allowed)
+        accepted = free[:, None] | free
+        for one, _, other in (name.partition(":") for name in allowed if ":" in name):
+            both = np.isin(self.labels, one), np.isin(self.labels, other)
+            accepted |= np.outer(*both) | np.outer(*both[::-1])
+        return replace(self, locks=self.locks & ~accepted)
+
+    def least(self, one: int, other: int) -> tuple[float, int, int]:
+        """Of the six ways of a unit past another that on which they get least deep into each
+        other: how deep [m], the axis, and the side, +1 or -1, to which the first goes out."""
+        sides = ((+1, one, other), (-1, other, one))
+        return min(
+            (float(self.depths[axis, i, j]), axis, side) for axis in AXES for side, i, j in sides
+        )
 
     def grouped(self, groups: Sequence[Sequence[int]]) -> Blocking:
         """The same of groups of units, each joined already; each is named after its first."""
@@ -108,17 +123,17 @@ def blocking(source: InPlace) -> Blocking:
     units = source.units()
     finder, found, unit = _bodies(source)
     count = len(units)
-    levels = np.zeros((3, count, count), np.int8)
+    levels, depths = np.zeros((3, count, count), np.int8), np.zeros((3, count, count))
     for axis in AXES:
         overlaps = finder.along(axis, np.ones(1, bool))
-        _enter(overlaps, unit, levels[axis])
+        _enter(overlaps, unit, levels[axis], depths[axis])
     bounds = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
     np.minimum.at(bounds[0], unit[found.part], found.low)
     np.maximum.at(bounds[1], unit[found.part], found.high)
     labels = tuple(label for label, _ in units)
     touch = _touching(finder, found, unit, count)
     hidden = _hidden(overlaps, unit, [part.label for _, members in units for part in members])
-    return Blocking(labels, levels, levels >= LOCKED, touch, *bounds, hidden)
+    return Blocking(labels, levels, levels >= LOCKED, touch, *bounds, depths, hidden)
 
 
 def rooms(source: InPlace, axis: int) -> Array:
@@ -163,7 +178,7 @@ def _hidden(found: Overlaps, unit: Ints, labels: Sequence[str]) -> tuple[Drawn, 
     return tuple(Drawn(labels[one], labels[other], depth) for one, other, depth in pairs)
 
 
-def _enter(found: Overlaps, unit: Ints, levels: NDArray[np.int8]) -> None:
+def _enter(found: Overlaps, unit: Ints, levels: NDArray[np.int8], deep: Array) -> None:
     """Enters what is in the way along an axis. The later part of a pair comes from the lower side,
     so goes out there, and the earlier one goes to the upper side; or the other way about."""
     one, other, depths = unit[found.one], unit[found.other], found.depths
@@ -176,6 +191,7 @@ def _enter(found: Overlaps, unit: Ints, levels: NDArray[np.int8]) -> None:
         apart = moving != standing
         at = moving[apart], standing[apart]
         np.maximum.at(levels, at, level[apart, column].astype(np.int8))
+        np.maximum.at(deep, at, depths.path[apart, column])
 
 
 def _touching(finder: Finder, found: ConvexBodies, unit: Ints, count: int) -> NDArray[np.bool_]:

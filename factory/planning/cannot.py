@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import combinations, product
 from typing import Any, Literal
 
 import numpy as np
@@ -32,23 +32,48 @@ Direction = tuple[int, int]
 Units = tuple[int, ...]
 """Numbers of units, ascending."""
 
+
+def named(direction: Direction) -> str:
+    """A direction along an axis in words: `+x`."""
+    axis, side = direction
+    return f"{'-+'[side > 0]}{'xyz'[axis]}"
+
+
 ROUNDS = 400
 """So many interlocked sets, at most, are looked for to prove that a removal is the smallest."""
+
+
+@dataclass(frozen=True, slots=True)
+class LeastClash:
+    """Two parts that get into each other on each of the six ways: how deep [m] on that on which
+    they do least, a lower bound, and to where the first goes out there."""
+
+    one: str
+    other: str
+    depth: float
+    way: Direction
 
 
 @dataclass(frozen=True, slots=True)
 class Interlock:
     """Parts no two groups of which come apart: their `labels`, and for each of the six directions a
     circuit through all of them, each of which, going out there, meets the next one (and the last
-    the first), so that none can leave the others: a proof. A part may come by several times."""
+    the first), so that none can leave the others: a proof. A part may come by several times.
+    `clashes`: the pairs of them that hold each other by themselves."""
 
     labels: tuple[str, ...]
     circuits: tuple[tuple[Direction, tuple[str, ...]], ...]
+    clashes: tuple[LeastClash, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """The labels, and the circuits by direction, as `+x`."""
-        ways = {f"{'-+'[side > 0]}{'xyz'[axis]}": way for (axis, side), way in self.circuits}
-        return {"parts": list(self.labels), "circuits": {w: list(c) for w, c in ways.items()}}
+        ways = {named(direction): way for direction, way in self.circuits}
+        clashes = [
+            {"parts": [c.one, c.other], "depth_mm": round(1e3 * c.depth, 4), "way": named(c.way)}
+            for c in self.clashes
+        ]
+        circuits = {way: list(circuit) for way, circuit in ways.items()}
+        return {"parts": list(self.labels), "circuits": circuits, "clashes": clashes}
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,9 +89,26 @@ def interlocks(found: Blocking) -> tuple[Interlock, ...]:
     """The largest sets of units that interlock, none for a product that can be joined."""
     every = tuple(range(len(found)))
     return tuple(
-        Interlock(tuple(found.labels[n] for n in core), tuple(_circuits(found, core)))
+        Interlock(
+            tuple(found.labels[n] for n in core),
+            tuple(_circuits(found, core)),
+            _clashes(found, core),
+        )
         for core in cores(found.locks, every)
     )
+
+
+def _clashes(found: Blocking, core: Units) -> tuple[LeastClash, ...]:
+    """The pairs of an interlocked set that cannot pass each other on any way."""
+    if not found.depths.size:
+        return ()
+    held = np.asarray((found.locks & found.locks.transpose(0, 2, 1)).all(axis=0))
+    pairs = [(one, other) for one, other in combinations(core, 2) if held[one, other]]
+    made = []
+    for one, other in pairs:
+        depth, *way = found.least(one, other)
+        made.append(LeastClash(found.labels[one], found.labels[other], depth, (way[0], way[1])))
+    return tuple(sorted(made, key=lambda clash: (clash.depth, clash.one, clash.other)))
 
 
 def cores(locks: NDArray[np.bool_], members: Sequence[int]) -> list[Units]:

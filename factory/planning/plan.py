@@ -30,9 +30,9 @@ from factory.support.settings import Settings
 @dataclass(frozen=True)
 class PlanOptions:
     """`aim`: what the tree is chosen for; `seconds` to search; `allow`: units that may pass through
-    others; `hulls`: whether hulls may hide what goes into them; `up`: the axis of the file and its
-    side that is up, None for z unless the product tips then; `lay_out`: whether layouts decide, or
-    estimates alone; `settings` and `templates` of the factory, None for those shipped; `told`
+    others, or two, `a:b`, through each other; `hulls`: whether hulls may hide what goes into them;
+    `up`: the axis of the file and its side that is up, None for z unless the product tips then;
+    `lay_out`: whether layouts decide, or estimates alone; `settings` and `templates` of the factory, None for those shipped; `told`
     hears what goes on, and how many of how many are done; `stopped` says that the best so far is
     wanted at once."""
 
@@ -211,7 +211,8 @@ def _join(join: Join, pose: Pose, room: Array) -> PlannedJoin:
 def _check_allowed(allow: tuple[str, ...], found: Blocking) -> None:
     faults = [
         Diagnostic("Usage", f"nothing that is planned is called '{label}'", None, hint)
-        for label in allow
+        for name in allow
+        for label in (name.split(":", 1) if name not in found.labels else ())
         if label not in found.labels
         for hint in [did_you_mean(label, list(found.labels), "labels")]
     ]

@@ -10,7 +10,7 @@ import numpy as np
 
 from factory.geometry.meshes import Array
 from factory.planning.blocking import Blocking
-from factory.planning.cannot import Direction, Interlock, interlocks
+from factory.planning.cannot import Direction, Interlock, interlocks, named
 from factory.planning.parts import InPlace
 from factory.planning.standing import overhang
 from factory.planning.turning import only, turned, turns
@@ -111,12 +111,6 @@ def along(direction: Direction) -> Array:
     """A direction along an axis as a unit vector (3,)."""
     axis, side = direction
     return np.asarray(side * np.eye(3)[axis])
-
-
-def named(direction: Direction) -> str:
-    """A direction along an axis in words: `+x`."""
-    axis, side = direction
-    return f"{'-+'[side > 0]}{'xyz'[axis]}"
 
 
 def in_words(way: Array) -> str:
