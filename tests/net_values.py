@@ -31,6 +31,19 @@ def net_from(edges: list[tuple[str, str, int]]) -> MarkedNet:
     return MarkedNet(net, tuple(tokens for _, _, tokens in edges))
 
 
+PHILOSOPHERS = [
+    ("putA putB", "takeA1 takeB2", 1),
+    ("putA putB", "takeA2 takeB1", 1),
+    ("putA", "takeA1", 1),
+    ("putB", "takeB1", 1),
+    ("takeA1", "takeA2", 0),
+    ("takeB1", "takeB2", 0),
+    ("takeA2", "putA", 0),
+    ("takeB2", "putB", 0),
+]
+"""Two philosophers and two forks: each takes one fork and then the other."""
+
+
 @dataclass
 class Truth:
     """What exploring every marking says."""

@@ -18,6 +18,7 @@ from factory.nets.verify import proved, verify
 from factory.plant.factory import Factory
 from factory.support.errors import RunError
 from tests.net_values import (
+    PHILOSOPHERS,
     crossed_twice,
     doubled_token,
     explored,
@@ -346,6 +347,17 @@ def test_a_deadlock_is_shown_by_a_firing_sequence() -> None:
     assert (verdict.live, verdict.safe, verdict.reversible) == (False, True, False)
     assert witness(verdict, "deadlock").transitions == ("c",)
     assert witness(verdict, "no way back").transitions == ("c",)
+    told = witness(analyse(net_from(PHILOSOPHERS)), "deadlock").reason
+    assert told == "after takeA1, takeB1 nothing is enabled any more, with tokens in p4, p5"
+
+
+def test_a_marked_graph_says_how_it_comes_to_a_stop() -> None:
+    """One with a circuit that never fires; and nothing of a stop where the rest goes on."""
+    stuck = [("a", "b", 0), ("b", "a", 0)]
+    told = witness(analyse(net_from([*stuck, ("a", "c", 1)])), "token-free circuit").reason
+    assert told.endswith("after c nothing is enabled any more")
+    going = [("c", "d", 1), ("d", "c", 0)]
+    assert ";" not in witness(analyse(net_from([*stuck, *going])), "token-free circuit").reason
 
 
 def test_a_livelock_starves_a_transition() -> None:

@@ -22,6 +22,7 @@ from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
     from factory.compiler.mating.findings import Matings
+    from factory.nets.verdict import Witness
     from factory.pipeline import Project
     from factory.study.checking import Checked
     from factory.study.failures import FailureCost, FailureStudy
@@ -34,6 +35,9 @@ PICTURES = "Write a picture of each blocked operation, and of what no hand can h
 
 COSTS = "Say what each failure costs, with times estimated from sizes, and how retries are bounded."
 """What `--failures` does."""
+
+AGAINST = 3
+"""The most that is printed against one property, unless `-v` asks for all."""
 
 POOLED = 8
 """The most parts whose copies are printed, and robots that need spares."""
@@ -150,7 +154,8 @@ def _describe(checked: Checked, verbose: bool) -> None:
         )
         for g in shown
     )
-    table("", ("robot", "type", "gear"), rows)
+    if gears:
+        table("", ("robot", "type", "gear"), rows)
     if len(shown) < len(gears):
         say(f"... and {len(gears) - len(shown)} more robots (-v shows all)")
     say(
@@ -161,8 +166,12 @@ def _describe(checked: Checked, verbose: bool) -> None:
     words = {True: "yes", False: "NO", None: "undecided"}
     names = checked.verdict.properties
     say(", ".join(f"{name.replace('_', ' ')}: {words[document[name]]}" for name in names))
-    for witness in checked.verdict.faults:
-        say(f"  {witness}")
+    for alike in _by_property(checked.verdict.faults):
+        for witness in alike if verbose else alike[:AGAINST]:
+            say(f"  {witness}")
+        if not verbose and len(alike) > AGAINST:
+            name = alike[0].property.replace("_", " ")
+            say(f"  not {name}: and {len(alike) - AGAINST} more (-v shows all)")
     if checked.pool:
         most = sorted(checked.pool.items(), key=lambda item: -item[1])[:POOLED]
         listed = ", ".join(f"{label} {count}" for label, count in most)
@@ -171,6 +180,14 @@ def _describe(checked: Checked, verbose: bool) -> None:
         _describe_approaches(checked.matings)
     if "deputies" in document:
         _describe_deputies(document["deputies"])
+
+
+def _by_property(faults: Sequence[Witness]) -> list[list[Witness]]:
+    """What speaks against each property; last what speaks against the shape of the net."""
+    found: dict[str, list[Witness]] = {}
+    for witness in faults:
+        found.setdefault(witness.property, []).append(witness)
+    return [found[name] for name in sorted(found, key=lambda name: name.startswith("gear"))]
 
 
 def _has_places(project: Project) -> bool:

@@ -319,7 +319,7 @@ PICTURE = options(
         "--with",
         "panels",
         type=Suggested("net", "gantt", "net,gantt"),
-        help="Beside the 3-D: net, gantt or net,gantt (modes over time)."
+        help="Beside the 3-D: net, gantt or net,gantt (modes over time).",
     ),
     click.option("--title", default="", help="Shown at the beginning of a film."),
     click.option("--poster", type=PATH, help="A still of a film's best moment (.png)."),

@@ -7,15 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from factory.export.swimlanes import LEFT, owners_of, swimlanes
+from factory.export.swimlanes import LEFT, apart, owners_of, swimlanes
 from factory.nets.marked import MarkedNet
-from factory.support.canvas import Canvas
+from factory.support.canvas import Canvas, Point
 
 RADIUS, HEAD = 12.0, (8.0, 3.5)
 """Of a place; the length of an arrowhead and half its width."""
 
 ARC = "arc", "tip"
 """The styles of an arc and its head."""
+
+EDGE = 20.0
+"""How far arcs cross the edges apart."""
 
 ALONG = 60.0
 """A bar that is longer crosses several lanes."""
@@ -37,18 +40,38 @@ class NetDrawing:
 
     def _arcs(self) -> None:
         """Those that close a circle leave at the right edge and come in at the left."""
+        edges = self._edges()
         for place, shape in enumerate(self.net.net.places):
             x, y = self.at.places[place]
             style = f"arcs {self.styles(self.owners[place])}"
             with self.canvas.group(style, data_arc=place):
+                edge = edges.get(place, y)
                 for event in shape.left:
-                    start = self.at.touch(event, y)
-                    if not self.at.forward(place, event):
-                        self.canvas.arrow(start, (self.at.width - 14, start[1]), ARC, HEAD)
-                        start = LEFT - 24, y
-                    self.canvas.arrow(start, (x - RADIUS, y), ARC, HEAD)
+                    back = not self.at.forward(place, event)
+                    end = (self.at.width - 14, edge) if back else (x - RADIUS, y)
+                    self._arc(place, self.at.touch(event, y), end)
+                if any(not self.at.forward(place, event) for event in shape.left):
+                    self._arc(place, (LEFT - 24, edge), (x - RADIUS, y))
+                if place in edges:
+                    self.canvas.text((self.at.width - 26, edge - 7), shape.name, 9.5, "grey", "end")
                 for event in shape.right:
-                    self.canvas.arrow((x + RADIUS, y), self.at.touch(event, y), ARC, HEAD, 3.0)
+                    self._arc(place, (x + RADIUS, y), self.at.touch(event, y), 3.0)
+
+    def _edges(self) -> dict[int, float]:
+        """Where arcs to places without a robot cross the edges, each at a height of its own."""
+        back = [
+            (place, self.at.places[place][1])
+            for place, shape in enumerate(self.net.net.places)
+            if not self.owners[place] and any(not self.at.forward(place, e) for e in shape.left)
+        ]
+        return apart(dict(back), EDGE)
+
+    def _arc(self, place: int, start: Point, end: Point, off: float = 0.0) -> None:
+        """An arc of a place, straight along the lane of its robot, or past what is between."""
+        points = [start, end] if self.owners[place] else self.at.way(start, end)
+        if points[2:]:
+            self.canvas.line("arc", *points[:-1])
+        self.canvas.arrow(points[-2], end, ARC, HEAD, off)
 
     def _lanes(self) -> None:
         """The names of the robots, and the ways of those that an operation has beside its

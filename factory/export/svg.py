@@ -38,7 +38,7 @@ def draw_net(net: MarkedNet, title: str) -> str:
     drawing, robots = NetDrawing(net, _style), len(net.gears)
     places, transitions = len(net.net.places), len(net.net.transitions)
     counts = f"{robots} robots, {places} places, {transitions} transitions"
-    ends = "; the left and the right edge are one" if robots else ""
+    ends = "; the left and the right edge are one" if transitions else ""
     drawing.canvas.text((14.0, 20.0), f"{title}: {counts}{ends}", 12.0, "grey")
     style = f"{STYLE}.shared {{ color: {SHARED}; }}\n"
     return drawing.canvas.document(f"{title}: net", drawing.page, style)

@@ -2,15 +2,17 @@
 left to right.
 
 A transition is a bar across the lanes of its robots; a place lies in the lane of its robot, that of
-an operation in the middle one of its robots. The columns are the lengths of the longest paths
+an operation in the middle one of its robots. Where there are no robots, as in a net with choice, a
+transition is a short bar between its places. The columns are the lengths of the longest paths
 without tokens, so that every arc but those that close a circle goes to the right. The lanes of
 robots that meet early are neighbours. Linear in the net, but for sorting.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from math import inf
 
 from factory.nets.marked import MarkedNet, token_free
 from factory.support.canvas import Point
@@ -29,8 +31,11 @@ PITCH, LANE = 120.0, 64.0
 LEFT, TOP = 96.0, 64.0
 """Where the first column and the first lane are."""
 
+CLEAR, AWAY = 22.0, 8.0
+"""How far arcs keep from the middles of places, and from bars, that they pass."""
+
 OVERHANG = 18.0
-"""How far a bar goes beyond its outermost lanes."""
+"""How far a bar goes beyond its outermost lanes, or beyond its middle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,9 +60,30 @@ class Swimlanes:
         low, high = self.spans[event]
         return self.x[event], min(max(y, low), high)
 
+    def way(self, start: Point, end: Point) -> list[Point]:
+        """A way to the right between two points, past the bars and places that are between."""
+        columns: dict[float, list[Point]] = {}
+        for x, y in self.places:
+            columns.setdefault(x, []).append((y - CLEAR, y + CLEAR))
+        for x, (low, high) in zip(self.x, self.spans, strict=True):
+            columns.setdefault(x, []).append((low - AWAY, high + AWAY))
+        found = [start]
+        for x in sorted(x for x in columns if start[0] < x < end[0]):
+            share = (x - found[-1][0]) / (end[0] - found[-1][0])
+            y = found[-1][1] + share * (end[1] - found[-1][1])
+            found.append((x, _free(y, columns[x])))
+        return [*found, end]
+
     def forward(self, place: int, before: int) -> bool:
         """Whether a place is to the right of a transition that marks it."""
         return self.x[before] < self.places[place][0]
+
+
+def _free(y: float, taken: Sequence[Point]) -> float:
+    """The height nearest to y that is within none of some others."""
+    ends = [y, *(end for pair in taken for end in pair)]
+    free = [end for end in ends if not any(low < end < high for low, high in taken)]
+    return min(free, key=lambda end: abs(end - y))
 
 
 def colour(owners: Sequence[int]) -> str:
@@ -82,10 +108,10 @@ def swimlanes(net: MarkedNet) -> Swimlanes:
     row = {gear: number for number, gear in enumerate(order)}
     lanes = tuple(TOP + LANE * row[gear] for gear in range(len(net.gears)))
     across = [_across(net, place, x) for place in range(len(owners))]
-    down = _heights(owners, across, lanes)
-    spans = _spans(net, owners, down, lanes)
+    down = _heights(owners, across, lanes, _rows(net))
+    spans = _spans(net, owners, down, lanes, x)
     width = max([*x, *across], default=LEFT) + PITCH
-    height = max([*down, *lanes], default=TOP) + TOP
+    height = max([*down, *lanes, *(low for low, _ in spans)], default=TOP) + TOP
     places = tuple(zip(across, down, strict=True))
     return Swimlanes(places, tuple(x), tuple(spans), lanes, width, height)
 
@@ -132,20 +158,30 @@ def _lane_order(net: MarkedNet, owners: Sequence[Sequence[int]], x: Sequence[flo
 
 
 def _heights(
-    owners: Sequence[Sequence[int]], across: Sequence[float], lanes: Sequence[float]
+    owners: Sequence[Sequence[int]],
+    across: Sequence[float],
+    lanes: Sequence[float],
+    order: Sequence[int],
 ) -> list[float]:
     """The height of each place: its lane, else a row below that is free in that column."""
     below = max(lanes, default=TOP - LANE) + LANE
     taken: dict[float, int] = {}
-    found = []
-    for place, gears in enumerate(owners):
-        if gears:
-            found.append(sorted(lanes[gear] for gear in gears)[(len(gears) - 1) // 2])
+    found = [0.0] * len(owners)
+    for place in order:
+        if gears := owners[place]:
+            found[place] = sorted(lanes[gear] for gear in gears)[(len(gears) - 1) // 2]
             continue
         number = taken.get(across[place], 0)
         taken[across[place]] = number + 1
-        found.append(below + LANE * number)
+        found[place] = below + LANE * number
     return found
+
+
+def _rows(net: MarkedNet) -> list[int]:
+    """The places in the order of their rows: by the transitions that they lead to, those of fewer
+    first."""
+    after = [shape.right or shape.left or (0,) for shape in net.net.places]
+    return sorted(range(len(after)), key=lambda place: (min(after[place]), len(after[place])))
 
 
 def _spans(
@@ -153,6 +189,7 @@ def _spans(
     owners: Sequence[Sequence[int]],
     down: Sequence[float],
     lanes: Sequence[float],
+    x: Sequence[float],
 ) -> list[Point]:
     """From where to where each transition's bar goes."""
     rows: list[list[float]] = [[] for _ in net.net.transitions]
@@ -160,10 +197,35 @@ def _spans(
         for event in gear.transitions:
             if event >= 0:
                 rows[event].append(lanes[number])
+    alone = {event for event, found in enumerate(rows) if not found}
     for place, shape in enumerate(net.net.places):
-        for event in (*shape.left, *shape.right):
-            if not rows[event] or not owners[place]:
+        for event in {*shape.left, *shape.right}:
+            if not owners[place] or event in alone:
                 rows[event].append(down[place])
+    for event, height in _spread(alone, rows, x).items():
+        rows[event] = [height]
     return [
         (min(found, default=TOP) - OVERHANG, max(found, default=TOP) + OVERHANG) for found in rows
     ]
+
+
+def _spread(
+    events: Iterable[int], rows: Sequence[Sequence[float]], x: Sequence[float]
+) -> dict[int, float]:
+    """The height of transitions without a lane: in the middle of their places, a lane apart from
+    others in their column."""
+    columns: dict[float, dict[int, float]] = {}
+    for event in events:
+        height = sum(rows[event]) / max(len(rows[event]), 1)
+        columns.setdefault(x[event], {})[event] = max(height, TOP)
+    return {e: y for column in columns.values() for e, y in apart(column, LANE).items()}
+
+
+def apart(wanted: Mapping[int, float], least: float) -> dict[int, float]:
+    """Heights of things that are so far apart at the least, as near below what is wanted as can
+    be, in the same order."""
+    found: dict[int, float] = {}
+    lowest = -inf
+    for key in sorted(wanted, key=lambda key: (wanted[key], key)):
+        found[key] = lowest = max(wanted[key], lowest + least)
+    return found

@@ -21,6 +21,9 @@ from factory.nets.verdict import Defect, listing
 WORK = 5_000_000
 """How many places the search for an unsafe one may look at."""
 
+RUN_DOWN, NAMED = 10_000, 12
+"""The most firings to a deadlock of a marked graph; the most that are named in a sentence."""
+
 
 @dataclass(frozen=True, slots=True)
 class Behaviour:
@@ -60,10 +63,14 @@ def _dying(net: MarkedNet, stuck: tuple[int, ...]) -> Iterable[Defect]:
         elif events[0] in net.blocked:
             text = f"place {shown} is before and after its transition, which is dead (Def. 3.4)"
             kind = "1-gear"
+        if (firing := run_down(net)) is not None:
+            text += f"; {_stopped(net, firing)}"
         yield Defect("live", kind, text, (), circuit, events)
         return
     for p in dead_ends(net)[:1]:
         text = f"nothing marks place {names[p].name} again once its tokens are gone"
+        if (firing := run_down(net)) is not None:
+            text += f"; {_stopped(net, firing)}"
         yield Defect("live", "missing producer", text, (), (p,), (net.right[p],))
 
 
@@ -77,8 +84,7 @@ def _unsafe(net: MarkedNet, closed: Sequence[bool], stuck: frozenset[int]) -> It
         bound = overfill(net, place, stuck)
         if bound.firings is not None:
             firing = play(net, bound.firings)
-            when = f"after {len(firing)} firings" if firing else "initially"
-            text = f"place {net.net.places[place].name} holds two tokens {when}"
+            text = f"place {net.net.places[place].name} holds two tokens {_after(net, firing)}"
             yield Defect("safe", "two tokens", text, (), (place,), firing)
             return
         work += bound.work
@@ -170,6 +176,50 @@ def play(net: MarkedNet, firings: Mapping[int, int]) -> tuple[int, ...]:
     return tuple(sequence)
 
 
+def run_down(net: MarkedNet, most: int = RUN_DOWN) -> tuple[int, ...] | None:
+    """A sequence from m_0 after which nothing is enabled any more; None where a marked graph has
+    none of at most so many firings: what is enabled in one stays so until it fires, so each way to
+    fire comes as far."""
+    tokens, firing = list(net.tokens), list[int]()
+    ready = [event for event in range(len(net.net.transitions)) if event not in net.blocked]
+    while ready:
+        event = ready.pop()
+        if not all(tokens[p] for p in net.net.preset[event]):
+            continue
+        if len(firing) == most:
+            return None
+        firing.append(event)
+        for p in net.net.preset[event]:
+            tokens[p] -= 1
+        for p in net.net.postset[event]:
+            tokens[p] += 1
+        after = [net.right[p] for p in net.net.postset[event]]
+        ready += [event, *(e for e in after if e != NONE and e not in net.blocked)]
+    return tuple(firing)
+
+
+def _after(net: MarkedNet, firing: Sequence[int]) -> str:
+    """`after a, b`: what has fired, in words."""
+    names = [net.net.transitions[event].name for event in firing]
+    if len(names) > NAMED:
+        left = len(names) - NAMED
+        names[NAMED // 2 : -NAMED // 2] = [f"... ({left} more: --json) ..."]
+    return f"after {', '.join(names)}" if names else "initially"
+
+
+def _stopped(net: MarkedNet, firing: Sequence[int]) -> str:
+    """That nothing is enabled after a firing sequence, and where the tokens are then."""
+    tokens = list(net.tokens)
+    for event in firing:
+        for p in net.net.preset[event]:
+            tokens[p] -= 1
+        for p in net.net.postset[event]:
+            tokens[p] += 1
+    where = [place.name for place, count in zip(net.net.places, tokens, strict=True) if count]
+    held = f", with tokens in {listing(where)}" if where else ""
+    return f"{_after(net, firing)} nothing is enabled any more{held}"
+
+
 def _one_way(net: MarkedNet, stuck: tuple[int, ...]) -> Iterable[Defect]:
     """An enabled transition connected to something that fires finitely often: in a component that
     repeats at all, all fire equally often."""
@@ -204,22 +254,22 @@ def _found(net: MarkedNet, found: Exploration) -> Iterable[Defect]:
     names, events = net.net.places, net.net.transitions
     text = f"undecided: {found.markings} markings were explored, and there are more"
     if found.deadlock is not None:
-        reason = f"after {len(found.deadlock)} firings nothing is enabled any more"
+        reason = _stopped(net, found.deadlock)
         yield Defect("live", "deadlock", reason, transitions=found.deadlock)
     elif found.starved is not None:
         firing, event = found.starved
-        reason = f"after {len(firing)} firings {events[event].name} can never fire again"
+        reason = f"{_after(net, firing)} {events[event].name} can never fire again"
         yield Defect("live", "dead transition", reason, transitions=firing or (event,))
     elif not found.complete:
         yield Defect("live", "undecided", text)
     if found.unsafe is not None:
         firing, place = found.unsafe
-        reason = f"place {names[place].name} holds two tokens after {len(firing)} firings"
+        reason = f"place {names[place].name} holds two tokens {_after(net, firing)}"
         yield Defect("safe", "two tokens", reason, (), (place,), firing)
     elif not found.complete:
         yield Defect("safe", "undecided", text)
     if one_way := found.one_way or found.deadlock:
-        reason = f"after {len(one_way)} firings the initial marking is out of reach"
+        reason = f"{_after(net, one_way)} the initial marking is out of reach"
         yield Defect("reversible", "no way back", reason, transitions=one_way)
     elif not found.complete:
         yield Defect("reversible", "undecided", text)
