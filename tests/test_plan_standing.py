@@ -105,3 +105,28 @@ def test_a_peg_that_leans_is_put_in_lying(tmp_path: Path) -> None:
     assert isinstance(found, Planned)
     assert np.abs(found.orientation[2]) == pytest.approx((0, 1, 0), abs=1e-6)
     assert overhang(model_source(tmp_path, slanted(20)).parts, found.orientation[2]) < 0
+
+
+def test_no_sub_assembly_tips_where_another_order_stands(tmp_path: Path) -> None:
+    """A bar on two posts: with one post alone it would tip over."""
+    posts = {f"post{n}": box(10, 10, 40, (x, 0, 20)) for n, x in enumerate((-45, 45))}
+    parts = {"floor": box(100, 20, 4, (0, 0, -2)), **posts, "bar": box(100, 10, 10, (0, 0, 45))}
+    found = plan(model_source(tmp_path, parts), QUICK)
+    assert isinstance(found, Planned) and found.figures.tips == 0
+    made = [{*join.pile, *join.come} for join in found.operations]
+    assert not any({"bar"} < units and "floor" not in units for units in made)
+    assert len(found.notes) == 1
+    bridge = plan(model_source(tmp_path, {k: v for k, v in parts.items() if k != "floor"}), QUICK)
+    assert isinstance(bridge, Planned) and bridge.figures.tips == 1
+    assert "a sub-assembly tips over" in bridge.notes[1]
+
+
+@pytest.mark.parametrize("base", ["plate", "dowel2"])
+def test_all_others_come_onto_the_base(base: str, tmp_path: Path) -> None:
+    found = plan(model_source(tmp_path, jig()), PlanOptions(lay_out=False, base=base))
+    assert isinstance(found, Planned)
+    made = [join for join in found.operations if base in (*join.pile, *join.come)]
+    assert made and all(base in join.pile for join in made)
+    assert all(join.direction[2] > 0 for join in made if join.lowered)
+    with pytest.raises(InputError, match=r"nothing that is planned is called 'plat'"):
+        plan(model_source(tmp_path, jig()), PlanOptions(lay_out=False, base="plat"))

@@ -69,6 +69,7 @@ KINDS: tuple[Kind, ...] = ("slide", "lower", "blocked")
     type=click.Choice(UPS),
     help="The axis of SOURCE that is up; without, z, unless the product would tip over.",
 )
+@click.option("--base", help="The part, or sub-tree, onto which all others come.")
 @click.option("--hulls", is_flag=True, help="Plan with hulls, though they hide what goes in.")
 @click.option("--unit", type=click.Choice(UNITS), help="Of lengths; found out without.")
 @click.option("--in-place", is_flag=True, help="Parts are in place, whatever they look like.")
@@ -93,6 +94,7 @@ def plan(
     replan: bool,
     allow: tuple[str, ...],
     up: str | None,
+    base: str | None,
     hulls: bool,
     unit: str | None,
     in_place: bool,
@@ -127,7 +129,8 @@ def plan(
         for note in found.notes:
             say(f"  {note}")
     seconds = usual_seconds(len(found.units())) if seconds is None else seconds
-    search = PlanOptions(aim, seconds, allow, hulls, UPS[up] if up else None, templates=templates)
+    side = UPS[up] if up else None
+    search = PlanOptions(aim, seconds, allow, hulls, side, base or "", templates=templates)
     planned = _sought(found, search, out)
     if isinstance(planned, CannotAssemble):
         return refuse(found, planned, folder, look, out)

@@ -26,6 +26,7 @@ from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
 from factory.planning.hulls import Drawn
 from factory.planning.parts import InPlace
+from factory.planning.standing import Feet
 
 FREE, SCRAPES, DEEPER, LOCKED, CLASHES = range(5)
 """How much one part is in another's way: not at all; they scrape, or stay drawn into each other;
@@ -57,6 +58,8 @@ class Blocking:
     (n, n): which units touch. `low`, `high` (n, 3): their boxes [m]. `depths` (3, n, n): how deep
     the first gets into the second [m], none where that is not known. `hidden`: the parts of two
     units that overlap when finished, as far as the hull of an open mesh shows, the deepest first.
+    `feet`: what units stand on, None where it does not matter whether sub-assemblies tip. `base`:
+    the unit onto which all others come, -1 for none.
     """
 
     labels: tuple[str, ...]
@@ -67,6 +70,8 @@ class Blocking:
     high: Array = field(repr=False)
     depths: Array = field(default_factory=lambda: np.zeros((3, 0, 0)), repr=False)
     hidden: tuple[Drawn, ...] = field(default=(), repr=False)
+    feet: Feet | None = field(default=None, repr=False)
+    base: int = -1
 
     def __post_init__(self) -> None:
         for array in (self.levels, self.locks, self.touch, self.low, self.high, self.depths):
@@ -107,6 +112,7 @@ class Blocking:
             return np.asarray(np.maximum.reduceat(rows, starts, axis=-1))
 
         own = np.eye(count, dtype=bool)
+        based = [number for number, group in enumerate(groups) if self.base in group]
         return Blocking(
             tuple(self.labels[group[0]] for group in groups),
             np.where(own, FREE, most(self.levels)).astype(np.int8),
@@ -114,6 +120,8 @@ class Blocking:
             most(self.touch),
             np.minimum.reduceat(self.low[order], starts),
             np.maximum.reduceat(self.high[order], starts),
+            feet=self.feet and self.feet.grouped(groups),
+            base=based[0] if based else -1,
         )
 
 

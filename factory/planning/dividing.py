@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from factory.geometry.meshes import Array
 from factory.planning.blocking import CLASHES, DEEPER, LOCKED, Blocking
 from factory.planning.cannot import Units
-from factory.planning.subsets import APART, BLOCKED, LOOSE, PASSES
+from factory.planning.subsets import APART, BLOCKED, LOOSE, PASSES, TIPS
 
 Sets = NDArray[np.bool_]
 
@@ -25,7 +25,8 @@ TRIED = 40
 
 @dataclass(frozen=True, slots=True)
 class Division:
-    """Two sides of some units and what dividing them costs."""
+    """Two sides of some units, the one onto which all others come first, and what dividing them
+    costs."""
 
     one: Units
     other: Units
@@ -52,13 +53,22 @@ class Divider:
         touch = self.found.touch[np.ix_(units, units)]
         best, chosen = np.inf, 0
         for n in np.lexsort((worth, prices))[:TRIED].tolist():
-            price = prices[n] + APART * (_pieces(touch, sets[n]) + _pieces(touch, ~sets[n]))
+            price = prices[n] + sum(self._unsound(units, touch, s) for s in (sets[n], ~sets[n]))
             if price < best:
                 best, chosen = price, n
             if price <= prices[n]:
                 break
-        one, other = units[sets[chosen]], units[~sets[chosen]]
-        return Division(tuple(one.tolist()), tuple(other.tolist()), float(best))
+        one, other = (tuple(units[s].tolist()) for s in (sets[chosen], ~sets[chosen]))
+        if self.found.base in other:
+            one, other = other, one
+        return Division(one, other, float(best))
+
+    def _unsound(self, units: NDArray[np.int64], touch: Sets, members: NDArray[np.bool_]) -> float:
+        """The price of a side that is in pieces, or would tip over."""
+        feet = self.found.feet
+        several = feet is not None and members.sum() > 1
+        tips = several and bool(feet.joined(units[members].tolist()).tips[0])  # type: ignore[union-attr]
+        return APART * _pieces(touch, members) + TIPS * tips
 
     def _candidates(
         self, units: NDArray[np.int64], axes: tuple[int, ...], random: np.random.Generator

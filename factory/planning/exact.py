@@ -24,7 +24,7 @@ import numpy as np
 
 from factory.geometry.meshes import Array
 from factory.planning.estimate import Expected
-from factory.planning.subsets import APART, Masks, Subsets, splits
+from factory.planning.subsets import APART, TIPS, Masks, Subsets, splits
 
 RELAY = 1.0
 """The price of a relay."""
@@ -89,9 +89,12 @@ class TreeTask:
 
     def divisions(self, whole: int) -> tuple[Masks, Masks, Array]:
         """How a subset can be divided: both sides (k,), and the least prices (k, 3) along the first
-        and second horizontal axis, whoever goes, and upright."""
+        and second horizontal axis, whoever goes, and upright. The unit onto which all others come
+        is on the first side, which is not lowered then."""
         one = splits(whole)
         other = whole ^ one
+        swapped = self.subsets.based[other]
+        one, other = np.where(swapped, other, one), np.where(swapped, one, other)
         if not self.apart:
             hangs = self.subsets.hangs[one] & self.subsets.hangs[other]
             one, other = one[hangs], other[hangs]
@@ -102,6 +105,8 @@ class TreeTask:
             ],
             axis=-1,
         )
+        if self.subsets.based[whole]:
+            found[:, 2] = self.subsets.price(self.axis, 0 if self.up > 0 else 1, other, one)
         open_ = np.isfinite(found).any(axis=1)
         return one[open_], other[open_], found[open_]
 
@@ -118,9 +123,11 @@ class TreeTask:
         yield from order[(self.subsets.size[order] > 1) & useful[order]].tolist()
 
     def penalty(self, whole: int) -> float:
-        """The price of a sub-assembly in pieces."""
-        pieces = not self.subsets.hangs[whole] and whole != self.subsets.whole
-        return APART if pieces else 0.0
+        """The price of a sub-assembly in pieces, or that would tip over."""
+        if whole == self.subsets.whole:
+            return 0.0
+        pieces, tips = not self.subsets.hangs[whole], bool(self.subsets.tips[whole])
+        return APART * pieces + TIPS * tips
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,7 +223,8 @@ class Best:
             worth = self._mates(whole, axis, one, other, prices) + own
             found.append((worth, one, other, "mate"))
         if stops > 0 or (self.bound == np.inf and not self.mates):
-            for pile, come in ((one, other), (other, one)):
+            sides = ((one, other), (other, one))
+            for pile, come in sides[: 1 if self.task.subsets.based[whole] else 2]:
                 worth = self._inserts(whole, axis, stops, pile, come, prices) + own
                 found.append((worth, pile, come, "insert"))
         return found

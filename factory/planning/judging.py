@@ -14,7 +14,7 @@ from factory.planning.cannot import Direction, Units
 from factory.planning.estimate import Expected
 from factory.planning.exact import RELAY, Tree
 from factory.planning.stance import ROOT_AXIS, Stance
-from factory.planning.subsets import APART, BLOCKED, LOOSE, PASSES
+from factory.planning.subsets import APART, BLOCKED, LOOSE, PASSES, TIPS
 
 PRICES = {CLASHES: BLOCKED, LOCKED: PASSES, DEEPER: LOOSE}
 """What a join costs in which parts are so much in each other's way."""
@@ -38,8 +38,8 @@ class Join:
 @dataclass(frozen=True)
 class Judged:
     """A tree of units in a stance, with its `joins`, how many sub-assemblies are in pieces
-    (`apart`) and how many are relayed; the greatest expected cycle of its robots [s], how many
-    these are, and how long all sub-assemblies are [m]."""
+    (`apart`), how many would tip over (`tips`) and how many are relayed; the greatest expected
+    cycle of its robots [s], how many these are, and how long all sub-assemblies are [m]."""
 
     tree: Tree = field(repr=False)
     stance: Stance
@@ -49,12 +49,13 @@ class Judged:
     seconds: float
     robots: int
     sizes: float
+    tips: int = 0
 
     @cached_property
     def price(self) -> float:
         """What its joins and its sub-assemblies in pieces cost."""
         joins = sum(PRICES.get(join.level, 0.0) for join in self.joins)
-        return joins + APART * self.apart + RELAY * self.relays
+        return joins + APART * self.apart + TIPS * self.tips + RELAY * self.relays
 
     def count(self, level: int) -> int:
         """How many joins have parts that much in each other's way, or more."""
@@ -73,7 +74,8 @@ class Judge:
         members, held = walk.made(tree, ROOT_AXIS)
         walk.seconds.append(held + float(self.expected.delivering(self.size(members))))
         joins, apart = tuple(walk.joins), walk.apart - (not self.hangs(members))
-        found = joins, apart, walk.relays, max(walk.seconds), walk.robots, walk.sizes
+        tips = walk.tips - self.tips(members)
+        found = joins, apart, walk.relays, max(walk.seconds), walk.robots, walk.sizes, tips
         return Judged(tree, self.stance, *found)
 
     def size(self, members: Units) -> Array:
@@ -96,12 +98,17 @@ class Judge:
         touch = self.found.touch[np.ix_(members, members)]
         return int(connected_components(touch, directed=False)[0]) == 1
 
+    def tips(self, members: Units) -> bool:
+        """Whether some units would tip over where they stand."""
+        feet = self.found.feet
+        return feet is not None and bool(feet.joined(members).tips[0])
+
     def join(self, pile: Units, come: Units, axis: int, onto: bool) -> Join:
         """How two groups come together along an axis of the floor, or one from above: the least in
         the way, then sliding."""
         ways = [(self.stance.axes[axis], side, False) for side in (+1, -1)]
         ways.append((self.stance.axes[2], self.stance.up, True))
-        if not onto:
+        if not onto and self.found.base not in pile:
             ways.append((self.stance.axes[2], -self.stance.up, True))
         found = [self._way(pile, come, way, onto) for way in ways]
         return min(found, key=lambda join: (join.level, join.lowered))
@@ -121,6 +128,7 @@ class _Walk:
     joins: list[Join] = field(default_factory=list)
     seconds: list[float] = field(default_factory=list)
     apart: int = 0
+    tips: int = 0
     relays: int = 0
     robots: int = 0
     sizes: float = 0.0
@@ -153,6 +161,7 @@ class _Walk:
             self.joins.append(join)
             pile = tuple(sorted((*pile, *come)))
             self.apart += not self.judge.hangs(pile)
+            self.tips += self.judge.tips(pile)
             self.sizes += float(self.judge.size(pile))
         return pile, time
 

@@ -18,9 +18,10 @@ from factory.planning.judging import Join, Judged
 from factory.planning.kept import KeptPrices
 from factory.planning.laying import LaidOut, Layouts
 from factory.planning.parts import InPlace
-from factory.planning.posing import Pose, along, posed, said
+from factory.planning.posing import Pose, along, posed, said, toppling
 from factory.planning.searching import Aim, Budget, Sought, trees
 from factory.planning.stance import stances
+from factory.planning.standing import feet
 from factory.planning.writing import Tree
 from factory.problem.template import Template
 from factory.support.errors import Diagnostic, InputError, did_you_mean
@@ -32,15 +33,17 @@ class PlanOptions:
     """`aim`: what the tree is chosen for; `seconds` to search; `allow`: units that may pass through
     others, or two, `a:b`, through each other; `hulls`: whether hulls may hide what goes into them;
     `up`: the axis of the file and its side that is up, None for z unless the product tips then;
-    `lay_out`: whether layouts decide, or estimates alone; `settings` and `templates` of the factory, None for those shipped; `told`
-    hears what goes on, and how many of how many are done; `stopped` says that the best so far is
-    wanted at once."""
+    `base`: the unit onto which all others come, "" for any; `lay_out`: whether layouts decide, or
+    estimates alone; `settings` and `templates` of the factory, None for those shipped; `told` hears
+    what goes on, and how many of how many are done; `stopped` says that the best so far is wanted
+    at once."""
 
     aim: Aim = "cycle"
     seconds: float = 60.0
     allow: tuple[str, ...] = ()
     hulls: bool = False
     up: Direction | None = None
+    base: str = ""
     lay_out: bool = True
     settings: Settings = field(default_factory=Settings)
     templates: Mapping[str, Template] | None = field(default=None, repr=False)
@@ -67,10 +70,10 @@ class PlannedJoin:
 class PlanFigures:
     """Of a plan: how many operations, how many of them are `blocked`, have parts pass through each
     other that were drawn into each other (`through`), get a little deeper (`left_out`), or scrape;
-    how many sub-assemblies are in pieces (`apart`), are handed over to turn (`relays`), or cannot
-    be held by any hand (`not_held`, None where nothing was laid out); how many trees were laid out;
-    robots; the cycle time that was expected from sizes and that which is predicted [s], and the
-    floor [m²] (None where nothing was laid out)."""
+    how many sub-assemblies are in pieces (`apart`), would tip over (`tips`), are handed over to
+    turn (`relays`), or cannot be held by any hand (`not_held`, None where nothing was laid out);
+    how many trees were laid out; robots; the cycle time that was expected from sizes and that which
+    is predicted [s], and the floor [m²] (None where nothing was laid out)."""
 
     operations: int
     blocked: int
@@ -78,6 +81,7 @@ class PlanFigures:
     left_out: int
     scrape: int
     apart: int
+    tips: int
     relays: int
     robots: int
     expected: float
@@ -118,12 +122,13 @@ class CannotAssemble:
 
 def plan(source: InPlace, options: PlanOptions | None = None) -> Planned | CannotAssemble:
     """The best tree for a source's parts, or why there is none. Raises InputError where `allow`
-    names nothing that is planned (Usage), or where hulls hide what is in the way (Hulls)."""
+    or `base` names nothing that is planned, or the product tips with `up` up (Usage), or where
+    hulls hide what is in the way (Hulls)."""
     asked = options or PlanOptions()
     budget = Budget(asked.seconds, stopped=asked.stopped)
     asked.told("looking for what is in the way", 0, None, "")
     found = blocking(source)
-    _check_allowed(asked.allow, found)
+    _check_named((*asked.allow, *([asked.base] if asked.base else ())), found)
     pairs = found.hidden
     if not asked.hulls:
         refuse_hidden(source, pairs)
@@ -136,12 +141,15 @@ def plan(source: InPlace, options: PlanOptions | None = None) -> Planned | Canno
     if pose.stuck:
         return CannotAssemble(pose.stuck, removal(found), pose.needs)
     planned = _planned(pose, asked, budget)
-    notes = said(pose, planned.orientation)
+    notes = (*said(pose, planned.orientation), *toppling(planned.figures.tips))
     return replace(planned, hidden=pairs if asked.hulls else (), notes=notes)
 
 
 def _planned(pose: Pose, asked: PlanOptions, budget: Budget) -> Planned:
-    source, found = pose.source, pose.found
+    source = pose.source
+    base = pose.found.labels.index(asked.base) if asked.base else -1
+    stands = feet([parts for _, parts in source.units()], along(pose.up))
+    found = replace(pose.found, feet=stands, base=base)
     templates = all_templates() if asked.templates is None else asked.templates
     expected = Expected(Pace.of(asked.settings))
     seen = [0]
@@ -177,6 +185,7 @@ def _result(pose: Pose, laid: LaidOut, optimal: bool, layouts: int) -> Planned:
         left_out=judged.count(DEEPER) - judged.count(LOCKED),
         scrape=judged.count(SCRAPES) - judged.count(DEEPER),
         apart=judged.apart,
+        tips=judged.tips,
         relays=judged.relays,
         robots=judged.robots,
         expected=judged.seconds,
@@ -208,10 +217,10 @@ def _join(join: Join, pose: Pose, room: Array) -> PlannedJoin:
     return PlannedJoin(pile, come, (x, y, z), least, join.lowered, join.level >= LOCKED)
 
 
-def _check_allowed(allow: tuple[str, ...], found: Blocking) -> None:
+def _check_named(names: tuple[str, ...], found: Blocking) -> None:
     faults = [
         Diagnostic("Usage", f"nothing that is planned is called '{label}'", None, hint)
-        for name in allow
+        for name in names
         for label in (name.split(":", 1) if name not in found.labels else ())
         if label not in found.labels
         for hint in [did_you_mean(label, list(found.labels), "labels")]

@@ -12,7 +12,7 @@ from factory.geometry.meshes import Array
 from factory.planning.blocking import Blocking
 from factory.planning.cannot import Direction, Interlock, interlocks, named
 from factory.planning.parts import InPlace
-from factory.planning.standing import overhang
+from factory.planning.standing import TIPS, overhang
 from factory.planning.turning import only, turned, turns
 from factory.support.errors import Diagnostic, InputError
 
@@ -21,9 +21,6 @@ AS_DRAWN: Direction = (2, +1)
 
 SIDES = tuple((axis, side) for axis in (2, 0, 1) for side in (+1, -1))
 """All six directions along the axes, z first."""
-
-TIPS = 1e-5
-"""A centre of mass that is no further outside than this [m] does not tip a product."""
 
 
 @dataclass(frozen=True)
@@ -132,6 +129,12 @@ def said(pose: Pose, turn: Array) -> tuple[str, ...]:
         stands += f", turned by {angle:.4g}° about it"
     tips = f"; it tips over there, and on each side: {_beyond(pose.tips)}"
     return (stands + (tips if pose.tips > TIPS else ""),)
+
+
+def toppling(count: int) -> tuple[str, ...]:
+    """That some sub-assemblies would tip over by themselves, if any do."""
+    some = f"{count} sub-assemblies tip" if count > 1 else "a sub-assembly tips"
+    return (f"{some} over where nothing holds it: no tree was found without",) if count else ()
 
 
 def _beyond(far: float) -> str:

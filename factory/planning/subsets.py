@@ -21,8 +21,8 @@ BLOCKED, PASSES, LOOSE = 1e6, 1e4, 1e2
 that were drawn into each other pass through each other, or get a little deeper. Below all these: a
 relay."""
 
-APART = 1e5
-"""What a sub-assembly costs that does not hang together."""
+APART, TIPS = 1e5, 2e4
+"""What a sub-assembly costs that does not hang together, or would tip over where it stands."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,8 @@ class Subsets:
     """Tables by subset. `ways` (3 levels, 3 axes, 2 sides, s): what is in the way of a subset that
     goes out along an axis to the upper or lower side, at least LOCKED and not allowed, DEEPER or
     more, or CLASHES; `passes` the same for LOCKED, allowed; `hangs` (s,): whether it hangs
-    together; `low`, `high` (3, s): its box [m]; `size` (s,): of how many units."""
+    together; `low`, `high` (3, s): its box [m]; `size` (s,): of how many units; `tips` (s,):
+    whether it would tip over; `based` (s,): whether it has the unit onto which all others come."""
 
     count: int
     ways: Masks = field(repr=False)
@@ -38,6 +39,8 @@ class Subsets:
     low: Array = field(repr=False)
     high: Array = field(repr=False)
     size: Masks = field(repr=False)
+    tips: NDArray[np.bool_] = field(repr=False)
+    based: NDArray[np.bool_] = field(repr=False)
 
     @property
     def whole(self) -> int:
@@ -79,7 +82,9 @@ def subsets(found: Blocking) -> Subsets:
         low[:, here] = np.minimum(low[:, before], found.low[unit][:, None])
         high[:, here] = np.maximum(high[:, before], found.high[unit][:, None])
         members[here] = members[before] + 1
-    return Subsets(count, ways, _hanging(found.touch, members), low, high, members)
+    tips = np.zeros(size, bool) if found.feet is None else found.feet.subsets()
+    based = (np.arange(size) >> max(found.base, 0) & 1 == 1) & (found.base >= 0)
+    return Subsets(count, ways, _hanging(found.touch, members), low, high, members, tips, based)
 
 
 def splits(whole: int) -> Masks:
