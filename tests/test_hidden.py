@@ -12,7 +12,7 @@ from factory.study.fidelity.hidden import HiddenPenetrations, overlaps_of
 from factory.support.engine import mujoco
 from tests.command_line import PAPER, Terminal
 from tests.pag_texts import laid_out
-from tests.test_overlap import PRESSED
+from tests.test_insets import PRESSED
 
 MASKS = 'contype="0" conaffinity="0"'
 EXCLUDE = '<exclude body1="r1/head" body2="part/a#1"/>'

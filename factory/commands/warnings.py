@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from factory.commands.requests import OutputOptions
-from factory.lang.words import natural
 from factory.support.console import warn
 from factory.support.errors import Diagnostic
+from factory.support.order import natural
 
 SHOWN = 24
 """The most blocked operations that are listed, unless `-v` asks for all."""

@@ -36,9 +36,3 @@ def number(word: str, unit: str = "m") -> float | None:
 def is_label(word: str) -> bool:
     """Whether a word of the lexer may be a label."""
     return _LABEL.fullmatch(word) is not None
-
-
-def natural(name: str) -> tuple[tuple[int, str], ...]:
-    """The key by which `part2` comes before `part10`."""
-    words = re.split(r"(\d+)", name.lower())
-    return tuple((int(word), "") if word.isdigit() else (-1, word) for word in words)

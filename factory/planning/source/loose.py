@@ -16,7 +16,6 @@ from factory.importing.labels import file_stem, label_of
 from factory.importing.mesh_files import MeshStore
 from factory.importing.places import quaternion, rounded
 from factory.lang.source import quoted
-from factory.lang.words import natural
 from factory.planning.source.alike import alike, shape_of
 from factory.planning.source.bodies import Bodies, FileBody, apart, unit_of
 from factory.planning.source.faults import check_count
@@ -25,6 +24,7 @@ from factory.planning.source.trees import TreeProduct
 from factory.problem.pag import PAG, Assembly, Parameter
 from factory.support.errors import Diagnostic, InputError, Position
 from factory.support.files import MESH, read_bytes
+from factory.support.order import natural
 
 STILL = 1e-9
 """A rotation this close to none is none."""
