@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import imageio.v3 as iio
 import numpy as np
@@ -24,12 +25,15 @@ from hypothesis.extra import numpy as arrays
 
 import factory
 from factory.geometry.meshes import Mesh
+from factory.geometry.sight import Framing, fit, towards
 from factory.mjcf.mesh_files import corner_normals, face_normals, mesh_file
 from factory.record.log import LogWriter, read_log
 from factory.record.monitor.subject import subject_of_run
 from factory.render import Film, Picture, Still, camera_named, check_output, render_log
-from factory.render.camera import Framing, fit, from_above, overview, towards
+from factory.render.camera import from_above, overview
+from factory.render.caption import Caption
 from factory.render.painter import Painter, Renderer
+from factory.render.reel import HOLD
 from factory.render.subject import Snapshot
 from factory.render.video import VideoFile
 from factory.simulation.request import RunRequest
@@ -42,6 +46,7 @@ from tests.opengl import needs_gl
 ROOT = Path(__file__).parent.parent
 PAPER = ROOT / "examples" / "paper.pag"
 SIZE, FPS = (160, 96), 10.0
+HELD = round(HOLD * FPS)
 SMALL, PRODUCT = Picture(SIZE), Picture((240, 136), "product")
 
 
@@ -86,7 +91,7 @@ def film_of(path: Path) -> np.ndarray:
 def test_size_rate_and_frames_are_exact(taken) -> None:
     folder, run, film, _ = taken
     frames = film_of(folder / "run.mp4")
-    wanted = int(run.sim_time_s * FPS + 1e-6) + 1
+    wanted = int(run.sim_time_s * FPS + 1e-6) + 1 + HELD
     assert film.frames == wanted and frames.shape == (wanted, SIZE[1], SIZE[0], 3)
     about = iio.immeta(folder / "run.mp4", plugin="pyav")
     assert about["fps"] == pytest.approx(FPS) and about["codec"] == "h264"
@@ -95,10 +100,29 @@ def test_size_rate_and_frames_are_exact(taken) -> None:
 
 
 @needs_gl
+def test_a_film_ends_with_all_units_for_a_second(
+    taken, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The last unit may be out after the last even time: its moment is shown all the same."""
+    pictures, said = taken[3], []
+    draw = Caption.draw
+
+    def drawn(caption: Caption, pixels: Any, product: str, made: int, *rest: Any) -> Any:
+        said.append(made)
+        return draw(caption, pixels, product, made, *rest)
+
+    assert HELD == FPS
+    assert all(np.array_equal(pictures[-1], one) for one in pictures[-HELD:])
+    monkeypatch.setattr(Caption, "draw", drawn)
+    render_log(read_log(taken[0] / "run.log"), tmp_path / "again.mp4", SMALL, FPS)
+    assert said[0] == 0 and said[-1] == 1
+
+
+@needs_gl
 def test_the_picture_is_not_blank_and_changes(taken) -> None:
     frames = film_of(taken[0] / "run.mp4").astype(int)
     assert all(frame.std() > 10 for frame in frames)
-    factory_only = frames[:, : int(0.8 * SIZE[1])]
+    factory_only = frames[:-HELD, : int(0.8 * SIZE[1])]
     changed = [np.abs(a - b).max() for a, b in pairwise(factory_only)]
     assert np.mean(np.array(changed) > 30) > 0.6
 
@@ -153,7 +177,7 @@ def test_an_interruption_leaves_a_film_of_what_was(layout, tmp_path: Path, error
     path = tmp_path / "cut.mp4"
     with pytest.raises(error), Film(simulation, path, SMALL, FPS) as film:
         simulation.run([film.observe, interrupt])
-    assert len(film_of(path)) == film.frames == 11
+    assert len(film_of(path)) == film.frames == 11 + HELD
     assert [p.name for p in tmp_path.iterdir()] == ["cut.mp4"]
 
 

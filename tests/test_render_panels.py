@@ -412,7 +412,7 @@ def test_a_film_with_everything(tmp_path: Path) -> None:
     ):
         run = simulation.run([writer.observe, filming.observe])
     frames = iio.imread(film, plugin="pyav").astype(int)
-    assert frames.shape == (int(run.sim_time_s * 2 + 1e-6) + 1, 490, 560, 3)
+    assert frames.shape == (int(run.sim_time_s * 2 + 1e-6) + 3, 490, 560, 3)
     assert iio.imread(tmp_path / "p.png").shape == (490, 560, 3)
     again = tmp_path / "again.mp4"
     render_log(read_log(log), again, picture, 2)

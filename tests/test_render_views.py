@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from factory.geometry.sight import Framing, View, fit, towards
 from factory.mjcf import names
 from factory.mjcf.replica import Replica
 from factory.problem.pag import NOPART
 from factory.record.log import Log, LogWriter, read_log
 from factory.render.action import Action, action_of, shape_of
-from factory.render.camera import Framing, View, fit, orbit, overview, towards
+from factory.render.camera import orbit, overview
 from factory.render.camerawork import Take
 from factory.render.fading import FAINT, Fading
 from factory.render.film import moment_of, take_of

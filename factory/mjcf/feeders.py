@@ -78,12 +78,12 @@ def _add_housing(body: Element, name: str, found: Feeder, left: float) -> None:
     low, top = found.low, found.high
     middle, half = (low + top - WALL) / 2, (top - WALL - low) / 2
     across_post = found.across * left
-    boom = rear - WALL - found.back
+    boom = rear - WALL - found.back - POST / 2
     shapes: list[tuple[str, Point3, Point3, str]] = [
         ("post", (found.back, across_post, top / 2), (POST / 2, POST / 2, top / 2), "post"),
         (
             "boom",
-            (found.back + boom / 2, across_post, top - BOOM_HEIGHT / 2),
+            (found.back + (POST + boom) / 2, across_post, top - BOOM_HEIGHT / 2),
             (boom / 2, BOOM / 2, BOOM_HEIGHT / 2),
             "post",
         ),

@@ -9,6 +9,7 @@ from factory.layout.hands.hand import Hand
 from factory.layout.hands.limbs import limbs
 from factory.layout.layout import Layout
 from factory.mjcf.hands import Styles, load_hand
+from factory.mjcf.plates import add_number
 from factory.mjcf.robots import Drive, Held, Hoist, RobotModel, instantiate, load_robot_model
 from factory.mjcf.scene import add_follower
 from factory.mjcf.stops import carriage_stops
@@ -33,6 +34,7 @@ def add_robots(
             model = models[robot.type] = load_robot_model(catalogue[robot.type])
             section["default"].append(model.defaults)
             section["asset"].extend(model.assets)
+        role = role_of(factory, robot.index)
         held = Held(_low(layout, robot.index))
         if layout.hands:
             held = Held(0.0, _style(layout.hand(robot.index), styles), limbs(layout, robot.index))
@@ -43,9 +45,10 @@ def add_robots(
             drive,
             carriage_stops(layout, robot.index),
             held,
-            role_of(factory, robot.index),
+            role,
             hoists.get(robot.index),
         )
+        add_number(body, section["asset"], robot.name, path, role)
         if robot.index == 0:
             add_follower(body, layout)
         section["worldbody"].append(body)

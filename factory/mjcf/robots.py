@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from copy import deepcopy
 from dataclasses import dataclass, field
 from math import atan2, cos, hypot, sin
@@ -21,6 +22,9 @@ from factory.support.errors import Diagnostic, InputError, Position
 
 OWN_HAND = {"finger", "pin", "column", "pad"}
 """Geoms of a type's own file that stand for a hand, where none is chosen."""
+
+CAP = "cap"
+"""The geom on top of the mast, which is none where a tower is."""
 
 LIFTED = 0.4
 """Mass of a lift's head without what stands for a hand [kg]."""
@@ -169,7 +173,8 @@ def instantiate(
     if held.styles is None:
         _stretch(body, path, held.top, hoist)
     else:
-        _fit_arm(body, path)
+        towers = any(limb.name == "tower" for limb in held.limbs)
+        _fit_arm(body, path, OWN_HAND | {CAP} if towers else OWN_HAND)
         lifted = next((b for b in body.iter("body") if b.get("name") == head(robot)), None)
         add_hand(body, lifted, held.styles, robot, held.limbs, model.name)
     slide = next(j for j in body.iter("joint") if j.get("name") == f"{robot}/slide")
@@ -201,16 +206,16 @@ def heading_quaternion(path: Guidepath) -> tuple[float, float, float, float]:
     return (w, 0.0, 0.0, z)
 
 
-def _fit_arm(body: Element, path: Guidepath) -> None:
-    """The arm from the mast to the rim, of a robot whose hand goes on from there; a tool's head
-    reaches a little further."""
+def _fit_arm(body: Element, path: Guidepath, without: Collection[str]) -> None:
+    """The arm from the mast to the rim, of a robot whose hand goes on from there, `without` some
+    geoms; a tool's head reaches a little further."""
     rim = max(path.reach - path.arm, MAST / 2 + 0.002)
     parents = {child: parent for parent in body.iter() for child in parent}
     for geom in list(body.iter("geom")):
         name = (geom.get("name") or "").rpartition("/")[2]
         if name == "arm":
             _span(geom, (0.0, 0.0), (rim, 0.0))
-        elif name in OWN_HAND:
+        elif name in without:
             parents[geom].remove(geom)
     for lifted in body.iter("body"):
         if (lifted.get("name") or "").endswith("/head"):

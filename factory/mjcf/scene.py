@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from math import cos, hypot, radians, sin, tan
+from itertools import product
+from math import hypot
 from xml.etree.ElementTree import Element
 
+import numpy as np
+
+from factory.geometry.sight import Array, Framing, View, fit, towards
 from factory.layout.dimensions import CARRIAGE, PAYLOAD
 from factory.layout.layout import Layout
 from factory.mjcf.elements import add, add_shown, add_station, fill, numbers
@@ -25,8 +29,11 @@ FAR = 1e5
 GROUND = 0.1
 """Half the thickness of the floor [m]: spare copies are kept below it."""
 
-OVERVIEW = radians(42), radians(-62)
-"""From how high up and from how far around the overview camera looks [rad]."""
+OVERVIEW, TOP = (-62.0, 42.0), (-90.0, 90.0)
+"""From how far around and from how high up the cameras look that see all [degrees]."""
+
+FRAMING = Framing(4 / 3, 0.05, 0.05, 0.05, VIEW)
+"""What they see is in the frame of a window of this shape, or a wider one."""
 
 KEY, FILL = (0.40, 0.48, -0.78), (-0.65, 0.30, -0.70)
 """Directions of the two lights; the first casts the shadows."""
@@ -34,10 +41,11 @@ KEY, FILL = (0.40, 0.48, -0.78), (-0.65, 0.30, -0.70)
 
 def add_scene(world: Element, statistic: Element, layout: Layout) -> None:
     """Everything that stands still, and how large it is."""
-    x, y, radius = _floor(layout)
-    fill(statistic, center=(x, y, 0.1), extent=radius)
+    overview = _cameras(world, layout)
+    # The engine's free camera begins 1.5 extents away from the centre, where the overview is.
+    center = overview.position + overview.distance * overview.axes[2]
+    fill(statistic, center=tuple(center.tolist()), extent=overview.distance / 1.5)
     _floor_and_light(world, layout)
-    _cameras(world, layout)
     for robot in range(len(layout.guidepaths)):
         _rail(world, layout, robot)
 
@@ -130,40 +138,35 @@ def _compass(world: Element, layout: Layout) -> None:
         )
 
 
-def _aim(up: float, around: float, distance: float) -> tuple[tuple[float, float, float], str]:
-    """Where a camera is that looks at the origin from so high up and from so far around [rad], and
-    its axes."""
-    right = (-sin(around), cos(around), 0.0)
-    above = (-sin(up) * cos(around), -sin(up) * sin(around), cos(up))
-    flat = distance * cos(up)
-    return (flat * cos(around), flat * sin(around), distance * sin(up)), numbers((*right, *above))
+def _cameras(world: Element, layout: Layout) -> View:
+    """The cameras that see the whole factory; gives the view of the overview."""
+    points = _corners(layout)
+    views = {
+        name: fit(points, towards(*angles), FRAMING)
+        for name, angles in (("overview", OVERVIEW), ("top", TOP))
+    }
+    for name, view in views.items():
+        pos = tuple(view.position.tolist())
+        add(world, "camera", name=name, pos=pos, xyaxes=_xy(view.axes), fovy=VIEW)
+    return views["overview"]
 
 
-def _cameras(world: Element, layout: Layout) -> None:
-    x, y, _ = _floor(layout)
-    at, axes = _aim(*OVERVIEW, look_distance(layout, 16 / 9))
-    pos = (x + at[0], y + at[1], 0.05 + at[2])
-    add(world, "camera", name="overview", pos=pos, xyaxes=axes, fovy=VIEW)
-    xlo, xhi, ylo, yhi = layout.floor
-    tall = max(yhi - ylo, (xhi - xlo) * 9 / 16) * 1.12 + 0.2
-    pos = (x, y, tall / 2 / tan(radians(VIEW / 2)))
-    add(world, "camera", name="top", pos=pos, xyaxes="1 0 0 0 1 0", fovy=VIEW)
-
-
-def look_distance(layout: Layout, aspect: float) -> float:
-    """How far the overview camera stands so that the floor fills the picture [m]."""
-    xlo, xhi, ylo, yhi = layout.floor
-    up, around = OVERVIEW
-    wide = abs((xhi - xlo) * sin(around)) + abs((yhi - ylo) * cos(around))
-    deep = abs((xhi - xlo) * cos(around)) + abs((yhi - ylo) * sin(around))
-    tall = deep * sin(up) + 0.25 * cos(up)
-    half = tan(radians(VIEW / 2))
-    return max(tall / 2 / half, wide / 2 / half / aspect) * 1.04 + deep / 2 * cos(up) * 0.8
+def _corners(layout: Layout) -> Array:
+    """The corners of boxes round all that is in the factory (n, 3) [m]."""
+    regions = layout.certificate.regions if layout.certificate else ()
+    boxes = [(*region.box, *region.z) for region in regions] or [(*layout.floor, 0.0, PAYLOAD)]
+    return np.array([corner for box in boxes for corner in product(box[:2], box[2:4], box[4:])])
 
 
 def add_follower(body: Element, layout: Layout) -> None:
     """The camera `product`, which rides with the output robot and looks at its nest."""
     size = float(max(layout.product.high - layout.product.low)) + 0.1
-    at, axes = _aim(radians(32), radians(-125), 2.2 * size + 0.15)
+    axes = towards(-125.0, 32.0)
+    at = (2.2 * size + 0.15) * -axes[2]
     pos = (layout.guidepaths[0].reach + at[0], at[1], PAYLOAD + 0.3 * size + at[2])
-    add(body, "camera", name="product", pos=pos, xyaxes=axes, fovy=VIEW)
+    add(body, "camera", name="product", pos=pos, xyaxes=_xy(axes), fovy=VIEW)
+
+
+def _xy(axes: Array) -> str:
+    """The axes of a camera as a model has them."""
+    return numbers(axes[:2].ravel().tolist())

@@ -14,9 +14,6 @@ from factory.mjcf.names import pad_of
 SHOWN = {"contype": "0", "conaffinity": "0", "mass": "0", "group": "1"}
 """What a class of geoms that are only shown says of them."""
 
-MESH = "mesh/"
-"""What the names of parts' meshes begin with."""
-
 
 def leave_out_what_is_shown(root: Element) -> None:
     """Take geoms that are only shown out of an MJCF, bodies that are nothing else, and meshes that
@@ -31,7 +28,7 @@ def leave_out_what_is_shown(root: Element) -> None:
         used = {geom.get("mesh") for geom in world.iter("geom")}
     for asset in root.findall("asset"):
         for mesh in asset.findall("mesh"):
-            if mesh.get("name", "").startswith(MESH) and mesh.get("name") not in used:
+            if mesh.get("name") not in used:
                 asset.remove(mesh)
 
 

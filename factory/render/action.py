@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from factory.geometry.sight import Array
 from factory.geometry.solids import rotation
 from factory.mjcf import names
 from factory.mjcf.weld_frames import WeldFrames
-from factory.render.camera import Array
 from factory.render.subject import SIGNS, corners, placed
 from factory.support.engine import mujoco
 

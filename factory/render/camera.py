@@ -1,22 +1,15 @@
-"""Cameras and their views: a view is as near as it can be with a set of points inside the frame.
-
-For a direction of sight and an aspect ratio that position has a closed form, so the factory fills a
-picture of any shape."""
+"""Cameras: their names, and the views of those that stand or go round."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from math import cos, radians, sin, tan
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from factory.geometry.sight import Array, Framing, View, fit, tangents, towards
 from factory.problem.pag import PAG
 from factory.support.errors import Diagnostic, InputError, did_you_mean
-
-Array = NDArray[np.float64]
 
 Standing = Literal["overview", "orbit", "top", "product"]
 """`overview`: the whole factory, aslant; `orbit`: the same from all sides in turn; `top`: from
@@ -32,54 +25,6 @@ Camera = str
 
 TURN = 8.0
 """How fast `orbit` goes round [degrees/s]."""
-
-FIELD = 24.0
-"""Angle of view across the shorter side of the picture [degrees]: narrow, for little
-perspective."""
-
-
-@dataclass(frozen=True, slots=True)
-class Framing:
-    """What of a picture may be used: `aspect` = width / height, and the margins as fractions of
-    height."""
-
-    aspect: float
-    below: float = 0.03
-    above: float = 0.03
-    beside: float = 0.03
-
-
-@dataclass(frozen=True, slots=True)
-class View:
-    """A camera: its `position` (3,), its `axes` (3, 3) right, up and ahead, the tangents of half
-    its angles of view, the `distance` to the middle of what it looks at, and half the depth of that
-    [m]."""
-
-    position: Array
-    axes: Array
-    wide: float
-    tall: float
-    distance: float
-    depth: float
-
-    @property
-    def range(self) -> tuple[float, float]:
-        """From where to where something is drawn [m]: tightly, or shadows get speckles. Twice as
-        far as the floor at the upper edge of the picture, since the sky is drawn nearer than the
-        far end."""
-        far = float(self.position[2]) / max(self.dip, 0.06)
-        near = max(0.1 * self.distance, 0.7 * (self.distance - self.depth))
-        return near, 2 * max(far, self.distance + self.depth)
-
-    @property
-    def dip(self) -> float:
-        """How steeply the upper edge of the picture looks down: its descent on a way of 1 ahead."""
-        return float(-self.axes[2][2] - self.tall * self.axes[1][2])
-
-    @property
-    def has_sky(self) -> bool:
-        """Whether the end of the floor may be seen, which is 20 times as large as the factory."""
-        return self.dip < 0.3
 
 
 def camera_names(pag: PAG | None) -> tuple[Camera, ...]:
@@ -115,42 +60,6 @@ def _none_of(noun: str, found: str, valid: Sequence[str]) -> InputError:
     return InputError(Diagnostic("BadValue", f"there is no {noun} '{found}'", None, hint))
 
 
-def towards(azimuth: float, elevation: float) -> Array:
-    """Axes (3, 3), rows right, up and ahead, of a camera that stands at an azimuth and an elevation
-    [degrees] from what it looks at."""
-    a, e = radians(azimuth), radians(elevation)
-    right = (-sin(a), cos(a), 0.0)
-    up = (-sin(e) * cos(a), -sin(e) * sin(a), cos(e))
-    ahead = (-cos(e) * cos(a), -cos(e) * sin(a), -sin(e))
-    return np.array([right, up, ahead])
-
-
-def fit(points: Array, axes: Array, framing: Framing) -> View:
-    """The nearest view along `axes` that has all points (n, 3) in the frame.
-
-    The positions (a, c) from which points (r, f) are seen between two rays of tangents s and t are
-    a wedge, -(f - c) s <= r - a <= (f - c) t, that opens backwards from its tip."""
-    tall, side, low, high = _tangents(framing)
-    r, u, f = axes @ points.T
-    wedges = [
-        (float((x - f * t).max()), float((x + f * s).min()), s, t)
-        for x, s, t in ((r, side, side), (u, low, high))
-    ]
-    c = min((right - left) / (s + t) for left, right, s, t in wedges)
-    a, b = ((left + c * t + right - c * s) / 2 for left, right, s, t in wedges)
-    middle, depth = float(f.min() + f.max()) / 2, float(f.max() - f.min()) / 2
-    position = axes.T @ np.array([a, b, c])
-    return View(position, axes, tall * framing.aspect, tall, middle - c, depth)
-
-
-def _tangents(framing: Framing) -> tuple[float, float, float, float]:
-    """Tangents of half the angle of view upwards, and of what may be used of it beside, below and
-    above."""
-    tall = tan(radians(FIELD / 2)) / min(1.0, framing.aspect)
-    side = tall * (framing.aspect - 2 * framing.beside)
-    return tall, side, tall * (1 - 2 * framing.below), tall * (1 - 2 * framing.above)
-
-
 def overview(points: Array, framing: Framing) -> View:
     """From the south, aslant, or from where the points are larger on average by a twentieth; the
     narrower the picture, the higher up."""
@@ -171,7 +80,7 @@ def orbit(points: Array, framing: Framing) -> Callable[[float], View]:
     elevation = 36.0 if framing.aspect >= 1 else 50.0
     azimuths = np.arange(0.0, 360.0, 3.0)
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
-    about, tall = points - middle, _tangents(framing)[0]
+    about, tall = points - middle, tangents(framing)[0]
     best = [fit(about, towards(a, elevation), framing) for a in azimuths]
     aside = _calm(np.array([(v.axes @ v.position)[:2] for v in best]))
     needed = [_away(about, v.axes, at, framing) for v, at in zip(best, aside, strict=True)]
@@ -193,7 +102,7 @@ def orbit(points: Array, framing: Framing) -> Callable[[float], View]:
 def _away(points: Array, axes: Array, at: Array, framing: Framing) -> float:
     """How far a camera has to go back along `axes` from the plane through the origin, `at` (2,) to
     the right and up in it, to have all points in the frame."""
-    _, side, low, high = _tangents(framing)
+    _, side, low, high = tangents(framing)
     r, u, f = axes @ points.T - np.array([[at[0]], [at[1]], [0.0]])
     return float((np.maximum(np.abs(r) / side, np.maximum(u / high, -u / low)) - f).max())
 

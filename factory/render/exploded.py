@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from factory.geometry.meshes import Array
+from factory.geometry.sight import Framing, View, fit, towards
 from factory.geometry.solids import Product
 from factory.mjcf.loose_parts import loose_parts
 from factory.mjcf.replica import Replica
 from factory.planning.exploding import Explosion
 from factory.planning.source.placing import surface
-from factory.render.camera import Framing, View, fit, towards
 from factory.render.ink import Pixels
 from factory.render.painter import Renderer
 from factory.render.picture import Size

@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
+from factory.geometry.sight import Array, View
 from factory.mjcf import names
 from factory.mjcf.replica import Replica, paint, shown
-from factory.render.camera import Array, View
 from factory.render.subject import placed
 
 FAINT = 0.16

@@ -52,10 +52,10 @@ class _Observer(Recorder):
 class Film(_Observer):
     """Films a run: a frame whenever simulated time reaches the next, from the run itself.
 
-    Frame k is at k / fps seconds, so T seconds have ⌊T fps⌋ + 1 frames. Closed after an
-    interruption too, the file holds what happened until then. `poster`: a still (PNG) of the moment
-    that shows most. Raises InputError for a size, rate, ending or camera that will not do,
-    MissingError where there is no GL."""
+    Frame k is at k / fps seconds, so T seconds have ⌊T fps⌋ + 1 frames, and those of the last
+    moment (`reel.HOLD`). Closed after an interruption too, the file holds what happened until then.
+    `poster`: a still (PNG) of the moment that shows most. Raises InputError for a size, rate,
+    ending or camera that will not do, MissingError where there is no GL."""
 
     def __init__(
         self,

@@ -11,23 +11,12 @@ from collections.abc import Callable
 
 import numpy as np
 
+from factory.geometry.sight import Array, Framing, View, fit, towards
 from factory.mjcf import names
 from factory.mjcf.replica import Replica
 from factory.record.monitor.subject import MonitorSubject
 from factory.render.action import action_of
-from factory.render.camera import (
-    HANDOVER,
-    PART,
-    Array,
-    Camera,
-    Framing,
-    View,
-    fit,
-    from_above,
-    orbit,
-    overview,
-    towards,
-)
+from factory.render.camera import HANDOVER, PART, Camera, from_above, orbit, overview
 from factory.render.junction import handover_view
 from factory.render.subject import SIGNS, Snapshot, corners
 from factory.support.engine import mujoco

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from factory.geometry.meshes import Array, Indices
+from factory.geometry.sight import Framing, View, fit, towards
 from factory.mjcf.loose_parts import loose_parts
 from factory.mjcf.replica import Replica
 from factory.planning.cannot import Interlock
 from factory.planning.parts import InPlace
-from factory.render.camera import Framing, View, fit, towards
 from factory.render.colours import EDGE, FAINT, GROUND, INK
 from factory.render.ink import Colour, Ink, Pixels, fitted, width
 from factory.render.painter import Renderer

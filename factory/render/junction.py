@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from factory.geometry.sight import Array, Framing, View, fit, towards
 from factory.mjcf import names
 from factory.mjcf.pads import Pads
 from factory.mjcf.replica import Replica
@@ -19,7 +20,6 @@ from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
 from factory.record.monitor.subject import MonitorSubject
 from factory.render.action import box_of, shape_of
-from factory.render.camera import Array, Framing, View, fit, towards
 from factory.render.subject import placed
 
 ROOM = 1.3

@@ -6,10 +6,11 @@ from functools import cache
 
 import numpy as np
 
+from factory.geometry.sight import Array, Framing, View
 from factory.mjcf import names
 from factory.mjcf.replica import SHOWN, Replica
 from factory.record.monitor.subject import MonitorSubject
-from factory.render.camera import Array, Camera, Framing, View
+from factory.render.camera import Camera
 from factory.render.fading import Fading
 from factory.render.following import Viewpoint
 from factory.render.ink import Pixels

@@ -17,9 +17,13 @@ SAMPLES = 24
 """Pictures that a still is the mean of."""
 
 
+HOLD = 1.0
+"""How long a film shows its last moment [s]."""
+
+
 class Reel(Closing):
-    """Frames of a growing row of moments, at even times, into a video file; with a still of the
-    best of them where there is to be a `poster`."""
+    """Frames of a growing row of moments, at even times, into a video file, and of the last one for
+    HOLD; with a still of the best of them where there is to be a `poster`."""
 
     def __init__(self, take: Take, path: Path, fps: float, poster: Path | None = None) -> None:
         check_output(path, take.picture.size, fps)
@@ -58,9 +62,17 @@ class Reel(Closing):
     def give_up(self) -> None:
         """Finish the file and give the GL back."""
         try:
-            self.file.close()
+            with self.file:
+                self._hold()
         finally:
             self.work.close()
+
+    def _hold(self) -> None:
+        """Write the frames of the last moment, in which the last unit is out."""
+        if self.last is not None:
+            pixels, self.last = self.work.picture(self.last, 1 / self.fps), None
+            for _ in range(round(HOLD * self.fps)):
+                self.file.write(pixels)
 
 
 class Poster:

@@ -8,9 +8,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from factory.geometry.sight import Array
 from factory.mjcf import names
 from factory.mjcf.replica import mesh_of
-from factory.render.camera import Array
 from factory.support.engine import mujoco
 
 SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))

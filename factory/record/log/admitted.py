@@ -32,7 +32,7 @@ ELEMENTS: Mapping[str, str] = {
     "global": "offwidth offheight fovy azimuth elevation orthographic cameraid",
     "default": "class",
     "texture": "name type builtin mark rgb1 rgb2 markrgb width height",
-    "mesh": "name class file inertia scale",
+    "mesh": "name class file inertia scale vertex face",
     **dict.fromkeys(("visual", "asset", "worldbody", "contact", "actuator", "keyframe"), ""),
     **dict.fromkeys(("flag", "headlight", "map", "statistic", "material", "body", "inertial"), ANY),
     **dict.fromkeys(("joint", "freejoint", "geom", "site", "camera", "light"), ANY),
