@@ -171,6 +171,21 @@ def test_each_hand_over_is_seen_from_near_by(log, take, framing) -> None:
         assert np.abs(at).max() < 1.0
         assert np.ptp(at, axis=0).max() > 0.7, node.label
         assert len(viewpoint.watched) > 1, "no pad is seen"
+        share = shown_share(replica, _geoms_of(m, factory, node.label), view.position)
+        assert share > 0.3, f"{node.label}: {share:.2f} is seen"
+
+
+def shown_share(replica: Replica, geoms: list[int], eye: np.ndarray) -> float:
+    """The share of rays from a camera to geoms that meet these first, or a post, which fades."""
+    m, d, found = replica.m, replica.d, []
+    for geom in geoms:
+        box = placed(m, d, geom)
+        for weights in np.random.default_rng(0).dirichlet(np.ones(8), 40):
+            ray, hit = weights @ box - eye, np.zeros(1, np.int32)
+            mujoco.mj_ray(m, d, eye, ray, None, 1, -1, hit, None)
+            name = m.geom(int(hit[0])).name if hit[0] >= 0 else ""
+            found.append(hit[0] in geoms or name.endswith(("/post", "/boom")))
+    return float(np.mean(found))
 
 
 def _geoms_of(m: mujoco.MjModel, factory, label: str) -> list[int]:

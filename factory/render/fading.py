@@ -56,7 +56,7 @@ class Fading:
     def hidden(self, view: View, watched: Array) -> Array:
         """For each group of geoms the greatest share of a watched box that it hides in a view."""
         watched = watched + ROUND * np.sign(watched - watched.mean(axis=1, keepdims=True))
-        (front, before), (back, behind) = _outlines(view, self.boxes), _outlines(view, watched)
+        (front, before), (back, behind) = outlines(view, self.boxes), outlines(view, watched)
         one, other = shapely.STRtree(back).query(front, predicate="intersects")
         shared = shapely.area(shapely.intersection(front[one], back[other]))
         shared /= np.maximum(shapely.area(back[other]), 1e-12)
@@ -71,7 +71,7 @@ class Fading:
         return found
 
 
-def _outlines(view: View, boxes: Array) -> tuple[Array, Array]:
+def outlines(view: View, boxes: Array) -> tuple[Array, Array]:
     """The outlines (n,) of boxes (n, 8, 3) in a view, as polygons, and how far ahead (n, 8) their
     corners are."""
     seen = (boxes - view.position) @ view.axes.T

@@ -10,16 +10,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import shapely
 
 from factory.geometry.sight import Array, Framing, View, fit, towards
 from factory.mjcf import names
 from factory.mjcf.pads import Pads
-from factory.mjcf.replica import Replica
+from factory.mjcf.replica import Replica, shown
 from factory.mjcf.weld_frames import held_at
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
 from factory.record.monitor.subject import MonitorSubject
 from factory.render.action import box_of, shape_of
+from factory.render.fading import STANDS, outlines
 from factory.render.subject import placed
 
 ROOM = 1.3
@@ -33,6 +35,10 @@ AZIMUTH, STEP = -62.0, 15.0
 are tried [degrees]."""
 
 
+TOUCH = 1e-4
+"""What reaches this far into each other touches [m]."""
+
+
 def handover_view(
     replica: Replica, subject: MonitorSubject, label: str, framing: Framing
 ) -> tuple[Array, View]:
@@ -44,11 +50,18 @@ def handover_view(
     _gather(replica, subject, taking)
     load = _load(replica, subject, made)
     hands, arms = _hands(replica, subject, taking)
+    stands, others = _stands(replica), _others(replica, subject, taking, made)
     replica.place(before)
     middle = load.mean(axis=0)
     reach = [hand + np.append(arm / 2, 0.0) for hand, arm in zip(hands, arms, strict=True)]
     points = np.concatenate([middle + ROOM * (load - middle), *hands, *reach])
-    return np.array([load, *hands]), fit(points, towards(_azimuth(arms), ELEVATION), framing)
+    watched = np.array([load, *hands])
+    tried = np.arange(AZIMUTH - 180.0, AZIMUTH + 180.0, STEP)
+    views = [fit(points, towards(azimuth, ELEVATION), framing) for azimuth in tried]
+    hidden = [_hidden(view, np.concatenate([stands, others]), load) for view in views]
+    covered = [_covered(view, stands, middle) for view in views]
+    seen = _along(tried, arms) - hidden - covered
+    return watched, views[int(np.argmax(seen))]
 
 
 def _gather(replica: Replica, subject: MonitorSubject, operation: Operation) -> None:
@@ -87,14 +100,61 @@ def _hands(
     return corners, arms
 
 
-def _azimuth(arms: Sequence[Array]) -> float:
-    """The direction [degrees] in which no arm points to the camera or away from it; rather away,
-    and rather from where an overview looks."""
-    tried = np.arange(AZIMUTH - 180.0, AZIMUTH + 180.0, STEP)
+def _along(tried: Array, arms: Sequence[Array]) -> Array:
+    """How well arms are seen from directions [degrees], at most about 1: they should point neither
+    to the camera nor away from it; rather away, and rather as an overview looks."""
     angles = np.radians(tried)
     towards_it = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     arms = [arm / max(float(np.linalg.norm(arm)), 1e-9) for arm in arms]
     along = np.stack([towards_it @ arm for arm in arms] or [np.zeros(len(tried))])
     seen = (np.sqrt(1 - np.minimum(along**2, 1.0)) - 0.2 * np.maximum(along, 0.0)).min(axis=0)
-    usual = np.cos(angles - np.radians(AZIMUTH))
-    return float(tried[np.argmax(seen + 0.05 * usual)])
+    return np.asarray(seen + 0.05 * np.cos(angles - np.radians(AZIMUTH)))
+
+
+def _stands(replica: Replica) -> Array:
+    """The boxes (n, 8, 3) round what stands still and does not fade: housings and the shed."""
+    m, d = replica.m, replica.d
+    bodies = [b for b in range(1, m.nbody) if names.kind(m.body(b).name) in ("feeder", "outfeed")]
+    geoms = (g for b in bodies if m.body_weldid[b] == 0 for g in shown(m, b))
+    found = [placed(m, d, g) for g in geoms if not m.geom(g).name.endswith(STANDS)]
+    return np.array(found).reshape(-1, 8, 3)
+
+
+def _others(
+    replica: Replica, subject: MonitorSubject, operation: Operation, made: Operation
+) -> Array:
+    """The boxes (n, 8, 3) round what else is brought to an operation, and the limbs of its
+    robots."""
+    m, d, factory = replica.m, replica.d, subject.factory
+    loads = [
+        _load(replica, subject, factory.by_label[label])
+        for label in operation.before
+        if label in factory.by_label and label != made.label
+    ]
+    feet = {m.body(names.carriage(factory.robots[r].name)).id for r in operation.robots}
+    bodies = (b for b in range(m.nbody) if m.body_rootid[b] in feet)
+    limbs = [placed(m, d, g) for b in bodies for g in shown(m, b) if m.geom_contype[g]]
+    return np.array([*loads, *limbs]).reshape(-1, 8, 3)
+
+
+def _hidden(view: View, boxes: Array, load: Array) -> float:
+    """The share of a box (8, 3) that others (n, 8, 3) hide in a view. All lie along the axes: one
+    hides nothing of what it is apart from along an axis, where the camera is on the far side."""
+    low, high = boxes.min(axis=1), boxes.max(axis=1)
+    below, above = high <= load.min(axis=0) + TOUCH, low >= load.max(axis=0) - TOUCH
+    behind = (below & (view.position >= high)) | (above & (view.position <= low))
+    front = boxes[~behind.any(axis=1)]
+    return _share(view, front, outlines(view, load[None])[0][0])
+
+
+def _covered(view: View, stands: Array, middle: Array) -> float:
+    """The share of a picture that boxes (n, 8, 3) take which are nearer than what is looked at."""
+    ahead = (stands.mean(axis=1) - middle) @ view.axes[2]
+    frame = shapely.box(-view.wide, -view.tall, view.wide, view.tall)
+    return _share(view, stands[ahead < 0], frame)
+
+
+def _share(view: View, boxes: Array, of: shapely.Geometry) -> float:
+    """The share of an outline that boxes (n, 8, 3) are before."""
+    taken = shapely.intersection(shapely.union_all(outlines(view, boxes)[0]), of)
+    return float(shapely.area(taken) / max(float(shapely.area(of)), 1e-12))
