@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 import socket
 import sys
@@ -103,6 +104,10 @@ def moved(share: float) -> float:
         simulation.supervisor.step()
         found.append(float(world.d.qpos[slide]) - start)
     assert abs(found[-1]) < 1e-4 < 5e-4 < abs(max(found, key=abs)), "it gives way and comes back"
+    push = interventions.pushed
+    assert push is not None and push.robot == 0
+    assert push.force == share * world.m.actuator_forcerange[world.motion.axes.actuator[0], 1]
+    assert push.gave == pytest.approx(abs(max(found, key=abs)), rel=0.1)
     return max(found, key=abs)
 
 
@@ -358,6 +363,23 @@ def test_robots_are_drawn_in_one_piece() -> None:
             corners = [tuple(map(float, p.split(","))) for p in shape.get("points", "").split()]
             assert len(corners) >= 4
             assert max(np.hypot(x, y) for x, y in corners) <= 1e3 * path.reach + 31
+
+
+def test_a_push_answers() -> None:
+    """Which robot, with what force, how far it gave way; while the factory stands, that it will."""
+    running = Running()
+    try:
+        running.session.send(Command("pause"))
+        running.until(lambda f: not f.playing)
+        running.session.send(Command("push", robot=2, share=-1.0))
+        running.until(lambda f: "r3 is pushed back with" in f.pushed)
+        running.session.send(Command("play"))
+        running.until(lambda f: re.fullmatch(ANSWER, f.pushed) is not None)
+    finally:
+        running.close()
+
+
+ANSWER = r"r3 was pushed back with \d+ N and gave way by [1-9]\d*\.\d mm"
 
 
 # --- the command -------------------------------------------------------------------------------

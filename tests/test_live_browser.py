@@ -127,6 +127,23 @@ def test_buttons_step_slow_push_and_block(watched: Watched) -> None:
     assert watched.trouble == []
 
 
+def test_a_page_whose_server_is_gone_says_how_to_start_it(watched: Watched) -> None:
+    watched.until("f.count > 2")
+    assert watched.page.locator("#acts button:enabled").count() == 0
+    watched.page.locator("#gantt button[data-robot='1']").click()
+    assert watched.page.locator("#acts button:enabled").count() > 3
+    assert watched.page.locator("#gone").is_hidden()
+    watched.press("◂◂ back")
+    watched.seen(
+        "a => a.textContent.startsWith('r2 was pushed back')", "document.getElementById('answer')"
+    )
+    watched.server.close()
+    watched.seen("gone => !gone.hidden", "document.getElementById('gone')")
+    assert "factory view FILE.pag" in (watched.page.locator("#gone").text_content() or "")
+    assert watched.page.locator("#acts button:enabled, #run button:enabled").count() == 0
+    assert watched.page.locator("#speed").is_disabled()
+
+
 def assert_marked(watched: Watched, state: str, *marks: str) -> None:
     """Exactly these are marked: names in the chart, robots in the plan, tags over the 3-D view."""
     places = ("#gantt button", ".floor [data-body]", "#tags ")

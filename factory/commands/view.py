@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -65,10 +66,11 @@ def view(
     request = replace(endless, recovers=fails)
     campaign = asked.campaign(layout.factory) if fails else None
     session = Session(lambda: Simulation(layout, request), not paused, campaign)
-    with Interruption() as stop, Server(session, page(session), host, port, expose) as server:
+    shown = page(session, shlex.join(["factory", *sys.argv[1:]]))
+    with Interruption() as stop, Server(session, shown, host, port, expose) as server:
         if out.as_json:
-            shown = {"address": server.address, "host": host, "port": server.port}
-            emit({**shown, "warnings": warnings})
+            where = {"address": server.address, "host": host, "port": server.port}
+            emit({**where, "warnings": warnings})
         else:
             _tell(server, host, expose)
         sys.stdout.flush()

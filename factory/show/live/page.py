@@ -36,8 +36,8 @@ SCRIPTS = (
 """In the order in which they run."""
 
 
-def page(session: Session) -> bytes:
-    """The page, for as long as the session lasts."""
+def page(session: Session, command: str = "factory view FILE.pag") -> bytes:
+    """The page, for as long as the session lasts; it says what `command` begins another."""
     stage, pack = stage_of(session.simulation), Pack()
     factory = stage.factory
     labels, name = labels_of(factory), factory.pag.root
@@ -72,6 +72,7 @@ def page(session: Session) -> bytes:
             for s in SPEEDS
         ),
         "options": options(document),
+        "command": escape(command),
     }
     styles = ("report/report.css", "report/failures.css", "live/live.css")
     text = filled("live/live.html", fields, document, pack.text(), SCRIPTS, styles, "'self'")

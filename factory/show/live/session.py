@@ -36,7 +36,7 @@ LOOK = 0.05
 
 
 SAID = 6.0
-"""How long a failure is told [s]."""
+"""How long a failure, and what a push did, is told [s]."""
 
 Told = tuple[float, int | list[int] | str]
 """When [s], and which transition fired, or which were undone, or what failed, in words."""
@@ -48,7 +48,8 @@ class LiveFrame:
     restarts; `poses`: positions [m] and quaternions (bodies, 7) as float32; `marked` places;
     `count`: how often something has fired, or was undone; `failed`: how often something has failed;
     `rhythm`: between the last two products [s]; `pace`: simulated seconds in a second; `outages`:
-    what is out of order; `note`: what has just gone wrong, if anything."""
+    what is out of order; `note`: what has just gone wrong, if anything; `pushed`: what the last
+    push did."""
 
     number: int
     run: int
@@ -66,6 +67,7 @@ class LiveFrame:
     blocked: tuple[str, ...]
     outages: Outages
     note: str
+    pushed: str
 
 
 class WallClock:
@@ -289,6 +291,7 @@ class Session:
             tuple(sorted(self.interventions.blocked)),
             outages,
             self._trouble or self._failed() or ("" if outages.told else self._waits()),
+            self._pushed(),
         )
         with self._changed:
             self.frame = frame
@@ -308,6 +311,18 @@ class Session:
         """What has failed lately, and when, the latest last."""
         late = self.simulation.world.time - SAID
         return "; ".join(f"{one.t:.2f} s: {one}" for one in self._found[-3:] if one.t > late)
+
+    def _pushed(self) -> str:
+        """Which robot was pushed lately, with what force, and how far it gave way."""
+        push = self.interventions.pushed
+        if push is None or self.simulation.world.time > push.end + SAID:
+            return ""
+        name = self.simulation.layout.factory.robots[push.robot].name
+        way = "ahead" if push.force > 0 else "back"
+        pushed = f"pushed {way} with {abs(push.force):.0f} N"
+        if not self._goes:
+            return f"{name} is {pushed} as soon as the factory goes on"
+        return f"{name} was {pushed} and gave way by {1000 * push.gave:.1f} mm"
 
     def _waits(self) -> str:
         """Which robots wait for what, where nothing has fired for a long time."""

@@ -4,6 +4,7 @@ goes on after failures, faults of every kind strike."""
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
@@ -18,12 +19,25 @@ from factory.simulation.simulation import Simulation
 from factory.support.errors import Diagnostic, InputError
 
 
+@dataclass(slots=True)
+class Pushed:
+    """A push of a robot (index) with a `force` [N] ahead, negative backwards, until a time `end`
+    [s]; `gave`: how far at most the robot has been off its setpoint for it [m], by what it was off
+    `before`."""
+
+    robot: int
+    force: float
+    end: float
+    before: float
+    gave: float = 0.0
+
+
 class Interventions:
     """Into a simulation in MuJoCo.
 
     A robot is pushed along its guidepath. One that is slowed down knows its new limits; no other
     robot does. A feeder that is blocked gives no part. With a `campaign` the simulation goes on
-    after failures, and more of them can be made.
+    after failures, and more of them can be made. `pushed`: the last push.
     """
 
     def __init__(self, simulation: Simulation, campaign: Campaign | None = None) -> None:
@@ -36,7 +50,8 @@ class Interventions:
         self._limits = simulation.limits
         self._slowed: dict[int, float] = {}
         self._blocked: set[str] = set()
-        self._pushed: dict[int, float] = {}
+        self._pushed: dict[int, Pushed] = {}
+        self.pushed: Pushed | None = None
         self._world.hooks.gates.append(self._admits)
 
     @property
@@ -55,11 +70,13 @@ class Interventions:
         layout = self.simulation.layout
         body = int(self._world.m.body(names.carriage(layout.factory.robots[robot].name)).id)
         heading = np.array([*layout.guidepaths[robot].heading, 0.0])
-        force = share * self._interference.greatest_force(robot) * heading
-        self._interference.push(body, force)
+        newtons = share * self._interference.greatest_force(robot)
+        self._interference.push(body, newtons * heading)
         if not self._pushed:
             self._world.hooks.before_step.append(self._let_go)
-        self._pushed[body] = self._world.time + seconds
+        end, off = self._world.time + seconds, self._interference.off(robot)
+        pushed = self._pushed.setdefault(body, Pushed(robot, newtons, end, off))
+        pushed.force, pushed.end, self.pushed = newtons, end, pushed
 
     def slow(self, robot: int, factor: float) -> None:
         """Let a robot go at `factor` times its speed from now on; 1 gives it back."""
@@ -97,9 +114,12 @@ class Interventions:
         self.recovery.strike(WorldFault(kind, label, name, at=now, seconds=seconds))
 
     def _let_go(self) -> None:
-        """Before a timestep: end the pushes whose time is over."""
+        """Before a timestep: see how far robots give way, and end the pushes whose time is over."""
         now = self._world.time
-        for body in [body for body, end in self._pushed.items() if now >= end]:
+        for pushed in self._pushed.values():
+            off = self._interference.off(pushed.robot) - pushed.before
+            pushed.gave = max(pushed.gave, abs(off))
+        for body in [body for body, pushed in self._pushed.items() if now >= pushed.end]:
             self._interference.push(body, None)
             del self._pushed[body]
         if not self._pushed:

@@ -76,6 +76,11 @@ class Interference:
         self._d.xfrc_applied[body, :3] = 0.0 if force is None else force
         self._world.motion.sleep.wake([body])
 
+    def off(self, axis: int) -> float:
+        """How far an axis is from its setpoint [m]."""
+        setpoint = self._d.ctrl.reshape(-1, INPUTS)[self._actuator[axis], 0]
+        return float(self._d.qpos[self._qpos[axis]] - setpoint)
+
     def greatest_force(self, axis: int) -> float:
         """Of an axis's drive [N]."""
         return float(self._m.actuator_forcerange[self._actuator[axis], 1])

@@ -56,12 +56,14 @@ function unpackedFrame(buffer) {
 // What can be done to what is selected.
 class Acts {
   constructor(panel, selection, send) {
-    Object.assign(this, { panel, selection, send, slowed: {}, blocked: [] });
+    Object.assign(this, { panel, selection, send, slowed: {}, blocked: [], answer: document.getElementById('answer') });
     selection.listeners.push(() => this.draw());
     this.draw();
   }
 
-  take({ slowed, blocked }) {
+  take({ slowed, blocked, pushed }) {
+    this.answer.textContent = pushed;
+    this.answer.hidden = !pushed;
     const same = JSON.stringify([slowed, blocked]) === JSON.stringify([this.slowed, this.blocked]);
     if (same) return;
     Object.assign(this, { slowed, blocked });
@@ -235,6 +237,8 @@ class Live {
     const shown = document.getElementById('socket');
     shown.textContent = words;
     shown.className = `value ${good ? 'good' : 'bad'}`;
+    document.getElementById('gone').hidden = good;
+    document.querySelectorAll('#acts, #run').forEach((group) => { group.disabled = !good; });
   }
 
   send(command) {
