@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import product
+from types import MappingProxyType
+from typing import Any
 
 Vector = tuple[float, float, float]
+Box = tuple[Vector, Vector]
 
 FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
 """The corners of each face of a box, as (0, 0, 0), (0, 0, 1), ..., (1, 1, 1), seen from outside."""
@@ -14,6 +17,7 @@ FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (
 class _Writer:
     def __init__(self) -> None:
         self.lines: list[str] = []
+        self.styled: list[str] = []
 
     def add(self, text: str) -> str:
         self.lines.append(f"#{len(self.lines) + 1}={text};")
@@ -29,13 +33,45 @@ class _Writer:
         ends = ",".join((self.point(at), self.direction(z), self.direction(x)))
         return self.add(f"AXIS2_PLACEMENT_3D('',{ends})")
 
+    def frame(self, at: Vector = (0, 0, 0)) -> str:
+        return self.axes(at, (0, 0, 1), (1, 0, 0))
 
-def step_of(boxes: Mapping[str, tuple[Vector, Vector]]) -> str:
-    """The text of a file of boxes by name, each from its low to its high corner [mm]."""
+    def paint(self, item: str, colour: Vector) -> None:
+        light = self.add(f"COLOUR_RGB('',{','.join(f'{x:.3f}' for x in colour)})")
+        fill = self.add(f"FILL_AREA_STYLE_COLOUR('',{light})")
+        filled = self.add(f"FILL_AREA_STYLE('',({fill}))")
+        area = self.add(f"SURFACE_STYLE_FILL_AREA({filled})")
+        side = self.add(f"SURFACE_SIDE_STYLE('',({area}))")
+        usage = self.add(f"SURFACE_STYLE_USAGE(.BOTH.,{side})")
+        style = self.add(f"PRESENTATION_STYLE_ASSIGNMENT(({usage}))")
+        self.styled.append(self.add(f"STYLED_ITEM('',({style}),{item})"))
+
+
+INCH = (
+    "(CONVERSION_BASED_UNIT('INCH',{})LENGTH_UNIT()NAMED_UNIT({}))",
+    "DIMENSIONAL_EXPONENTS(1.,0.,0.,0.,0.,0.,0.)",
+    "LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(25.4),{})",
+)
+"""A unit by its conversion: itself, its exponents and its measure."""
+
+
+def step_of(
+    boxes: Mapping[str, Box | Sequence[Box]],
+    inches: bool = False,
+    colours: Mapping[str, Mapping[int, Vector]] = MappingProxyType({}),
+    places: Mapping[str, Sequence[Vector]] = MappingProxyType({}),
+) -> str:
+    """The text of a file of boxes by name, each from its low to its high corner [mm], or [in]; of
+    several boxes one component is made. `colours`: those of some faces of a component's first box,
+    by number, -1 for that of the box, -2 for that of the second. `places`: where the components of
+    an assembly are."""
     w = _Writer()
     app = w.add("APPLICATION_CONTEXT('automotive design')")
     w.add(f"APPLICATION_PROTOCOL_DEFINITION('','automotive_design',2000,{app})")
     length = w.add("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))")
+    if inches:
+        measure = w.add(INCH[2].format(length))
+        length = w.add(INCH[0].format(measure, w.add(INCH[1])))
     angle = w.add("(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.))")
     solid = w.add("(NAMED_UNIT(*)SI_UNIT($,.STERADIAN.)SOLID_ANGLE_UNIT())")
     fine = w.add(f"UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE(1.E-6),{length},'','')")
@@ -43,16 +79,24 @@ def step_of(boxes: Mapping[str, tuple[Vector, Vector]]) -> str:
         f"(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT(({fine}))"
         f"GLOBAL_UNIT_ASSIGNED_CONTEXT(({length},{angle},{solid}))REPRESENTATION_CONTEXT('',''))"
     )
-    for name, (low, high) in boxes.items():
-        body, frame = _brep(w, name, low, high), w.axes((0, 0, 0), (0, 0, 1), (1, 0, 0))
-        shape = w.add(f"ADVANCED_BREP_SHAPE_REPRESENTATION('',({frame},{body}),{context})")
-        where = w.add(f"PRODUCT_CONTEXT('',{app},'mechanical')")
-        made = w.add(f"PRODUCT('{name}','{name}','',({where}))")
-        form = w.add(f"PRODUCT_DEFINITION_FORMATION('','',{made})")
-        view = w.add(f"PRODUCT_DEFINITION_CONTEXT('part definition',{app},'design')")
-        definition = w.add(f"PRODUCT_DEFINITION('design','',{form},{view})")
-        given = w.add(f"PRODUCT_DEFINITION_SHAPE('','',{definition})")
-        w.add(f"SHAPE_DEFINITION_REPRESENTATION({given},{shape})")
+    made = {}
+    for name, given in boxes.items():
+        several: Sequence[Any] = [given] if isinstance(given[0][0], float | int) else given
+        bodies, frame = [], w.frame()
+        for low, high in several:
+            body, faces = _brep(w, name, low, high)
+            bodies.append(body)
+            for number, colour in colours.get(name, {}).items():
+                if -number == len(bodies) or (number >= 0 and len(bodies) == 1):
+                    w.paint(body if number < 0 else faces[number], colour)
+        items = ",".join([frame, *bodies])
+        shape = w.add(f"ADVANCED_BREP_SHAPE_REPRESENTATION('',({items}),{context})")
+        made[name] = shape, frame, _product(w, app, name, shape)
+    if places:
+        _assembly(w, app, context, made, places)
+    if w.styled:
+        styled = ",".join(w.styled)
+        w.add(f"MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION('',({styled}),{context})")
     head = (
         "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\n"
         "FILE_NAME('boxes','2026-01-01T00:00:00',(''),(''),'','','');\n"
@@ -61,8 +105,48 @@ def step_of(boxes: Mapping[str, tuple[Vector, Vector]]) -> str:
     return head + "\n".join(w.lines) + "\nENDSEC;\nEND-ISO-10303-21;\n"
 
 
-def _brep(w: _Writer, name: str, low: Vector, high: Vector) -> str:
-    corners: list[Vector] = list(product(*zip(low, high, strict=True)))
+def _product(w: _Writer, app: str, name: str, shape: str) -> str:
+    """A product with a shape; gives its definition."""
+    where = w.add(f"PRODUCT_CONTEXT('',{app},'mechanical')")
+    made = w.add(f"PRODUCT('{name}','{name}','',({where}))")
+    form = w.add(f"PRODUCT_DEFINITION_FORMATION('','',{made})")
+    view = w.add(f"PRODUCT_DEFINITION_CONTEXT('part definition',{app},'design')")
+    definition = w.add(f"PRODUCT_DEFINITION('design','',{form},{view})")
+    given = w.add(f"PRODUCT_DEFINITION_SHAPE('','',{definition})")
+    w.add(f"SHAPE_DEFINITION_REPRESENTATION({given},{shape})")
+    return definition
+
+
+def _assembly(
+    w: _Writer,
+    app: str,
+    context: str,
+    made: Mapping[str, tuple[str, str, str]],
+    places: Mapping[str, Sequence[Vector]],
+) -> None:
+    """A product of components at places."""
+    frames = {(name, at): w.frame(at) for name, every in places.items() for at in every}
+    items = ",".join([w.frame(), *frames.values()])
+    whole = w.add(f"SHAPE_REPRESENTATION('',({items}),{context})")
+    top = _product(w, app, "all", whole)
+    for number, ((name, _), frame) in enumerate(frames.items()):
+        shape, origin, definition = made[name]
+        used = w.add(
+            f"NEXT_ASSEMBLY_USAGE_OCCURRENCE('{number}','','',{top},{definition},'{number}')"
+        )
+        given = w.add(f"PRODUCT_DEFINITION_SHAPE('','',{used})")
+        moved = w.add(f"ITEM_DEFINED_TRANSFORMATION('','',{origin},{frame})")
+        related = w.add(
+            f"(REPRESENTATION_RELATIONSHIP('','',{shape},{whole})"
+            f"REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION({moved})"
+            "SHAPE_REPRESENTATION_RELATIONSHIP())"
+        )
+        w.add(f"CONTEXT_DEPENDENT_SHAPE_REPRESENTATION({related},{given})")
+
+
+def _brep(w: _Writer, name: str, low: Vector, high: Vector) -> tuple[str, list[str]]:
+    """A box, and its faces."""
+    corners: list[Any] = list(product(*zip(low, high, strict=True)))
     vertices = [w.add(f"VERTEX_POINT('',{w.point(corner)})") for corner in corners]
     edges: dict[tuple[int, int], str] = {}
     faces = []
@@ -82,7 +166,7 @@ def _brep(w: _Writer, name: str, low: Vector, high: Vector) -> str:
         plane = w.add(f"PLANE('',{w.axes(a, normal, along)})")
         faces.append(w.add(f"ADVANCED_FACE('',({bound}),{plane},.T.)"))
     shell = w.add(f"CLOSED_SHELL('',({','.join(faces)}))")
-    return w.add(f"MANIFOLD_SOLID_BREP('{name}',{shell})")
+    return w.add(f"MANIFOLD_SOLID_BREP('{name}',{shell})"), faces
 
 
 def _edge(w: _Writer, corners: list[Vector], vertices: list[str], key: tuple[int, int]) -> str:

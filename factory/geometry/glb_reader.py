@@ -41,26 +41,28 @@ Object = dict[str, Any]
 Matrix = NDArray[np.float64]
 
 
+Colour = tuple[float, ...] | None
+Triangles = tuple[Array, Indices]
+"""Vertices (n, 3) and faces (m, 3)."""
+
+
 @dataclass(frozen=True, slots=True)
 class GlbBody:
-    """A mesh at a node: the names of both, "" for none; vertices (n, 3) where they stand, in the
-    file's unit; faces (m, 3); the colour, as it is written, of most of its surface, None for
-    none."""
+    """A mesh at a node: the names of both, "" for none; its primitives where they stand, in the
+    file's unit, and the colour of each as it is written, None for none."""
 
     names: tuple[str, str]
-    vertices: Array = field(repr=False)
-    faces: Indices = field(repr=False)
-    colour: tuple[float, ...] | None = None
+    bodies: tuple[Triangles, ...] = field(repr=False)
+    colours: tuple[Colour, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class _Shape:
-    """A mesh of the file in its own frame."""
+    """A mesh of the file in its own frame: primitives that have triangles, and their colours."""
 
     name: str
-    vertices: Array
-    faces: Indices
-    colour: tuple[float, ...] | None
+    bodies: tuple[Triangles, ...]
+    colours: tuple[Colour, ...]
 
 
 @np.errstate(all="ignore")
@@ -71,15 +73,19 @@ def read_glb(content: bytes) -> list[GlbBody]:
     found, total = [], 0
     for node, matrix in glb.nodes():
         shape = glb.shape(node["mesh"])
-        if not len(shape.faces):
-            continue
-        total += len(shape.faces)
+        total += sum(len(faces) for _, faces in shape.bodies)
         if total > MOST:
             raise _broken(f"its nodes have more than {MOST} triangles together")
-        vertices = shape.vertices @ matrix[:3, :3].T + matrix[:3, 3]
-        faces = shape.faces[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else shape.faces
-        found.append(GlbBody((_name(node), shape.name), vertices, faces, shape.colour))
+        if shape.bodies:
+            placed = tuple(moved_by(matrix, *body) for body in shape.bodies)
+            found.append(GlbBody((_name(node), shape.name), placed, shape.colours))
     return found
+
+
+def moved_by(matrix: Matrix, vertices: Array, faces: Indices) -> Triangles:
+    """Triangles after an affine map (4, 4), turned outwards still if it mirrors them."""
+    flips = bool(np.linalg.det(matrix[:3, :3]) < 0)
+    return vertices @ matrix[:3, :3].T + matrix[:3, 3], faces[:, ::-1] if flips else faces
 
 
 def _chunks(content: bytes) -> tuple[Object, bytes]:
@@ -194,30 +200,23 @@ class _Glb:
         return [number for number in range(len(every)) if number not in below]
 
     def shape(self, number: object) -> _Shape:
-        """A mesh: the triangles of all its primitives, and the colour of the larger part."""
+        """A mesh, read once."""
         mesh = self.entry("meshes", number)
         if number not in self._shapes:
             self._shapes[number] = self._read(mesh)  # type: ignore[index]
         return self._shapes[number]  # type: ignore[index]
 
     def _read(self, mesh: Object) -> _Shape:
-        points, corners, start = [np.zeros((0, 3))], [np.zeros((0, 3), np.int64)], 0
-        areas: dict[tuple[float, ...] | None, float] = {}
+        found = []
         for primitive in self.listed(mesh, "primitives"):
             if not isinstance(primitive, dict):
                 raise _broken("one of its primitives is no object")
-            vertices, faces = self._triangles(primitive)
-            colour = self._colour(primitive)
-            a, b, c = (vertices[faces[:, corner]] for corner in range(3))
-            area = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
-            areas[colour] = areas.get(colour, 0.0) + area
-            points.append(vertices)
-            corners.append(faces + start)
-            start += len(vertices)
-        colour = max(areas, key=areas.__getitem__, default=None)
-        return _Shape(_name(mesh), np.concatenate(points), np.concatenate(corners), colour)
+            body = self._triangles(primitive)
+            if len(body[1]):
+                found.append((body, self._colour(primitive)))
+        return _Shape(_name(mesh), tuple(b for b, _ in found), tuple(c for _, c in found))
 
-    def _triangles(self, primitive: Object) -> tuple[Array, Indices]:
+    def _triangles(self, primitive: Object) -> Triangles:
         mode, attributes = primitive.get("mode", TRIANGLES), primitive.get("attributes")
         where = attributes.get("POSITION") if isinstance(attributes, dict) else None
         if mode not in (TRIANGLES, STRIP, FAN) or where is None:
@@ -235,7 +234,7 @@ class _Glb:
             raise _broken("a triangle has a vertex that is not there")
         return vertices, faces
 
-    def _colour(self, primitive: Object) -> tuple[float, ...] | None:
+    def _colour(self, primitive: Object) -> Colour:
         """The colour of a primitive's material, None where it states none."""
         if "material" not in primitive:
             return None

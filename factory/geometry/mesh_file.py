@@ -41,6 +41,16 @@ class MeshFile:
         out, if any others are there."""
         return _merged(*joined(self.bodies))
 
+    def areas(self) -> Array:
+        """The area of each body."""
+        return np.array([areas_of(*body).sum() for body in self.bodies])
+
+
+def areas_of(vertices: Array, faces: Indices) -> Array:
+    """The area of each triangle (m,)."""
+    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
+    return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
+
 
 def checked(bodies: Iterable[tuple[Array, Indices]], suffix: str) -> MeshFile:
     """The bodies that have triangles. Raises UnreadableMesh where none has, or one is broken."""

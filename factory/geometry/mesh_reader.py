@@ -37,7 +37,7 @@ def read_mesh(content: bytes, suffix: str) -> MeshFile:
     if suffix == ".obj":
         return checked([_obj(content)], suffix)
     if suffix == ".glb":
-        return checked([(body.vertices, body.faces) for body in read_glb(content)], suffix)
+        return checked([mesh for body in read_glb(content) for mesh in body.bodies], suffix)
     return checked(_by_trimesh(content, suffix), suffix)
 
 

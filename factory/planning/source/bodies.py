@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.geometry.mesh_file import MeshFile
+from factory.geometry.glb_reader import Colour
+from factory.geometry.mesh_file import MeshFile, areas_of
 from factory.geometry.meshes import Array, is_closed, volume_of
-from factory.geometry.pieces import closed_bodies, components, joined
+from factory.geometry.pieces import MOST_PIECES, components
+from factory.geometry.touching import bodies as shells
 from factory.lang.words import UNITS as LENGTHS
 from factory.support.errors import Diagnostic, InputError
 
 UNITS = {**LENGTHS, "ldu": 0.0004}
 """Units of length [m]; `ldu` is that of LDraw."""
 
-LONGEST, LIKELY = 5.0, 2.5
-"""A product is no longer than the first [m] whatever a file states, and no longer than the second
-where its format states the unit, which not every program heeds."""
+LIKELY = 2.5
+"""A product is no longer than this [m] where its format states the unit, which not every program
+heeds."""
 
 DOUBTFUL, SHEET = (1.0, 30.0), (0.1, 2.0)
 """A product may be so long in metres, centimetres and inches alike, between the two; one that is
@@ -27,11 +30,13 @@ longer may be in either of the latter, too, where the median part is as thin as 
 @dataclass(frozen=True, slots=True)
 class FileBody:
     """A part of a file: its triangles where they are in the product, in the file's unit. `name` is
-    "" where the file has none; `colour` None likewise."""
+    "" where the file has none; `colour` None likewise. `colours`: those of the bodies of its mesh,
+    none where they are not known."""
 
     name: str
     mesh: MeshFile = field(repr=False)
-    colour: tuple[float, ...] | None = None
+    colour: Colour = None
+    colours: tuple[Colour, ...] = ()
 
     @property
     def size(self) -> float:
@@ -67,7 +72,7 @@ def unit_of(bodies: Bodies, asked: str | None) -> tuple[float, str]:
     length = float((high.max(axis=0) - low.min(axis=0)).max())
     if asked:
         return UNITS[asked], f"lengths are in {asked}, as asked for: {_long(length, asked)}"
-    if bodies.unit and length * UNITS[bodies.unit] <= (LONGEST if bodies.sure else LIKELY):
+    if bodies.unit and (bodies.sure or length * UNITS[bodies.unit] <= LIKELY):
         return UNITS[bodies.unit], f"lengths are in {bodies.unit}: {bodies.by}"
     why = (
         f"{bodies.by}, but that would be a product of {length * UNITS[bodies.unit]:.4g} m"
@@ -92,25 +97,49 @@ def _long(length: float, unit: str) -> str:
     return f"the product is {length * UNITS[unit]:.4g} m long"
 
 
+def most_of(areas: Array, colours: Sequence[Colour]) -> Colour:
+    """The colour of most of a surface: of each of its areas one."""
+    found: dict[Colour, float] = {}
+    for area, colour in zip(areas.tolist(), colours, strict=True):
+        found[colour] = found.get(colour, 0.0) + area
+    return max(found, key=found.__getitem__)
+
+
 def solids_of(body: FileBody) -> tuple[FileBody, ...]:
-    """The solids of a body, told apart where they touch, each with its cavities; the body itself
-    where it is one, or is not closed."""
+    """The solids of a body, told apart where they touch, each with its cavities and in the colour
+    of most of it; the body itself where it is one, or is not closed."""
     vertices, faces = body.mesh.merged()
-    shells = closed_bodies(vertices, faces) if is_closed(faces) else []
-    volumes = [volume_of(*shell) for shell in shells]
-    outer = [n for n, volume in enumerate(volumes) if volume > 0]
-    if len(outer) < 2:
+    if not is_closed(faces):
         return (body,)
-    made = {n: [shells[n]] for n in outer}
-    boxes = [(shell[0].min(axis=0), shell[0].max(axis=0)) for shell in shells]
-    for number in set(range(len(shells))) - set(outer):
-        low, high = boxes[number]
-        around = [n for n in outer if (boxes[n][0] <= low).all() and (boxes[n][1] >= high).all()]
-        made[min(around or outer, key=volumes.__getitem__)].append(shells[number])
-    return tuple(
-        FileBody(body.name and f"{body.name}-{index}", MeshFile((joined(own),)), body.colour)
-        for index, own in enumerate(made.values(), 1)
-    )
+    number = shells(vertices, faces)
+    count = int(number.max()) + 1
+    volume = np.array([volume_of(vertices, faces[number == n]) for n in range(count)])
+    outer = np.flatnonzero(volume > 0)
+    if len(outer) < 2 or count > MOST_PIECES:
+        return (body,)
+    boxes = np.array([_box(vertices[faces[number == n]].reshape(-1, 3)) for n in range(count)])
+    of = np.arange(count)
+    for n in np.flatnonzero(volume <= 0):
+        around = (boxes[outer, 0] <= boxes[n, 0]) & (boxes[outer, 1] >= boxes[n, 1])
+        near = outer[around.all(axis=1)]
+        of[n] = min(near if len(near) else outer, key=volume.__getitem__)
+    areas, paint = areas_of(vertices, faces), np.repeat(-1, len(faces))
+    sizes = [len(own) for _, own in body.mesh.bodies]
+    if body.colours and sum(sizes) == len(faces):
+        paint = np.repeat(np.arange(len(sizes)), sizes)
+    found = []
+    for index, solid in enumerate(outer.tolist(), 1):
+        mine = of[number] == solid
+        used, corners = np.unique(faces[mine], return_inverse=True)
+        shades = [body.colour if n < 0 else body.colours[n] for n in paint[mine].tolist()]
+        mesh = MeshFile(((vertices[used], corners.reshape(-1, 3)),))
+        name = body.name and f"{body.name}-{index}"
+        found.append(FileBody(name, mesh, most_of(areas[mine], shades)))
+    return tuple(found)
+
+
+def _box(points: Array) -> Array:
+    return np.array([points.min(axis=0), points.max(axis=0)])
 
 
 def apart(body: FileBody) -> tuple[FileBody, ...]:

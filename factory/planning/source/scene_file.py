@@ -11,7 +11,7 @@ from factory.geometry.mesh_file import MeshFile, UnreadableMesh, checked
 from factory.geometry.mesh_reader import read_mesh
 from factory.nets.verdict import listing
 from factory.planning.source import threemf_file
-from factory.planning.source.bodies import Bodies, FileBody, solids_of
+from factory.planning.source.bodies import Bodies, FileBody, most_of, solids_of
 from factory.planning.source.step_file import read_step
 
 STEP, SCENES = (".step", ".stp"), (".glb", ".3mf", ".step", ".stp")
@@ -67,13 +67,14 @@ def read_scene(content: bytes, suffix: str) -> Bodies:
         if len(solids) > 1
     ]
     apart = [body for solids in parts for body in solids]
-    return Bodies(tuple(apart), *stated, (*notes[:SHOWN], *_merged(apart)))
+    return Bodies(tuple(apart), *stated, (*dict.fromkeys(notes), *_merged(apart)))
 
 
 def _body(body: GlbBody, suffix: str, unit: float = 1.0) -> FileBody:
     """A body of a file, in another unit."""
     name = next((name for name in body.names if not NAMELESS.fullmatch(name)), "")
-    return FileBody(name, checked([(body.vertices * unit, body.faces)], suffix), body.colour)
+    mesh = checked([(vertices * unit, faces) for vertices, faces in body.bodies], suffix)
+    return FileBody(name, mesh, most_of(mesh.areas(), body.colours), body.colours)
 
 
 def _merged(bodies: Sequence[FileBody]) -> tuple[str, ...]:

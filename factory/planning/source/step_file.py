@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from factory.geometry.glb_reader import GlbBody, read_glb
+from factory.geometry.glb_reader import Colour, GlbBody, read_glb
 from factory.geometry.mesh_file import EXPECTED, UnreadableMesh
 from factory.support.extras import optional
 from factory.support.files import MESH, read_bytes
@@ -52,12 +52,12 @@ def read_step(content: bytes) -> list[GlbBody]:
         except OSError:
             raise UnreadableMesh("it has too many triangles: export it as GLB, coarser") from None
     return [
-        GlbBody(body.names, body.vertices, body.faces, _stated(body.colour))
+        GlbBody(body.names, body.bodies, tuple(map(_stated, body.colours)))
         for body in read_glb(glb)
     ]
 
 
-def _stated(linear: tuple[float, ...] | None) -> tuple[float, ...] | None:
+def _stated(linear: Colour) -> Colour:
     """A colour as STEP states it: glTF has its light in its place (IEC 61966-2-1)."""
     if linear is None:
         return None

@@ -17,7 +17,7 @@ from xml.parsers import expat
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.geometry.glb_reader import MOST, GlbBody
+from factory.geometry.glb_reader import MOST, GlbBody, moved_by
 from factory.geometry.mesh_file import EXPECTED, UnreadableMesh
 from factory.support.files import MESH, MIB
 
@@ -177,9 +177,8 @@ def _bodies(plate: list[_Placed], objects: Mapping[Key, _Object]) -> list[GlbBod
         if triangles > MOST:
             raise UnreadableMesh(f"its objects have more than {MOST} triangles together")
         if entry.corners:
-            vertices = np.array(entry.vertices).reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
+            vertices = np.array(entry.vertices).reshape(-1, 3)
             faces = np.array(entry.corners, np.int64).reshape(-1, 3)
-            flips = np.linalg.det(matrix[:3, :3]) < 0
-            names = (place.name, entry.name)
-            found.append(GlbBody(names, vertices, faces[:, ::-1] if flips else faces))
+            body = moved_by(matrix, vertices, faces)
+            found.append(GlbBody((place.name, entry.name), (body,), (None,)))
     return found
