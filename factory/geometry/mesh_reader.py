@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from factory.geometry.glb_reader import read_glb
+from factory.geometry.glb_reader import MOST, read_glb
 from factory.geometry.mesh_file import EXPECTED, MeshFile, UnreadableMesh, checked
 from factory.geometry.meshes import Array, Indices
 
@@ -85,6 +85,8 @@ def _obj(content: bytes) -> tuple[Array, Indices]:
     for number, line in enumerate(text.split("\n"), 1):
         if len(line) > LINE:
             raise UnreadableMesh(f"line {number} has more than {LINE} characters")
+        if max(len(vertices), len(faces)) > MOST:
+            raise UnreadableMesh(f"it has more than {MOST} vertices or triangles")
         words = line.partition("#")[0].split()
         if words[:1] == ["v"]:
             vertices.append(_vertex(words[1:4], number))

@@ -23,12 +23,19 @@ others, give or take this factor."""
 AWAY = 2.0
 """Parts are away from each other that have so many times the larger one's size between them."""
 
+MOST_PARTS = 5000
+"""A plan has tables of all pairs of parts: of so many they take a gigabyte."""
+
 EQUAL = 1e-4
 """Vertices of two parts are in one place that are nearer than this share of their size."""
 
 
 def check_count(path: Path, labels: Sequence[str], what: str = "parts") -> None:
-    """Raises InputError (TooFewParts) for a source with no part, or one."""
+    """Raises InputError for a source with no part, or one (TooFewParts), or with more than can be
+    planned (TooLarge)."""
+    if len(labels) > MOST_PARTS:
+        message = f"{quoted(path.name)} has {len(labels)} {what}; at most {MOST_PARTS} are planned"
+        raise InputError(Diagnostic("TooLarge", message, None, "plan sub-assemblies of it"))
     if len(labels) > 1:
         return
     if labels:

@@ -12,6 +12,7 @@ from factory.geometry.mesh_reader import read_mesh
 from factory.nets.verdict import listing
 from factory.planning.source import threemf_file
 from factory.planning.source.bodies import Bodies, FileBody, most_of, solids_of
+from factory.planning.source.faults import MOST_PARTS
 from factory.planning.source.step_file import read_step
 
 STEP, SCENES = (".step", ".stp"), (".glb", ".3mf", ".step", ".stp")
@@ -49,12 +50,11 @@ def read_scene(content: bytes, suffix: str) -> Bodies:
         metres = threemf_file.UNITS.get(unit)
         if metres is None:
             raise UnreadableMesh(f"it states a unit that 3MF does not have: {unit[:20]}")
-        bodies = [_body(body, kind, metres) for body in found]
+        bodies = [_body(body, kind, metres) for body in _few(found)]
         stated = "m", f"the 3MF file states {unit}", True
     else:
-        bodies = [
-            _body(body, kind) for body in (read_step if kind == ".step" else read_glb)(content)
-        ]
+        found = (read_step if kind == ".step" else read_glb)(content)
+        bodies = [_body(body, kind) for body in _few(found)]
         stated = STATED[kind]
     if not bodies:
         checked((), kind)
@@ -68,6 +68,13 @@ def read_scene(content: bytes, suffix: str) -> Bodies:
     ]
     apart = [body for solids in parts for body in solids]
     return Bodies(tuple(apart), *stated, (*dict.fromkeys(notes), *_merged(apart)))
+
+
+def _few(bodies: list[GlbBody]) -> list[GlbBody]:
+    """The same bodies, if they are no more than can be planned."""
+    if len(bodies) > MOST_PARTS:
+        raise UnreadableMesh(f"it has {len(bodies)} bodies; at most {MOST_PARTS} are planned")
+    return bodies
 
 
 def _body(body: GlbBody, suffix: str, unit: float = 1.0) -> FileBody:
