@@ -65,6 +65,7 @@ def checked(bodies: Iterable[tuple[Array, Indices]], suffix: str) -> MeshFile:
     return MeshFile(tuple(found))
 
 
+@np.errstate(all="ignore")
 def _merged(vertices: Array, faces: Indices) -> tuple[Array, Indices]:
     import trimesh
 

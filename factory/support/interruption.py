@@ -108,10 +108,11 @@ def side_by_side(works: Sequence[Callable[[], T]]) -> list[T]:
 
 class Interruption(Closing):
     """Within its context the first signal is noted, and `observe` raises it as KeyboardInterrupt;
-    the second is raised at once."""
+    the second is raised at once, and so is the first while there is nothing to be kept
+    (`keeps`)."""
 
-    def __init__(self) -> None:
-        self.noted = False
+    def __init__(self, keeps: bool = True) -> None:
+        self.noted, self.keeps = False, keeps
         self._before: Mapping[int, Any] = {}
 
     def __enter__(self) -> Self:
@@ -129,6 +130,6 @@ class Interruption(Closing):
             raise KeyboardInterrupt
 
     def _note(self, number: int, frame: FrameType | None) -> None:
-        if self.noted:
+        if self.noted or not self.keeps:
             raise KeyboardInterrupt
         self.noted = True

@@ -7,6 +7,7 @@ before memory is taken for it: each object may place others twice, forty deep.
 from __future__ import annotations
 
 import io
+import struct
 import zipfile
 import zlib
 from array import array
@@ -38,6 +39,12 @@ NESTED = 100
 """So deep, at most, objects are within objects."""
 
 ROOT = "3d/3dmodel.model"
+
+ZIP_FAULTS = (
+    *(zipfile.BadZipFile, zlib.error, struct.error, EOFError, OSError),
+    *(NotImplementedError, OverflowError, RuntimeError, ValueError),
+)
+"""What zipfile raises of an archive that is none, damaged, or locked."""
 
 Matrix = NDArray[np.float64]
 Key = tuple[str, str]
@@ -91,8 +98,8 @@ def _files(content: bytes) -> dict[str, bytes]:
             if sum(info.file_size for info in models) > MESH:
                 raise UnreadableMesh(f"it unpacks to more than {MESH // MIB} MiB, the most")
             return {i.filename.lower().strip("/"): archive.read(i) for i in models}
-    except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, zlib.error):
-        raise _broken() from None  # what zipfile says of an archive that is none, or is locked
+    except ZIP_FAULTS:
+        raise _broken() from None
 
 
 class _Model:
