@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -37,6 +38,8 @@ UPS = {
 
 LOOKS = ("exploded.png", "assembly.mp4")
 """How the names of the still and of the film end."""
+STOPPING = "stopping with the best tree so far, which is laid out; once more: at once"
+"""The answer to a signal."""
 
 KINDS: tuple[Kind, ...] = ("slide", "lower", "blocked")
 
@@ -108,7 +111,6 @@ def plan(
     bodies (.glb, .3mf, .step), an LDraw model (.ldr, .mpd), or a PAG whose tree is thrown away."""
     from factory.pipeline import all_templates, read
     from factory.planning.plan import CannotAssemble, PlanOptions
-    from factory.planning.searching import usual_seconds
     from factory.planning.source.reading import SourceOptions, read_source
     from factory.planning.writing import planned_product
     from factory.support.files import own_names, write_all
@@ -128,10 +130,9 @@ def plan(
     if not out.as_json:
         for note in found.notes:
             say(f"  {note}")
-    seconds = usual_seconds(len(found.units())) if seconds is None else seconds
     side = UPS[up] if up else None
     search = PlanOptions(aim, seconds, allow, hulls, side, base or "", templates=templates)
-    planned = _sought(found, search, out)
+    planned, stopped = _sought(found, search, out)
     if isinstance(planned, CannotAssemble):
         return refuse(found, planned, folder, look, out)
     made = planned_product(found, planned.tree, planned.orientation, source.name)
@@ -140,7 +141,9 @@ def plan(
     write_all(files)
     pag = next(iter(files))
     project = read(pag, folders)
-    looked = _looks(project, out) if look else []
+    looked = _looks(project, out) if look and not stopped else []
+    if stopped and not out.silent:
+        say("  stopped: the best tree so far, without pictures")
     known = set(map(id, project.product.warnings))
     warnings += announced([w for w in project.warnings if id(w) not in known], out)
     if out.as_json:
@@ -150,13 +153,28 @@ def plan(
     return 0
 
 
-def _sought(found: InPlace, asked: PlanOptions, out: OutputOptions) -> Planned | CannotAssemble:
-    """The best plan that is found in time, or until a signal; or why there is none."""
+def _sought(
+    found: InPlace, asked: PlanOptions, out: OutputOptions
+) -> tuple[Planned | CannotAssemble, bool]:
+    """The best plan that is found in time, or until a signal, or why there is none; and whether
+    there was a signal. Before there is a tree a signal is raised at once."""
+    from factory.planning.plan import LAYING
     from factory.planning.plan import plan as sought
+    from factory.planning.searching import usual_seconds
     from factory.support.interruption import Interruption
 
-    with Interruption() as stop, StepBar("looking for a tree", out.silent, asked.seconds) as bar:
-        return sought(found, replace(asked, told=bar.show, stopped=lambda: stop.noted))
+    limit = asked.seconds or usual_seconds(len(found.units()))
+    with (
+        Interruption(False, lambda: print(STOPPING, file=sys.stderr)) as stop,
+        StepBar("looking for a tree", out.silent, limit) as bar,
+    ):
+
+        def told(what: str, done: int, total: int | None, words: str) -> None:
+            stop.keeps = done > 0 and what != LAYING
+            bar.show(what, done, total, words)
+
+        search = replace(asked, told=told, stopped=lambda: stop.noted)
+        return sought(found, search), stop.noted
 
 
 def _looks(project: Project, out: OutputOptions) -> list[Path]:

@@ -134,14 +134,21 @@ class Layouts:
         told: Callable[[LaidOut], None] = lambda _: None,
     ) -> LaidOut:
         """The best of some trees, as many of which are laid out as there is time for, the first
-        always. The next one is taken to need as long as the longest did."""
+        always. The next one is taken to need as long as the longest did. A KeyboardInterrupt ends
+        that of any but the first."""
         best: LaidOut | None = None
         longest = 0.0
         for judged in trees:
             if best is not None and budget.left < longest:
                 break
-            begin, laid = perf_counter(), self.of(judged)
-            best = laid if best is None else min(best, laid, key=lambda one: one.rank(aim))
+            begin = perf_counter()
+            try:
+                laid = self.of(judged)
+                best = laid if best is None else min(best, laid, key=lambda one: one.rank(aim))
+            except KeyboardInterrupt:
+                if best is None:
+                    raise
+                break
             told(best)
             longest = max(longest, perf_counter() - begin)
         if best is None:

@@ -19,7 +19,7 @@ from factory.planning.kept import KeptPrices
 from factory.planning.laying import LaidOut, Layouts
 from factory.planning.parts import InPlace
 from factory.planning.posing import Pose, along, posed, said, toppling
-from factory.planning.searching import Aim, Budget, Sought, trees
+from factory.planning.searching import Aim, Budget, Sought, trees, usual_seconds
 from factory.planning.stance import stances
 from factory.planning.standing import feet
 from factory.planning.writing import Tree
@@ -27,19 +27,22 @@ from factory.problem.template import Template
 from factory.support.errors import Diagnostic, InputError, did_you_mean
 from factory.support.settings import Settings
 
+LAYING = "laying out"
+"""What goes on once there are trees."""
+
 
 @dataclass(frozen=True)
 class PlanOptions:
-    """`aim`: what the tree is chosen for; `seconds` to search; `allow`: units that may pass through
-    others, or two, `a:b`, through each other; `hulls`: whether hulls may hide what goes into them;
-    `up`: the axis of the file and its side that is up, None for z unless the product tips then;
-    `base`: the unit onto which all others come, "" for any; `lay_out`: whether layouts decide, or
-    estimates alone; `settings` and `templates` of the factory, None for those shipped; `told` hears
-    what goes on, and how many of how many are done; `stopped` says that the best so far is wanted
-    at once."""
+    """`aim`: what the tree is chosen for; `seconds` to search, None for the usual time and proofs
+    that are always ended (`searching`); `allow`: units that may pass through others, or two, `a:b`,
+    through each other; `hulls`: whether hulls may hide what goes into them; `up`: the axis of the
+    file and its side that is up, None for z unless the product tips then; `base`: the unit onto
+    which all others come, "" for any; `lay_out`: whether layouts decide, or estimates alone;
+    `settings` and `templates` of the factory, None for those shipped; `told` hears what goes on,
+    and how many of how many are done; `stopped` says that the best so far is wanted at once."""
 
     aim: Aim = "cycle"
-    seconds: float = 60.0
+    seconds: float | None = None
     allow: tuple[str, ...] = ()
     hulls: bool = False
     up: Direction | None = None
@@ -125,7 +128,8 @@ def plan(source: InPlace, options: PlanOptions | None = None) -> Planned | Canno
     or `base` names nothing that is planned, or the product tips with `up` up (Usage), or where
     hulls hide what is in the way (Hulls)."""
     asked = options or PlanOptions()
-    budget = Budget(asked.seconds, stopped=asked.stopped)
+    usual = usual_seconds(len(source.units()))
+    budget = Budget(asked.seconds or usual, asked.seconds is not None, stopped=asked.stopped)
     asked.told("looking for what is in the way", 0, None, "")
     found = blocking(source)
     _check_named((*asked.allow, *([asked.base] if asked.base else ())), found)
@@ -170,9 +174,10 @@ def _planned(pose: Pose, asked: PlanOptions, budget: Budget) -> Planned:
     def said(best: LaidOut) -> None:
         laid[0] += 1
         words = f"{best.robots} robots, {best.seconds:.2f} s"
-        asked.told("laying out", laid[0], len(sought.all), words)
+        asked.told(LAYING, laid[0], len(sought.all), words)
 
     best = layouts.best(sought.all, asked.aim, budget, said)
+    asked.told("measuring the room on ways", 1, None, "")
     return _result(pose, best, sought.optimal, laid[0])
 
 

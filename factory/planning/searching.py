@@ -40,7 +40,8 @@ PROOF, EACH = 30.0, 0.2
 more."""
 
 SURE = 12
-"""The trees of so many units are proved, however long it takes, unless the search is stopped."""
+"""The trees of so many units are proved, however long it takes, unless the search is stopped or its
+time was asked for."""
 
 GROWN, PROVED = 0.4, 0.6
 """The shares of the time after which large products grow no more, and proofs are given up: layouts
@@ -57,9 +58,11 @@ def usual_seconds(units: int) -> float:
 
 @dataclass(frozen=True)
 class Budget:
-    """A time to search [s], from when it is made; `stopped`: whether it is to end at once."""
+    """A time to search [s], from when it is made; `asked`: whether it bounds all proofs; `stopped`:
+    whether it is to end at once."""
 
     seconds: float
+    asked: bool = True
     begin: float = field(default_factory=perf_counter)
     stopped: Callable[[], bool] = lambda: False
 
@@ -125,7 +128,9 @@ def trees(sought: Sought) -> Trees:
         keep(_grown(sought, GROWN / 2 if few else GROWN))
     try:
         if few:
-            keep(_proved(sought, sought.budget.stopped if sure else sought.budget.share(PROVED)))
+            endless = sure and not sought.budget.asked
+            late = sought.budget.stopped if endless else sought.budget.share(PROVED)
+            keep(_proved(sought, late))
             optimal = True
     except TooLate:
         if not kept:

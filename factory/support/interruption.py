@@ -108,11 +108,11 @@ def side_by_side(works: Sequence[Callable[[], T]]) -> list[T]:
 
 class Interruption(Closing):
     """Within its context the first signal is noted, and `observe` raises it as KeyboardInterrupt;
-    the second is raised at once, and so is the first while there is nothing to be kept
-    (`keeps`)."""
+    the second is raised at once, and so is the first while nothing has to be ended first
+    (`keeps`). `heard` answers a signal that is noted."""
 
-    def __init__(self, keeps: bool = True) -> None:
-        self.noted, self.keeps = False, keeps
+    def __init__(self, keeps: bool = True, heard: Callable[[], None] = lambda: None) -> None:
+        self.noted, self.keeps, self.heard = False, keeps, heard
         self._before: Mapping[int, Any] = {}
 
     def __enter__(self) -> Self:
@@ -130,6 +130,7 @@ class Interruption(Closing):
             raise KeyboardInterrupt
 
     def _note(self, number: int, frame: FrameType | None) -> None:
-        if self.noted or not self.keeps:
+        again, self.noted = self.noted, True
+        if again or not self.keeps:
             raise KeyboardInterrupt
-        self.noted = True
+        self.heard()
