@@ -23,6 +23,7 @@ NOT_PROVOKED = {
     *("CutOff", "NotProved", "Stalled", "Unstable"),
     *("Contact", "EngineWarning", "GripGap", "HandOffGap", "Missed", "NotRefined"),
     *("Record", "CannotAssemble", "Hulls", "NotInPlace", "Unit"),
+    *("HandOffTurn", "Mass", "NotSolid", "Options", "ProductError", "ProductTurn", "Shape"),
 }
 """Codes that need a broken machine, run or factory, which other tests make."""
 

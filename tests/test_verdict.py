@@ -261,9 +261,10 @@ def test_each_failed_part_is_a_line_of_the_summary(
     before_the_switch(monkeypatch, "sub1", moved(names.slide("r3"), -0.06))
     done = run("run", PAPER)
     lines = [line.strip() for line in done.out.splitlines()]
-    at = lines.index("the run FAILED:")
-    assert lines[at + 1].startswith("Early: ") and "60.0 mm from its goal" in lines[at + 1]
-    assert any(line.startswith("HandOffGap: a hand-off with a gap of 60.0") for line in lines[at:])
+    assert lines[0].startswith("the run FAILED: Early: ") and "60.0 mm from its goal" in lines[0]
+    assert any(line.startswith("HandOffGap: a hand-off with a gap of 60.0") for line in lines)
+    words = [line.partition(":")[0] for line in lines[1:8] if line[0].isupper()]
+    assert len(words) == len({*words}), "one line a code"
     assert "the run succeeded" in run("run", PAPER).out
 
 

@@ -19,9 +19,6 @@ if TYPE_CHECKING:
     from factory.record.monitor import Report
     from factory.record.verdict import RunVerdict
 
-SHOWN = 8
-"""The most violations that are printed, unless `-v` asks for all."""
-
 
 @click.command()
 @click.argument("file", metavar="LOG", type=PATH)
@@ -55,30 +52,34 @@ def monitor(file: Path, lenient: bool, out: OutputOptions) -> int:
         }
         emit(document)
     else:
+        if not verdict.succeeded:
+            say_verdict(verdict, out.verbose)
         say(found_by(report, log.cut_off))
         if log.failures is not None:
             say_failures(log.failures, out.verbose)
-        say_verdict(verdict)
+        if verdict.succeeded:
+            say_verdict(verdict, out.verbose)
         for firing in (*report.seen, *report.inferred) if out.verbose else ():
             how = "inferred" if firing.seen is None else "seen"
             span = f"{firing.earliest:.3f} to {firing.latest:.3f} s"
             say(f"  {firing.transition} of unit {firing.unit}: {how}, {span}")
-    say_violations(report, len(report.violations) if out.verbose else SHOWN)
+    tell_failures(verdict, out.verbose)
     if log.cut_off:
         print(log.cut_off.diagnostic(file), file=sys.stderr)
     return 0 if verdict.succeeded else 1
 
 
-def say_verdict(verdict: RunVerdict) -> None:
-    """Whether a run succeeded and, in a line each, what of its verdict failed."""
-    if verdict.failures and verdict.succeeded:
-        say("the run succeeded, as --lenient leaves this out:")
+def say_verdict(verdict: RunVerdict, verbose: bool = False) -> None:
+    """Whether a run succeeded and what of its verdict failed, the cause first and, unless it is
+    `verbose`, a line for each code."""
+    failures = verdict.failures if verbose else verdict.gathered
+    lines = [f"{failure.code}: {failure.message}" for failure in failures]
+    if verdict.succeeded:
+        say("the run succeeded" + (", as --lenient leaves this out:" if lines else ""))
     else:
-        say("the run succeeded" if verdict.succeeded else "the run FAILED:")
-    for failure in verdict.failures[:SHOWN]:
-        say(f"  {failure.code}: {failure.message}")
-    if more := len(verdict.failures[SHOWN:]):
-        say(f"  ... and {more} more")
+        say(f"the run FAILED: {lines.pop(0)}")
+    for line in lines:
+        say(f"  {line}")
 
 
 def found_by(report: Report, cut_off: CutOff | None) -> str:
@@ -110,7 +111,7 @@ def say_failures(failures: Failures, verbose: bool) -> None:
         say(f"  {one.t:.2f} s: {one}")
 
 
-def say_violations(report: Report | None, shown: int = SHOWN) -> None:
-    """The first violations, on stderr."""
-    for violation in report.violations[:shown] if report else ():
-        print(violation.diagnostic(), file=sys.stderr)
+def tell_failures(verdict: RunVerdict, verbose: bool) -> None:
+    """What of a verdict failed, with where it comes from, on stderr."""
+    for failure in verdict.failures if verbose else verdict.gathered:
+        print(failure, file=sys.stderr)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from factory.commands.grouped import Grouped
-from factory.commands.monitor import found_by, say_failures, say_verdict, say_violations
+from factory.commands.monitor import found_by, say_failures, say_verdict, tell_failures
 from factory.commands.options import (
     FAULTS,
     FLOOR,
@@ -150,9 +149,7 @@ def _told(
         emit({**document, "warnings": warnings, **({"errors": trouble} if trouble else {})})
     else:
         summarise(record, factory, out.verbose)
-    say_violations(record.monitor)
-    if record.trouble is not None:
-        print(record.trouble, file=sys.stderr)
+    tell_failures(record.verdict, out.verbose)
     return 0 if record.succeeded else 1
 
 
@@ -261,7 +258,9 @@ def not_tested(physics: PhysicsFigures) -> str:
 
 
 def summarise(record: Run, factory: Factory, verbose: bool) -> None:
-    """A run in a few lines for people."""
+    """A run in a few lines for people; of one that failed, the first says why."""
+    if not record.succeeded:
+        say_verdict(record.verdict, verbose)
     cycle = f"{record.cycle_time_s:.3f} s" if record.cycle_time_s is not None else "not yet steady"
     of_all = " with all robots" if record.exchanges else ""
     say(
@@ -315,7 +314,8 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
         say(f"{exchange.t:.2f} s: {exchange}")
     if record.monitor is not None:
         say(found_by(record.monitor, record.cut_off))
-    say_verdict(record.verdict)
+    if record.succeeded:
+        say_verdict(record.verdict, verbose)
     busy = sorted(zip(factory.robots, record.utilisation, strict=True), key=lambda p: -p[1])
     rows = [(r.name, r.type, f"{100 * u:.0f} %") for r, u in (busy if verbose else busy[:6])]
     table("Utilisation", ("robot", "type", "busy"), rows)

@@ -161,6 +161,11 @@ def label_of(name: str) -> str:
     return name.partition("/")[2].rpartition("#")[0]
 
 
+def part_of(body: str) -> str:
+    """The part whose geoms a body has: that of `part/part1#2`, or of `shell/sub1#2/part1`."""
+    return body.rpartition("/")[2] if kind(body) == SHELL else label_of(body)
+
+
 def without_copy(name: str) -> str:
     """The name of a geom, the same for all copies of a part and all pieces of a copy:
     `part/part1#2/3` -> `part/part1`."""

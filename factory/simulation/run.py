@@ -77,12 +77,16 @@ def busy_times(
 class PhysicsFigures:
     """What only the engine can tell; see the specification of `run` for each.
 
+    `product_angle_max_deg`: how far any part of a product was turned against its first one,
+    `misplaced`: the label of the one that was out of place most;
+    `handoff_angle_max_deg`: the same of the frames that a grip joined as it closed;
     `joining_error_max_mm`: how far any vertex of a part was from its place as a grip closed on it,
     before welds pulled: `product_error_max_mm` is what is left of that. `mating_forces`: by
     operation, the largest force of a contact between inputs that it was joining [N]; `pairs`: how
     many pairs of parts there are; `excluded`: those whose contact was off; `timestep_chosen`: by
     the factory, not by the user; `wip_chosen`: the bound on units inside at once where the factory
-    chose one.
+    chose one; `contact_first_s`: when the first unintended contact began, `dropped_s`: when a load
+    was dropped [s]; `faults`: what was not as it should be of the engine's model.
     """
 
     handoffs: int = 0
@@ -100,6 +104,12 @@ class PhysicsFigures:
     timestep_chosen: bool = False
     wip_chosen: int | None = None
     grip_gap_max_mm: float | None = None
+    product_angle_max_deg: float | None = None
+    handoff_angle_max_deg: float = 0.0
+    misplaced: tuple[str, ...] = ()
+    contact_first_s: float | None = None
+    dropped_s: float | None = None
+    faults: tuple[Diagnostic, ...] = ()
     joining_error_max_mm: float = 0.0
     grip_strength_share_max: float | None = None
     grip_strength_robot: str | None = None
@@ -211,12 +221,14 @@ class Run:
         keys = (
             "handoffs",
             "handoff_gap_max_mm",
+            "handoff_angle_max_deg",
             "grip_gap_max_mm",
             "grip_strength_share_max",
             "grip_strength_robot",
             "grip_strength_label",
             "weld_residual_max_mm",
             "product_error_max_mm",
+            "product_angle_max_deg",
             "joining_error_max_mm",
             "unintended_contacts",
             "pairs_tested",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from math import radians
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,14 +24,18 @@ MISSED = 1e-4
 [m]; nor is a part where its next holder takes it over that is further than this beyond twice the
 radius of those balls."""
 
-TURNS = 0.05
-"""A part that is turned by more than this is not held either [rad]."""
+TWISTS = radians(0.5)
+"""A part that is turned by more than this against its weld is not held either [rad]."""
+
+TURNED = radians(0.1)
+"""Nor is one where it should be, where its next holder takes it over, that is turned by more than
+this; nor does a weld put a part in its place that does [rad]. Honest runs stay below 1e-6."""
 
 FIRST = np.zeros((1, 1), np.intp)
 """The only one of several looks."""
 
-STRAIGHT = float(np.cos(TURNS / 2))
-"""The least product of two quaternions that are no further apart."""
+UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
+"""All that is held has the axes of the product, which are those of the world."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +121,7 @@ class Grips:
         looks, copies, welds = np.array(self._taken).T
         at, frames = self.anatomy.body[copies][:, None] + np.arange(7), self.anatomy.frames
         qpos = np.array([seen.qpos for seen in self._taking])
-        gap, turned = _apart(qpos, looks[:, None], at, frames.chosen(welds))
+        gap, turned = _apart(qpos, looks[:, None], at, frames.chosen(welds), TURNED)
         rows = np.flatnonzero((gap > self.near) | turned).tolist()
         found = [
             (self._taking[look].time, copy, weld, float(gap[row]))
@@ -136,7 +141,7 @@ class Grips:
             at = self.anatomy.body[copies][:, None] + np.arange(7)
             self._kept = _Kept(on, copies, at, self.anatomy.frames.chosen(on))
         kept = self._kept
-        gap, turned = _apart(seen.qpos[None], FIRST, kept.at, kept.frames)
+        gap, turned = _apart(seen.qpos[None], FIRST, kept.at, kept.frames, TWISTS)
         rows = np.flatnonzero((gap > self.limit) | turned).tolist()
         if not rows:
             self._off.clear()
@@ -147,26 +152,33 @@ class Grips:
 
 
 def _apart(
-    qpos: Array, look: Index, at: Index, frames: WeldFrames
+    qpos: Array, look: Index, at: Index, frames: WeldFrames, most: float
 ) -> tuple[Array, NDArray[np.bool_]]:
     """How far bodies, at these addresses (n, 7) in the states (k, nq) of looks (n, 1), are from
-    where welds keep them [m], and whether they are turned; bodies that are nowhere are."""
+    where welds keep them [m], and whether they are turned by more than a `most` [rad]; bodies that
+    are nowhere are."""
     pose = qpos[look, at]
     apart = pose[:, :3] - frames.at(qpos[look, frames.along])
-    along = np.abs(np.einsum("ni,ni->n", pose[:, 3:], frames.turn))
-    return np.sqrt(np.einsum("ni,ni->n", apart, apart)), ~(along >= STRAIGHT)
+    straight = _straight(pose[:, 3:], frames.turn, most)
+    return np.sqrt(np.einsum("ni,ni->n", apart, apart)), ~straight
+
+
+def _straight(one: Array, other: Array, most: float) -> NDArray[np.bool_]:
+    """Whether quaternions (n, 4) are apart by no more than an angle [rad]."""
+    along = np.abs(np.einsum("ni,ni->n", one, np.broadcast_to(other, one.shape)))
+    return np.asarray(along >= np.cos(most / 2))
 
 
 def misplaced(
     anatomy: Anatomy, factory: Factory, places: dict[str, Array], tolerance: float = 1e-6
 ) -> list[int]:
-    """The welds (by number) that do not keep a part in its place in the product, relative to the
-    others that the same holder keeps, a robot on one tour. Those by which robots hold nothing in
-    this factory, but may as deputies, are left out."""
+    """The welds (by number) that turn a part, or do not keep it in its place in the product,
+    relative to the others that the same holder keeps, a robot on one tour. Those by which robots
+    hold nothing in this factory, but may as deputies, are left out."""
     first: dict[tuple[int, ...], tuple[Array, Array]] = {}
     inside, robots = factory.contents, range(len(factory.robots))
     brought = [{part for x in factory.deliveries(r) for part in inside[x]} for r in robots]
-    found = []
+    found, straight = [], _straight(anatomy.frames.turn, UPRIGHT, TURNED)
     for weld, holder in enumerate(anatomy.holder):
         if holder is None or holder[0] not in (GRIP, HOLD):
             continue
@@ -175,7 +187,7 @@ def misplaced(
         base, place = anatomy.frames.base[weld], places[anatomy.part[weld]]
         tour = factory.tour_with(holder[1], anatomy.part[weld]) if holder[0] == GRIP else 0
         anchor, middle = first.setdefault((*holder, tour), (base, place))
-        if np.abs((base - anchor) - (place - middle)).max() > tolerance:
+        if not straight[weld] or np.abs((base - anchor) - (place - middle)).max() > tolerance:
             found.append(weld)
     return found
 

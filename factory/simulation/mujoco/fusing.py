@@ -53,6 +53,11 @@ class Fusion:
         starts = np.cumsum(sizes, dtype=np.intp) - sizes
         return np.asarray(np.maximum.reduceat(apart, starts))
 
+    def turns(self, bodies: Sequence[int]) -> float:
+        """How far at most any of some bodies is turned against the first [rad]."""
+        turn = self._d.xmat[np.array(bodies)].reshape(-1, 3, 3)
+        return float(angles(turn[0].T @ turn).max())
+
     def fuse(self, bodies: Sequence[int], whole: int) -> None:
         """Put the body `whole` in the place of others, with their momentum and angular momentum.
         Its attitude is that of the heaviest. Angular speeds are in a body's own frame."""
@@ -76,6 +81,13 @@ class Fusion:
 def rotations(quaternions: Array) -> Array:
     """Rotation matrices (n, 3, 3) of unit quaternions (n, 4)."""
     return np.asarray(Rotation.from_quat(quaternions, scalar_first=True).as_matrix())
+
+
+def angles(turns: Array) -> Array:
+    """The angles (n,) of rotation matrices (n, 3, 3) [rad]; exact for small ones, from the sine."""
+    axis = np.stack([turns[:, i, j] - turns[:, j, i] for i, j in ((2, 1), (0, 2), (1, 0))])
+    cosine = (np.trace(turns, axis1=1, axis2=2) - 1) / 2
+    return np.asarray(np.arctan2(np.linalg.norm(axis, axis=0) / 2, cosine))
 
 
 def _cross(one: Array, other: Array) -> Array:

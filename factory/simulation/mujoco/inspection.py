@@ -2,48 +2,52 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from dataclasses import replace
-from math import comb
+from dataclasses import astuple, replace
+from math import comb, degrees
+from typing import Any
 
 import numpy as np
 
 from factory.layout.layout import Layout
 from factory.mjcf.model import Model
 from factory.mjcf.weld_frames import residuals
-from factory.simulation.keeping import Keeper, is_size, is_text, maybe_size, one_of, up_to
-from factory.simulation.mujoco.contacts import ContactMasks
+from factory.simulation.keeping import Keeper, is_size, one_of, up_to
+from factory.simulation.mujoco.onsets import Onsets
 from factory.simulation.mujoco.pressing import Pressing
-from factory.simulation.mujoco.product_error import ProductError
+from factory.simulation.mujoco.product_error import Misfit, ProductError
+from factory.simulation.mujoco.soundness import Soundness
 from factory.simulation.mujoco.strength import StrengthUse
 from factory.simulation.mujoco.welds import Welds
 from factory.simulation.run import PhysicsFigures
 from factory.support.engine import mujoco
 
-MOST_ONSETS = 10**7
-"""So many onsets of contact are taken up at most."""
-
 
 class Inspection:
     """Keeps the worst figures of a run. Contacts are looked at after every step of the engine.
 
-    `joining`: for each operation under way (index) the unit whose inputs it joins. `unintended`:
-    onsets of contact that nothing intends, by the names of geoms; `pressing`: what is no such
-    contact. `residual` [m]: the largest of a weld's position. `error` [m]: that of a product.
+    `joining`: for each operation under way (index) the unit whose inputs it joins. `onsets`: of
+    contact that nothing intends; `pressing`: what is no such contact. `residual` [m]: the largest
+    of a weld's position. `error`: that of a product, None before one is finished. `soundness`: of
+    the engine's model.
     """
 
     def __init__(
-        self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, masks: ContactMasks
+        self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, soundness: Soundness
     ) -> None:
-        self._m, self._d, self._model, self._masks = m, d, model, masks
+        self._m, self._d, self._model, self.soundness = m, d, model, soundness
+        self._masks = soundness.masks
         self._product = ProductError(model)
-        self.pressing = Pressing(m, model, masks)
-        self._touching: frozenset[tuple[int, int]] = frozenset()
+        self.pressing = Pressing(m, model, self._masks)
+        self.onsets = Onsets(lambda geom: str(m.geom(geom).name))
         self.joining: dict[int, int] = {}
         self.force: dict[str, float] = {}
         self.residual = 0.0
-        self.error: float | None = None
-        self.unintended: list[tuple[str, str]] = []
+        self.error: Misfit | None = None
+
+    @property
+    def unintended(self) -> list[tuple[str, str]]:
+        """The names of the geoms of each contact that nothing intends."""
+        return self.onsets.pairs
 
     def exchange(self, layout: Layout) -> None:
         """From now on robots do what a layout says."""
@@ -56,8 +60,8 @@ class Inspection:
 
     def tick(self) -> None:
         """A tick is over: what touched in it may be apart."""
-        if self._touching and not self._d.ncon:
-            self._touching = frozenset()
+        if not self._d.ncon:
+            self.onsets.apart()
 
     def contacts(self) -> None:
         """Keep the forces between inputs that are being joined, and count the onsets of all other
@@ -72,28 +76,22 @@ class Inspection:
                 self.pressing.knocked(a, b)
             elif not self.pressing.meant(a, b, float(found.dist[number])):
                 now.add((a, b))
-        for a, b in sorted(now - self._touching):
-            self.unintended.append((self._m.geom(a).name, self._m.geom(b).name))
-        self._touching = frozenset(now)
+        self.onsets.note(now, float(self._d.time))
 
     def keep(self, keeper: Keeper) -> None:
         """The figures, what touches, and what is being joined."""
-        operations, a_geom = self._model.factory.operations, up_to(self._m.ngeom)
+        operations = self._model.factory.operations
         labels = {operation.label for operation in operations}
         an_operation = up_to(len(operations))
         joins = keeper.rows("joins", self.joining.items(), an_operation, up_to(np.inf))
         force = keeper.rows("forces", self.force.items(), one_of(labels), is_size)
-        touching = keeper.rows("touching", sorted(self._touching), a_geom, a_geom)
-        onsets = [(*pair, count) for pair, count in Counter(self.unintended).items()]
-        onsets = keeper.rows("onsets", onsets, is_text, is_text, up_to(MOST_ONSETS))
         self.residual = keeper.number("residual", self.residual, 0)
-        self.error = keeper.value("error", self.error, maybe_size)
+        error = None if self.error is None else [*astuple(self.error)]
+        error = keeper.value("error", error, lambda v: v is None or _is_misfit(v))
+        self.error = None if error is None else Misfit(*error)
         self.joining = dict(joins)
         self.force = dict(force)
-        self._touching = frozenset(touching)
-        if sum(count for _, _, count in onsets) > MOST_ONSETS:
-            raise ValueError(f"'onsets' are more than {MOST_ONSETS}")
-        self.unintended = [(a, b) for a, b, count in onsets for _ in range(count)]
+        self.onsets.keep(keeper, self._m.ngeom)
 
     def _joined(self, one: int, other: int) -> str | None:
         """The label of the operation that is joining the parts of two geoms, None for none."""
@@ -113,21 +111,23 @@ class Inspection:
         force = float(np.linalg.norm(wrench[:3]))
         self.force[label] = max(self.force.get(label, 0.0), force)
 
-    def measure(self, bodies: np.ndarray, misfit: float) -> None:
-        """Keep the error of a finished product, and how far off [m] its parts were when they became
-        one body."""
-        self.error = max(self.error or 0.0, self._product.measure(self._d, bodies), misfit)
+    def measure(self, bodies: np.ndarray, misfit: Misfit) -> None:
+        """Keep the error of a finished product, and how far off its parts were when they became one
+        body."""
+        found = self._product.measure(self._d, bodies).worse(misfit)
+        self.error = found.worse(self.error or Misfit())
 
     def figures(self, welds: Welds, strength: StrengthUse | None = None) -> PhysicsFigures:
         """The figures of the run so far; `strength`: the largest share of a hand's strength that
         was used."""
         pairs = dict.fromkeys(f"{a} - {b}" for a, b in self.unintended)
-        pads = welds.pads.largest
+        pads, misfit = welds.pads.largest, self.error
+        self.soundness.look()
         return PhysicsFigures(
             welds.taken.count,
             1e3 * welds.taken.gap,
             1e3 * self.residual,
-            None if self.error is None else 1e3 * self.error,
+            None if misfit is None else 1e3 * misfit.vertex,
             len(self.unintended),
             int(sum(w.number for w in self._d.warning)),
             tuple(pairs),
@@ -137,8 +137,20 @@ class Inspection:
             bool(self._model.carried.wholes),
             float(self._m.opt.timestep),
             grip_gap_max_mm=None if pads is None else 1e3 * pads,
+            product_angle_max_deg=None if misfit is None else degrees(misfit.angle),
+            faults=self.soundness.found,
+            contact_first_s=self.onsets.begun,
+            misplaced=() if misfit is None else (misfit.label,),
+            handoff_angle_max_deg=degrees(welds.taken.turn),
             joining_error_max_mm=1e3 * welds.taken.off,
             grip_strength_share_max=None if strength is None else strength.share,
             grip_strength_robot=None if strength is None else strength.robot,
             grip_strength_label=None if strength is None else strength.label,
         )
+
+
+def _is_misfit(value: Any) -> bool:
+    """Whether a value is two sizes and a label."""
+    if not isinstance(value, list) or len(value) != 3:
+        return False
+    return is_size(value[0]) and is_size(value[1]) and isinstance(value[2], str)

@@ -40,7 +40,9 @@ class Interference:
 
     def weigh(self, bodies: Iterable[int], factor: float) -> None:
         """Bodies weigh `factor` times as much."""
-        for body in bodies:
+        heavier = [*bodies]
+        self._world.inspection.soundness.weigh(heavier, factor)
+        for body in heavier:
             self._m.body_mass[body] *= factor
             self._m.body_inertia[body] *= factor
         mujoco.mj_setConst(self._m, mujoco.MjData(self._m))

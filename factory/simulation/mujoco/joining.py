@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import astuple
 from types import MappingProxyType
 
 import numpy as np
 
 from factory.mjcf.model import Model
-from factory.simulation.keeping import Keeper, is_size, one_of, up_to
+from factory.simulation.keeping import Keeper, is_size, is_text, one_of, up_to
 from factory.simulation.mujoco.copies import Copies
 from factory.simulation.mujoco.feeders import Feeders
 from factory.simulation.mujoco.fusing import RIGID, SETTLING, Fusion
 from factory.simulation.mujoco.hands import Grasps
+from factory.simulation.mujoco.product_error import Misfit
 from factory.simulation.mujoco.welds import Welds
 from factory.support.engine import mujoco
 
@@ -21,8 +23,8 @@ NOTHING: Mapping[int, float] = MappingProxyType({})
 
 class Joining:
     """Where the model has bodies for sub-assemblies: `waiting`, the label that each robot (index)
-    has joined and since when [s]; `misfit`: how far out of place any vertex of a unit's parts was
-    when they became one [m]."""
+    has joined and since when [s]; `misfit`: how far out of place a unit's parts were when
+    they became one."""
 
     def __init__(
         self, model: Model, hands: Grasps, copies: Copies, feeders: Feeders, welds: Welds
@@ -30,16 +32,17 @@ class Joining:
         self._model, self._hands, self._copies = model, hands, copies
         self._feeders, self._welds = feeders, welds
         self.waiting: dict[int, tuple[str, float]] = {}
-        self.misfit: dict[int, float] = {}
+        self.misfit: dict[int, Misfit] = {}
 
     def keep(self, keeper: Keeper) -> None:
         """What waits to become one body, and how far out of place parts were."""
         waiting = [(robot, *since) for robot, since in self.waiting.items()]
         a_number, a_label = up_to(np.inf), one_of(self._copies.body)
         waiting = keeper.rows("joining.waiting", waiting, a_number, a_label, is_size)
-        misfit = keeper.rows("joining.misfit", self.misfit.items(), a_number, is_size)
+        misfit = [(unit, *astuple(far)) for unit, far in self.misfit.items()]
+        misfit = keeper.rows("joining.misfit", misfit, a_number, is_size, is_size, is_text)
         self.waiting = {robot: (label, since) for robot, label, since in waiting}
-        self.misfit = dict(misfit)
+        self.misfit = {unit: Misfit(*far) for unit, *far in misfit}
         if not self.waiting.keys() <= self._hands.of.keys():
             raise ValueError("its robots have joined what they do not hold")
 
@@ -89,7 +92,8 @@ class Joining:
         self._welds.write()
         hand = self._hands.of[robot]
         unit, bodies = hand.unit, [*hand.bodies.values()]
-        self.misfit[unit] = max(self.misfit.get(unit, 0.0), misfit)
+        off = Misfit(misfit, self.fusion.turns(bodies), label)
+        self.misfit[unit] = off.worse(self.misfit.get(unit, Misfit()))
         whole = self._copies.take(label, unit)
         self.fusion.fuse(bodies, whole)
         self._hands.let_go(robot)

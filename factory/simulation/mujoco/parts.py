@@ -19,6 +19,7 @@ from factory.simulation.mujoco.hands import Grasps
 from factory.simulation.mujoco.joining import Joining
 from factory.simulation.mujoco.motion import Motion
 from factory.simulation.mujoco.passing import Passing
+from factory.simulation.mujoco.product_error import Misfit
 from factory.simulation.mujoco.strength import Strength
 from factory.simulation.mujoco.supply import Supply
 from factory.simulation.mujoco.welds import Welds
@@ -126,11 +127,11 @@ class Parts:
         self.feeders.retire(self.labels(unit), unit)
         self.welds.write()
 
-    def finished(self, unit: int) -> tuple[np.ndarray, float]:
-        """The bodies of a finished product, in the order of its `labels`, and how far off [m] its
+    def finished(self, unit: int) -> tuple[np.ndarray, Misfit]:
+        """The bodies of a finished product, in the order of its `labels`, and how far off its
         parts were when they became one body."""
         bodies = [self.copies[label, unit] for label in self.labels(unit)]
-        return np.array(bodies), self.joining.misfit.get(unit, 0.0)
+        return np.array(bodies), self.joining.misfit.get(unit, Misfit())
 
     def labels(self, unit: int) -> tuple[str, ...]:
         """The labels of the bodies that a finished product consists of."""

@@ -1,11 +1,29 @@
-"""How far the parts of a finished product are from their places in it."""
+"""How far the parts of a finished product are from their places in it, and how far turned."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from factory.mjcf.model import Model
+from factory.simulation.mujoco.fusing import angles
 from factory.support.engine import mujoco
+
+
+@dataclass(frozen=True, slots=True)
+class Misfit:
+    """How far any vertex is from its place beside a first body [m], how far any body is turned
+    against that one [rad], and the `label` of the body with that vertex."""
+
+    vertex: float = 0.0
+    angle: float = 0.0
+    label: str = ""
+
+    def worse(self, other: Misfit) -> Misfit:
+        """The larger figures of two."""
+        label = self.label if self.vertex >= other.vertex else other.label
+        return Misfit(max(self.vertex, other.vertex), max(self.angle, other.angle), label)
 
 
 class ProductError:
@@ -18,16 +36,20 @@ class ProductError:
         corners = [
             np.concatenate([solids[part].corners for part in bodies.parts(body)]) for body in found
         ]
+        self._labels = found
         self._owner = np.repeat(np.arange(len(found)), [len(points) for points in corners])
         self._nominal = np.concatenate(corners) - bodies.centre[found[0]]
         places = np.array([bodies.centre[body] for body in found])
         self._local = np.concatenate(corners) - places[self._owner]
 
-    def measure(self, d: mujoco.MjData, bodies: np.ndarray) -> float:
-        """The largest displacement [m] of any vertex from its place in the product, after a rigid
-        fit on the first body."""
+    def measure(self, d: mujoco.MjData, bodies: np.ndarray) -> Misfit:
+        """The largest displacement of any vertex from its place in the product, and the largest
+        turn of any body, after a rigid fit on the first body."""
         turn = d.xmat[bodies].reshape(-1, 3, 3)
         turned = np.einsum("nij,nj->ni", turn[self._owner], self._local)
         here = turned + d.xpos[bodies][self._owner]
         fitted = (here - d.xpos[bodies[0]]) @ turn[0]
-        return float(np.linalg.norm(fitted - self._nominal, axis=1).max())
+        off = np.linalg.norm(fitted - self._nominal, axis=1)
+        worst = int(off.argmax())
+        label = self._labels[int(self._owner[worst])]
+        return Misfit(float(off[worst]), float(angles(turn[0].T @ turn).max()), label)

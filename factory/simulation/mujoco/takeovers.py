@@ -12,12 +12,12 @@ from factory.support.engine import mujoco
 
 class Takeovers:
     """`count`: how many bodies have been taken over; `gap` [m]: the largest distance between the
-    frames that a grip joined; `off` [m]: the largest way of any vertex to where its grip keeps it,
-    turns included. `radii` (nbody,): how far vertices are from their body's origin [m]. The
-    kinematics in `d` are up to date."""
+    frames that a grip joined; `turn` [rad]: the largest angle between them; `off` [m]: the largest
+    way of any vertex to where its grip keeps it, turns included. `radii` (nbody,): how far vertices
+    are from their body's origin [m]. The kinematics in `d` are up to date."""
 
     def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, radii: Array) -> None:
-        self.count, self.gap, self.off = 0, 0.0, 0.0
+        self.count, self.gap, self.turn, self.off = 0, 0.0, 0.0, 0.0
         self._d, self._frames, self._radii = d, WeldFrames.of(m, d), radii
         self._qpos = m.jnt_qposadr[m.body_jntadr][:, None] + np.arange(7)
 
@@ -25,6 +25,7 @@ class Takeovers:
         """What has been measured."""
         self.count = keeper.whole("taken.count", self.count)
         self.gap = keeper.number("taken.gap", self.gap, 0)
+        self.turn = keeper.number("taken.turn", self.turn, 0)
         self.off = keeper.number("taken.off", self.off, 0)
 
     def measure(self, welds: Index, bodies: Index) -> None:
@@ -33,8 +34,9 @@ class Takeovers:
         q, frames = self._d.qpos, self._frames.chosen(welds)
         pose = q[self._qpos[bodies]]
         gap = np.linalg.norm(pose[:, :3] - frames.at(q[frames.along]), axis=1)
-        along = (pose[:, 3:] * frames.turn).sum(axis=1) ** 2
-        turned = 2 * np.sqrt(np.maximum(0.0, 1.0 - along)) * self._radii[bodies]
+        sine = np.sqrt(np.maximum(0.0, 1.0 - (pose[:, 3:] * frames.turn).sum(axis=1) ** 2))
+        turned = 2 * sine * self._radii[bodies]
         self.count += len(welds)
         self.gap = max(self.gap, float(gap.max()))
+        self.turn = max(self.turn, 2 * float(np.arcsin(np.minimum(sine.max(), 1.0))))
         self.off = max(self.off, float((gap + turned).max()))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
+from dataclasses import replace
 from math import ceil
 
 import numpy as np
@@ -28,6 +29,7 @@ from factory.simulation.mujoco.inspection import Inspection
 from factory.simulation.mujoco.motion import Motion
 from factory.simulation.mujoco.parts import Parts
 from factory.simulation.mujoco.sliders import NEVER
+from factory.simulation.mujoco.soundness import Soundness
 from factory.simulation.mujoco.stepping import SingleSteps
 from factory.simulation.request import RunRequest
 from factory.simulation.run import PhysicsFigures
@@ -71,7 +73,9 @@ class MujocoWorld:
         self.motion = Motion(self.m, self.d, model, start, gains)
         self._away = HandsAway(self.d, model.layout, self.motion.axes.qpos)
         self.parts = Parts(self.m, self.d, model, self.motion, request, counts)
-        self.inspection = Inspection(self.m, self.d, model, self.parts.masks)
+        parts = self.parts
+        soundness = Soundness(self.m, self.d, model, parts.masks, parts.copies.body, parts.grips)
+        self.inspection = Inspection(self.m, self.d, model, soundness)
         for operation in model.factory.operations:
             begun, over = (counts.get(t, 0) for t in (operation.start, operation.end))
             if begun > over:
@@ -83,6 +87,7 @@ class MujocoWorld:
             else SingleSteps(*stepping)
         )
         self.motion.begin(self.parts.hands.loads())
+        soundness.look()
         mujoco.mj_forward(self.m, self.d)
 
     @property
@@ -170,7 +175,9 @@ class MujocoWorld:
         all have their numbers. What it held, and what is shown where nobody takes it now, are put
         away before."""
         tree = self.motion.axes.tree[robot]
-        self.parts.masks.remove(np.flatnonzero(self.m.body_treeid == tree).tolist())
+        gone = np.flatnonzero(self.m.body_treeid == tree).tolist()
+        self.parts.masks.remove(gone)
+        self.inspection.soundness.gone.update(gone)
         self.parts.feeders.exchange(robot, layout)
         self.inspection.exchange(layout)
         self._away = HandsAway(self.d, layout, self.motion.axes.qpos)
@@ -263,7 +270,8 @@ class MujocoWorld:
 
     def figures(self) -> PhysicsFigures:
         """The figures of the run so far."""
-        return self.inspection.figures(self.parts.welds, self.parts.strength.most)
+        found = self.inspection.figures(self.parts.welds, self.parts.strength.most)
+        return found if self.dropped is None else replace(found, dropped_s=self.dropped.time)
 
 
 def anything() -> None:

@@ -8,6 +8,7 @@ from factory.control.mode import Array, Index
 from factory.mjcf import names
 from factory.mjcf.model import Model
 from factory.mjcf.weld_frames import HOLD
+from factory.simulation.mujoco.fusing import angles
 from factory.study.fidelity.readings import ActiveWelds
 from factory.study.fidelity.record import Misplaced
 
@@ -54,7 +55,7 @@ class Finished:
         spin = np.einsum("nij,nj->ni", turn[self._owner] - np.eye(3), self._local)
         far = np.linalg.norm(off[self._owner] + spin, axis=1)
         self.position = np.maximum(self.position, np.linalg.norm(off, axis=1))
-        self.angle = np.maximum(self.angle, _angles(turn))
+        self.angle = np.maximum(self.angle, angles(turn))
         self.vertex = np.maximum(self.vertex, np.maximum.reduceat(far, self._starts))
         self.products += 1
 
@@ -70,16 +71,3 @@ class Finished:
             strict=True,
         )
         return tuple(Misplaced(part, float(p), float(a), float(v)) for part, p, a, v in rows)
-
-
-def _angles(turns: Array) -> Array:
-    """The angles of rotation matrices (n, 3, 3) [rad]; exact for small ones, from the sine."""
-    axis = np.stack(
-        [
-            turns[:, 2, 1] - turns[:, 1, 2],
-            turns[:, 0, 2] - turns[:, 2, 0],
-            turns[:, 1, 0] - turns[:, 0, 1],
-        ]
-    )
-    cosine = (np.trace(turns, axis1=1, axis2=2) - 1) / 2
-    return np.asarray(np.arctan2(np.linalg.norm(axis, axis=0) / 2, cosine))

@@ -1,0 +1,190 @@
+"""Whether the engine's model is that of the factory: what should be solid is, bodies weigh what
+their parts do and have their shapes, and nothing in the engine is switched off.
+
+A run of another model proves nothing. What is expected comes from the layout's parts and from who
+holds what, not from the model that was written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+
+import numpy as np
+
+from factory.control.mode import Array, Index
+from factory.layout.hands.limbs import limbs
+from factory.mjcf import names
+from factory.mjcf.feeders import SLIDER_MASS
+from factory.mjcf.masks import masks_of
+from factory.mjcf.model import CARRIAGE_MASS, GRAVITY, Model
+from factory.mjcf.outfeed import SHUTTER_MASS, TRAY_MASS
+from factory.simulation.mujoco.contacts import ContactMasks
+from factory.simulation.mujoco.fusing import angles, rotations
+from factory.support.engine import mujoco
+from factory.support.errors import Diagnostic
+
+NAMED = 3
+"""So many are named of those that share a fault."""
+
+STATION = 1
+"""The bit of masks by which robots and stations collide with everything."""
+
+STANDS = {"feeder", "outfeed", "bin", "ground"}
+"""What stands, by the first word of its geoms' names; all of it is solid, but rods are not."""
+
+ROD = "/rod"
+"""What the names of geoms end with that slide in lids, which have no holes for them."""
+
+WEIGHTS = {"carriage": CARRIAGE_MASS, "slider": SLIDER_MASS}
+WEIGHTS |= {"tray": TRAY_MASS, "shutter": SHUTTER_MASS}
+"""What weighs how much, by the last word of its name, with what is on it [kg]."""
+
+HEAVIER = 1e-6
+"""Masses are the same to this share."""
+
+SHIFTED, TILTED = 1e-6, 1e-5
+"""A geom is no further from its place in its part [m], and turned by no more [rad], than rounding
+takes."""
+
+HARMLESS = int(mujoco.mjtDisableBit.mjDSBL_ISLAND) | int(mujoco.mjtDisableBit.mjDSBL_WARMSTART)
+"""What may be switched off: how the engine solves, not what."""
+
+
+class Soundness:
+    """Compares an engine's model with the factory's, whose parts have `bodies` by label and are in
+    the hands that `grips` gives: welds, each with the code of its holder. `mass` (nbody,): what
+    bodies weigh [kg], nan where nothing is asked for; `gone`: bodies that touch nothing any more;
+    `found`: all that was wrong when something first was."""
+
+    def __init__(
+        self,
+        m: mujoco.MjModel,
+        d: mujoco.MjData,
+        model: Model,
+        masks: ContactMasks,
+        bodies: Mapping[str, Index],
+        grips: Callable[[], Iterable[tuple[int, int]]],
+    ) -> None:
+        self._m, self._d, self._model, self._of, self._grips = m, d, model, bodies, grips
+        self.masks, self.gone, self.found = masks, set[int](), tuple[Diagnostic, ...]()
+        self._name = [m.geom(geom).name for geom in range(m.ngeom)]
+        called = [m.body(body).name for body in range(m.nbody)]
+        robots = np.array([names.kind(name) == "robot" for name in called])[m.geom_bodyid]
+        stands = [names.kind(n) in STANDS and not n.endswith(ROD) for n in self._name]
+        self._stations = np.flatnonzero(robots & (m.geom_group == 0) | stands)
+        self.mass = np.array([WEIGHTS.get(name.rpartition("/")[2], np.nan) for name in called])
+        for label, ids in bodies.items():
+            self.mass[ids] = model.carried.mass[label]
+
+    def weigh(self, bodies: Iterable[int], factor: float) -> None:
+        """Bodies weigh `factor` times as much, on purpose."""
+        self.mass[[*bodies]] *= factor
+
+    def look(self) -> None:
+        """Look for what is not as it should be, unless something was not before."""
+        self.found = self.found or (
+            *self._options(),
+            *self._loose(),
+            *self._heavy(),
+            *self._misshapen(),
+        )
+
+    def _options(self) -> Iterator[Diagnostic]:
+        """The engine's options that are not a factory's."""
+        option = self._m.opt
+        for name, bit in mujoco.mjtDisableBit.__members__.items():
+            if int(bit) & option.disableflags & ~HARMLESS:
+                word = name.removeprefix("mjDSBL_").lower()
+                yield Diagnostic("Options", f"the engine's '{word}' is switched off")
+        if not np.array_equal(option.gravity, (0.0, 0.0, -GRAVITY)):
+            yield Diagnostic("Options", f"gravity is {option.gravity.tolist()} m/s²")
+        if option.timestep != self._model.settings.step:
+            yield Diagnostic("Options", f"the engine's timestep is {option.timestep:g} s")
+        floating = np.flatnonzero(self._m.body_gravcomp).tolist()
+        yield from _each("Options", "gravity acts less on {}", map(self._body, floating))
+
+    def _loose(self) -> Iterator[Diagnostic]:
+        """What does not collide, and should."""
+        m, layout = self._m, self._model.layout
+        at = self._stations[~np.isin(m.geom_bodyid[self._stations], [*self.gone])]
+        solid = (m.geom_contype[at] > 0) & (m.geom_conaffinity[at] & STATION > 0)
+        loose = [self._name[geom] for geom in at[~solid].tolist()]
+        robots = [robot for robot in layout.factory.robots if layout.hands]
+        limbed = {f"{r.name}/{limb.name}" for r in robots for limb in limbs(layout, r.index)}
+        loose += sorted(limbed.difference(self._name[geom] for geom in self._stations.tolist()))
+        yield from _each("NotSolid", "{} is not solid", [*loose, *self._unmasked()])
+        yield from _each("NotSolid", "{} do not collide", self._left_out())
+
+    def _unmasked(self) -> Iterator[str]:
+        """The geoms of held parts whose masks are not those of what their holder holds."""
+        m, d = self._m, self._d
+        for weld, code in self._grips():
+            if d.eq_active[weld]:
+                geoms = self.masks.solid[int(m.eq_obj2id[weld])]
+                masks = np.stack([m.geom_contype[geoms], m.geom_conaffinity[geoms]], axis=1)
+                wrong = (masks != masks_of(code)).any(axis=1)
+                yield from (self._name[geom] for geom in geoms[wrong].tolist())
+
+    def _left_out(self) -> Iterator[str]:
+        """The pairs of bodies that are left out of contact, and should not be."""
+        apart = {frozenset(pair) for pair in self._model.excluded}
+        listed = self._m.exclude_signature.view(np.uint32)
+        for signature in listed[listed != np.iinfo(np.uint32).max].tolist():
+            pair = [self._body(signature >> 16), self._body(signature & 0xFFFF)]
+            if frozenset(map(names.part_of, pair)) not in apart:
+                yield " and ".join(pair)
+
+    def _heavy(self) -> Iterator[Diagnostic]:
+        """Bodies that weigh something else than they should."""
+        mass, wanted, up = self._m.body_mass.copy(), self.mass, self._m.body_parentid
+        for body in range(self._m.nbody - 1, 0, -1):
+            mass[up[body]] += mass[body]
+        wrong = np.flatnonzero(np.abs(mass - wanted) > HEAVIER * wanted).tolist()
+        words = (f"{self._body(b)} weighs {mass[b]:.4g} kg, not {wanted[b]:.4g} kg" for b in wrong)
+        yield from _each("Mass", "{}", words)
+
+    def _misshapen(self) -> Iterator[Diagnostic]:
+        """Parts whose geoms are elsewhere in their bodies than in the product, or of another
+        size."""
+        wrong = []
+        for label, ids in self._of.items():
+            solid = self.masks.solid
+            first, *others = [solid[body] for body in ids.tolist()]
+            place, turn, size = self._nominal(label, int(ids[0]), first)
+            for geoms in (first, *others):
+                off = np.linalg.norm(self._m.geom_pos[geoms] - place, axis=1) > SHIFTED
+                tilt = angles(turn.transpose(0, 2, 1) @ rotations(self._m.geom_quat[geoms]))
+                grown = np.abs(self._m.geom_size[geoms] - size).max(axis=1) > SHIFTED
+                wrong += [self._name[g] for g in geoms[off | (tilt > TILTED) | grown].tolist()]
+        yield from _each("Shape", "{} is not where its part is, or not as large", wrong)
+
+    def _nominal(self, label: str, body: int, geoms: Index) -> tuple[Array, Array, Array]:
+        """Where the geoms of a body are in it (n, 3), how they are turned (n, 3, 3), and their
+        sizes (n, 3); nan for those of meshes."""
+        m, solids, bodies = self._m, self._model.layout.product.solids, self._model.carried
+        place, turn = np.zeros((len(geoms), 3)), np.zeros((len(geoms), 3, 3))
+        size = np.full((len(geoms), 3), np.nan)
+        for row, geom in enumerate(geoms.tolist()):
+            inside = self._name[geom].removeprefix(f"{self._body(body)}/").partition("/")[0]
+            solid = solids[inside if label in bodies.wholes else label]
+            turn[row] = rotations(solid.quaternion[None])[0]
+            place[row] = solid.position - bodies.centre[label]
+            if solid.mesh is None:
+                receded = m.geom_user[geom, 0] if m.nuser_geom else 0.0
+                size[row, : len(solid.size)] = np.array(solid.size) - receded
+            else:  # the engine puts a mesh's origin into its centre of mass
+                mesh = int(m.geom_dataid[geom])
+                place[row] += turn[row] @ m.mesh_pos[mesh]
+                turn[row] = turn[row] @ rotations(m.mesh_quat[mesh][None])[0]
+        return place, turn, size
+
+    def _body(self, body: int) -> str:
+        return str(self._m.body(body).name)
+
+
+def _each(code: str, words: str, wrong: Iterable[str]) -> Iterator[Diagnostic]:
+    """A fault of each of the first, and how many more have it."""
+    found = list(dict.fromkeys(wrong))
+    yield from (Diagnostic(code, words.format(name)) for name in found[:NAMED])
+    if len(found) > NAMED:
+        yield Diagnostic(code, f"and {len(found) - NAMED} more")
