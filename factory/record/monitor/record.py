@@ -22,6 +22,7 @@ from factory.record.monitor.anatomy import Anatomy
 from factory.record.monitor.calm import judge_calm
 from factory.record.monitor.monitor import Monitor
 from factory.record.monitor.observation import Observation
+from factory.record.monitor.recount import differences, recounted, worst
 from factory.record.monitor.report import Report
 from factory.record.monitor.subject import MonitorSubject, subject_from
 from factory.record.verdict import RunVerdict, judged
@@ -53,12 +54,16 @@ def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
 
 
 def _seen(log: Log, subject: MonitorSubject, m: Any) -> Report:
-    """What a monitor says of the states, and of whether the firings agree with those."""
-    seen = observations(log)
-    monitor = Monitor(subject, Anatomy.of(m, subject.factory), next(seen))
+    """What a monitor says of the states, and of whether the firings and figures agree with
+    those."""
+    seen, anatomy = observations(log), Anatomy.of(m, subject.factory)
+    monitor = Monitor(subject, anatomy, next(seen))
     for observation in seen:
         monitor.see(observation)
-    return monitor.report(log.events)
+    report = monitor.report(log.events)
+    counted = recounted(log, subject, anatomy, m, observations(log))
+    wrong = differences(log.figures or {}, counted, float(log.time[-1]))
+    return replace(report, violations=(*report.violations, *wrong), figures=counted)
 
 
 def verdict_on(log: Log, factory: Factory, report: Report | None) -> RunVerdict:
@@ -68,7 +73,9 @@ def verdict_on(log: Log, factory: Factory, report: Report | None) -> RunVerdict:
     after = [*nets_after(factory, log.entries)]
     refines = replay(factory.net, log.entries, start, joins_of(factory), after).refines
     trouble = None if cut is None else cut.failure
-    return judged(trouble, refines, log.figures, report)
+    counted = report.figures if report else None
+    figures = log.figures if counted is None else worst(log.figures, counted)
+    return judged(trouble, refines, figures, report)
 
 
 def _markings(log: Log) -> Iterator[tuple[float, list[int]]]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from factory.support.errors import Diagnostic, Position
 
@@ -60,13 +62,15 @@ class Firing:
 @dataclass(frozen=True, slots=True)
 class Report:
     """The verdict of a monitor. `time_s`: what the monitor itself took [s]; `calm_s`: how long the
-    spells of the run were that it has judged [s], None where it has judged all of it."""
+    spells of the run were that it has judged [s], None where it has judged all of it; `figures` of
+    the bodies, counted from the states in a log, None where they were not."""
 
     seen: tuple[Firing, ...] = field(repr=False)
     inferred: tuple[Firing, ...] = field(repr=False)
     violations: tuple[Violation, ...]
     time_s: float = 0.0
     calm_s: float | None = None
+    figures: Mapping[str, Any] | None = field(default=None, repr=False)
 
     @property
     def refines_net(self) -> bool:

@@ -1,0 +1,252 @@
+"""The figures of a run's bodies, counted again from the states in its log.
+
+What a log says of itself is not believed: contacts, gaps and turns at hand-overs, and the errors of
+products follow from its positions, the constraints that were active, and the model. States are
+known once a tick, and what came and went within one is not seen. So a figure that the log keeps may
+be larger than the same counted here, and not smaller.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from math import degrees
+from typing import Any
+
+import numpy as np
+
+from factory.mjcf import names
+from factory.mjcf.masks import NOBODY, masks_of, robot_code
+from factory.mjcf.pads import Pads
+from factory.mjcf.replica import Replica
+from factory.mjcf.shells import trunks
+from factory.mjcf.weld_frames import GRIP, HOLD, PARK
+from factory.record.log.reader import Log
+from factory.record.monitor.anatomy import Anatomy
+from factory.record.monitor.observation import Array, Index, Observation
+from factory.record.monitor.report import Violation
+from factory.record.monitor.subject import MonitorSubject
+from factory.support.engine import mujoco
+
+PRESSED = 1e-4
+"""So deep may a part lie in the pad that holds it, or is about to [m]."""
+
+SAME = 5e-3
+"""Figures are the same up to this [mm, degrees]."""
+
+WORDS = {
+    "unintended_contacts": "unintended contacts",
+    "handoff_gap_max_mm": "mm of gap at a hand-off",
+    "handoff_angle_max_deg": "degrees of turn at a hand-off",
+    "grip_gap_max_mm": "mm from a pad to what it takes",
+    "product_error_max_mm": "mm of error of a product",
+    "product_angle_max_deg": "degrees of turn in a product",
+}
+"""What is counted again, in words."""
+
+
+def recounted(
+    log: Log, subject: MonitorSubject, anatomy: Anatomy, m: Any, seen: Iterator[Observation]
+) -> dict[str, Any]:
+    """The figures that the observations `seen` in a log show, as `kept_figures` names them."""
+    contacts, places = _Contacts(subject, anatomy, m), _Places(subject, anatomy, m)
+    before, row = next(seen), 0
+    for now in seen:
+        places.look(before, now)
+        if not now.at_end:
+            marked = {*log.marking[row].tolist(), *log.marking[row + 1].tolist()}
+            row += 1
+            contacts.look(before, now, marked)
+        before = now
+    return {**places.figures, **contacts.figures()}
+
+
+def differences(kept: Mapping[str, Any], counted: Mapping[str, Any], t: float) -> list[Violation]:
+    """The figures kept in a log that ends at `t` [s] that its states contradict."""
+    return [
+        Violation(t, "", "", "Record", f"the log says {kept[key]:g} {words}, its states {value:g}")
+        for key, words in WORDS.items()
+        if (value := counted[key]) is not None
+        and key in kept
+        and not value <= (kept[key] or 0.0) + SAME
+    ]
+
+
+def worst(kept: Mapping[str, Any] | None, counted: Mapping[str, Any]) -> dict[str, Any]:
+    """Of each figure the larger of the two, and of contacts all that is known of more of them."""
+    kept = kept or {}
+    found = {**kept}
+    for key in WORDS:
+        values = [value for value in (kept.get(key), counted[key]) if value is not None]
+        found[key] = max(values, default=None)
+    if counted["unintended_contacts"] > (kept.get("unintended_contacts") or 0):
+        found |= {key: counted[key] for key in ("contacts", "contact_first_s")}
+    return found
+
+
+class _Contacts:
+    """Contacts that nothing intends, of bodies in the hands that the active welds tell."""
+
+    def __init__(self, subject: MonitorSubject, anatomy: Anatomy, m: Any) -> None:
+        self._replica, self._anatomy = Replica(m), anatomy
+        self._operations = {o.place: o for o in subject.factory.operations}
+        m = self._m = self._replica.m
+        m.exclude_signature[:] = -1
+        self._apart = {frozenset(names.excluded(m.exclude(e).name)) for e in range(m.nexclude)}
+        self._trunk, self._solid = trunks(m), Pads(m).solid
+        self._code = _codes(m, subject)
+        self._holds = _held(m, subject, anatomy)
+        self._in = np.full(m.nbody, NOBODY)
+        self._welds: Index | None = None
+        self._touching: set[tuple[int, int]] = set()
+        self._onsets: list[tuple[float, int, int]] = []
+
+    def look(self, before: Observation, now: Observation, marked: set[int]) -> None:
+        """At what touches where a tick begins, in the hands that things are in during it."""
+        if now.welds is not self._welds:
+            self._hold(now.welds)
+        m, d = self._replica.m, self._replica.d
+        self._replica.place(before.qpos)
+        mujoco.mj_collision(m, d)
+        found = d.contact
+        touching = set()
+        for number in np.flatnonzero(found.dist[: d.ncon] < 0).tolist():
+            a, b = found.geom[number].tolist()
+            if not self._intended(a, b, float(found.dist[number]), marked):
+                touching.add((a, b))
+        fresh = sorted(touching - self._touching)
+        self._onsets += [(before.time, a, b) for a, b in fresh]
+        self._touching = touching
+
+    def figures(self) -> dict[str, Any]:
+        """How many onsets, of which geoms, and when the first was [s]."""
+        name = self._m.geom
+        pairs = dict.fromkeys(f"{name(a).name} - {name(b).name}" for _, a, b in self._onsets)
+        return {
+            "unintended_contacts": len(self._onsets),
+            "contacts": list(pairs),
+            "contact_first_s": self._onsets[0][0] if self._onsets else None,
+        }
+
+    def _hold(self, welds: Index) -> None:
+        """Parts are in the hands of what these welds (k, 3) hold them by."""
+        m, self._welds = self._m, welds
+        for weld, holder, body in welds.tolist():
+            if self._anatomy.copy_of[body] < 0 or self._anatomy.holder[weld] is None:
+                continue
+            parked = self._anatomy.holder[weld] == (PARK, -1)
+            code = NOBODY if parked else int(self._code[holder])
+            if self._in[body] != code:
+                own, geoms = self._trunk == body, self._solid[body]
+                self._in[own] = code
+                m.geom_contype[geoms], m.geom_conaffinity[geoms] = masks_of(code)
+                m.body_contype[own], m.body_conaffinity[own] = masks_of(code)
+
+    def _intended(self, a: int, b: int, apart: float, marked: set[int]) -> bool:
+        """Whether two geoms may touch: they are of parts that are being joined or overlap when
+        finished, or one is a pad and the other what that holds."""
+        m = self._m
+        bodies = m.geom_bodyid[[a, b]].tolist()
+        label = [names.part_of(m.body(body).name) for body in bodies]
+        if all(label):
+            robots = {int(self._in[body]) - 1 for body in bodies}
+            at = (o for place in marked if (o := self._operations.get(place)))
+            return frozenset(label) in self._apart or any(robots <= {*o.robots} for o in at)
+        pad, part = (a, label[1]) if label[1] else (b, label[0])
+        held = self._holds.get(names.pad_of(m.geom(pad).name), set())
+        return apart >= -PRESSED and part in held
+
+
+class _Places:
+    """How far what changes hands is from where it should be, and the parts of products."""
+
+    def __init__(self, subject: MonitorSubject, anatomy: Anatomy, m: Any) -> None:
+        self._replica, self._anatomy = Replica(m), anatomy
+        self._pads = Pads(self._replica.m)
+        self._kind = np.array([holder[0] if holder else -1 for holder in anatomy.holder])
+        self._place = {label: np.array(place) for label, place in subject.places.items()}
+        order = [part for x in subject.factory.products for part in subject.factory.contents[x]]
+        self._order = {part: number for number, part in enumerate(order)}
+        self.figures: dict[str, float | None] = dict.fromkeys(WORDS)
+
+    def look(self, before: Observation, now: Observation) -> None:
+        """At a state `now`, and at what changed hands since the one before."""
+        if now.welds is before.welds:
+            return
+        was, on = ({int(w): int(b) for w, _, b in seen.welds} for seen in (before, now))
+        fresh = np.array([w for w, body in on.items() if was.get(w) != body], np.intp)
+        parked = {body for weld, body in was.items() if self._kind[weld] == PARK}
+        taken = [w for w in fresh.tolist() if self._kind[w] >= GRIP and on[w] not in parked]
+        if now.at_end and taken:
+            self._taken(np.array(taken), np.array([on[w] for w in taken]), now)
+        for seen, held, other in ((now, on, was), (before, was, on)):
+            held_now = {
+                w: b for w, b in held.items() if self._kind[w] == HOLD and other.get(w) != b
+            }
+            if held_now:
+                self._finished([*held_now.values()], seen.qpos)
+
+    def _taken(self, welds: Index, bodies: Index, now: Observation) -> None:
+        """Welds close on bodies, and holders' pads on the first that they take."""
+        frames, qpos = self._anatomy.frames.chosen(welds), now.qpos
+        pose = qpos[self._at(bodies)]
+        gap = np.linalg.norm(pose[:, :3] - frames.at(qpos[frames.along]), axis=1)
+        self._note("handoff_gap_max_mm", 1e3 * float(gap.max()))
+        self._note("handoff_angle_max_deg", _angle(pose[:, 3:], frames.turn))
+        self._replica.switch(now.welds.astype(np.int32))
+        self._replica.place(qpos)
+        apart = self._pads.first_taken(self._replica.d, welds, now.welds[:, 0])
+        if apart is not None:
+            self._note("grip_gap_max_mm", 1e3 * apart)
+
+    def _finished(self, bodies: Sequence[int], qpos: Array) -> None:
+        """The bodies of a product, against the first of them."""
+        name = {body: self._anatomy.label[self._anatomy.copy_of[body]] for body in bodies}
+        order = sorted(bodies, key=lambda body: self._order.get(name[body], 0))
+        pose, labels = qpos[self._at(np.array(order))], [name[body] for body in order]
+        turn = np.zeros(9)
+        mujoco.mju_quat2Mat(turn, pose[0, 3:])
+        nominal = np.array([self._place[label] - self._place[labels[0]] for label in labels])
+        fitted = (pose[:, :3] - pose[0, :3]) @ turn.reshape(3, 3)
+        off = float(np.linalg.norm(fitted - nominal, axis=1).max())
+        self._note("product_error_max_mm", 1e3 * off)
+        first = np.broadcast_to(pose[0, 3:], (len(pose), 4))
+        self._note("product_angle_max_deg", _angle(pose[:, 3:], first))
+
+    def _at(self, bodies: Index) -> Index:
+        """Addresses (n, 7) of bodies."""
+        copies = self._anatomy.copy_of[bodies]
+        return np.asarray(self._anatomy.body[copies][:, None] + np.arange(7))
+
+    def _note(self, key: str, value: float) -> None:
+        self.figures[key] = max(self.figures[key] or 0.0, value)
+
+
+def _angle(one: Array, other: Array) -> float:
+    """The largest angle between quaternions (n, 4) [degrees]."""
+    sine = np.sqrt(np.maximum(0.0, 1.0 - (one * other).sum(axis=1) ** 2))
+    return degrees(2 * float(np.arcsin(np.minimum(sine.max(), 1.0))))
+
+
+def _codes(m: Any, subject: MonitorSubject) -> Index:
+    """The code of each body that holds parts (nbody,): a robot's is that of its number, any other's
+    is in the masks of its geoms."""
+    robots = {robot.name: robot_code(robot.index) for robot in subject.factory.robots}
+    found = np.zeros(m.nbody, np.intp)
+    np.maximum.at(found, m.geom_bodyid, m.geom_contype >> 1)
+    for body in range(m.nbody):
+        name = m.body(body).name
+        found[body] = robots.get(names.holder(name), found[body])
+    return found
+
+
+def _held(m: Any, subject: MonitorSubject, anatomy: Anatomy) -> dict[str, set[str]]:
+    """The labels of all bodies that each holder ever holds, by the holder's name."""
+    found: dict[str, set[str]] = {}
+    contents = subject.factory.contents
+    for weld, holder in enumerate(anatomy.holder):
+        if holder is not None and holder[0] != PARK:
+            name = names.holder(m.body(int(m.eq_obj1id[weld])).name)
+            label = anatomy.part[weld]
+            owner = name.removesuffix("/slider")
+            found.setdefault(owner, set()).update((label, *contents.get(label, ())))
+    return found
