@@ -44,6 +44,17 @@ class Replica:
         self.m.eq_obj1id[active[:, 0]] = active[:, 1]
         self.m.eq_obj2id[active[:, 0]] = active[:, 2]
 
+    def exclude_nothing(self) -> None:
+        """Let no pair of bodies be left out of contact."""
+        self.m.exclude_signature[:] = -1
+
+    def mask(
+        self, geoms: NDArray[Any], bodies: NDArray[Any], contype: int, conaffinity: int
+    ) -> None:
+        """Give geoms and the bodies that they are of these masks."""
+        self.m.geom_contype[geoms], self.m.geom_conaffinity[geoms] = contype, conaffinity
+        self.m.body_contype[bodies], self.m.body_conaffinity[bodies] = contype, conaffinity
+
     def leave_out(self, geoms: NDArray[np.bool_]) -> None:
         """Let these geoms (ngeom,) touch nothing by masks of their own."""
         self.m.geom_contype[geoms] = self.m.geom_conaffinity[geoms] = 0

@@ -26,7 +26,7 @@ class SolidReplica(Replica):
         m, solid = self.m, drawn(m)
         m.geom_contype[:] = m.geom_conaffinity[:] = solid
         m.geom_margin[:] = m.geom_gap[:] = m.body_margin[:] = 0.0
-        m.exclude_signature[:] = -1
+        self.exclude_nothing()
         m.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT)
         self._solid = np.isin(np.arange(m.nbody), m.geom_bodyid[solid])
 

@@ -89,8 +89,7 @@ class _Contacts:
     def __init__(self, subject: MonitorSubject, anatomy: Anatomy, m: Any) -> None:
         self._replica, self._anatomy = Replica(m), anatomy
         self._operations = {o.place: o for o in subject.factory.operations}
-        m = self._m = self._replica.m
-        m.exclude_signature[:] = -1
+        self._replica.exclude_nothing()
         self._apart = {frozenset(names.excluded(m.exclude(e).name)) for e in range(m.nexclude)}
         self._trunk, self._solid = trunks(m), Pads(m).solid
         self._code = _codes(m, subject)
@@ -119,7 +118,7 @@ class _Contacts:
 
     def figures(self) -> dict[str, Any]:
         """How many onsets, of which geoms, and when the first was [s]."""
-        name = self._m.geom
+        name = self._replica.m.geom
         pairs = dict.fromkeys(f"{name(a).name} - {name(b).name}" for _, a, b in self._onsets)
         return {
             "unintended_contacts": len(self._onsets),
@@ -128,23 +127,24 @@ class _Contacts:
         }
 
     def _hold(self, welds: Index) -> None:
-        """Parts are in the hands of what these welds (k, 3) hold them by."""
-        m, self._welds = self._m, welds
-        for weld, holder, body in welds.tolist():
+        """Parts are in the hands of what these welds (k, 3) hold them by, and of two of that which
+        took them last."""
+        before = {*map(tuple, () if self._welds is None else self._welds.tolist())}
+        fresh = [row for row in welds.tolist() if tuple(row) not in before]
+        self._welds = welds
+        for weld, holder, body in fresh:
             if self._anatomy.copy_of[body] < 0 or self._anatomy.holder[weld] is None:
                 continue
             parked = self._anatomy.holder[weld] == (PARK, -1)
             code = NOBODY if parked else int(self._code[holder])
-            if self._in[body] != code:
-                own, geoms = self._trunk == body, self._solid[body]
-                self._in[own] = code
-                m.geom_contype[geoms], m.geom_conaffinity[geoms] = masks_of(code)
-                m.body_contype[own], m.body_conaffinity[own] = masks_of(code)
+            own = self._trunk == body
+            self._in[own] = code
+            self._replica.mask(self._solid[body], own, *masks_of(code))
 
     def _intended(self, a: int, b: int, apart: float, marked: set[int]) -> bool:
         """Whether two geoms may touch: they are of parts that are being joined or overlap when
         finished, or one is a pad and the other what that holds."""
-        m = self._m
+        m = self._replica.m
         bodies = m.geom_bodyid[[a, b]].tolist()
         label = [names.part_of(m.body(body).name) for body in bodies]
         if all(label):

@@ -117,13 +117,15 @@ class Soundness:
 
     def _unmasked(self) -> Iterator[str]:
         """The geoms of held parts whose masks are not those of what their holder holds."""
-        m, d = self._m, self._d
+        m, held = self._m, dict[int, list[tuple[int, int]]]()
         for weld, code in self._grips():
-            if d.eq_active[weld]:
-                geoms = self.masks.solid[int(m.eq_obj2id[weld])]
-                masks = np.stack([m.geom_contype[geoms], m.geom_conaffinity[geoms]], axis=1)
-                wrong = (masks != masks_of(code)).any(axis=1)
-                yield from (self._name[geom] for geom in geoms[wrong].tolist())
+            if self._d.eq_active[weld]:
+                held.setdefault(int(m.eq_obj2id[weld]), []).append(masks_of(code))
+        for body, masks in held.items():
+            geoms = self.masks.solid[body]
+            given = np.stack([m.geom_contype[geoms], m.geom_conaffinity[geoms]], axis=1)
+            right = (given[:, None] == masks).all(axis=2).any(axis=1)
+            yield from (self._name[geom] for geom in geoms[~right].tolist())
 
     def _left_out(self) -> Iterator[str]:
         """The pairs of bodies that are left out of contact, and should not be."""
