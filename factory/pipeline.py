@@ -29,6 +29,7 @@ from factory.support.settings import Settings
 
 if TYPE_CHECKING:
     from factory.compiler.mating.findings import Matings
+    from factory.geometry.overlapping import DrawnOverlaps
     from factory.geometry.solids import Product
     from factory.layout.hands.choosing import Hands
     from factory.layout.hands.misses import NoGrip
@@ -95,14 +96,22 @@ class Project:
         return matings(self.pag, self.templates, self.product)
 
     @property
+    def overlaps(self) -> DrawnOverlaps:
+        """Which parts overlap in the finished product; none of default boxes."""
+        from factory.geometry.overlapping import DrawnOverlaps, overlaps_of
+
+        return overlaps_of(self.product) if is_shaped(self.pag) else DrawnOverlaps()
+
+    @property
     def warnings(self) -> tuple[Diagnostic, ...]:
-        """What is wrong with the geometry of its parts, what is blocked, and what no hand can
-        hold, unless the product is of an unlikely size."""
+        """What is wrong with the geometry of its parts, what overlaps, what is blocked, and what no
+        hand can hold, unless the product is of an unlikely size."""
         product = () if is_plain(self.pag) else self.product.warnings
         blocked = self.matings.warnings if self.matings else ()
         sized = any(warning.code == "Size" for warning in product)
         grips = () if sized else tuple(found.warning() for found in self.no_grips)
-        return (*product, *blocked, *grips)
+        overlaps = self.overlaps.faults(self.pag.allowed)
+        return (*product, *overlaps, *blocked, *grips)
 
     @cached_property
     def _hands(self) -> Hands | None:

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import click
 
 from factory.commands.grouped import Grouped
-from factory.commands.options import HANDS, OUTPUT, PATH, RELAY, SOURCE, WIP, for_a_pag
+from factory.commands.options import ALLOW, HANDS, OUTPUT, PATH, RELAY, SOURCE, WIP, for_a_pag
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
-from factory.commands.warnings import announced
+from factory.commands.warnings import announced, say_allowed
 from factory.problem.shapes import is_shaped
 from factory.support.collector import collector_paused
 from factory.support.console import emit, say, table
@@ -48,6 +48,7 @@ POOLED = 8
 @click.option("--certificate", type=PATH, help="Write the proof here.")
 @click.option("--against", type=PATH, help="Check a proof that --certificate has written.")
 @WIP
+@ALLOW
 @click.option("--clashes", type=PATH, help=PICTURES)
 @click.option("--failures", is_flag=True, help=COSTS)
 @RELAY
@@ -83,6 +84,8 @@ def check(
             check_project(project, wip, failures or None, asked) if project else check_net(file)
         )
     announced(checked.warnings, out)
+    if project is not None and not out.silent:
+        say_allowed(project)
     proved = None if against is None else _proved(against, checked)
     if clashes is not None:
         files = _pictures(checked, clashes)

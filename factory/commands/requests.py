@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from factory.support.errors import Diagnostic, InputError
+from factory.support.errors import Diagnostic, InputError, did_you_mean
 
 if TYPE_CHECKING:
     from factory.layout.request import Ground
     from factory.pipeline import Project
     from factory.plant.factory import Factory
-    from factory.problem.pag import PAG
+    from factory.problem.pag import PAG, Allowance
     from factory.render import Picture
     from factory.simulation.recovery.faults import Campaign
     from factory.simulation.request import RunRequest, WorldName
@@ -62,6 +62,7 @@ class ProjectOptions:
     limit: float | None = None
     parallel: tuple[tuple[str, int], ...] = ()
     deputies: bool = False
+    allow: tuple[Allowance, ...] = ()
 
     def settings(self) -> Settings:
         """Options before the environment, that before the `factory.toml` beside the PAG or in the
@@ -104,6 +105,18 @@ class ProjectOptions:
                 message = f"{option} does not go with {what}"
                 raise InputError(Diagnostic("BadValue", message, None, hint))
 
+    def _allowing(self, pag: PAG) -> PAG:
+        """The PAG with the overlaps that are allowed. Raises InputError (Usage) for names that are
+        no parts."""
+        parts = [node.label for node in pag.parts()]
+        for label in (label for allowed in self.allow for label in allowed.parts):
+            if label not in parts:
+                hint = did_you_mean(label, parts, "parts")
+                raise InputError(
+                    Diagnostic("Usage", f"--allow: there is no part '{label}'", None, hint)
+                )
+        return replace(pag, allowed=(*pag.allowed, *self.allow))
+
     def project(self, silent: bool = True, settings: Settings | None = None) -> Project:
         """The project that the options describe, with the forms and lines that they ask for, for
         these `settings` if any are given; unless `silent` the search for those shows its progress.
@@ -111,6 +124,8 @@ class ProjectOptions:
         from factory.pipeline import read
 
         project = read(self.file, self.folders, settings or self.settings(), self.ground())
+        if self.allow:
+            project = project.with_pag(self._allowing(project.pag), project.ground)
         if self.robots is None and self.cycle is None:
             return project
         from factory.study.allocation.aim import Aim, usual_effort

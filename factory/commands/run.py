@@ -14,6 +14,7 @@ import click
 from factory.commands.grouped import Grouped
 from factory.commands.monitor import found_by, say_failures, say_verdict, tell_failures
 from factory.commands.options import (
+    ALLOW,
     FAULTS,
     FLOOR,
     LENIENT,
@@ -34,7 +35,7 @@ from factory.commands.requests import (
     check_ideal,
 )
 from factory.commands.resuming import resumed
-from factory.commands.warnings import announced
+from factory.commands.warnings import announced, say_allowed
 from factory.support.console import POOL_BOUND, emit, say, table
 from factory.support.errors import Diagnostic, InputError, StoppedError
 from factory.support.progress import Progress, Waiting
@@ -57,6 +58,7 @@ if TYPE_CHECKING:
 @SOURCE
 @FAULTS
 @RUN
+@ALLOW
 @click.option("--video", type=PATH, help="Film the run (.mp4).")
 @click.option("--log", type=PATH, help="Keep every tick in a file.")
 @click.option(
@@ -100,6 +102,8 @@ def run(
     with Waiting("reading the shapes and laying out", out.silent):
         layout = project.layout
     warnings = announced(project.warnings, out)
+    if not out.silent:
+        say_allowed(project)
     shown.area()
     if asked.world == "ideal":
         check_ideal(asked.fuse, bool(monitor))

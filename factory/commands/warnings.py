@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import chain
+from typing import TYPE_CHECKING
 
 from factory.commands.requests import OutputOptions
-from factory.support.console import warn
+from factory.support.console import say, warn
 from factory.support.errors import Diagnostic
 from factory.support.order import natural
 
-SHOWN = 24
-"""The most blocked operations that are listed, unless `-v` asks for all."""
+if TYPE_CHECKING:
+    from factory.pipeline import Project
+
+LISTED = {"Overlap": (6, "pairs overlap"), "Blocked": (24, "operations are blocked")}
+"""The most of each code that are listed, unless `-v` asks for all, and what more there are."""
 
 NAMED = 12
 """The most labels that a line names."""
@@ -19,22 +24,20 @@ NAMED = 12
 
 def told(warnings: Sequence[Diagnostic], verbose: bool) -> list[Diagnostic]:
     """All warnings. Unless `verbose`: those of one cause as one line, that counts them, and names
-    what they are about; of blocked operations the first, and how many more there are."""
+    what they are about; of some codes the first, and how many more there are."""
     if verbose:
         return list(warnings)
     causes: dict[object, list[Diagnostic]] = {}
-    blocked = []
+    listed: dict[str, list[Diagnostic]] = {code: [] for code in LISTED}
     for number, warning in enumerate(warnings):
-        if warning.code == "Blocked":
-            blocked.append(warning)
+        if warning.code in LISTED:
+            listed[warning.code].append(warning)
         else:
             causes.setdefault(warning.many or number, []).append(warning)
-    others = [_as_one(alike) for alike in causes.values()]
-    more = len(blocked) - SHOWN
-    if more > 0:
-        message = f"and {more} more operations are blocked"
-        blocked[SHOWN:] = [Diagnostic("Blocked", message, None, "list: -v")]
-    return [*others, *blocked]
+    for code, (most, words) in LISTED.items():
+        if (more := len(listed[code]) - most) > 0:
+            listed[code][most:] = [Diagnostic(code, f"and {more} more {words}", None, "list: -v")]
+    return [*(_as_one(alike) for alike in causes.values()), *chain(*listed.values())]
 
 
 def _as_one(alike: list[Diagnostic]) -> Diagnostic:
@@ -53,3 +56,9 @@ def announced(warnings: Sequence[Diagnostic], out: OutputOptions) -> list[dict[s
     """Print warnings for people; gives all of them, as the document of `--json` lists them."""
     warn(told(warnings, out.verbose), out.silent)
     return [warning.as_json() for warning in warnings]
+
+
+def say_allowed(project: Project) -> None:
+    """Say which overlaps of parts are there, and allowed."""
+    for note in project.overlaps.notes(project.pag.allowed):
+        say(note)

@@ -14,6 +14,8 @@ NUMBERS = "numbers lie between commas in parentheses: pos = ( 0, 0, 0.1 )"
 COPIES = "copies of a part: screw[2] = atomic ( ... ) at ( 0, 0, 0 ), ( 0, 0, 0.1 );"
 VALUE = 'a value is a number, a text "..." or numbers in parentheses ( 0, 0, 1 )'
 
+ALLOWED = "an overlap of two parts is allowed up to a depth: allow ( peg, frame, 0.0005 );"
+
 FALLBACK = Lesson("unexpected {found}", FORM, "found", "")
 FALSE_UNIT = Lesson(
     "unexpected {found} after the unit", "write one of m, cm, mm, in: unit = mm;", "found", ""
@@ -21,6 +23,20 @@ FALSE_UNIT = Lesson(
 FALSE_ROOT = Lesson("unexpected {found} after the root", "write: root = label;", "found", "")
 
 LESSONS = (
+    Lesson(
+        "unexpected {found} in what is allowed",
+        ALLOWED,
+        "found",
+        'allow ( ) | allow ( , a ) | allow ( a , ) | allow ( a b | allow ( a "b" | allow ( a = b | '
+        'allow ( "a" | allow ( ( a | allow ( a ( | allow ( = | allow ( a , , b | allow ( a , ( b | '
+        'allow ( a , "b" | allow ( a , = 1',
+    ),
+    Lesson(
+        "missing ')': what is allowed is not closed",
+        ALLOWED,
+        "behind",
+        "allow ( | allow ( a | allow ( a , | allow ( a , b c",
+    ),
     Lesson("{found} is no statement", FORM, "found", '( a ) | ) a | , a | "a" | [2]'),
     Lesson("'{first}' alone is no statement", FORM, "first", 'a | a "b" | a , b | a )'),
     Lesson(

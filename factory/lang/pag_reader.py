@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 
+from factory.lang.allowances import allowances_of
 from factory.lang.copies import written_out
 from factory.lang.operations import AssemblyReader, signature
 from factory.lang.pag_syntax import Statements, read_statements
@@ -46,12 +47,14 @@ def read_pag(
     findings = Findings(source_of(text, file))
     statements = read_statements(findings)
     signatures = {name: signature(template) for name, template in templates.items()}
-    reader = AssemblyReader(findings, signatures, folder, unit_of(statements, findings))
+    unit = unit_of(statements, findings)
+    reader = AssemblyReader(findings, signatures, folder, unit)
     nodes = tuple(map(reader.read, written_out(statements, findings)))
     TreeCheck(statements, nodes, findings).run()
+    allowed = allowances_of(statements, nodes, unit, findings)
     findings.raise_if_any()
     count = next((int(token.lstrip("0") or 0) for token in statements.counts), None)
-    return PAG(str(statements.roots[0]), nodes, count, folder or ".", file)
+    return PAG(str(statements.roots[0]), nodes, count, folder or ".", file, allowed)
 
 
 def unit_of(statements: Statements, findings: Findings) -> str:

@@ -97,12 +97,20 @@ class WordPair(NamedTuple):
     second: Token
 
 
+class Permission(NamedTuple):
+    """`allow ( peg, frame, 0.0005 )`, `allow ( 0.0005 )`."""
+
+    word: Token
+    words: Sequence[Token]
+
+
 @dataclass(slots=True)
 class Statements:
     """The statements of a text. `broken`: the words of those that did not parse; `nameless`: one
     of those does not even start with the label it defines."""
 
     definitions: list[Definition] = field(default_factory=list)
+    permissions: list[Permission] = field(default_factory=list)
     units: list[Token] = field(default_factory=list)
     roots: list[Token] = field(default_factory=list)
     counts: list[Token] = field(default_factory=list)
@@ -125,6 +133,9 @@ class _Builder(Transformer[Token, Any]):
         places = rest[-1] if rest and isinstance(rest[-1], PlaceList) else None
         arguments = rest[0] if rest and rest[0] is not places else ()
         return Definition(label, operation, arguments, places)
+
+    def permission(self, word: Token, *rest: Token) -> Permission:
+        return Permission(word, [token for token in rest if token.type == "WORD"])
 
     def places(self, word: Token, *vectors: Vector) -> PlaceList:
         return PlaceList(word, vectors)
@@ -182,6 +193,9 @@ def _sort_in(statement: Any, made: Statements, findings: Findings) -> None:
     """Put a statement where it belongs; `pair` and `equation` may yet lack a sign."""
     if isinstance(statement, Definition):
         made.definitions.append(statement)
+        return
+    if isinstance(statement, Permission):
+        made.permissions.append(statement)
         return
     first, second = statement
     if isinstance(statement, Equation) and first == "root":
@@ -313,6 +327,8 @@ def _starts(tokens: Sequence[Token], index: int, depth: int) -> bool:
     if kinds[1:2] == ["COPIES"]:
         del kinds[1]
     kinds = kinds[:4]
+    if kinds[:1] == ["ALLOW"] and depth <= 0:
+        return True
     if kinds[:1] != ["WORD"]:
         return False
     before = tokens[index - 1] if index else None

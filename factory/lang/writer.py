@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from factory.problem.pag import PAG, Assembly, Value
+from factory.problem.pag import PAG, Allowance, Assembly, Value
 from factory.problem.template import LOST, Failure, Law, Template
 
 
 def write_pag(pag: PAG) -> str:
     """The canonical text of a PAG: one statement a line, numbers at full precision."""
     count = [] if pag.count is None else [f"{pag.count} parts;"]
-    lines = [*count, f"root = {pag.root};", *map(write_assembly, pag.nodes)]
+    allowed = map(write_allowance, pag.allowed)
+    lines = [*count, f"root = {pag.root};", *allowed, *map(write_assembly, pag.nodes)]
     return "\n".join(lines) + "\n"
+
+
+def write_allowance(allowed: Allowance) -> str:
+    """One statement: `allow ( peg, frame, 0.0005 );`."""
+    return f"allow ( {', '.join([*allowed.parts, write_number(allowed.depth)])} );"
 
 
 def write_assembly(node: Assembly) -> str:

@@ -44,6 +44,7 @@ from factory.plant.approaches import Pair
 from factory.plant.factory import Factory
 from factory.plant.fused_bodies import FusedBodies, Inside, bodies_of
 from factory.problem.robot_types import Catalogue
+from factory.support.errors import Diagnostic
 from factory.support.settings import Settings
 
 SKELETON = Path(__file__).with_name("skeleton.xml")
@@ -98,7 +99,7 @@ class Model:
     [kg]; `drives`: of each robot; `insets`: what is taken from the shapes that collide; `wip`: the
     most units inside at once that they are enough for, None where more never are; `apart`: the
     pairs of parts that are `excluded`, each part with the body that brings it to the other; `bins`:
-    those for scrap.
+    those for scrap; `overlaps`: what is said of parts that overlap in the finished product.
     """
 
     layout: Layout
@@ -115,6 +116,7 @@ class Model:
     wip: int | None = None
     apart: tuple[tuple[Inside, Inside], ...] = ()
     bins: tuple[Bin, ...] = ()
+    overlaps: tuple[Diagnostic, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("copies", "masses", "files"):

@@ -45,17 +45,37 @@ class Assembly:
         return next((p.value for p in self.parameters if p.name == name), default)
 
 
+ANY_DEPTH = 1000.0
+"""A depth that no overlap has [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Allowance:
+    """An overlap in the finished product that is meant, such as a press fit: up to a `depth` [m],
+    of two `parts` or, where none are named, of any two. Its position does not count in
+    comparisons; an option has none."""
+
+    depth: float
+    parts: tuple[str, ...] = ()
+    position: Position | None = field(default=None, compare=False)
+
+    def covers(self, one: str, other: str) -> bool:
+        """Whether it is about these two parts."""
+        return not self.parts or {one, other} == {*self.parts}
+
+
 @dataclass(frozen=True)
 class PAG:
     """A product assembly graph: one tree over its labels, in the order of the text, which
     `factory.lang.read_pag` checks. `count` is the number in `N parts`, None without it; `folder` is
-    where mesh paths start."""
+    where mesh paths start; `allowed`: overlaps that are meant."""
 
     root: str
     nodes: tuple[Assembly, ...]
     count: int | None = None
     folder: str = field(default=".", compare=False)
     file: str = field(default="<text>", compare=False)
+    allowed: tuple[Allowance, ...] = ()
 
     @cached_property
     def by_label(self) -> Mapping[str, Assembly]:

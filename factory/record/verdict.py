@@ -169,8 +169,9 @@ def _failures(
     figures: Mapping[str, Any], report: Report | None
 ) -> Iterator[tuple[float, Diagnostic]]:
     """What is wrong with the bodies of a run, each with its time [s]: that of the model is before
-    all, that of figures without a time after all."""
-    yield from ((-inf, Diagnostic(code, words)) for code, words in figures.get(FAULTS, []))
+    all, that of figures without a time and of the product's drawing after all."""
+    for code, words in figures.get(FAULTS, []):
+        yield inf if code == "Overlap" else -inf, Diagnostic(code, words)
     for limit in LIMITS:
         failure = limit.exceeded(figures)
         if failure is not None:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from factory.geometry.overlapping import overlaps_of, within
 from factory.layout.bins import Bin, bins_of
 from factory.layout.layout import Layout
 from factory.mjcf.timestep import timed
 from factory.plant.fused_bodies import FusedBodies, bodies_of, fused_copies
 from factory.problem.robot_types import Catalogue, load_catalogue
+from factory.problem.shapes import is_shaped
 from factory.simulation.request import RunRequest
+from factory.support.errors import Diagnostic
 from factory.support.settings import Settings
 from factory.timing.pool import part_pool
 
@@ -33,7 +37,17 @@ def modelled(layout: Layout, request: RunRequest, under_way: Mapping[str, int]) 
         copies = {label: count + SPARE for label, count in copies.items()}
         bins = bins_of(layout)
     catalogue, settings = request.catalogue or load_catalogue(), timed(request.settings, layout)
-    return build_model(layout, catalogue, copies, settings, bodies, request.shown, wip, bins)
+    made = build_model(layout, catalogue, copies, settings, bodies, request.shown, wip, bins)
+    return replace(made, overlaps=_overlaps(layout))
+
+
+def _overlaps(layout: Layout) -> tuple[Diagnostic, ...]:
+    """What overlaps in a product, and is not allowed. Units are alike: one is looked at."""
+    factory = layout.factory
+    if not is_shaped(factory.pag):
+        return ()
+    parts = {*factory.contents[factory.products[0]]}
+    return within(overlaps_of(layout.product), parts).faults(factory.pag.allowed)
 
 
 def physical_model(

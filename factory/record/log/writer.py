@@ -267,6 +267,7 @@ def _header(
     given, account = plain.factory.pag if pag is None else pag, simulation.world.hooks.account
     file = Path(given.file)
     written = file.is_file() and not layout.ground.get("formed")
+    written &= all(allowed.position for allowed in given.allowed)  # others are options
     said = file.read_text("utf-8", errors="replace") if written else write_pag(given)
     text = said if layout.plain is None else write_pag(factory.pag)
     templates = {o.template.name: o.template for o in factory.operations}

@@ -138,7 +138,7 @@ class Inspection:
             float(self._m.opt.timestep),
             grip_gap_max_mm=None if pads is None else 1e3 * pads,
             product_angle_max_deg=None if misfit is None else degrees(misfit.angle),
-            faults=self.soundness.found,
+            faults=(*self.soundness.found, *self._model.overlaps),
             contact_first_s=self.onsets.begun,
             misplaced=() if misfit is None else (misfit.label,),
             handoff_angle_max_deg=degrees(welds.taken.turn),

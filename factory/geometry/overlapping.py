@@ -1,0 +1,128 @@
+"""Which parts of a finished product overlap, by how much, as they are drawn, and whether that is
+allowed."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from weakref import finalize
+
+import numpy as np
+
+from factory.geometry.overlap import DrawnSolids
+from factory.geometry.solids import Product
+from factory.problem.pag import Allowance
+from factory.support.errors import Diagnostic
+
+SILENT = 2e-5
+"""What overlaps by no more than this is rounding, or how precisely a drawing was made [m]."""
+
+
+NOTHING = 1e-15
+"""Less in common than this is rounding [m³]."""
+
+ROUNDING = 1e-9
+"""A depth is allowed that is larger by no more than this [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Overlapping:
+    """Two parts, in the order of the product, and the depth of their overlap [m]."""
+
+    one: str
+    other: str
+    depth: float
+
+    def __str__(self) -> str:
+        return f"{self.one} and {self.other} overlap by {1e3 * self.depth:.2f} mm when finished"
+
+    def most(self, allowed: Iterable[Allowance]) -> float:
+        """The depth that is allowed of them [m]."""
+        return max((a.depth for a in allowed if a.covers(self.one, self.other)), default=0.0)
+
+    def fault(self, allowed: Sequence[Allowance]) -> Diagnostic | None:
+        """What is said of them unless it is allowed (Overlap)."""
+        most = self.most(allowed)
+        if self.depth <= most + ROUNDING:
+            return None
+        words = f"{self}, and {1e3 * most:.2f} mm is allowed" if most else str(self)
+        hint = f"mend the drawing or, if it is meant, allow it: --allow {self.one}:{self.other}"
+        return Diagnostic("Overlap", words, None, hint)
+
+
+@dataclass(frozen=True, slots=True)
+class DrawnOverlaps:
+    """The `pairs` of parts that overlap, the deepest first, and the parts that are `open`: their
+    meshes bound no volume, so that what they overlap is not known."""
+
+    pairs: tuple[Overlapping, ...] = ()
+    open: tuple[str, ...] = ()
+
+    def faults(self, allowed: Sequence[Allowance]) -> tuple[Diagnostic, ...]:
+        """What is said of the pairs that are not allowed."""
+        found = (pair.fault(allowed) for pair in self.pairs)
+        return tuple(fault for fault in found if fault is not None)
+
+    def notes(self, allowed: Sequence[Allowance]) -> list[str]:
+        """What is used of what is allowed, in words: pairs that are named one by one, all others
+        together."""
+        said, every = list[Overlapping](), list[Overlapping]()
+        for pair in self.pairs:
+            if pair.fault(allowed) is None:
+                named = any(a.parts and a.covers(pair.one, pair.other) for a in allowed)
+                (said if named else every).append(pair)
+        words = [f"{pair}, which is allowed" for pair in said]
+        if every:
+            most = max(a.depth for a in allowed if not a.parts)
+            count = "a pair of parts overlaps"
+            if len(every) > 1:
+                count = f"{len(every)} pairs of parts overlap"
+            deepest = f"{1e3 * every[0].depth:.2f} mm when finished"
+            words.append(f"{count} by up to {deepest}; {1e3 * most:g} mm is allowed everywhere")
+        return words
+
+
+_KNOWN: dict[int, DrawnOverlaps] = {}
+"""The overlaps of products that there are, by identity."""
+
+
+def overlaps_of(product: Product) -> DrawnOverlaps:
+    """The overlaps of all parts of a product, found once."""
+    key = id(product)
+    if key not in _KNOWN:
+        _KNOWN[key] = _found(product)
+        finalize(product, _KNOWN.pop, key, None)
+    return _KNOWN[key]
+
+
+def within(found: DrawnOverlaps, parts: Collection[str]) -> DrawnOverlaps:
+    """The overlaps of some parts."""
+    return DrawnOverlaps(
+        tuple(pair for pair in found.pairs if pair.one in parts and pair.other in parts),
+        tuple(part for part in found.open if part in parts),
+    )
+
+
+def _found(product: Product) -> DrawnOverlaps:
+    solids, bodies = list(product.solids.values()), DrawnSolids(product)
+    drawn = np.array([bodies.is_drawn(solid.label) for solid in solids], bool)
+    pairs = []
+    for one, other in _near(product):
+        if drawn[one] and drawn[other]:
+            labels = solids[one].label, solids[other].label
+            common = bodies.overlap(*labels)
+            if common.depth > SILENT and common.volume > NOTHING:
+                pairs.append(Overlapping(*labels, common.depth))
+    pairs.sort(key=lambda pair: -pair.depth)
+    return DrawnOverlaps(
+        tuple(pairs), tuple(s.label for s, good in zip(solids, drawn, strict=True) if not good)
+    )
+
+
+def _near(product: Product) -> Iterator[tuple[int, int]]:
+    """The pairs of parts, by number, whose boxes overlap."""
+    low = np.array([solid.low for solid in product.solids.values()])
+    high = np.array([solid.high for solid in product.solids.values()])
+    for one in range(len(low)):
+        near = (low[one] < high[one + 1 :] - SILENT) & (low[one + 1 :] < high[one] - SILENT)
+        yield from ((one, one + 1 + int(n)) for n in np.flatnonzero(near.all(axis=1)))
