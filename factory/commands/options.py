@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import fields
 from functools import wraps
@@ -16,8 +15,6 @@ from click.core import ParameterSource
 from click.shell_completion import CompletionItem
 
 from factory.commands.requests import OutputOptions, PictureOptions, ProjectOptions, RunOptions
-from factory.lang.words import UNITS, number
-from factory.problem.pag import ANY_DEPTH, Allowance
 from factory.support.errors import Diagnostic, FactoryError, InputError
 from factory.support.settings import LEAST, LONGEST, MOST_BRANCHES
 
@@ -185,36 +182,6 @@ class Branch(click.ParamType[tuple[str, int]]):
         if not equals or not label.strip():
             self.fail(f"'{value}' is no label with a number, as sub2=3.", param, ctx)
         return label.strip(), click.IntRange(1, MOST_BRANCHES).convert(number, param, ctx)
-
-
-class AllowedOverlap(click.ParamType[Allowance]):
-    """An overlap that is meant: `a:b`, `a:b:0.5mm`, or `0.5mm` for all parts."""
-
-    name = "[part:part][:depth]"
-
-    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        if isinstance(value, Allowance):
-            return value
-        parts, depth = value.split(":"), ANY_DEPTH
-        if len(parts) in (1, 3):
-            found = re.fullmatch(r"(.*?)\s*([a-z]*)", parts.pop())
-            unit = (found[2] or "m") if found else ""
-            length = number(found[1], unit) if found and unit in UNITS else None
-            if length is None or length < 0:
-                units = ", ".join(UNITS)
-                self.fail(f"'{value}' ends in no length in one of {units}.", param, ctx)
-            depth = length
-        if len(parts) not in (0, 2) or not all(parts) or len({*parts}) == 1:
-            self.fail(f"'{value}' is neither part:part, part:part:depth nor depth.", param, ctx)
-        return Allowance(depth, tuple(parts))
-
-
-ALLOW = click.option(
-    "--allow",
-    multiple=True,
-    type=AllowedOverlap(),
-    help="An overlap that is meant: a:b, a:b:0.5mm, or 0.5mm everywhere (repeatable).",
-)
 
 
 class RobotCount(click.ParamType[int | str]):

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from factory.layout.request import Ground
     from factory.pipeline import Project
     from factory.plant.factory import Factory
-    from factory.problem.pag import PAG, Allowance
+    from factory.problem.pag import PAG, AllowedOverlap
     from factory.render import Picture
     from factory.simulation.recovery.faults import Campaign
     from factory.simulation.request import RunRequest, WorldName
@@ -62,7 +62,7 @@ class ProjectOptions:
     limit: float | None = None
     parallel: tuple[tuple[str, int], ...] = ()
     deputies: bool = False
-    allow: tuple[Allowance, ...] = ()
+    allow: tuple[AllowedOverlap, ...] = ()
 
     def settings(self) -> Settings:
         """Options before the environment, that before the `factory.toml` beside the PAG or in the

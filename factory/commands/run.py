@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from factory.commands.allowing import ALLOW
 from factory.commands.grouped import Grouped
 from factory.commands.monitor import found_by, say_failures, say_verdict, tell_failures
 from factory.commands.options import (
-    ALLOW,
     FAULTS,
     FLOOR,
     LENIENT,

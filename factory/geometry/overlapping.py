@@ -11,7 +11,7 @@ import numpy as np
 
 from factory.geometry.overlap import DrawnSolids
 from factory.geometry.solids import Product
-from factory.problem.pag import Allowance
+from factory.problem.pag import AllowedOverlap
 from factory.support.errors import Diagnostic
 
 SILENT = 2e-5
@@ -36,11 +36,11 @@ class Overlapping:
     def __str__(self) -> str:
         return f"{self.one} and {self.other} overlap by {1e3 * self.depth:.2f} mm when finished"
 
-    def most(self, allowed: Iterable[Allowance]) -> float:
+    def most(self, allowed: Iterable[AllowedOverlap]) -> float:
         """The depth that is allowed of them [m]."""
         return max((a.depth for a in allowed if a.covers(self.one, self.other)), default=0.0)
 
-    def fault(self, allowed: Sequence[Allowance]) -> Diagnostic | None:
+    def fault(self, allowed: Sequence[AllowedOverlap]) -> Diagnostic | None:
         """What is said of them unless it is allowed (Overlap)."""
         most = self.most(allowed)
         if self.depth <= most + ROUNDING:
@@ -58,12 +58,12 @@ class DrawnOverlaps:
     pairs: tuple[Overlapping, ...] = ()
     open: tuple[str, ...] = ()
 
-    def faults(self, allowed: Sequence[Allowance]) -> tuple[Diagnostic, ...]:
+    def faults(self, allowed: Sequence[AllowedOverlap]) -> tuple[Diagnostic, ...]:
         """What is said of the pairs that are not allowed."""
         found = (pair.fault(allowed) for pair in self.pairs)
         return tuple(fault for fault in found if fault is not None)
 
-    def notes(self, allowed: Sequence[Allowance]) -> list[str]:
+    def notes(self, allowed: Sequence[AllowedOverlap]) -> list[str]:
         """What is used of what is allowed, in words: pairs that are named one by one, all others
         together."""
         said, every = list[Overlapping](), list[Overlapping]()

@@ -11,7 +11,7 @@ from lark import Token
 from factory.lang.pag_syntax import CopiedLabel, Permission, Statements
 from factory.lang.source import Findings, quoted
 from factory.lang.words import number
-from factory.problem.pag import Allowance, Assembly
+from factory.problem.pag import AllowedOverlap, Assembly
 from factory.support.errors import did_you_mean
 
 HOW = "write: allow ( peg, frame, 0.0005 ); or, for all pairs: allow ( 0.0005 );"
@@ -19,13 +19,13 @@ HOW = "write: allow ( peg, frame, 0.0005 ); or, for all pairs: allow ( 0.0005 );
 
 def allowances_of(
     statements: Statements, nodes: Sequence[Assembly], unit: str, findings: Findings
-) -> tuple[Allowance, ...]:
+) -> tuple[AllowedOverlap, ...]:
     """The overlaps that a text allows, whose depths are in a unit; the name of copies is each of
     them. Errors (BadValue, UndefinedLabel) go to the findings."""
     copied = [one.label for one in statements.definitions if isinstance(one.label, CopiedLabel)]
     groups = {str(label.name): [str(copy) for copy in label.labels()] for label in copied}
     parts = {node.label: not node.inputs for node in nodes}
-    found: list[Allowance] = []
+    found: list[AllowedOverlap] = []
     for permission in statements.permissions:
         found += _read(permission, groups, parts, unit, statements.broken, findings)
     return tuple(found)
@@ -38,7 +38,7 @@ def _read(
     unit: str,
     broken: set[str],
     findings: Findings,
-) -> Iterator[Allowance]:
+) -> Iterator[AllowedOverlap]:
     *labels, last = permission.words
     at, depth = findings.source.at(permission.word), number(last, unit)
     pairs = [
@@ -53,7 +53,7 @@ def _read(
         if label not in groups and not parts.get(label) and label not in broken:
             _refuse(label, label in parts, [part for part in parts if parts[part]], findings)
             return
-    yield from (Allowance(depth, pair, at) for pair in pairs or [()])
+    yield from (AllowedOverlap(depth, pair, at) for pair in pairs or [()])
 
 
 def _refuse(label: Token, made: bool, parts: Sequence[str], findings: Findings) -> None:

@@ -134,8 +134,8 @@ class _Builder(Transformer[Token, Any]):
         arguments = rest[0] if rest and rest[0] is not places else ()
         return Definition(label, operation, arguments, places)
 
-    def permission(self, word: Token, *rest: Token) -> Permission:
-        return Permission(word, [token for token in rest if token.type == "WORD"])
+    def permission(self, word: Token, *words: Token) -> Permission:
+        return Permission(word, words)
 
     def places(self, word: Token, *vectors: Vector) -> PlaceList:
         return PlaceList(word, vectors)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from factory.problem.pag import PAG, Allowance, Assembly, Value
+from factory.problem.pag import PAG, AllowedOverlap, Assembly, Value
 from factory.problem.template import LOST, Failure, Law, Template
 
 
@@ -14,7 +14,7 @@ def write_pag(pag: PAG) -> str:
     return "\n".join(lines) + "\n"
 
 
-def write_allowance(allowed: Allowance) -> str:
+def write_allowance(allowed: AllowedOverlap) -> str:
     """One statement: `allow ( peg, frame, 0.0005 );`."""
     return f"allow ( {', '.join([*allowed.parts, write_number(allowed.depth)])} );"
 

@@ -50,7 +50,7 @@ ANY_DEPTH = 1000.0
 
 
 @dataclass(frozen=True, slots=True)
-class Allowance:
+class AllowedOverlap:
     """An overlap in the finished product that is meant, such as a press fit: up to a `depth` [m],
     of two `parts` or, where none are named, of any two. Its position does not count in
     comparisons; an option has none."""
@@ -75,7 +75,7 @@ class PAG:
     count: int | None = None
     folder: str = field(default=".", compare=False)
     file: str = field(default="<text>", compare=False)
-    allowed: tuple[Allowance, ...] = ()
+    allowed: tuple[AllowedOverlap, ...] = ()
 
     @cached_property
     def by_label(self) -> Mapping[str, Assembly]:
