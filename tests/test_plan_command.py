@@ -96,11 +96,12 @@ def test_each_operation_has_its_room(
 def test_the_report_has_the_way_and_the_room_of_an_operation(
     planning: Planning, terminal: Terminal, tmp_path: Path, drawn: bool
 ) -> None:
-    """That of the plan; and that a pair is left out that is drawn into each other."""
+    """That of the plan; and that a pair is left out that is drawn into each other, by 0.03 mm which
+    nobody has allowed."""
     wall = (-20, -20, 0.2), (-4.97 if drawn else -5.2, 20, 30.2)
     done = planning({**PEG, "cap": [*PEG["cap"][1:], wall]}, "--no-look")
     (join,), to = done.json["joins"], tmp_path / "report.html"
-    assert terminal("report", done.json["pag"], "--units", 1, "-o", to).status == 0
+    assert terminal("report", done.json["pag"], "--units", 1, "-o", to).status == int(drawn)
     text = to.read_text().partition("How parts come together")[2].partition("</table>")[0]
     (row,) = [row for row in text.split("<tr>") if f">{join['label']}<" in row]
     assert "<td>peg + cap</td><td>cap is lowered " in row
