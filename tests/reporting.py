@@ -7,6 +7,7 @@ import argparse
 import json
 import os
 import platform
+import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -62,7 +63,7 @@ class Report:
         """Measure a section and keep what it found at once: one that takes long yields all that it
         has found so far, again and again. With `only` it measures these products, and the others
         that are kept stay as they are; one that `goes_on` measures what is not kept yet."""
-        begin = perf_counter()
+        begin, setting = perf_counter(), self._setting()
         measure = self.module(name).measure
         file = self.folder / f"{name}.json"
         before = json.loads(file.read_text()) if (only or goes_on) and file.is_file() else {}
@@ -77,7 +78,7 @@ class Report:
                 "section": name,
                 "quick": quick,
                 "seconds": round(perf_counter() - begin, 1),
-                **self._setting(),
+                **setting,
                 "results": results,
             }
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -98,13 +99,23 @@ class Report:
         self.path.write_text(self.text())
 
     def _setting(self) -> dict[str, str]:
-        """What it was measured on, and when."""
+        """What it is measured on, when, at which commit, and how busy the machine is with other
+        work before."""
         packages = [f"{name} {version(name)}" for name in self.versions]
         return {
             "date": datetime.now(UTC).strftime("%Y-%m-%d"),
             "machine": f"{os.cpu_count()} cores of {_processor()}, {platform.system()}",
+            "commit": _commit(),
+            "load": f"{os.getloadavg()[0]:.1f}",
             "versions": ", ".join([f"Python {platform.python_version()}", *packages]),
         }
+
+
+def _commit() -> str:
+    """The commit that is checked out, "" where there is none."""
+    words = ["git", "rev-parse", "--short", "HEAD"]
+    done = subprocess.run(words, cwd=DOCS.parent, capture_output=True, text=True)
+    return done.stdout.strip()
 
 
 def _processor() -> str:
@@ -119,7 +130,9 @@ def _processor() -> str:
 
 def _foot(kept: Mapping[str, object]) -> str:
     quick = ", the quick version" if kept["quick"] else ""
+    commit = f" at commit {kept['commit']}" if kept.get("commit") else ""
+    load = f", load average {kept['load']}" if kept.get("load") else ""
     return (
-        f"*Measured on {kept['date']} in {kept['seconds']} s{quick}: {kept['versions']};"
-        f" {kept['machine']}.*"
+        f"*Measured on {kept['date']}{commit} in {kept['seconds']} s{quick}: {kept['versions']};"
+        f" {kept['machine']}{load}.*"
     )

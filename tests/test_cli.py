@@ -283,6 +283,26 @@ def test_what_is_no_pag_says_what_it_is(run: Terminal, tmp_path: Path, command: 
         assert "not the PAG of a product" in done.err and words in done.err
 
 
+@pytest.mark.parametrize(
+    ("line", "hint"),
+    [
+        ("lamp.pag", "the command comes first: factory run lamp.pag"),
+        ("simulate lamp.pag", "did you mean 'factory run'?"),
+        ("help", "did you mean 'factory --help'?"),
+        ("run lamp", "did you mean 'lamp.pag'?"),
+        ("export lamp.pag", "There are: csv, dot, "),
+        ("render lamp.pag", "-o: OUT.mp4, or OUT.png for a still."),
+    ],
+)
+def test_first_lines_have_a_way_out(
+    run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, line: str, hint: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "lamp.pag").write_text("root = a; a = atomic()")
+    done = run(*line.split())
+    assert done.status == 2 and hint in done.err
+
+
 def test_help_is_in_sections(run: Terminal) -> None:
     out = run("run", "--help").out
     titles = re.findall(r"^(\w[\w ]+):$", out, re.M)

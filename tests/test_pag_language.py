@@ -228,6 +228,44 @@ def test_words_that_are_meant_otherwise(word: str, name: str) -> None:
     assert found.hint == "did you mean 'atomic'?"
 
 
+@pytest.mark.parametrize(
+    ("arguments", "hint"),
+    [
+        ("box = 15, 15, 1", "write: box = ( 15, 15, 1 )"),
+        ("scale = 0,001", "decimals stand behind a point: scale = 0.001"),
+        ("sphere = 0,5, mass = 1", "decimals stand behind a point: sphere = 0.5"),
+        (
+            "box = ( 150mm, 1, 1 )",
+            "write 150, and in a line of its own, for all lengths: unit = mm;",
+        ),
+        ("rgba = ( 139, 69, 19 )", 'levels from 0 to 255 are written so: rgba = "#8b4513"'),
+        ("rgba = ( 1, 0.5, 0 )", "the last is opacity: rgba = ( 1, 0.5, 0, 1 )"),
+        ("quat = ( 0, 0, 90 )", "(w, x, y, z): a turn by 90 degrees about z is quat"),
+        ("15, 15, 1", "a parameter needs its name, for example: box = ( 15, 15, 1 )"),
+    ],
+)
+def test_what_beginners_write_is_one_error_with_a_way_out(arguments: str, hint: str) -> None:
+    (found,) = errors(f"root = p; p = atomic ( {arguments} )")
+    assert found.hint.startswith(hint)
+
+
+@pytest.mark.parametrize(
+    ("text", "hint"),
+    [
+        ("Root = a; a = atomic()", "write: root = a;"),
+        ("root = a; a = box ( 1, 2, 3 )", "write: a = atomic ( box = ( 1, 2, 3 ) )"),
+        ("root = a; a = glue ( b, c ); b = atomic(); c = atomic()", "join them first"),
+        (
+            "root = a; a = mate ( b, c ); c = atomic(); b[2] = atomic() at ( 0, 0, 0 ) ( 0, 1, 1 )",
+            "places lie between",
+        ),
+    ],
+)
+def test_statements_that_beginners_write(text: str, hint: str) -> None:
+    (found,) = errors(text)
+    assert found.hint.startswith(hint)
+
+
 def test_copies_are_parts_of_their_own() -> None:
     pag = read(SCREWS)
     assert pag["all"].inputs == ("plate", "screw1", "screw2")

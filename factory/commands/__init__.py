@@ -122,6 +122,8 @@ def _usage(error: click.ClickException) -> Diagnostic:
     context = getattr(error, "ctx", None)
     hint = f"see {context.command_path if context else 'factory'} --help"
     message = error.format_message()
+    if isinstance(error, click.MissingParameter) and isinstance(error.param, click.Option):
+        hint = f"{error.param.opts[0]}: {error.param.help} ({hint})"
     if isinstance(error, click.exceptions.NoSuchOption):
         message = f"there is no option '{error.option_name}'"
         if error.possibilities:
@@ -141,6 +143,24 @@ def _unwritten(error: OSError) -> InputError:
     return InputError(Diagnostic("BadFile", message, None, NO_ROOM))
 
 
+MEANT = {
+    word: command
+    for command, words in {
+        "--help": "help man usage",
+        "run": "simulate sim start play execute go",
+        "build": "compile make layout mjcf",
+        "check": "verify prove validate lint test",
+        "view": "show gui visualize visualise open watch live",
+        "render": "film video draw picture movie",
+        "new": "init create start-project template",
+        "export": "convert save",
+        "doctor": "version info status",
+    }.items()
+    for word in words.split()
+}
+"""The commands that are meant by words that people write in their place."""
+
+
 class _Commands(click.Group):
     """A group that suggests the nearest command."""
 
@@ -148,7 +168,12 @@ class _Commands(click.Group):
         try:
             return super().resolve_command(ctx, args)
         except click.UsageError as error:
+            meant = MEANT.get(args[0].lower().lstrip("-"), "")
             hint = did_you_mean(args[0], list(self.commands), "commands")
+            if args[0].endswith(".pag"):
+                hint = f"the command comes first: factory run {args[0]}"
+            elif meant:
+                hint = f"did you mean 'factory {meant}'?"
             message = f"there is no command '{args[0]}'"
             raise InputError(Diagnostic("Usage", message, None, hint)) from error
 

@@ -46,6 +46,12 @@ class _Format(click.ParamType[str]):
 
     name = "format"
 
+    def get_missing_message(self, param: click.Parameter, ctx: click.Context | None) -> str:
+        """What there is to choose from."""
+        from factory.export import exporters
+
+        return f"There are: {', '.join(exporters())}."
+
     def shell_complete(
         self, ctx: click.Context, param: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import dropwhile
 from types import MappingProxyType
+from typing import TypeGuard
 
 from lark import Token
 
@@ -104,17 +105,21 @@ class AssemblyReader:
         label, operation, arguments, _ = definition
         assert isinstance(label, Token)
         at = self.findings.source.at
+        entry = self.signatures.get(operation)
+        if entry is not None and entry.parameters:
+            arguments = self._without_loose_numbers(entry, arguments)
         inputs = [argument for argument in arguments if isinstance(argument, Token)]
         keywords: list[Keyword] = []
         if len(inputs) < len(arguments):
             keywords = [argument for argument in arguments if isinstance(argument, Keyword)]
             self._check_order(arguments)
         self._check_label(label)
-        entry = self.signatures.get(operation)
         if entry is None or operation in RESERVED:
-            self._unknown(operation)
+            self._unknown(operation, label, inputs)
         else:
             self._check_inputs(entry, operation, inputs)
+        if entry is None or not entry.inputs:
+            inputs = [token for token in inputs if not is_number(token)]
         return Assembly(
             str(label),
             str(operation),
@@ -143,12 +148,48 @@ class AssemblyReader:
                 hint = "write the inputs first, then the parameters"
                 self.findings.add("Syntax", message, argument, hint)
 
-    def _unknown(self, operation: Token) -> None:
+    def _without_loose_numbers(
+        self, entry: Signature, arguments: Sequence[Token | Keyword]
+    ) -> list[Token | Keyword]:
+        """Arguments without `box = 1, 2, 3`, which is noted as an error."""
+        kept: list[Token | Keyword] = []
+        left = list(reversed(arguments))
+        while left:
+            argument = left.pop()
+            name, value = argument if isinstance(argument, Keyword) else (argument, argument)
+            kind = entry.parameters.get(name) if isinstance(argument, Keyword) else None
+            alone = not left or not _is_bare_number(left[-1])
+            if (
+                kind is None
+                or not _is_bare_number(value)
+                or kind.length < 1
+                or (kind.length == 1 and alone)
+            ):
+                kept.append(argument)
+                continue
+            numbers = [value]
+            while left and _is_bare_number(following := left[-1]):
+                numbers.append(following)
+                left.pop()
+            message = f"the numbers of {quoted(name)} are not in parentheses"
+            hint = f"write: {name} = ( {', '.join(numbers)} )"
+            if kind.length == 1:
+                message = f"{quoted(name)} takes one number, not {len(numbers)}"
+                hint = f"decimals stand behind a point: {name} = {'.'.join(numbers[:2])}"
+            elif len(numbers) != kind.length:
+                hint = f"it takes {kind.wanted}, for example: {name} = {kind.example}"
+            self.findings.add("BadValue", message, value, hint)
+        return kept
+
+    def _unknown(self, operation: Token, label: Token, inputs: Sequence[Token]) -> None:
         known = sorted({*self.signatures} - RESERVED)
         meant = MEANT_OPERATIONS.get(operation.lower(), "")
         near = meant in known
         hint = f"did you mean '{meant}'?" if near else did_you_mean(operation, known, "operations")
         message = f"there is no operation {quoted(operation)}"
+        if operation in SHAPES:
+            value = f"( {', '.join(inputs)} )" if inputs else GEOMETRY[operation].example
+            hint = f"write: {label} = atomic ( {operation} = {value} )"
         if operation == "dropoff":
             message = "'dropoff' is not an operation of a PAG"
             hint = "the factory drops the product off by itself: name it with root = label;"
@@ -163,9 +204,13 @@ class AssemblyReader:
         hint = f"write: {entry.name} ( {names}{', ...' * entry.further} )"
         if not entry.inputs:
             hint = f"write: {entry.name}(); it makes a part out of nothing else"
-        elif odd and is_number(odd) and entry.parameters:
-            name = next(iter(entry.parameters))
-            hint = f"a parameter needs its name, for example: {name} = {odd}"
+        elif entry.inputs == 1 and odd and not is_number(odd):
+            joined = f"joined = mate ( {', '.join(inputs)} );"
+            hint = f"join them first, in a statement of its own: {joined} {entry.name} ( joined )"
+        if odd and is_number(odd) and entry.parameters:
+            name = "box" if "box" in entry.parameters else next(iter(entry.parameters))
+            value = odd if name != "box" else f"( {', '.join(filter(is_number, inputs))} )"
+            hint = f"a parameter needs its name, for example: {name} = {value}"
         message = f"{quoted(entry.name)} takes {entry.takes}, not {count or 'none'}"
         self.findings.add("WrongInputs", message, odd or operation, hint)
 
@@ -215,6 +260,10 @@ class AssemblyReader:
         problem = self.meshes[path]
         if problem:
             self.findings.add("BadMesh", problem[0], position, problem[1])
+
+
+def _is_bare_number(argument: object) -> TypeGuard[Token]:
+    return isinstance(argument, Token) and argument.type == "WORD" and is_number(argument)
 
 
 def _mesh_problem(folder: str | None, path: str) -> tuple[str, str] | None:

@@ -20,6 +20,12 @@ FALLBACK = Lesson("unexpected {found}", FORM, "found", "")
 FALSE_UNIT = Lesson(
     "unexpected {found} after the unit", "write one of m, cm, mm, in: unit = mm;", "found", ""
 )
+FALSE_PLACE = Lesson(
+    "missing ',' before {found}",
+    "places lie between commas: at ( 0, 0, 0 ), ( 0, 0, 0.1 )",
+    "behind",
+    "",
+)
 FALSE_ROOT = Lesson("unexpected {found} after the root", "write: root = label;", "found", "")
 
 LESSONS = (

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from lark import Lark, Token, Transformer, UnexpectedInput, v_args
 
-from factory.lang.pag_lessons import FALLBACK, FALSE_ROOT, FALSE_UNIT, LESSONS
+from factory.lang.pag_lessons import FALLBACK, FALSE_PLACE, FALSE_ROOT, FALSE_UNIT, LESSONS
 from factory.lang.recovery import (
     UNLAWFUL,
     Lesson,
@@ -205,7 +205,7 @@ def _sort_in(statement: Any, made: Statements, findings: Findings) -> None:
     elif isinstance(statement, WordPair) and second == "parts":
         made.counts.append(first)
     else:
-        made.broken.update((*labels_of(first), str(second)))
+        made.broken.update((*labels_of(first), str(second), str(first).lower()))
         _report_incomplete(statement, findings)
 
 
@@ -226,7 +226,10 @@ def _report_incomplete(statement: Equation | WordPair, findings: Findings) -> No
         message = f"missing '(' after the operation {quoted(second)}"
         hint = f"an operation has parentheses, even around nothing: {first} = {second} ();"
         at = findings.source.after(second)
-        if second in UNITS:
+        if first.lower() in ("root", "unit"):
+            message = f"{quoted(first)} is written in small letters"
+            hint, at = f"write: {first.lower()} = {second};", findings.source.at(first)
+        elif second in UNITS:
             message, hint = f"{quoted(first)} is no length", f"write: unit = {second};"
             at = findings.source.at(first)
     elif first == "parts":
@@ -277,6 +280,9 @@ def _report_stuck(stuck: Stuck, piece: list[Token], findings: Findings) -> None:
         lesson = FALSE_ROOT
     elif piece[0] == "unit" and stuck.index >= 2 and all(t.type != "LPAR" for t in piece):
         lesson = FALSE_UNIT
+    elif stuck.token.type == "LPAR" and piece[stuck.index - 1].type == "RPAR":
+        opened = sum({"LPAR": 1, "RPAR": -1}.get(t.type, 0) for t in piece[: stuck.index])
+        lesson = lesson if opened else FALSE_PLACE
     pairs = pairwise(piece)
     operation = next((word for word, sign in pairs if sign.type == "LPAR"), piece[0])
     words = {

@@ -102,6 +102,8 @@ def _unreadable(name: str, error: Exception) -> Diagnostic:
     hint = "give a file that exists and that you may read"
     if isinstance(error, FileNotFoundError):
         message, hint = f"there is no file {quoted(name)}", near_file("", name) or hint
+        if os.path.isfile(f"{name}.pag"):
+            hint = f"did you mean {quoted(f'{name}.pag')}?"
     elif isinstance(error, IsADirectoryError):
         message, hint = f"{quoted(name)} is a folder, not a file", "name a file in it"
     elif name == STDIN:

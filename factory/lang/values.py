@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
@@ -140,7 +140,8 @@ class ValueReader:
     def _vector(self, name: str, kind: Kind, raw: Vector) -> Value | None:
         if kind.length < 2 or len(raw.words) != kind.length:
             count = f"{len(raw.words)} number{'s' * (len(raw.words) != 1)} in parentheses"
-            self._refuse(name, kind, raw.opening, f"takes {kind.wanted}, not {count}")
+            problem = f"takes {kind.wanted}, not {count}"
+            self._refuse(name, kind, raw.opening, problem, _better(kind, raw.words))
             return None
         values = [self._number(name, kind, word) for word in raw.words]
         numbers = tuple(value for value in values if value is not None)
@@ -162,11 +163,28 @@ class ValueReader:
                 why = f"takes {kind.wanted}; {quoted(word)} overflows"
             elif word.lower().lstrip("+-") in ("inf", "infinity", "nan"):
                 why = f"takes {kind.wanted}; {quoted(word)} is not a finite number"
-        self._refuse(name, kind, word, why)
+        hint = ""
+        if kind.long and (unit := re.fullmatch(r"([+-]?[0-9.]+)(m|cm|mm|in)", word)):
+            hint = f"write {unit[1]}, and in a line of its own, for all lengths: unit = {unit[2]};"
+        self._refuse(name, kind, word, why, hint)
         return None
 
-    def _refuse(self, name: str, kind: Kind, token: Token, problem: str) -> None:
-        hint = f"for example: {name} = {kind.example}"
+    def _refuse(self, name: str, kind: Kind, token: Token, problem: str, better: str = "") -> None:
+        hint = better or f"for example: {name} = {kind.example}"
         if kind.length == 0 and token.type == "WORD":
             hint = f'in quotes: {name} = "{token}"'
         self.findings.add("BadValue", f"{quoted(name)} {problem}", token, hint)
+
+
+def _better(kind: Kind, words: Sequence[Token]) -> str:
+    """A hint for a turn, or a colour of three numbers; "" for anything else."""
+    if kind is GEOMETRY["quat"]:
+        return "(w, x, y, z): a turn by 90 degrees about z is quat = ( 0.7071, 0, 0, 0.7071 )"
+    levels = [value for word in words if (value := number(word)) is not None and value >= 0]
+    if kind is not GEOMETRY["rgba"] or len(levels) != 3 or len(words) != 3 or max(levels) > 255:
+        return ""
+    if max(levels) <= 1:
+        return f"the last is opacity: rgba = ( {', '.join(words)}, 1 )"
+    return 'levels from 0 to 255 are written so: rgba = "#{:02x}{:02x}{:02x}"'.format(
+        *map(round, levels)
+    )
