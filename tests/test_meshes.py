@@ -134,6 +134,18 @@ def one_of_two_inside_out() -> trimesh.Trimesh:
     return trimesh.util.concatenate([cube().apply_translation((0.3, 0, 0)), inside_out()])
 
 
+def wire_inside_out() -> trimesh.Trimesh:
+    """A frame of wire: 1 part in 200,000 of its box."""
+    rods = []
+    for way in range(3):
+        size = np.full(3, 2e-4)
+        size[way] = EDGE
+        rods.append(trimesh.creation.box(size).apply_translation(EDGE * np.eye(3)[way - 1]))
+    mesh = trimesh.util.concatenate(rods)
+    mesh.invert()
+    return mesh
+
+
 def half_inside_out() -> trimesh.Trimesh:
     mesh = cube().apply_translation((0.3, 0, 0))
     mesh.invert()
@@ -176,6 +188,7 @@ MENDED: tuple[tuple[Callable[[], trimesh.Trimesh], str, float], ...] = (
     (inside_out, "was inside out", TUBE),
     (one_of_two_inside_out, "was inside out", TUBE + EDGE**3),
     (half_inside_out, "was inside out", 2 * EDGE**3),
+    (wire_inside_out, "was inside out", 3 * EDGE * 4e-8),
     (with_a_hole, "was open by slivers or small holes", TUBE),
     (with_a_sliver, "was open by slivers or small holes", EDGE**3),
     (cracked, "was open by cracks", TUBE),

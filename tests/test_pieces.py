@@ -310,10 +310,67 @@ def test_a_library_that_fails_leaves_the_hull(
 def test_each_body_is_decomposed_by_itself(tmp_path: Path, library: list[int]) -> None:
     """What touches would be a mesh that intersects itself, which the library puts on a grid."""
     tube = trimesh.creation.annulus(0.05, 0.1, 0.1)
-    top = trimesh.creation.annulus(0.05, 0.1, 0.1).apply_translation((0, 0, 0.1))
+    top = trimesh.creation.annulus(0.05, 0.1, 0.2).apply_translation((0, 0, 0.15))
     foot = trimesh.creation.box((0.1, 0.1, 0.1)).apply_translation((1, 0, 0))
     assert len(solid_of(tmp_path, trimesh.util.concatenate([tube, top, foot])).pieces) == 5
     assert len(library) == 1 + 1  # two tubes, and the box as it is
+
+
+def turned(mesh: trimesh.Trimesh, seed: int) -> trimesh.Trimesh:
+    """A copy that is moved, and turned about any axis."""
+    way = trimesh.transformations.random_rotation_matrix(np.random.default_rng(seed).random(3))
+    way[:3, 3] = (0.3, -0.2, 0.1)
+    return mesh.copy().apply_transform(way)
+
+
+@pytest.mark.parametrize("kind", ["obj", "stl"])
+def test_a_shape_is_decomposed_once_wherever_it_is(
+    tmp_path: Path, library: list[int], cache: Path, kind: str
+) -> None:
+    """In one product, and in the next; its bodies move with it. A mirror image is another shape."""
+    arm = trimesh.creation.annulus(0.05, 0.1, 0.1)
+    arm.vertices[:, 0] += 0.3 * arm.vertices[:, 2] + 0.7 * np.maximum(arm.vertices[:, 1], 0.02)
+    first = solid_of(tmp_path, arm, kind)
+    for seed in range(3):
+        other = turned(arm, seed)
+        found = solid_of(tmp_path, other, kind)
+        assert len(library) == 1
+        assert len(found.pieces) == len(first.pieces) == 2
+        for one, two in zip(first.pieces, found.pieces, strict=True):
+            gap = np.linalg.norm(two - other.vertices.mean(axis=0), axis=1)
+            assert gap == pytest.approx(
+                np.linalg.norm(one - arm.vertices.mean(axis=0), axis=1), abs=1e-6
+            )
+    mirrored = arm.copy().apply_transform(np.diag([-1.0, 1, 1, 1]))
+    solid_of(tmp_path, mirrored, kind)
+    assert len(library) == 2
+
+
+def test_copies_in_one_product_are_decomposed_once(
+    tmp_path: Path, library: list[int], cache: Path
+) -> None:
+    tube = trimesh.creation.annulus(0.05, 0.1, 0.1)
+    parts = []
+    for number in range(4):
+        turned(tube, number).export(tmp_path / f"{number}.obj")
+        parts.append((f"p{number}", "atomic", "", {"mesh": f"{number}.obj"}))
+    pag = table_pag("s", ("s", "mate", "p0 p1 p2 p3", {}), *parts)  # type: ignore[arg-type]
+    product_geometry(PAG(pag.root, pag.nodes, folder=str(tmp_path)))
+    assert len(library) == 1
+
+
+def test_a_body_is_decomposed_in_the_frame_of_its_own_sides() -> None:
+    """However it is turned, its sides lie along the axes; as drawn where some do already."""
+    ell = trimesh.creation.box((4, 1, 1)).union(
+        trimesh.creation.box((1, 3, 1)).apply_translation((1.5, 1, 0))
+    )
+    assert (decomposition.own_axes(Mesh("m", ell.vertices, ell.faces)) == np.eye(3)).all()
+    for seed in range(5):
+        mesh = turned(ell, seed)
+        axes = decomposition.own_axes(Mesh("m", mesh.vertices, mesh.faces))
+        assert np.linalg.det(axes) == pytest.approx(1)
+        normals = mesh.face_normals @ axes.T
+        assert np.abs(normals).max(axis=1) == pytest.approx(1)
 
 
 def test_bodies_that_reach_out_of_their_mesh_count_where_they_collide(

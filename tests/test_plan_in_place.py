@@ -141,6 +141,24 @@ def test_parts_with_some_play_touch(tmp_path: Path) -> None:
     assert len(read_source(tmp_path / "parts", TEMPLATES, SourceOptions("cm")).parts) == 4
 
 
+def test_a_sheet_of_two_sides_is_said_to_bound_nothing(terminal: Terminal, tmp_path: Path) -> None:
+    """It is neither "-0%" of its hull, nor a fault of ours."""
+    turns = np.linspace(0, np.pi, 13)
+    points = [(200 * np.cos(t), y, 200 * np.sin(t)) for t in turns for y in (0.0, 500.0)]
+    faces = [f for k in range(0, 24, 2) for f in ([k, k + 1, k + 2], [k + 1, k + 3, k + 2])]
+    both = [*faces, *([a, c, b] for a, b, c in faces)]
+    parts = {
+        "gutter": trimesh.Trimesh(points, both, process=False),
+        "block": block((-150, 0, -50), (150, 500, 50)),
+    }
+    words = ("plan", folder_of(tmp_path / "parts", parts), "-o", tmp_path / "out", "--no-look")
+    done = terminal(*words, "--json")
+    assert (done.status, done.codes) == (2, ["Hulls"])
+    message = done.json["errors"][0]["message"]
+    assert message.startswith("'gutter' bounds no volume, and its hull overlaps 'block'")
+    assert "%" not in done.err and "not convex" not in done.err
+
+
 @pytest.mark.parametrize("scale", [1 / 25.4, 0.05, 1 / 254, 0.004])
 def test_a_unit_that_is_not_known_is_refused(tmp_path: Path, scale: float) -> None:
     """A product of 17 or 1.7 inches, or of 21.5 or 1.7 cm."""

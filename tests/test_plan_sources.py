@@ -14,10 +14,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.geometry.meshes import Array
-from factory.pipeline import all_templates, read
-from factory.planning.parts import InPlace
-from factory.planning.source.alike import (
+from factory.geometry.alike import (
     PartShape,
     RigidMotion,
     alike,
@@ -25,6 +22,9 @@ from factory.planning.source.alike import (
     moved,
     shape_of,
 )
+from factory.geometry.meshes import Array
+from factory.pipeline import all_templates, read
+from factory.planning.parts import InPlace
 from factory.planning.source.reading import SourceOptions, read_source
 from factory.planning.writing import planned_product
 from factory.support.files import write_all

@@ -3,7 +3,8 @@
 What is open, or convex but for a fiftieth of its hull, keeps its hull. A mesh of several closed
 convex bodies (a plate with a hole, written as wedges that touch) is exactly these bodies. What else
 is closed is decomposed by CoACD, body by body, where that is installed (the extra `decompose`),
-else it has its hull. Its results are kept in the user's cache.
+else it has its hull. A body is decomposed in the frame of its own sides, so however it is turned.
+The results are kept in the user's cache, and serve for the same shape wherever it is.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from factory.geometry.alike import PartShape, motion_between, moved, shape_of
 from factory.geometry.meshes import Array, Mesh, is_closed, volume_of
 from factory.geometry.pieces import FLATNESS, closed_bodies, is_convex, joined
 from factory.support.array_cache import PACKED, digest, find, keep, packed, unpacked
@@ -39,6 +41,17 @@ PARAMETERS = {
 }
 """What else CoACD is called with: it tries fewer cuts than it does by itself, and has a third of
 the triangles where it puts a mesh that intersects itself on a grid."""
+
+SAME_AREA, EXACT = 1e-4, 2e-6
+"""Areas that differ by less than the first share may be of one shape, of which no vertex is off by
+more than the second share of its size."""
+
+ALONG, LEVEL = 0.1, 1e-6
+"""A body stands along the axes of its file of whose surface the first share does; a side lies along
+an axis whose normal has a cosine to it that is off 1 by less than the second."""
+
+AS_DRAWN = np.eye(3)
+"""The axes of a file."""
 
 LOADING = Lock()
 
@@ -72,13 +85,79 @@ def _decomposed(mesh: Mesh) -> tuple[Array, ...]:
     where it is convex, or CoACD fails."""
     if _fills(mesh, FULL):
         return (mesh.vertices,)
-    parameters = sorted(_parameters(mesh).items())
-    name = digest(release("coacd"), parameters, SLIVER, mesh.vertices, mesh.faces)
-    kept = find(FOLDER, name, PACKED)
-    found = _run_coacd(mesh) if kept is None else unpacked(kept)
-    if kept is None:
-        keep(FOLDER, name, packed(found))
+    shape = shape_of(mesh.vertices, mesh.faces)
+    found = _kept(shape)
+    if found is None:
+        axes = own_axes(mesh)
+        turned = replace(mesh, vertices=mesh.vertices @ axes.T) if axes is not AS_DRAWN else mesh
+        found = _run_coacd(turned)
+        if axes is not AS_DRAWN:
+            found = tuple(piece @ axes for piece in found)
+        arrays = {"vertices": shape.vertices, "faces": shape.faces, **packed(found)}
+        keep(FOLDER, _names(shape)[0], arrays)
     return found or (mesh.vertices,)
+
+
+def _names(shape: PartShape) -> tuple[str, ...]:
+    """The names under which a shape may be kept; the first is its own. What they depend on is the
+    same wherever it is, but for the last digits of its area."""
+    sizes = len(shape.vertices), len(shape.faces)
+    step = np.log(shape.surface[0]) / SAME_AREA
+    given = release("coacd"), sorted(PARAMETERS.items()), CONCAVITY, SLENDER, SLIVER, sizes
+    numbers = dict.fromkeys(int(np.floor(step + off)) for off in (0.0, -0.01, 0.01))
+    return tuple(digest(*given, number) for number in numbers)
+
+
+def _kept(shape: PartShape) -> tuple[Array, ...] | None:
+    """The bodies that were found of a shape, here or elsewhere, moved with it; None for none."""
+    for name in _names(shape):
+        kept = find(FOLDER, name, (*PACKED, "vertices", "faces"))
+        if kept is None:
+            continue
+        if np.array_equal(kept["vertices"], shape.vertices):
+            return unpacked(kept)
+        motion = motion_between(PartShape(kept["vertices"], kept["faces"]), shape)
+        if motion is None or _off(moved(motion, kept["vertices"]), shape) > EXACT * shape.size:
+            continue
+        return tuple(moved(motion, piece) for piece in unpacked(kept))
+    return None
+
+
+def _off(points: Array, shape: PartShape) -> float:
+    """How far points are from the vertices of a shape at most [m]."""
+    from scipy.spatial import cKDTree
+
+    return float(cKDTree(shape.vertices).query(points)[0].max())
+
+
+def own_axes(mesh: Mesh) -> Array:
+    """The axes (3, 3) of a body's own frame, as rows: the normals of its largest sides. Those of
+    its file, where a share of ALONG of its surface lies along them."""
+    a, b, c = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
+    normals = np.cross(b - a, c - a)
+    areas = np.linalg.norm(normals, axis=1)
+    normals /= np.maximum(areas, 1e-300)[:, None]
+    flat = np.abs(normals).max(axis=1) > 1 - LEVEL
+    if areas[flat].sum() >= ALONG * areas.sum():
+        return AS_DRAWN
+    first = _largest(normals, areas)
+    across = np.abs(normals @ first) < LEVEL**0.5
+    if across.any():
+        second = _largest(normals[across], areas[across])
+    else:
+        second = np.eye(3)[np.abs(first).argmin()]
+    second = second - (second @ first) * first
+    second /= np.linalg.norm(second)
+    return np.array([first, second, np.cross(first, second)])
+
+
+def _largest(normals: Array, areas: Array) -> Array:
+    """The normal (3,) that, with its opposite, has the largest area."""
+    ends = normals * np.sign(normals @ np.array([1.0, 1.1, 1.21]))[:, None]
+    _, group = np.unique(np.round(ends, 4), axis=0, return_inverse=True)
+    most = group == np.bincount(group.ravel(), areas).argmax()
+    mean = areas[most.ravel()] @ ends[most.ravel()]
+    return np.asarray(mean / np.linalg.norm(mean))
 
 
 def _run_coacd(mesh: Mesh) -> tuple[Array, ...]:

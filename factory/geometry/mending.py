@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from factory.geometry.mesh_file import areas_of
 from factory.geometry.meshes import Array, Indices, is_closed
 from factory.geometry.pieces import components
 
@@ -21,9 +22,9 @@ HOLES, SLIVERS = 0.05, 0.001
 mesh's surface, others if no more than the second: the rim of a large hole says little about what
 should be in it."""
 
-HOLLOW = 1e-5
-"""A mesh of less than this share of its box bounds no volume that is meant: a sheet with two sides,
-bodies that cancel each other."""
+HOLLOW = 1e-6
+"""A mesh bounds no volume that is meant, as a sheet with two sides or bodies that cancel each
+other, if it is thinner than this share of its size: its volume over its surface. A wire is not."""
 
 FILLED = "was open by slivers or small holes"
 
@@ -113,6 +114,7 @@ def _outwards(mesh: trimesh.Trimesh) -> Indices | None:
                 with_it = ((low >= low[body]) & (high <= high[body])).all(axis=1)
                 turned[with_it] = ~turned[with_it]
     whole, box = np.where(turned, -volume, volume).sum(), np.prod(np.ptp(vertices, axis=0))
-    if not HOLLOW * box < whole <= (1 + 1e-9) * box:
+    thinnest = HOLLOW * float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    if not thinnest * areas_of(vertices, faces).sum() < whole <= (1 + 1e-9) * box:
         return None
     return np.where(turned[number, None], faces[:, ::-1], faces)

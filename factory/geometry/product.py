@@ -8,8 +8,8 @@ box, with a warning that names it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
@@ -29,7 +29,7 @@ from factory.geometry.limits import (
     value_position,
 )
 from factory.geometry.mending import mended
-from factory.geometry.mesh_file import ANEW, UnreadableMesh
+from factory.geometry.mesh_file import ANEW, UnreadableMesh, areas_of
 from factory.geometry.mesh_reader import read_mesh
 from factory.geometry.meshes import (
     Array,
@@ -46,7 +46,15 @@ from factory.support.errors import Diagnostic, InputError
 from factory.support.files import MESH, read_bytes
 from factory.support.interruption import side_by_side
 
-Work = Callable[[], MassProperties | Diagnostic]
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """What is left `to_do` for a mesh whose file is read; `sizes` that are the same wherever it is
+    (how many vertices and faces, and the logarithm of its area), None where it is known."""
+
+    to_do: Callable[[], MassProperties | Diagnostic]
+    sizes: tuple[float, ...] | None = None
+
 
 LATTICE = 0.2
 """Longest edge of the lattice of parts with no geometry [m]."""
@@ -122,7 +130,9 @@ class _Reader:
             first.setdefault(_file(node), node)
         opened = {file: self._opened(node) for file, node in first.items()}
         works = dict(opened.values())
-        found = dict(zip(works, side_by_side([*works.values()]), strict=True))
+        found: dict[str, MassProperties | Diagnostic] = {}
+        for keys in _rounds(works):
+            found.update(zip(keys, side_by_side([works[key].to_do for key in keys]), strict=True))
         for number, (file, (key, _)) in enumerate(opened.items()):
             self._meshes[file] = _named(found[key], f"m{number}")
 
@@ -170,17 +180,30 @@ class _Reader:
             key = kept_meshes.key_of(content, suffix, scale)
             kept = kept_meshes.find(key)
             if kept is not None:
-                return key, lambda: kept
+                return key, Work(lambda: kept)
             file = read_mesh(content, suffix)
         except (OSError, UnreadableMesh) as error:
             why = error.strerror if isinstance(error, OSError) else error
             message, position = f"cannot read '{path}': {why}", value_position(node, "mesh")
             fault = Diagnostic("BadMesh", message, position, ANEW)
-            return f"{path} {scale}", lambda: fault
+            return f"{path} {scale}", Work(lambda: fault)
         vertices, faces = file.merged()
         if not np.abs(vertices).max() * scale <= FURTHEST:
-            return f"{path} {scale}", partial(too_far, node, "scale", "mesh")
-        return key, partial(_finished, key, vertices * scale, faces)
+            return f"{path} {scale}", Work(partial(too_far, node, "scale", "mesh"))
+        to_do = partial(_finished, key, vertices * scale, faces)
+        area = float(areas_of(vertices * scale, faces).sum())
+        return key, Work(to_do, (len(vertices), len(faces), round(float(np.log(area)), 3)))
+
+
+def _rounds(works: Mapping[str, Work]) -> Iterator[list[str]]:
+    """The keys of works, those first that are the first of their shape, as far as sizes tell: what
+    is found of them serves for others, whichever thread is faster."""
+    left = list(works)
+    while left:
+        shapes = {works[key].sizes or key: key for key in reversed(left)}
+        first = set(shapes.values())
+        yield [key for key in left if key in first]
+        left = [key for key in left if key not in first]
 
 
 def _named(found: MassProperties | Diagnostic, name: str) -> MassProperties | Diagnostic:

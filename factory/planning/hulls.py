@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 from factory.geometry.decomposition import FULL
 from factory.geometry.meshes import Mesh, is_closed
+from factory.geometry.overlap import drawn
 from factory.nets.verdict import listing
 from factory.planning.parts import InPlace
 from factory.support.errors import Diagnostic, InputError
@@ -34,7 +35,7 @@ def hull_stands(mesh: Mesh | None) -> bool:
     """Whether a hull stands for a closed mesh that is notably less than it."""
     if mesh is None or mesh.pieces or not is_closed(mesh.faces):
         return False
-    return mesh.share < FULL
+    return 0 < mesh.share < FULL
 
 
 def refuse_hidden(source: InPlace, pairs: Sequence[Drawn]) -> None:
@@ -49,8 +50,10 @@ def refuse_hidden(source: InPlace, pairs: Sequence[Drawn]) -> None:
             for pair in pairs
             if part.label in (pair.one, pair.other)
         ]
-        mesh = part.solid.mesh
-        if others and mesh is not None and not is_closed(mesh.faces):
-            message = f"'{part.label}' is open, and its hull overlaps {listing(others, NAMED)}"
+        if others and drawn(part.solid) is None:
+            mesh = part.solid.mesh
+            is_open = mesh is not None and not is_closed(mesh.faces)
+            state = "is open" if is_open else "bounds no volume"
+            message = f"'{part.label}' {state}, and its hull overlaps {listing(others, NAMED)}"
             faults.append(Diagnostic("Hulls", message))
     raise InputError([*faults[:-1], replace(faults[-1], hint=CLOSE)])

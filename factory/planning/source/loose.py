@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from factory.geometry.alike import alike, shape_of
 from factory.geometry.mesh_file import ANEW, UnreadableMesh
 from factory.geometry.meshes import Array, Indices
 from factory.geometry.solids import colour
@@ -16,7 +17,6 @@ from factory.importing.labels import file_stem, label_of
 from factory.importing.mesh_files import MeshStore
 from factory.importing.places import quaternion, rounded
 from factory.lang.source import quoted
-from factory.planning.source.alike import alike, shape_of
 from factory.planning.source.bodies import Bodies, FileBody, apart, unit_of
 from factory.planning.source.faults import check_count
 from factory.planning.source.scene_file import MESHES, SCENES, read_one, read_scene

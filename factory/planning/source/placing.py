@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from factory.geometry.alike import PartShape, shape_of
 from factory.geometry.meshes import Array, Indices, hull_mesh
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import Solid, rotation
 from factory.planning.hulls import EXTRA, hull_stands
 from factory.planning.parts import PlacedPart
-from factory.planning.source.alike import PartShape, shape_of
 from factory.problem.pag import PAG
 from factory.support.errors import Diagnostic
 

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from factory.geometry.alike import Alike, alike
 from factory.importing.importer import LDRAW
 from factory.lang.source import quoted
 from factory.planning.parts import InPlace, Kept, PlacedPart
-from factory.planning.source.alike import Alike, alike
 from factory.planning.source.faults import check_count, check_places, raise_if_any
 from factory.planning.source.in_place import check_in_place
 from factory.planning.source.loose import bodies_in, loose_product
