@@ -203,6 +203,7 @@ def test_a_label_may_still_be_called_unit() -> None:
     assert read("unit = cm; root = unit; unit = atomic ( sphere = 2 )")["unit"].parameter(
         "sphere"
     ) == pytest.approx(0.02)
+    assert "unit = mm;" in errors("unit = Millimetres; root = a; a = atomic()")[0].hint
     assert codes("root = unit; unit = atomic; ") == ["UndefinedLabel", "BadValue"]
     assert codes("unit = mm; unit = cm; root = a; a = atomic()") == ["BadValue"]
     for text in ('unit = "mm";', "unit = 1 mm;", "unit mm;", "units = mm;", "unit =;"):
@@ -278,7 +279,13 @@ def test_copies_are_parts_of_their_own() -> None:
     assert read("root = p; p = atomic() at ( 0, 0, 1 )") == read(
         "root = p; p = atomic ( pos = ( 0, 0, 1 ) )"
     )
-    assert read("root = a; a = mate ( b2, b1 ); b [ 2 ] = atomic()")["a"].inputs == ("b2", "b1")
+    for inputs in ("b2, b1", "b[2], b[ 1 ]", "b2, b[1]"):
+        pag = read(f"root = a; a = mate ( {inputs} ); b [ 2 ] = atomic()")
+        assert pag["a"].inputs == ("b2", "b1")
+    (found,) = errors("root = a; a = mate ( b, b[3] ); b[2] = atomic()")
+    assert found.message == "'b3' is not defined"
+    (found,) = errors("root = a; a = mate ( b, b ); b[2] = atomic()")
+    assert "name it once" in found.hint
 
 
 @pytest.mark.parametrize(

@@ -44,8 +44,13 @@ def _with_groups(
         findings.add("DuplicateLabel", message, label, "rename one of the two")
         return definition
     arguments: list[Token | Keyword] = []
-    for argument in definition.arguments:
-        if isinstance(argument, Token) and argument in groups:
+    for number, argument in enumerate(definition.arguments):
+        twice = argument in definition.arguments[:number]
+        if isinstance(argument, Token) and argument in groups and twice:
+            message = f"{quoted(argument)} means all its copies, and is there twice"
+            hint = f"name it once, or its copies one by one: {argument}[1]"
+            findings.add("PagNotTree", message, argument, hint)
+        elif isinstance(argument, Token) and argument in groups:
             place = partial(Token.new_borrow_pos, borrow_t=argument)
             arguments += [place("WORD", str(copy)) for copy in groups[argument]]
         else:

@@ -35,7 +35,9 @@ LESSONS = (
         "found",
         'allow ( ) | allow ( , a ) | allow ( a , ) | allow ( a b | allow ( a "b" | allow ( a = b | '
         'allow ( "a" | allow ( ( a | allow ( a ( | allow ( = | allow ( a , , b | allow ( a , ( b | '
-        'allow ( a , "b" | allow ( a , = 1',
+        'allow ( a , "b" | allow ( a , = 1 | allow ( ; a | allow ( a ; b | allow ( a , ; b | '
+        "allow ( [2] | allow ( a , [2] | allow ( a ) b | allow ( a ) = b | allow ( a ) ( b | "
+        'allow ( a ) ) | allow ( a ) , b | allow ( a ) "b" | allow ( a ) [2]',
     ),
     Lesson(
         "missing ')': what is allowed is not closed",
@@ -77,10 +79,9 @@ LESSONS = (
     ),
     Lesson(
         "unexpected {found}",
-        "only a label that is defined has a number of copies: screw[2] = atomic ( ... ); they "
-        "are screw1 and screw2, and screw means both",
+        "copies are defined by screw[2] = atomic ( ... ); screw[1] is one of them, screw both",
         "found",
-        "a b [2] | a = [2] | a = b [2] | a = m ( [2] ) | a = m ( b [2] ) | a = m ( b , [2] ) | "
+        "a b [2] | a = [2] | a = b [2] | a = m ( [2] ) | a = m ( b , [2] ) | "
         'a = m ( b = [2] ) | a = m ( b = c [2] ) | a = m ( b = "c" [2] ) | a = m ( b = ( 1 ) [2] )',
     ),
     Lesson("one '=' is enough", FORM, "found", "a = = b ( ) | a = m ( b = = 1 )"),
@@ -94,14 +95,15 @@ LESSONS = (
         "missing ')': the arguments of {operation} are not closed",
         "close them with ')' and end the statement with ';'",
         "behind",
-        "a = m ( | a = m ( b | a = m ( b , c | a = m ( b , | a = m ( b = 1 | "
+        "a = m ( | a = m ( b | a = m ( b [2] | a = m ( b , c | a = m ( b , | a = m ( b = 1 | "
         'a = m ( b = "x" | a = m ( b = ( 1 ) | a = m ( b = 1 ,',
     ),
     Lesson(
         "missing ',' before {found}",
         ARGUMENTS,
         "behind",
-        'a = m ( b c ) | a = m ( b "c" ) | a = m ( b = 1 c ) | a = m ( b = 1 "c" ) | '
+        'a = m ( b c ) | a = m ( b [2] c ) | a = m ( b [2] "c" ) | a = m ( b [2] [2] ) | '
+        'a = m ( b "c" ) | a = m ( b = 1 c ) | a = m ( b = 1 "c" ) | '
         'a = m ( b = "x" c ) | a = m ( b = ( 1 ) c ) | '
         'a = m ( b = "x" "y" ) | a = m ( b = ( 1 ) ( 2 ) ) | a = m ( b = "x" ( 2 ) ) | '
         'a = m ( b = ( 1 ) "x" )',
@@ -123,6 +125,7 @@ LESSONS = (
         "unexpected '=' behind a value",
         ARGUMENTS,
         "found",
+        "a = m ( b [2] = 1 ) | "
         'a = m ( b = c = 1 ) | a = m ( b = "x" = 1 ) | a = m ( b = ( 1 ) = 2 )',
     ),
     Lesson(
@@ -170,6 +173,7 @@ LESSONS = (
         "an operation inside another",
         "give it a statement of its own, and use its label here: label = operation ( ... );",
         "found",
+        "a = m ( b [2] ( c ) ) | "
         "a = m ( b ( c ) ) | a = m ( b = c ( d ) ) | a = m ( b = ( 1 ( 2 ) ) ) | "
         "a = m ( b = ( 1 , c ( 2 ) ) )",
     ),
@@ -183,6 +187,7 @@ LESSONS = (
         "';' inside the arguments of {operation}",
         ARGUMENTS,
         "found",
+        "a = m ( b [2] ; c ) | "
         "a = m ( b ; c ) | a = m ( b = 1 ; c ) | a = m ( ; b ) | a = m ( b , ; c ) | "
         'a = m ( b = "x" ; c ) | a = m ( b = ( 1 ) ; c ) | a = m ( b = ( 1 ; 2 ) ) | '
         "a = m ( b = ( ; 2 ) ) | a = m ( b = ( 1 , ; 2 ) ) | "

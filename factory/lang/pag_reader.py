@@ -37,6 +37,14 @@ KINDS = {
 }
 """Files that are no PAGs, by their endings: what each is, and what can be done with it."""
 
+WORDS = {
+    "mm": "mm millimeter millimetre millimeters millimetres",
+    "cm": "cm centimeter centimetre centimeters centimetres",
+    "m": "m meter metre meters metres si",
+    "in": "in inch inches zoll",
+}
+"""Words that mean a unit."""
+
 
 @collector_paused()
 def read_pag(
@@ -61,7 +69,8 @@ def unit_of(statements: Statements, findings: Findings) -> str:
     """The unit of the lengths of a text: the one it says, else metres."""
     for unit in statements.units:
         if unit not in UNITS:
-            hint = did_you_mean(unit, list(UNITS), "units")
+            near = next((u for u, words in WORDS.items() if unit.lower() in words.split()), "")
+            hint = f"write: unit = {near};" if near else did_you_mean(unit, list(UNITS), "units")
             findings.add("BadValue", f"there is no unit of length {quoted(unit)}", unit, hint)
     for unit in statements.units[1:]:
         hint = "one unit holds for all lengths of the text: remove one of the two"

@@ -129,6 +129,10 @@ class _Builder(Transformer[Token, Any]):
 
     arguments = start
 
+    def copy(self, name: Token, brackets: Token) -> Token:
+        number = CopiedLabel(name, brackets).number
+        return Token.new_borrow_pos("WORD", f"{name}{number}", name)
+
     def definition(self, label: Token | CopiedLabel, operation: Token, *rest: Any) -> Definition:
         places = rest[-1] if rest and isinstance(rest[-1], PlaceList) else None
         arguments = rest[0] if rest and rest[0] is not places else ()
