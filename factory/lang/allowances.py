@@ -8,8 +8,8 @@ from itertools import product
 
 from lark import Token
 
-from factory.lang.pag_syntax import CopiedLabel, Permission, Statements
 from factory.lang.source import Findings, quoted
+from factory.lang.statements import CopiedLabel, Permission, Statements
 from factory.lang.words import number
 from factory.problem.pag import AllowedOverlap, Assembly
 from factory.support.errors import did_you_mean

@@ -9,8 +9,8 @@ from itertools import chain, repeat
 
 from lark import Token
 
-from factory.lang.pag_syntax import COPIES, CopiedLabel, Definition, Keyword, Statements, labels_of
 from factory.lang.source import Findings, quoted
+from factory.lang.statements import COPIES, CopiedLabel, Definition, Keyword, Statements, labels_of
 
 HOW = "screw[2] = atomic ( ... ) at ( 0, 0, 0 ), ( 0, 0, 0.1 )"
 

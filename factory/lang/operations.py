@@ -12,8 +12,8 @@ from typing import TypeGuard
 
 from lark import Token
 
-from factory.lang.pag_syntax import Definition, Keyword
 from factory.lang.source import Findings, near_file, quoted, where
+from factory.lang.statements import Definition, Keyword
 from factory.lang.values import GEOMETRY, SHAPES, Kind, ValueReader, kind_of
 from factory.lang.words import LABEL_HINT, UNITS, is_label, is_number
 from factory.problem.pag import RESERVED, Assembly, Parameter

@@ -12,8 +12,9 @@ from collections.abc import Mapping
 from factory.lang.allowances import allowances_of
 from factory.lang.copies import written_out
 from factory.lang.operations import AssemblyReader, signature
-from factory.lang.pag_syntax import Statements, read_statements
+from factory.lang.pag_syntax import read_statements
 from factory.lang.source import STDIN, Findings, quoted, read_text, source_of
+from factory.lang.statements import Statements
 from factory.lang.tree import TreeCheck
 from factory.lang.words import UNITS
 from factory.problem.pag import PAG

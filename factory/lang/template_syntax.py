@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 
 from lark import Lark, Token, Transformer, v_args
 
-from factory.lang.pag_syntax import Vector
 from factory.lang.recovery import END, UNLAWFUL, Stuck, drive, open_grammar, report_unlawful
 from factory.lang.source import Findings, quoted, where
+from factory.lang.statements import Vector
 from factory.support.errors import did_you_mean
 
 Words = Sequence[Token]

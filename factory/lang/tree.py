@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from factory.lang.pag_syntax import Statements
 from factory.lang.source import Findings, quoted, where
+from factory.lang.statements import Statements
 from factory.lang.words import LABEL_HINT, is_label, is_number
 from factory.problem.pag import RESERVED, Assembly
 from factory.support.errors import Position, did_you_mean

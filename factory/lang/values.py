@@ -10,8 +10,9 @@ from types import MappingProxyType
 
 from lark import Token
 
-from factory.lang.pag_syntax import Vector, spelled
+from factory.lang.pag_syntax import spelled
 from factory.lang.source import Findings, quoted
+from factory.lang.statements import Vector
 from factory.lang.words import is_number, number
 from factory.problem.pag import Value
 from factory.support.errors import Position, did_you_mean
