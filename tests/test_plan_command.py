@@ -228,3 +228,51 @@ def test_the_best_so_far_is_kept_on_a_signal(
     figures = done.json["figures"]
     assert figures["layouts"] == 1 and figures["blocked"] == 0 and not done.json["optimal"]
     assert labels_of(Path(done.json["pag"]))
+
+
+def test_the_time_that_is_asked_for_bounds_proofs_of_small_products(planning: Planning) -> None:
+    """A product whose trees are proved to the end, unless a time is asked for."""
+    done = planning(LOADED, "--no-look", "--seconds", 0.001)
+    assert done.status == 0, done.err
+    assert done.json["figures"]["layouts"] == 1 and not done.json["optimal"]
+    assert planning(LOADED, "--no-look", out="proved").json["optimal"]
+
+
+@pytest.mark.parametrize(
+    ("where", "kept"),
+    [
+        ("factory.planning.plan.blocking", False),
+        ("factory.render.exploded.ExplodedView.film", True),
+    ],
+)
+def test_a_signal_is_heard_at_once(
+    planning: Planning, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, where: str, kept: bool
+) -> None:
+    """While there is no tree yet, and while pictures are made, when the plan is written already."""
+
+    def stop(*_: object) -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        raise AssertionError("the signal was not heard")
+
+    monkeypatch.setattr("factory.render.exploded.ExplodedView.still", lambda *_: None)
+    monkeypatch.setattr(where, stop)
+    done = planning(LOADED, "--seconds", 0.001)
+    assert (done.status, done.codes) == (130, ["Interrupted"])
+    assert (tmp_path / "out" / "puzzle.pag").exists() == kept
+    assert not list(tmp_path.glob("out/*.mp4"))
+
+
+def test_no_pictures_are_made_after_a_signal(
+    planning: Planning, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown = count()
+
+    def stop(*_: object) -> None:
+        if next(shown) == 1:  # the first tree
+            os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(StepBar, "show", stop)
+    done = planning(LOADED)
+    assert done.status == 0, done.err
+    assert "once more: at once" in done.err
+    assert not [name for name in files_in(tmp_path / "out") if name.endswith(("png", "mp4"))]
