@@ -19,7 +19,6 @@ EXTRAS: Mapping[str, tuple[tuple[str, ...], str]] = MappingProxyType(
         "usd": (("usd-core",), "USD"),
         "yaml": (("pyyaml",), "`import` of trees in YAML"),
         "step": (("cascadio",), "`plan` of STEP files"),
-        "3mf": (("lxml",), "`plan` of 3MF files"),
         "cluster": (("distributed",), "`sweep --on` a Dask cluster"),
     }
 )
