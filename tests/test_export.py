@@ -128,9 +128,9 @@ def test_what_is_binary_needs_a_file(run: Terminal, form: str, log: Path) -> Non
 def test_what_takes_several_files_needs_a_place(run: Terminal, out: Path) -> None:
     done = run("export", MESHES, "--format", "urdf")
     assert (done.status, done.out) == (2, "")
-    assert "this takes 7 files" in done.err
     assert run("export", MESHES, "--format", "urdf", "-o", out / "m.urdf", "--json").status == 0
     files = files_in(out)
+    assert f"this takes {len(files)} files" in done.err
     assert {name.partition("/")[0] for name in files} == {"m.urdf", "m_meshes"}
     named = set(re.findall(r'filename="([^"]*)"', files["m.urdf"].decode()))
     assert named == set(files) - {"m.urdf"}
