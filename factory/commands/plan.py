@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from factory.commands.allowing import allowed_in
 from factory.commands.asking import UNITS, asked
 from factory.commands.interlocking import refuse
 from factory.commands.options import OUTPUT, PATH, SECONDS
 from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions
-from factory.commands.warnings import announced
+from factory.commands.warnings import announced, say_allowed
 from factory.support.console import emit, say
 from factory.support.errors import MissingError
 from factory.support.progress import StepBar, Waiting
@@ -124,6 +125,8 @@ def plan(
 
     options = SourceOptions(unit, keep, replan, library, boxes, in_place)
     found = asked(read_as, options, out.silent)
+    meant, allow = allowed_in(allow, {part.label for part in found.parts})
+    found = replace(found, allowed=(*found.allowed, *meant))
     folder = output or Path(f"{found.name}-planned")
     writable_folder(folder)
     warnings = announced(found.warnings, out)
@@ -135,7 +138,7 @@ def plan(
     planned, stopped = _sought(found, search, out)
     if isinstance(planned, CannotAssemble):
         return refuse(found, planned, folder, look, out)
-    made = planned_product(found, planned.tree, planned.orientation, source.name)
+    made = planned_product(found, planned.tree, planned.orientation, source.name, allow)
     files = {folder / name: content for name, content in made.files.items()}
     own_names(folder, files, [source])
     write_all(files)
@@ -146,6 +149,8 @@ def plan(
         say("  stopped: the best tree so far, without pictures")
     known = set(map(id, project.product.warnings))
     warnings += announced([w for w in project.warnings if id(w) not in known], out)
+    if not out.silent:
+        say_allowed(project)
     if out.as_json:
         emit(_document(found, planned, project, [*files, *looked], warnings))
     else:

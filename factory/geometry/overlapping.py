@@ -21,6 +21,9 @@ SILENT = 2e-5
 NOTHING = 1e-15
 """Less in common than this is rounding [m³]."""
 
+EVERYWHERE = 5e-4
+"""So deep do parts of a drawing without fits overlap [m]."""
+
 ROUNDING = 1e-9
 """A depth is allowed that is larger by no more than this [m]."""
 
@@ -93,6 +96,13 @@ def overlaps_of(product: Product) -> DrawnOverlaps:
         _KNOWN[key] = _found(product)
         finalize(product, _KNOWN.pop, key, None)
     return _KNOWN[key]
+
+
+def everywhere(product: Product) -> tuple[AllowedOverlap, ...]:
+    """What a drawing without fits needs, such as one of LDraw: that any two of its parts overlap by
+    up to 0.5 mm. Nothing where none do."""
+    needed = any(pair.depth <= EVERYWHERE for pair in overlaps_of(product).pairs)
+    return (AllowedOverlap(EVERYWHERE),) if needed else ()
 
 
 def within(found: DrawnOverlaps, parts: Collection[str]) -> DrawnOverlaps:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from factory.importing.assembling import Mates, assemble
@@ -64,9 +64,22 @@ def import_product(
     store = MeshStore("bricks" if file.suffix.lower() in LDRAW else "meshes")
     drafts = _drafts(file, templates, options, store, faults)
     pag = assemble(drafts, faults, options.mates)
+    if file.suffix.lower() in LDRAW:
+        pag = _allowing(pag, store.files)
     name = file_stem(file.stem)
     text = f"// {name}, imported from {file.name}\n".encode() + write_pag(pag).encode()
     return Imported(pag, name, {f"{name}.pag": text, **store.files}, tuple(faults.warnings))
+
+
+def _allowing(pag: PAG, files: Mapping[str, bytes]) -> PAG:
+    """An LDraw model whose parts may overlap everywhere by as much as such drawings need."""
+    from factory.geometry.overlapping import everywhere
+    from factory.geometry.product import product_geometry
+
+    try:
+        return replace(pag, allowed=everywhere(product_geometry(pag, files)))
+    except InputError:
+        return pag  # whoever uses it will hear of that
 
 
 def _drafts(

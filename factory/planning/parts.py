@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 from factory.geometry.meshes import Array, Indices
 from factory.geometry.solids import Solid
-from factory.problem.pag import PAG, Assembly
+from factory.problem.pag import PAG, AllowedOverlap, Assembly
 from factory.support.errors import Diagnostic
 
 
@@ -56,7 +56,8 @@ class InPlace:
 
     `notes` says in words what was found; `warnings` what may be wrong. `files` are the mesh files
     that the nodes of the parts name, by path in the output folder. `tree` is the tree that the
-    source came with, None for none: a plan may be compared with it.
+    source came with, None for none: a plan may be compared with it. `allowed`: overlaps of its
+    parts that are meant.
     """
 
     name: str
@@ -66,6 +67,7 @@ class InPlace:
     files: Mapping[str, bytes] = field(default_factory=dict, repr=False)
     tree: PAG | None = field(default=None, repr=False)
     warnings: tuple[Diagnostic, ...] = field(default=(), repr=False)
+    allowed: tuple[AllowedOverlap, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "files", MappingProxyType(dict(self.files)))

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count
+from math import ceil
 
 import numpy as np
 
 from factory.geometry.meshes import Array
-from factory.geometry.solids import rotation
+from factory.geometry.overlap import DrawnSolids
+from factory.geometry.overlapping import SILENT
+from factory.geometry.solids import Product, rotation
 from factory.importing.labels import file_stem, label_of
 from factory.importing.places import UNTURNED, quaternion, rounded
 from factory.lang.writer import write_pag
 from factory.planning.parts import InPlace
-from factory.problem.pag import PAG, Assembly, Parameter
+from factory.problem.pag import PAG, AllowedOverlap, Assembly, Parameter
 
 Tree = str | tuple["Tree", ...]
 """The label of a part or of a sub-tree that is kept, or what is mated: two trees or more, of which
@@ -34,10 +37,15 @@ class PlannedProduct:
 
 
 def planned_product(
-    source: InPlace, tree: Tree, orientation: Array | None = None, by: str = ""
+    source: InPlace,
+    tree: Tree,
+    orientation: Array | None = None,
+    by: str = "",
+    allow: Sequence[str] = (),
 ) -> PlannedProduct:
     """The product that a tree makes of a source's parts, turned by a rotation (3, 3) about the
-    origin. `by` is said in the first line of the PAG. Only templates that the package ships are
+    origin. `by` is said in the first line of the PAG; of pairs `a:b` that `allow` has, the overlap
+    is allowed as deep as it is. Only templates that the package ships are
     used: `mate`, with its further inputs inserted, and `relay`, besides what kept sub-trees
     name."""
     turn = np.eye(3) if orientation is None else orientation
@@ -58,11 +66,23 @@ def planned_product(
     whole = [node for nodes in kept.values() for node in nodes if node.inputs]
     parts = [_turned(part.node, turn) for part in source.parts]
     nodes = (*made, *reversed(whole), *parts)
-    pag = PAG(root, nodes, len(nodes))
+    pag = PAG(root, nodes, len(nodes), allowed=(*source.allowed, *_meant(source, allow)))
     name = file_stem(source.name)
     head = f"// {name}, planned{f' from {by}' if by else ''}\n"
     text = (head + write_pag(pag)).encode()
     return PlannedProduct(pag, {f"{name}.pag": text, **source.files})
+
+
+def _meant(source: InPlace, allow: Sequence[str]) -> Iterator[AllowedOverlap]:
+    """What pairs `a:b` overlap by, up to a hundredth of a millimetre more."""
+    pairs = [pair for name in allow if len(pair := name.split(":")) == 2]
+    solids = {part.label: part.solid for part in source.parts}
+    bodies = DrawnSolids(Product(solids, np.zeros(3), np.zeros(3)))
+    for one, other in pairs:
+        if one in solids and other in solids and bodies.is_drawn(one) and bodies.is_drawn(other):
+            depth = bodies.overlap(one, other).depth
+            if depth > SILENT:
+                yield AllowedOverlap(ceil(1e5 * depth) / 1e5, (one, other))
 
 
 def _free(name: str, taken: set[str]) -> str:

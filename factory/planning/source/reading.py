@@ -60,7 +60,8 @@ def read_source(
     said = tuple(f"'{k.label}' stays as it is: {len(k.parts)} parts" for k in kept)
     warnings = (*made.warnings, *warnings, *doubtful)
     tree = made.pag if made.has_tree else None
-    return InPlace(made.name, named, notes + said, kept, made.files, tree, warnings)
+    allowed = made.pag.allowed
+    return InPlace(made.name, named, notes + said, kept, made.files, tree, warnings, allowed)
 
 
 def _product(path: Path, templates: Mapping[str, Template], asked: SourceOptions) -> TreeProduct:
