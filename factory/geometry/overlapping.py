@@ -82,6 +82,9 @@ class DrawnOverlaps:
                 count = f"{len(every)} pairs of parts overlap"
             deepest = f"{1e3 * every[0].depth:.2f} mm when finished"
             words.append(f"{count} by up to {deepest}; {1e3 * most:g} mm is allowed everywhere")
+        if self.open:
+            parts = "a part has" if len(self.open) == 1 else f"{len(self.open)} parts have"
+            words.append(f"{parts} an open mesh: what these overlap is not judged")
         return words
 
 

@@ -20,6 +20,7 @@ from factory.record.log.recompiled import AGAIN, factory_of, of_its_factory
 from factory.record.monitor.agreement import contradictions
 from factory.record.monitor.anatomy import Anatomy
 from factory.record.monitor.calm import judge_calm
+from factory.record.monitor.continuity import jumps
 from factory.record.monitor.monitor import Monitor
 from factory.record.monitor.observation import Observation
 from factory.record.monitor.recount import differences, recounted, worst
@@ -62,7 +63,7 @@ def _seen(log: Log, subject: MonitorSubject, m: Any) -> Report:
         monitor.see(observation)
     report = monitor.report(log.events)
     counted = recounted(log, subject, anatomy, m, observations(log))
-    wrong = differences(log.figures or {}, counted, float(log.time[-1]))
+    wrong = [*jumps(log, m), *differences(log.figures or {}, counted, float(log.time[-1]))]
     return replace(report, violations=(*report.violations, *wrong), figures=counted)
 
 

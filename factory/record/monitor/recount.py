@@ -62,13 +62,13 @@ def recounted(
 
 def differences(kept: Mapping[str, Any], counted: Mapping[str, Any], t: float) -> list[Violation]:
     """The figures kept in a log that ends at `t` [s] that its states contradict."""
-    return [
-        Violation(t, "", "", "Record", f"the log says {kept[key]:g} {words}, its states {value:g}")
-        for key, words in WORDS.items()
-        if (value := counted[key]) is not None
-        and key in kept
-        and not value <= (kept[key] or 0.0) + SAME
-    ]
+    found = []
+    for key, words in WORDS.items():
+        said, value = kept.get(key), counted[key]
+        if key in kept and value is not None and not value <= (said or 0.0) + SAME:
+            message = f"the log says {said or 0:g} {words}, its states {value:g}"
+            found.append(Violation(t, "", "", "Record", message))
+    return found
 
 
 def worst(kept: Mapping[str, Any] | None, counted: Mapping[str, Any]) -> dict[str, Any]:

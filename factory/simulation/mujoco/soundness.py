@@ -75,10 +75,21 @@ class Soundness:
         self.mass = np.array([WEIGHTS.get(name.rpartition("/")[2], np.nan) for name in called])
         for label, ids in bodies.items():
             self.mass[ids] = model.carried.mass[label]
+        solid = masks.solid
+        self._geoms = np.concatenate([*solid.values()])
+        self._owner = np.repeat([*solid], [len(geoms) for geoms in solid.values()])
 
     def weigh(self, bodies: Iterable[int], factor: float) -> None:
         """Bodies weigh `factor` times as much, on purpose."""
         self.mass[[*bodies]] *= factor
+
+    def glance(self) -> None:
+        """See whether all parts have the masks of what their holders hold, before hands change."""
+        given = self._m.geom_contype[self._geoms]
+        wrong = given != masks_of(1)[0] * self.masks.code[self._owner]
+        if wrong.any() and not self.found:
+            names = (self._name[geom] for geom in self._geoms[wrong].tolist())
+            self.found = tuple(_each("NotSolid", "{} is not solid", names))
 
     def look(self) -> None:
         """Look for what is not as it should be, unless something was not before."""

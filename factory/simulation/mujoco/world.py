@@ -125,6 +125,7 @@ class MujocoWorld:
             self.hooks.tell_ended()
 
     def _hand_over(self, ended: Sequence[Job]) -> None:
+        self.inspection.soundness.glance()
         self.parts.complete(ended)
         for operation, unit in ended:
             self.inspection.joining.pop(operation.index, None)

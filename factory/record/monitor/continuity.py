@@ -1,0 +1,31 @@
+"""Whether the states of a log go together: what moves along a rail is where its speeds bring it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from factory.mjcf.weld_frames import SLIDE
+from factory.record.log.reader import Log
+from factory.record.monitor.report import Violation
+
+JUMP = 3e-4
+"""A joint is no further than this from where its speeds bring it in a tick [m]; honest logs stay
+below a tenth of it."""
+
+
+def jumps(log: Log, m: Any) -> Iterator[Violation]:
+    """The first tick in which each slide joint is elsewhere than its speeds at both ends of the
+    tick, or any between these, bring it."""
+    slides = np.flatnonzero(m.jnt_type == SLIDE)
+    q, v = log.qpos[:, m.jnt_qposadr[slides]], log.qvel[:, m.jnt_dofadr[slides]]
+    spent = np.diff(log.time)[:, None]
+    gone = np.diff(q, axis=0) - spent * (v[1:] + v[:-1]) / 2
+    off = np.abs(gone) - spent * np.abs(np.diff(v, axis=0)) / 2
+    for joint in np.flatnonzero((off > JUMP).any(axis=0)).tolist():
+        row = int((off[:, joint] > JUMP).argmax())
+        name = m.joint(int(slides[joint])).name
+        words = f"{name} jumps by {1e3 * abs(gone[row, joint]):.1f} mm within a tick"
+        yield Violation(float(log.time[row + 1]), "", "", "Record", words)

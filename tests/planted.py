@@ -1,0 +1,593 @@
+"""Faults to be planted in a factory: what each does, and by which codes a run fails that has it.
+
+One table (`PLANTS`): faults of the engine's model, of the bodies while it runs, of the product as
+it is drawn, of the log. Benign ones change what a factory is made to bear, and fail no run."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+
+from factory.layout.layout import Layout
+from factory.mjcf import names
+from factory.plant.factory import Operation
+from factory.record.log import Log, read_log
+from factory.record.log.writer import LogWriter
+from factory.record.monitor.record import verdict_on, watch_log
+from factory.record.verdict import RunVerdict
+from factory.simulation.mujoco import world as mujoco_world
+from factory.simulation.mujoco.parts import Parts
+from factory.simulation.request import RunRequest
+from factory.simulation.simulation import Simulation
+from factory.simulation.watched import watched
+from factory.support.engine import mujoco
+from tests.examples import with_hands
+from tests.pag_texts import laid_out
+
+Acts = Callable[[Any, Any], None]
+"""Acts on an engine's model and data."""
+
+OFF = mujoco.mjtDisableBit
+
+
+@dataclass(frozen=True)
+class Plant:
+    """A fault, of a `kind`: `xml` changes the model's text, `engine` the model before the run,
+    `run` model and data once in it, `switch` the same where sub1 is made and no weld is switched
+    yet, `log` the log of an honest run; `product` is a PAG. A run with it fails by all of these
+    `codes`; of none it succeeds."""
+
+    name: str
+    kind: str
+    act: Any
+    codes: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        return self.name
+
+    def verdict(self) -> RunVerdict:
+        """The verdict on a run that has it."""
+        return RUNNERS[self.kind](self.act)
+
+
+@cache
+def paper() -> Layout:
+    """The paper's example, with hands."""
+    return with_hands("paper")
+
+
+def _run(layout: Layout, **more: Any) -> RunVerdict:
+    return watched(Simulation(layout, RunRequest(shown=False, **more))).verdict
+
+
+def _of_engine(act: Callable[[Any], None]) -> RunVerdict:
+    """A run in a model that was changed after it had been compiled."""
+    load = mujoco_world.load
+
+    def changed(model: Any) -> Any:
+        m = load(model)
+        act(m)
+        return m
+
+    with patch.object(mujoco_world, "load", changed):
+        return _run(paper(), units=2)
+
+
+def _of_xml(change: Callable[[str], str]) -> RunVerdict:
+    """A run in a model whose text was changed before it was compiled."""
+    load = mujoco_world.load
+
+    def changed(model: Any) -> Any:
+        xml = change(model.xml)
+        assert xml != model.xml
+        return load(replace(model, xml=xml))
+
+    with patch.object(mujoco_world, "load", changed):
+        return _run(paper(), units=2)
+
+
+def _of_run(act: Acts) -> RunVerdict:
+    """A run in which something is changed once, at 1 s."""
+    simulation = Simulation(paper(), RunRequest(units=2, shown=False))
+    world, done = simulation.physical, list[bool]()
+
+    def once() -> None:
+        if world.time >= 1.0 and not done:
+            done.append(True)
+            act(world.m, world.d)
+
+    world.hooks.before_step.append(once)
+    return watched(simulation, max_time=12.0).verdict
+
+
+@contextmanager
+def before_the_switch(label: str, act: Acts) -> Iterator[None]:
+    """Act once, where an operation has ended and no weld is switched yet."""
+    hand_over, done = Parts.hand_over, list[bool]()
+
+    def acted(self: Parts, ended: Sequence[tuple[Operation, int]]) -> None:
+        if not done and any(operation.label == label for operation, _ in ended):
+            done.append(True)
+            act(self.welds._m, self.welds._d)
+        hand_over(self, ended)
+
+    with patch.object(Parts, "hand_over", acted):
+        yield
+
+
+def _of_switch(act: Acts) -> RunVerdict:
+    with before_the_switch("sub1", act):
+        return watched(Simulation(paper(), RunRequest(shown=False)), max_time=12.0).verdict
+
+
+def _of_product(text: str) -> RunVerdict:
+    return _run(laid_out(text))
+
+
+def _of_log(change: Callable[[Log], Log]) -> RunVerdict:
+    changed = change(honest_log())
+    report, subject = watch_log(changed)
+    return verdict_on(changed, subject.factory, report)
+
+
+@cache
+def honest_log() -> Log:
+    """The log of a run of the paper's example."""
+    return _logged(paper(), lambda m, d: None)
+
+
+@cache
+def hit_log() -> Log:
+    """The log of a run in which a part was put into a carriage."""
+    with before_the_switch("sub1", into("part/part1#1", "r2/carriage")):
+        return _logged(paper(), lambda m, d: None)
+
+
+def _logged(layout: Layout, act: Acts) -> Log:
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "log"
+        simulation = Simulation(layout, RunRequest(units=2, seed=2, jitter=0.3))
+        with LogWriter(path, simulation) as writer:
+            simulation.run([writer.observe], 20.0)
+        return read_log(path)
+
+
+RUNNERS: dict[str, Callable[[Any], RunVerdict]] = {
+    "xml": _of_xml,
+    "engine": _of_engine,
+    "run": _of_run,
+    "switch": _of_switch,
+    "product": _of_product,
+    "log": _of_log,
+}
+
+# --- what is done ---------------------------------------------------------------------------------
+
+
+def both(act: Callable[[Any], None]) -> Acts:
+    """The same while a run goes on."""
+    return lambda m, d: act(m)
+
+
+def hollow(*words: str) -> Callable[[Any], None]:
+    """Geoms whose names end so, or all, collide with nothing."""
+
+    def act(m: Any) -> None:
+        for geom in range(m.ngeom):
+            if not words or m.geom(geom).name.endswith(words):
+                m.geom_contype[geom] = m.geom_conaffinity[geom] = 0
+
+    return act
+
+
+def text(pattern: str, by: str) -> Callable[[str], str]:
+    """The model's text with another in the place of a pattern."""
+    return lambda xml: re.sub(pattern, by, xml)
+
+
+def off(bit: Any) -> Callable[[Any], None]:
+    """Something of the engine is switched off."""
+
+    def act(m: Any) -> None:
+        m.opt.disableflags |= int(bit)
+
+    return act
+
+
+def weightless(m: Any) -> None:
+    """There is no gravity."""
+    m.opt.gravity[:] = 0.0
+
+
+def heavier(body: str, by: float = 2.0) -> Callable[[Any], None]:
+    """A body weighs so many times as much."""
+
+    def act(m: Any) -> None:
+        m.body_mass[m.body(body).id] *= by
+        m.body_inertia[m.body(body).id] *= by
+        mujoco.mj_setConst(m, mujoco.MjData(m))
+
+    return act
+
+
+def floating(body: str) -> Callable[[Any], None]:
+    """Gravity does not act on a body."""
+
+    def act(m: Any) -> None:
+        m.body_gravcomp[m.body(body).id] = 1.0
+
+    return act
+
+
+def turn(degrees: float) -> np.ndarray:
+    """The quaternion of a turn about the vertical."""
+    half = np.radians(degrees) / 2
+    return np.array([np.cos(half), 0, 0, np.sin(half)])
+
+
+def misshapen(part: str, shift: float = 0.0, degrees: float = 0.0, size: float = 1.0) -> Any:
+    """The geoms of a part are elsewhere in its body."""
+
+    def act(m: Any) -> None:
+        first = m.body_geomadr[m.body(part).id]
+        for geom in range(first, first + m.body_geomnum[m.body(part).id]):
+            m.geom_pos[geom, 0] += shift
+            m.geom_size[geom] *= size
+            mujoco.mju_mulQuat(m.geom_quat[geom], turn(degrees), m.geom_quat[geom].copy())
+
+    return act
+
+
+def pad(name: str, by: float) -> Callable[[Any], None]:
+    """A pad is higher or lower in its hand."""
+
+    def act(m: Any) -> None:
+        m.geom_pos[m.geom(name).id, 2] += by
+
+    return act
+
+
+def reframed(weld: str, shift: float = 0.0, degrees: float = 0.0) -> Callable[[Any], None]:
+    """A weld keeps what it holds elsewhere."""
+
+    def act(m: Any) -> None:
+        number = m.equality(weld).id
+        m.eq_data[number, 3] += shift
+        rotated = np.empty(4)
+        mujoco.mju_mulQuat(rotated, turn(degrees), m.eq_data[number, 6:10])
+        m.eq_data[number, 6:10] = rotated
+
+    return act
+
+
+def welded(weld: str, on: bool) -> Acts:
+    """A weld is switched, of itself."""
+
+    def act(m: Any, d: Any) -> None:
+        d.eq_active[m.equality(weld).id] = on
+
+    return act
+
+
+def moved(joint: str, by: float) -> Acts:
+    """A robot jumps along its guidepath."""
+
+    def act(m: Any, d: Any) -> None:
+        d.qpos[m.jnt_qposadr[m.joint(joint).id]] += by
+
+    return act
+
+
+def displaced(part: str, by: float = 0.0, degrees: float = 0.0) -> Acts:
+    """A part jumps, or turns."""
+
+    def act(m: Any, d: Any) -> None:
+        at = m.jnt_qposadr[m.body_jntadr[m.body(part).id]]
+        d.qpos[at] += by
+        d.qpos[at + 3 : at + 7] = turn(degrees)
+
+    return act
+
+
+def into(part: str, body: str) -> Acts:
+    """A part is put into something."""
+
+    def act(m: Any, d: Any) -> None:
+        at = m.jnt_qposadr[m.body_jntadr[m.body(part).id]]
+        d.qpos[at : at + 3] = d.xpos[m.body(body).id]
+
+    return act
+
+
+def warns(m: Any, d: Any) -> None:
+    """The engine warns."""
+    d.warning[int(mujoco.mjtWarning.mjWARN_CNSTRFULL)].number += 1
+
+
+def figures(**values: Any) -> Callable[[Log], Log]:
+    """The log of a run in which something was hit says other figures."""
+
+    def change(log: Log) -> Log:
+        del log
+        kept = hit_log()
+        return replace(kept, figures={**(kept.figures or {}), **values})
+
+    return change
+
+
+def without_figures(log: Log) -> Log:
+    """The log of a run in which something was hit has no figures."""
+    return replace(hit_log(), figures=None)
+
+
+def states(joint: str, by: float, row: int = 150, rows: int = 1) -> Callable[[Log], Log]:
+    """A coordinate in some rows of a log is another."""
+
+    def change(log: Log) -> Log:
+        m = mujoco.MjModel.from_xml_string(
+            log.xml, {f"meshes/{n}": f for n, f in log.files.items()}
+        )
+        qpos = log.qpos.copy()
+        qpos[row : row + rows, m.jnt_qposadr[m.joint(joint).id]] += by
+        return replace(log, qpos=qpos)
+
+    return change
+
+
+def swapped(log: Log) -> Log:
+    """Two firings of different times change places."""
+    fired, times = log.fired.copy(), log.fired_t
+    one = next(k for k in range(8, len(fired)) if times[k + 1] - times[k] > 0.05)
+    fired[[one, one + 1]] = fired[[one + 1, one]]
+    return replace(log, fired=fired)
+
+
+def loosened(log: Log) -> Log:
+    """The log no longer has the constraint by which something is held, in some rows."""
+    values, grips = log.active.values.copy(), 0
+    m = mujoco.MjModel.from_xml_string(log.xml, {f"meshes/{n}": f for n, f in log.files.items()})
+    for row in values:
+        if m.equality(int(row[0])).name.startswith("grip") and grips < 1:
+            row[2] = next(
+                b for b in range(m.nbody) if names.kind(m.body(b).name) == "part" and b != row[2]
+            )
+            grips += 1
+    return replace(log, active=replace(log.active, values=values))
+
+
+OVERLAP = """root = r; r = mate ( a, b ); %s
+a = atomic ( box = (0.04, 0.04, 0.04), pos = (0, 0, 0.02) );
+b = atomic ( box = (0.04, 0.04, %s), pos = (0, %s, 0.02) )"""
+"""Two boxes side by side, that overlap where they are less than 40 mm apart."""
+
+# --- the table ------------------------------------------------------------------------------------
+
+PLANTS = (
+    Plant("nothing is solid", "engine", hollow(), ("NotSolid",)),
+    Plant("nothing is solid any more", "run", both(hollow()), ("NotSolid",)),
+    Plant(
+        "a hand is not solid", "engine", hollow("r5/finger", "r5/pad", "r5/column"), ("NotSolid",)
+    ),
+    Plant("a pad is not solid", "engine", hollow("r3/pad"), ("NotSolid",)),
+    Plant(
+        "a finger is only shown",
+        "xml",
+        text(r'(name="r5/finger" )', r'\1group="1" contype="0" conaffinity="0" '),
+        ("NotSolid",),
+    ),
+    Plant("a pad is missing", "xml", text(r'<geom name="r5/pad"[^>]*/>', ""), ("NotSolid",)),
+    Plant(
+        "a magazine is only shown",
+        "xml",
+        text(r'(name="feeder/part1/wall1" class=)"station"', r'\1"shown"'),
+        ("NotSolid",),
+    ),
+    Plant(
+        "robots are only shown",
+        "xml",
+        text(r'contype="1" conaffinity="1"', 'contype="0" conaffinity="0"'),
+        ("NotSolid",),
+    ),
+    Plant(
+        "two robots are left out of contact",
+        "xml",
+        text(
+            "<equality>",
+            '<contact><exclude body1="r2/carriage" body2="r3/carriage"/></contact><equality>',
+        ),
+        ("NotSolid",),
+    ),
+    Plant("there is no gravity", "xml", text("<option ", '<option gravity="0 0 0" '), ("Options",)),
+    Plant(
+        "the timestep is another",
+        "xml",
+        text(r'timestep="[^"]*"', 'timestep="0.002"'),
+        ("Options",),
+    ),
+    Plant(
+        "a part is twice as heavy in the text",
+        "xml",
+        text(r'(?s)(name="part/part1#1".*?mass=")', r"\g<1>1"),
+        ("Mass",),
+    ),
+    Plant("a carriage is not solid", "engine", hollow("r2/carriage"), ("NotSolid",)),
+    Plant("a magazine is not solid", "engine", hollow("feeder/part1/post"), ("NotSolid",)),
+    Plant("a magazine's lid is not solid", "engine", hollow("feeder/part2/lid"), ("NotSolid",)),
+    Plant("a feeder's pad is not solid", "engine", hollow("feeder/part2/pad"), ("NotSolid",)),
+    Plant("the tray is not solid", "engine", hollow("outfeed/tray"), ("NotSolid",)),
+    Plant("the shutter is not solid", "engine", hollow("outfeed/shutter"), ("NotSolid",)),
+    Plant("the floor is not solid", "engine", hollow("ground"), ("NotSolid",)),
+    Plant("a part is not solid any more", "run", both(hollow("part/part1#1")), ("NotSolid",)),
+    Plant("contacts are switched off", "engine", off(OFF.mjDSBL_CONTACT), ("Options",)),
+    Plant(
+        "contacts are switched off in the run", "run", both(off(OFF.mjDSBL_CONTACT)), ("Options",)
+    ),
+    Plant("constraints are switched off", "engine", off(OFF.mjDSBL_CONSTRAINT), ("Options",)),
+    Plant("welds are switched off", "engine", off(OFF.mjDSBL_EQUALITY), ("Options",)),
+    Plant("limits are switched off", "engine", off(OFF.mjDSBL_LIMIT), ("Options",)),
+    Plant("gravity is switched off", "engine", off(OFF.mjDSBL_GRAVITY), ("Options",)),
+    Plant("gravity is nothing", "engine", weightless, ("Options",)),
+    Plant("gravity is nothing from 1 s on", "run", both(weightless), ("Options",)),
+    Plant("gravity does not act on a part", "engine", floating("part/part1#1"), ("Options",)),
+    Plant("a part weighs twice as much", "engine", heavier("part/part1#1"), ("Mass",)),
+    Plant("a part weighs half as much", "engine", heavier("part/part3#1", 0.5), ("Mass",)),
+    Plant("a carriage weighs twice as much", "engine", heavier("r4/carriage"), ("Mass",)),
+    Plant("the tray weighs twice as much", "engine", heavier("outfeed/tray"), ("Mass",)),
+    Plant("a slider weighs twice as much", "engine", heavier("feeder/part1/slider"), ("Mass",)),
+    Plant(
+        "a part's shape is shifted by 0.2 mm", "engine", misshapen("part/part1#1", 2e-4), ("Shape",)
+    ),
+    Plant("a part's shape is turned by 1°", "engine", misshapen("part/part1#1", 0, 1), ("Shape",)),
+    Plant(
+        "a part's shape is turned by 0.2°", "engine", misshapen("part/part2#1", 0, 0.2), ("Shape",)
+    ),
+    Plant(
+        "a part's shape is a tenth as large",
+        "engine",
+        misshapen("part/part1#1", size=0.1),
+        ("Shape",),
+    ),
+    Plant("a pad is 2 mm lower", "engine", pad("r5/pad", -2e-3), ("GripGap",)),
+    Plant("a feeder's pad is 1 mm higher", "engine", pad("feeder/part1/pad", 1e-3), ("Contact",)),
+    Plant("a grip holds 0.2 mm off", "engine", reframed("grip/r3/part2", 2e-4), ("Frame",)),
+    Plant("a grip holds it turned by 1°", "engine", reframed("grip/r3/part2", 0, 1), ("Frame",)),
+    Plant(
+        "a grip holds it turned by 0.2°", "engine", reframed("grip/r5/part1", 0, 0.2), ("Frame",)
+    ),
+    Plant("the tray holds it turned by 1°", "engine", reframed("hold/part2", 0, 1), ("Frame",)),
+    Plant(
+        "a grip shifts by 0.2 mm in the run",
+        "run",
+        both(reframed("grip/r1/part2", 2e-4)),
+        ("ProductError",),
+    ),
+    Plant(
+        "the tray's hold shifts by 0.2 mm in the run",
+        "run",
+        both(reframed("hold/part1", 2e-4)),
+        ("ProductError",),
+    ),
+    Plant(
+        "the tray's hold turns by 1° in the run",
+        "run",
+        both(reframed("hold/part1", 0, 1)),
+        ("ProductTurn", "ProductError"),
+    ),
+    Plant(
+        "the tray's hold turns by 0.2° in the run",
+        "run",
+        both(reframed("hold/part3", 0, 0.2)),
+        ("ProductTurn",),
+    ),
+    Plant("a weld more", "run", welded("grip/r1/part3", True), ("TwoHolders",)),
+    Plant("a weld less", "run", welded("grip/r3/part1", False), ("Dropped",)),
+    Plant(
+        "a carriage jumps by 5 mm", "switch", moved(names.slide("r3"), -5e-3), ("Early", "Missed")
+    ),
+    Plant("a carriage jumps by 0.6 mm", "switch", moved(names.slide("r3"), -6e-4), ("Early",)),
+    Plant(
+        "a part jumps by 5 mm", "switch", displaced("part/part1#1", 5e-3), ("Missed", "HandOffGap")
+    ),
+    Plant("a part jumps by 0.6 mm", "switch", displaced("part/part1#1", 6e-4), ("Missed",)),
+    Plant(
+        "a part turns by 1°", "switch", displaced("part/part1#1", 0, 1), ("Missed", "HandOffTurn")
+    ),
+    Plant(
+        "a part turns by 0.2°",
+        "switch",
+        displaced("part/part1#1", 0, 0.2),
+        ("Missed", "HandOffTurn"),
+    ),
+    Plant(
+        "a part is put into a carriage", "switch", into("part/part1#1", "r2/carriage"), ("Contact",)
+    ),
+    Plant("the engine warns", "switch", warns, ("EngineWarning",)),
+    Plant("parts overlap by 0.3 mm", "product", OVERLAP % ("", "0.04", "0.0397"), ("Overlap",)),
+    Plant("parts overlap by 2 mm", "product", OVERLAP % ("", "0.04", "0.038"), ("Overlap",)),
+    Plant("a part is inside another", "product", OVERLAP % ("", "0.02", "0.001"), ("Overlap",)),
+    Plant(
+        "parts overlap by more than is allowed",
+        "product",
+        OVERLAP % ("allow ( 0.0001 );", "0.04", "0.0397"),
+        ("Overlap",),
+    ),
+    Plant(
+        "the log says 0 contacts",
+        "log",
+        figures(unintended_contacts=0, contacts=[], contact_first_s=None),
+        ("Record", "Contact"),
+    ),
+    Plant("the log says one contact of many", "log", figures(unintended_contacts=1), ("Record",)),
+    Plant("the log says no figures", "log", without_figures, ("Contact",)),
+    Plant("the log says no gap", "log", figures(handoff_gap_max_mm=0.0), ("Record",)),
+    Plant("the log says no distance of pads", "log", figures(grip_gap_max_mm=0.0), ("Record",)),
+    Plant(
+        "the log's contact is none, by a word",
+        "log",
+        figures(unintended_contacts=None),
+        ("Record", "Contact"),
+    ),
+    Plant("two firings are swapped in the log", "log", swapped, ("Record",)),
+    Plant(
+        "a firing is missing in the log",
+        "log",
+        lambda log: replace(log, fired=log.fired[:-1], fired_t=log.fired_t[:-1]),
+        ("Record",),
+    ),
+    Plant(
+        "firings are later in the log",
+        "log",
+        lambda log: replace(log, fired_t=log.fired_t + 0.05),
+        ("Record",),
+    ),
+    Plant("a robot is 1 mm off in a row of the log", "log", states("r3/slide", 1e-3), ("Record",)),
+    Plant(
+        "a robot is 1 mm off from then on in the log",
+        "log",
+        states("r4/slide", 1e-3, rows=9999),
+        ("Record",),
+    ),
+    Plant("a grip is on another part in the log", "log", loosened, ("TwoHolders",)),
+)
+"""What must be found."""
+
+
+def rubbed(m: Any) -> None:
+    """Parts are twice as rough."""
+    m.geom_friction[:] *= 2
+
+
+def sticky(m: Any) -> None:
+    """Rails have a little more dry friction."""
+    m.dof_frictionloss[:] += 0.1
+
+
+def stronger(m: Any) -> None:
+    """Drives are stiffer by a tenth."""
+    m.actuator_gainprm[:, 0] *= 1.1
+    m.actuator_biasprm[:, 1:3] *= 1.1
+
+
+BENIGN = (
+    Plant("nothing", "run", lambda m, d: None),
+    Plant("parts are twice as rough", "engine", rubbed),
+    Plant("rails have more dry friction", "engine", sticky),
+    Plant("drives are stiffer by a tenth", "engine", stronger),
+    Plant("parts overlap by 0.01 mm", "product", OVERLAP % ("", "0.04", "0.03999")),
+    Plant(
+        "parts overlap by what is allowed",
+        "product",
+        OVERLAP % ("allow ( a, b, 0.0003 );", "0.04", "0.0397"),
+    ),
+    Plant("the log is as it was", "log", lambda log: log),
+)
+"""What must not fail a run."""
