@@ -9,7 +9,16 @@ REPORT = Report(
     "tests.fidelity",
     "# Fidelity\n\nHow far the physics can be believed, measured. Written by `make fidelity`"
     " (`python -m tests.fidelity NAME` for one section) from what is kept in docs/fidelity/.",
-    ("seeds", "paces", "approaches", "convergence", "disturbances", "attraction", "long_runs"),
+    (
+        "seeds",
+        "paces",
+        "approaches",
+        "convergence",
+        "disturbances",
+        "attraction",
+        "planted",
+        "long_runs",
+    ),
     DOCS / "fidelity.md",
     ("mujoco", "numpy", "scipy"),
 )
