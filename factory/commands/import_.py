@@ -94,6 +94,8 @@ def import_(
     else:
         operations = len(product.pag) - parts
         say(f"{pag}: parts {parts}, operations {operations}, meshes {meshes_made}")
+        for allowed in product.pag.allowed:
+            say(f"its drawing has no fits: overlaps up to {1e3 * allowed.depth:g} mm are allowed")
         for path in files if out.verbose else ():
             say(f"  {path}")
     return 0
@@ -101,11 +103,14 @@ def import_(
 
 def _shape_warnings(pag: Path, templates: Mapping[str, Template]) -> tuple[Diagnostic, ...]:
     """What `build` will say of the shapes in a PAG that has been written."""
+    from factory.geometry.overlapping import overlaps_of
     from factory.geometry.product import product_geometry
     from factory.lang.pag_reader import load_pag
 
     try:
-        return product_geometry(load_pag(pag, templates)).warnings
+        made = load_pag(pag, templates)
+        product = product_geometry(made)
+        return (*product.warnings, *overlaps_of(product).faults(made.allowed))
     except InputError as error:
         return error.diagnostics
 

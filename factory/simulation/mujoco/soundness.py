@@ -76,8 +76,8 @@ class Soundness:
         for label, ids in bodies.items():
             self.mass[ids] = model.carried.mass[label]
         solid = masks.solid
-        self._geoms = np.concatenate([*solid.values()])
-        self._owner = np.repeat([*solid], [len(geoms) for geoms in solid.values()])
+        owner = np.repeat([*solid], [len(geoms) for geoms in solid.values()])
+        self._geoms = np.stack([np.concatenate([*solid.values()]), owner])
 
     def weigh(self, bodies: Iterable[int], factor: float) -> None:
         """Bodies weigh `factor` times as much, on purpose."""
@@ -85,10 +85,10 @@ class Soundness:
 
     def glance(self) -> None:
         """See whether all parts have the masks of what their holders hold, before hands change."""
-        given = self._m.geom_contype[self._geoms]
-        wrong = given != masks_of(1)[0] * self.masks.code[self._owner]
+        geoms, owner = self._geoms
+        wrong = self._m.geom_contype[geoms] != masks_of(1)[0] * self.masks.code[owner]
         if wrong.any() and not self.found:
-            names = (self._name[geom] for geom in self._geoms[wrong].tolist())
+            names = (self._name[geom] for geom in geoms[wrong].tolist())
             self.found = tuple(_each("NotSolid", "{} is not solid", names))
 
     def look(self) -> None:
