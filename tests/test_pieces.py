@@ -415,6 +415,22 @@ def test_a_rod_may_not_be_as_coarse_as_it_is_thick(
     assert given == pytest.approx([0.05, 0.1 / 3, 0.02], rel=0.01)
 
 
+def test_a_shallow_groove_is_cut_finer(
+    tmp_path: Path, library: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the usual share would leave as one body, its hull."""
+    given: list[float] = []
+    cut = sys.modules["coacd"].run_coacd
+
+    def run_coacd(mesh: object, threshold: float, **_: object) -> list[tuple[Array, Array]]:
+        given.append(threshold)
+        return cut(mesh)[: 2 if threshold < 0.03 else 1]  # type: ignore[no-any-return]
+
+    monkeypatch.setattr(sys.modules["coacd"], "run_coacd", run_coacd)
+    assert len(solid_of(tmp_path, trimesh.creation.annulus(0.05, 0.1, 0.1)).pieces) == 2
+    assert given == [0.05, 0.02]
+
+
 def test_meshes_are_decomposed_side_by_side(
     tmp_path: Path, library: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:

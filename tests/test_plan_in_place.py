@@ -134,6 +134,11 @@ def test_groups_that_touch_nothing_are_refused(tmp_path: Path, parts: Parts) -> 
     assert "groups that touch none of the others" in message
 
 
+def test_a_folder_gives_the_product_its_whole_name(tmp_path: Path) -> None:
+    folder_of(tmp_path / "stool_0.4m tall", stool())
+    assert read_source(tmp_path / "stool_0.4m tall", TEMPLATES).name == "stool_0.4m-tall"
+
+
 def test_parts_with_some_play_touch(tmp_path: Path) -> None:
     parts = stool()
     parts["seat"].apply_translation((0, 0, 0.8))

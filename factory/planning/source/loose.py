@@ -89,7 +89,7 @@ def loose_product(path: Path, bodies: Bodies, unit: str | None) -> TreeProduct:
         notes.append(f"one body of {len(pieces)} pieces that share no corner: a part each")
     check_count(path, [body.name for body in bodies.found], "bodies")
     metres, said = unit_of(bodies, unit)
-    name = file_stem(path.stem if path.suffix else path.resolve().name)
+    name = file_stem(path.resolve().name if path.is_dir() else path.stem)
     pag, files = _assembled(name, path, bodies.found, metres)
     return TreeProduct(name, pag, files, (*notes, said), bodies.warnings, has_tree=False)
 

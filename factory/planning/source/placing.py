@@ -14,8 +14,11 @@ from factory.planning.hulls import EXTRA, hull_stands
 from factory.planning.parts import PlacedPart
 from factory.problem.pag import PAG
 from factory.support.errors import Diagnostic
+from factory.support.version import release
 
 DECOMPOSE = f"{EXTRA}: then it is decomposed into convex bodies"
+
+AS_BODIES = "CoACD finds no bodies in it: write it as closed convex bodies that touch"
 
 
 def placed(
@@ -39,8 +42,9 @@ def _hulls(parts: Sequence[PlacedPart]) -> list[Diagnostic]:
         file = str(part.node.parameter("mesh"))
         if file not in found and hull_stands(part.solid.mesh):
             message = f"{file} is not convex; its convex hull stands for it"
-            many = f"meshes are not convex: their convex hulls stand for them ({EXTRA})"
-            found[file] = Diagnostic("BadMesh", message, part.node.position, DECOMPOSE, many)
+            hint = AS_BODIES if release("coacd") else DECOMPOSE
+            many = f"meshes are not convex: their convex hulls stand for them ({hint})"
+            found[file] = Diagnostic("BadMesh", message, part.node.position, hint, many)
     return list(found.values())
 
 
