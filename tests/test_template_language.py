@@ -173,13 +173,14 @@ def test_what_is_shipped() -> None:
         "mate",
         "press",
         "relay",
+        "screw",
         "weld",
     ]
     assert TEMPLATES["dropoff"].result == "nopart"
     assert TEMPLATES["mate"].further == TEMPLATES["mate"].instead == "insert"
     assert TEMPLATES["insert"].inputs == ("LAB1", "LAB2")
     dwells = {name: dict(t.parameters)["dwell"] for name, t in TEMPLATES.items() if t.parameters}
-    assert dwells == {"glue": 2.0, "inspect": 0.5, "press": 1.5, "weld": 1.0}
+    assert dwells == {"glue": 2.0, "inspect": 0.5, "press": 1.5, "screw": 1.0, "weld": 1.0}
 
 
 @pytest.mark.parametrize("path", sorted(SHIPPED.glob("*.op")), ids=lambda path: path.stem)
@@ -195,6 +196,7 @@ def test_tools_bring_and_take_nothing() -> None:
     for name in ("weld", "inspect", "press", "glue"):
         assert TEMPLATES[name].tools() == (1,)
         assert TEMPLATES[name].law.dwell == "dwell"
+    assert TEMPLATES["screw"].tools() == (2,)
 
 
 # Folders

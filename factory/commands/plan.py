@@ -74,6 +74,8 @@ KINDS: tuple[Kind, ...] = ("slide", "lower", "blocked")
     help="The axis of SOURCE that is up; without, z, unless the product would tip over.",
 )
 @click.option("--base", help="The part, or sub-tree, onto which all others come.")
+@click.option("--screw", "screws", multiple=True, help="A part that is a screw (repeatable).")
+@click.option("--no-screws", is_flag=True, help="Parts that look or are called so are no screws.")
 @click.option("--hulls", is_flag=True, help="Plan with hulls, though they hide what goes in.")
 @click.option("--unit", type=click.Choice(UNITS), help="Of lengths; found out without.")
 @click.option("--in-place", is_flag=True, help="Parts are in place, whatever they look like.")
@@ -99,6 +101,8 @@ def plan(
     allow: tuple[str, ...],
     up: str | None,
     base: str | None,
+    screws: tuple[str, ...],
+    no_screws: bool,
     hulls: bool,
     unit: str | None,
     in_place: bool,
@@ -134,7 +138,8 @@ def plan(
         for note in found.notes:
             say(f"  {note}")
     side = UPS[up] if up else None
-    search = PlanOptions(aim, seconds, allow, hulls, side, base or "", templates=templates)
+    fast = None if no_screws else screws
+    search = PlanOptions(aim, seconds, allow, hulls, side, base or "", fast, templates=templates)
     planned, stopped = _sought(found, search, out)
     if isinstance(planned, CannotAssemble):
         return refuse(found, planned, folder, look, out)

@@ -209,7 +209,7 @@ def _touching(finder: Finder, found: ConvexBodies, unit: Ints, count: int) -> ND
     while count > 1 and gap < 2 * furthest:
         one, other = finder.near(gap)
         near = np.zeros((count, count), bool)
-        near[unit[found.part[one]], unit[found.part[other]]] = True
+        near[unit[one], unit[other]] = True
         pieces, piece = connected_components(touch, directed=False)
         if gap > NEAR:
             near &= piece[:, None] != piece[None, :]

@@ -19,8 +19,8 @@ from factory.planning.judging import Judged
 from factory.planning.parts import InPlace
 from factory.planning.searching import Aim, Budget
 from factory.planning.stance import Stance
+from factory.planning.writing import Screwed, planned_product
 from factory.planning.writing import Tree as LabelTree
-from factory.planning.writing import planned_product
 from factory.problem.robot_types import load_catalogue
 from factory.problem.template import Template
 from factory.support.errors import FactoryError
@@ -110,6 +110,8 @@ class Layouts:
         """A tree with the labels of units in place of their numbers."""
         if isinstance(tree, int):
             return self._units[tree]
+        if isinstance(tree, Screwed):
+            return Screwed(self.labelled(tree.tree), tuple(self._units[n] for n in tree.screws))
         return tuple(self.labelled(below) for below in tree)
 
     def kinds(self, tree: Tree) -> int:
@@ -119,7 +121,8 @@ class Layouts:
         def below(tree: Tree) -> tuple[str, ...]:
             if isinstance(tree, int):
                 return (self._kinds.get(self._units[tree], self._units[tree]),)
-            kinds = tuple(sorted(kind for one in tree for kind in below(one)))
+            parts = (tree.tree, *tree.screws) if isinstance(tree, Screwed) else tree
+            kinds = tuple(sorted(kind for one in parts for kind in below(one)))
             found.add(kinds)
             return kinds
 

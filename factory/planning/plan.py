@@ -13,22 +13,27 @@ from factory.pipeline import Project, all_templates
 from factory.planning.blocking import CLASHES, DEEPER, LOCKED, SCRAPES, Blocking, blocking, rooms
 from factory.planning.cannot import Direction, Interlock, Removal, removal
 from factory.planning.estimate import Expected
+from factory.planning.fastening import fastened, fasteners, renumbered
 from factory.planning.hulls import Drawn, refuse_hidden
 from factory.planning.judging import Join, Judged
 from factory.planning.kept import KeptPrices
 from factory.planning.laying import LaidOut, Layouts
 from factory.planning.parts import InPlace
-from factory.planning.posing import Pose, along, posed, said, toppling
-from factory.planning.searching import Aim, Budget, Sought, trees, usual_seconds
+from factory.planning.posing import Pose, along, posed, said, screwing, toppling
+from factory.planning.searching import Aim, Budget, Sought, Trees, trees, usual_seconds
 from factory.planning.stance import stances
 from factory.planning.standing import feet
-from factory.planning.writing import Tree
+from factory.planning.turning import only
+from factory.planning.writing import Tree, screws_in
 from factory.problem.template import Template
 from factory.support.errors import Diagnostic, InputError, did_you_mean
 from factory.support.settings import Settings
 
 LAYING = "laying out"
 """What goes on once there are trees."""
+
+DWELL = 1.0
+"""How long a driver turns a screw [s], as its template says."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +42,8 @@ class PlanOptions:
     that are always ended (`searching`); `allow`: units that may pass through others, or two, `a:b`,
     through each other; `hulls`: whether hulls may hide what goes into them; `up`: the axis of the
     file and its side that is up, None for z unless the product tips then; `base`: the unit onto
-    which all others come, "" for any; `lay_out`: whether layouts decide, or estimates alone;
+    which all others come, "" for any; `screws`: units that are screws besides those that look or
+    are called so, None for no screws at all; `lay_out`: whether layouts decide, or estimates alone;
     `settings` and `templates` of the factory, None for those shipped; `told` hears what goes on,
     and how many of how many are done; `stopped` says that the best so far is wanted at once."""
 
@@ -47,6 +53,7 @@ class PlanOptions:
     hulls: bool = False
     up: Direction | None = None
     base: str = ""
+    screws: tuple[str, ...] | None = ()
     lay_out: bool = True
     settings: Settings = field(default_factory=Settings)
     templates: Mapping[str, Template] | None = field(default=None, repr=False)
@@ -132,7 +139,8 @@ def plan(source: InPlace, options: PlanOptions | None = None) -> Planned | Canno
     budget = Budget(asked.seconds or usual, asked.seconds is not None, stopped=asked.stopped)
     asked.told("looking for what is in the way", 0, None, "")
     found = blocking(source)
-    _check_named((*asked.allow, *([asked.base] if asked.base else ())), found)
+    named = (*asked.allow, *([asked.base] if asked.base else ()), *(asked.screws or ()))
+    _check_named(named, found)
     pairs = found.hidden
     if not asked.hulls:
         refuse_hidden(source, pairs)
@@ -146,6 +154,7 @@ def plan(source: InPlace, options: PlanOptions | None = None) -> Planned | Canno
         return CannotAssemble(pose.stuck, removal(found), pose.needs)
     planned = _planned(pose, asked, budget)
     notes = (*said(pose, planned.orientation), *toppling(planned.figures.tips))
+    notes += screwing(screws_in(planned.tree))
     return replace(planned, hidden=pairs if asked.hulls else (), notes=notes)
 
 
@@ -163,9 +172,24 @@ def _planned(pose: Pose, asked: PlanOptions, budget: Budget) -> Planned:
         words = f"{judged.robots} robots, about {judged.seconds:.1f} s"
         asked.told("looking for a tree", seen[0], None, words)
 
-    given = KeptPrices(source, templates)
-    choice = stances(pose.up)
-    sought = trees(Sought(found, expected, given, asked.aim, budget, told, choice))
+    def sought_for(screws: tuple[int, ...]) -> Trees:
+        rest = [n for n in range(len(found)) if n not in screws]
+        others = found.grouped([[n] for n in rest]) if screws else found
+        given = KeptPrices(only(source, others.labels), templates)
+        task = Sought(others, expected, given, asked.aim, budget, told, stances(pose.up))
+        return driven(trees(task), rest)
+
+    def driven(sought: Trees, rest: list[int]) -> Trees:
+        screws = [n for n in range(len(found)) if n not in rest]
+        if not screws:
+            return sought
+        made = [fastened(found, renumbered(j, rest), screws, DWELL) for j in sought.all]
+        if all(left for _, left in made):
+            lost = min((left for _, left in made), key=len)
+            return sought_for(tuple(n for n in screws if n not in lost))
+        return Trees(tuple(judged for judged, left in made if not left), sought.optimal)
+
+    sought = sought_for(_screws(source, found, asked))
     layouts = Layouts(source, templates, asked.settings)
     if not asked.lay_out:
         return _result(pose, layouts.of(sought.all[0]), sought.optimal, 0)
@@ -179,6 +203,16 @@ def _planned(pose: Pose, asked: PlanOptions, budget: Budget) -> Planned:
     best = layouts.best(sought.all, asked.aim, budget, said)
     asked.told("measuring the room on ways", 1, None, "")
     return _result(pose, best, sought.optimal, laid[0])
+
+
+def _screws(source: InPlace, found: Blocking, asked: PlanOptions) -> tuple[int, ...]:
+    """The units that are screws, equal ones in a row; none where nothing else is left."""
+    if asked.screws is None:
+        return ()
+    kinds = {part.label: part.kind for part in source.parts}
+    labels = sorted(fasteners(source, asked.screws), key=lambda label: kinds.get(label, label))
+    numbers = tuple(found.labels.index(label) for label in labels if label != asked.base)
+    return numbers if len(numbers) < len(found) else ()
 
 
 def _result(pose: Pose, laid: LaidOut, optimal: bool, layouts: int) -> Planned:

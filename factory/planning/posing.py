@@ -3,12 +3,13 @@ its parts come along no axis."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from factory.geometry.meshes import Array
+from factory.nets.verdict import listing
 from factory.planning.blocking import Blocking
 from factory.planning.cannot import Direction, Interlock, interlocks, named
 from factory.planning.parts import InPlace
@@ -129,6 +130,12 @@ def said(pose: Pose, turn: Array) -> tuple[str, ...]:
         stands += f", turned by {angle:.4g}° about it"
     tips = f"; it tips over there, and on each side: {_beyond(pose.tips)}"
     return (stands + (tips if pose.tips > TIPS else ""),)
+
+
+def screwing(labels: Sequence[str]) -> tuple[str, ...]:
+    """Which parts are driven in as screws, if any are."""
+    some = f"{listing(labels, 12)} {'are driven in as screws' if len(labels) > 1 else 'is a screw'}"
+    return (f"{some}, after what they clamp (--no-screws: as other parts)",) if labels else ()
 
 
 def toppling(count: int) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count
 from math import ceil
+from typing import Any, Generic, TypeVar, Union
 
 import numpy as np
 
@@ -19,12 +20,33 @@ from factory.lang.writer import write_pag
 from factory.planning.parts import InPlace
 from factory.problem.pag import PAG, AllowedOverlap, Assembly, Parameter
 
-Tree = str | tuple["Tree", ...]
+Unit = TypeVar("Unit", str, int)
+
+Tree = Union[str, tuple["Tree", ...], "Screwed[str]"]
 """The label of a part or of a sub-tree that is kept, or what is mated: two trees or more, of which
 the first two are mated and each further one is inserted; a single tree is handed over to another
-robot."""
+robot; or what screws are driven into."""
+
+
+@dataclass(frozen=True, slots=True)
+class Screwed(Generic[Unit]):
+    """A tree, and the screws that are driven into it, one after the other: labels, or numbers of
+    units."""
+
+    tree: Any
+    screws: tuple[Unit, ...]
+
 
 PLACES = ("pos", "quat")
+
+
+def screws_in(tree: Tree) -> tuple[str, ...]:
+    """The labels of the screws of a tree."""
+    if isinstance(tree, str):
+        return ()
+    inside = (tree.tree,) if isinstance(tree, Screwed) else tree
+    mine = tree.screws if isinstance(tree, Screwed) else ()
+    return (*(screw for below in inside for screw in screws_in(below)), *mine)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +67,8 @@ def planned_product(
 ) -> PlannedProduct:
     """The product that a tree makes of a source's parts, turned by a rotation (3, 3) about the
     origin. `by` is said in the first line of the PAG; of pairs `a:b` that `allow` has, the overlap
-    is allowed as deep as it is. Only templates that the package ships are
-    used: `mate`, with its further inputs inserted, and `relay`, besides what kept sub-trees
+    is allowed as deep as it is. Only templates that the package ships are used: `mate`, with its
+    further inputs inserted, `screw` and `relay`, besides what kept sub-trees
     name."""
     turn = np.eye(3) if orientation is None else orientation
     kept = {keep.label: keep.nodes for keep in source.kept}
@@ -56,7 +78,14 @@ def planned_product(
     names, made, stack = count(1), list[Assembly](), [(root, tree)]
     while stack:
         label, below = stack.pop()
-        if isinstance(below, str):
+        if isinstance(below, Screwed):
+            for screw in below.screws[::-1]:
+                last = screw == below.screws[0] and isinstance(below.tree, str)
+                pile = below.tree if last else _numbered(names, taken)
+                made.append(Assembly(label, "screw", (str(pile), screw)))
+                label = str(pile)
+            below = below.tree
+        if not isinstance(below, tuple):
             continue
         inputs = []
         for child in below:

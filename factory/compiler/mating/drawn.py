@@ -99,6 +99,13 @@ class DrawnWays:
                 found[row, column] = gap
         return found
 
+    def near(self, one: Ints, other: Ints, gap: float) -> NDArray[np.bool_]:
+        """Which pairs of parts (n,) are at most so far from each other in the finished product."""
+        pairs = zip(one.tolist(), other.tolist(), strict=True)
+        return np.array(
+            [self._body(a).min_gap(self._body(b), 2 * gap) <= gap for a, b in pairs], bool
+        )
+
     def _pair(self, moving: int, standing: int, still: bool, axis: int) -> tuple[Any, ...]:
         finished = self.finished(moving, standing)
         if still:

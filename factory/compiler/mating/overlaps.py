@@ -188,11 +188,16 @@ class Finder:
             yield one[later], other[later]
 
     def near(self, gap: float) -> tuple[Ints, Ints]:
-        """Pairs of bodies of two parts that are at most so far [m] from each other, the later part
-        first, wherever they meet. Bodies that meet with corners may be a little further apart."""
+        """Pairs of parts that are at most so far [m] from each other in the finished product, the
+        later one first. Bodies that meet with corners may be a little further apart."""
         one, other, depths = self.passing(2, gap, still=True)
         found = depths.finished >= -gap
-        return one[found], other[found]
+        bodies = self.bodies.part[np.stack([one, other])[:, found]]
+        one, other = np.unique(bodies, axis=1)
+        tested = np.flatnonzero(self.drawn.tested(one, other))
+        near = np.ones(len(one), bool)
+        near[tested] = self.drawn.near(one[tested], other[tested], gap)
+        return one[near], other[near]
 
     def passing(self, axis: int, gap: float, still: bool = False) -> tuple[Ints, Ints, Depths]:
         """Pairs of bodies (moving, standing) of two parts, the later one moving, whose boxes are at
