@@ -110,7 +110,7 @@ class Project:
         blocked = self.matings.warnings if self.matings else ()
         sized = any(warning.code == "Size" for warning in product)
         grips = () if sized else tuple(found.warning() for found in self.no_grips)
-        overlaps = self.overlaps.faults(self.pag.allowed)
+        overlaps = self.overlaps.faults(self.pag.allowed) if is_shaped(self.pag) else ()
         return (*product, *overlaps, *blocked, *grips)
 
     @cached_property

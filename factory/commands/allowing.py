@@ -8,7 +8,6 @@ from typing import Any
 
 import click
 
-from factory.lang.words import UNITS, number
 from factory.problem.pag import ANY_DEPTH, AllowedOverlap
 
 
@@ -24,6 +23,8 @@ class OverlapOption(click.ParamType[AllowedOverlap]):
         if len(parts) in (1, 3):
             length = length_of(parts.pop())
             if length is None or length < 0:
+                from factory.lang.words import UNITS
+
                 units = ", ".join(UNITS)
                 self.fail(f"'{value}' ends in no length in one of {units}.", param, ctx)
             depth = length
@@ -58,6 +59,8 @@ def allowed_in(
 
 def length_of(word: str) -> float | None:
     """The length that a word with a unit, or none for metres, is [m]; None for no length."""
+    from factory.lang.words import UNITS, number
+
     found = re.fullmatch(r"(.*?)\s*([a-z]*)", word)
     unit = (found[2] or "m") if found else ""
     return number(found[1], unit) if found and unit in UNITS else None

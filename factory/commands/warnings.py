@@ -60,5 +60,5 @@ def announced(warnings: Sequence[Diagnostic], out: OutputOptions) -> list[dict[s
 
 def say_allowed(project: Project) -> None:
     """Say which overlaps of parts are there, and allowed."""
-    for note in project.overlaps.notes(project.pag.allowed):
+    for note in project.overlaps.notes(project.pag.allowed) if project.pag.allowed else ():
         say(note)
