@@ -79,8 +79,8 @@ def _local(net: MarkedNet, shared: frozenset[int]) -> Iterator[Defect]:
             yield no_gear_net(kind, f"transition {called} {side} no place", transitions=[event])
         elif (preset[1:] and postset[0] not in shared) or (postset[1:] and preset[0] not in shared):
             text = (
-                f"{len(preset)} places lead to {called} and {len(postset)} from it: the gears that"
-                " meet there share no one place [a; b]"
+                f"places that lead to {called}: {len(preset)}, from it: {len(postset)}; the gears"
+                " that meet there share no one place [a; b]"
             )
             yield no_gear_net("no shared place", text, (), preset + postset, [event])
 
