@@ -204,3 +204,13 @@ def test_on_a_terminal_the_user_is_asked(
     asked = "unit of lengths" if name == "unit" else "plan them where they are?"
     assert asked in done.err
     assert (tmp_path / "out").exists() == (status == 0)
+
+
+def test_links_of_a_chain_that_do_not_touch_are_in_place(tmp_path: Path) -> None:
+    """One reaches into the other: no print bed and no exploded display looks so."""
+    ring = trimesh.creation.torus(15.0, 3.0, major_sections=24, minor_sections=12)
+    other = ring.copy().apply_transform(
+        trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0])
+    )
+    other.apply_translation([15.0, 0.0, 0.0])
+    assert len(read(tmp_path, {"one": ring, "other": other}).parts) == 2

@@ -110,11 +110,12 @@ def _groups(solids: Sequence[Solid], bodies: Sequence[Any]) -> list[Diagnostic]:
 def _gap(
     solids: Sequence[Solid], bodies: Sequence[Any], one: int, other: int, reach: float
 ) -> float:
-    """How far two parts are apart [m], `reach` for that and more. An open mesh has its hull."""
+    """How far two parts are apart [m], `reach` for that and more; 0 where the hull of one reaches
+    into that of the other, as of links of a chain. An open mesh is its hull."""
     from manifold3d import Manifold
 
-    pair = [
-        bodies[n] if bodies[n] is not None else Manifold.hull_points(solids[n].corners)
-        for n in (one, other)
-    ]
+    hulls = [Manifold.hull_points(solids[n].corners) for n in (one, other)]
+    if (hulls[0] ^ hulls[1]).volume() > 0:
+        return 0.0
+    pair = [bodies[n] or hull for n, hull in zip((one, other), hulls, strict=True)]
     return float(pair[0].min_gap(pair[1], reach))
