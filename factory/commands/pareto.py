@@ -68,7 +68,7 @@ def pareto(
     floor.
 
     Ctrl-C ends the search: what was found until then is told and written. The status is 1 where a
-    point that was run fails, or is further than 3 % from its prediction."""
+    point that was run fails, or is further than 2 % from its prediction."""
     from factory.study.pareto import Effort
 
     if trials and not layouts:
@@ -161,6 +161,8 @@ def _tell(front: ParetoFront, commands: Sequence[str | None]) -> None:
     if front.written is not None:
         say(f"as written: {front.written}")
     say(f"{front.least.total} robots at least, tools included")
+    if front.unproved:
+        say(front.unproved)
     for point in front.points:
         for failure in point.trial.failures if point.trial else ():
             print(f"{point.robots} robots: the run failed: {failure}", file=sys.stderr)
@@ -186,7 +188,7 @@ def _measured(point: FrontPoint) -> tuple[str, str]:
     """The cycle time of a run, and the error of what was predicted for it."""
     trial = point.trial
     if trial is None:
-        return "", ""
+        return "not run", ""
     if trial.error is None or trial.failures:
         return "failed", ""
     return f"{trial.measured:.2f}", f"{100 * trial.error:+.1f} %"

@@ -96,7 +96,7 @@ def _cards(front: ParetoFront) -> list[str]:
         good = sum(trial.holds for trial in front.trials)
         style = "good" if good == len(front.trials) else "bad"
         value = f'<span class="{style}">{good} of {len(front.trials)}</span>'
-        cards.append(("Run in both worlds", value, "as predicted within 3 %"))
+        cards.append(("Run in both worlds", value, "as predicted within 2 %"))
     return [
         f'<div class="card"><h3>{name}</h3><p class="value">{value}</p><p>{note}</p></div>'
         for name, value, note in cards
@@ -104,10 +104,10 @@ def _cards(front: ParetoFront) -> list[str]:
 
 
 def _ending(front: ParetoFront) -> str:
-    if front.complete:
-        return ""
-    words = "Not all was looked at: there was no time for the rest, or it was stopped."
-    return f'<p class="notice" role="note">{words}</p>'
+    words = [escape(front.unproved)] * bool(front.unproved)
+    if not front.complete:
+        words.append("Not all was looked at: there was no time for the rest, or it was stopped.")
+    return "".join(f'<p class="notice" role="note">{one}</p>' for one in words)
 
 
 def _table(front: ParetoFront) -> str:
@@ -138,7 +138,11 @@ def _row(name: str, point: FrontPoint) -> str:
         _figure(point.area, "m²"),
         _figure(trial.measured if trial else None, "s"),
         _figure(trial.predicted if trial else None, "s"),
-        "" if trial is None else "failed" if trial.error is None else f"{100 * trial.error:+.1f} %",
+        "not run"
+        if trial is None
+        else "failed"
+        if trial.error is None
+        else f"{100 * trial.error:+.1f} %",
     )
     first = f'<a class="link" href="#{name}">{name}</a>' if name else "as written"
     return f"<th>{first}</th>" + "".join(f"<td>{cell}</td>" for cell in cells)

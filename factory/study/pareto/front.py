@@ -110,7 +110,7 @@ class FrontPoint:
             "parallel": {},
             "bound_s": self.bound,
             "certified": self.certified,
-            "validated": trial and trial.holds,
+            "validated": trial is not None and trial.holds,
             "validation": trial and trial.as_json(),
         }
 
@@ -150,6 +150,18 @@ class ParetoFront:
     def trials(self) -> list[Trial]:
         """What runs gave, point by point."""
         return [point.trial for point in self.points if point.trial is not None]
+
+    @property
+    def unproved(self) -> str:
+        """That points were not run, in words; nothing where all were."""
+        count = len(self.points)
+        if not (left := count - len(self.trials)):
+            return ""
+        what = (
+            "its cycle time is a prediction" if left == 1 else "their cycle times are predictions"
+        )
+        run = "was" if left == 1 else "were"
+        return f"{left} of {count} points {run} not run: {what} (--validate {count} runs all)"
 
     def with_trial(self, number: int, trial: Trial) -> ParetoFront:
         """The same with the trial of a point."""

@@ -20,7 +20,7 @@ SEED, JITTER = 0, 0.3
 MOST = 24
 """The most products of a trial."""
 
-CLOSE = 0.03
+CLOSE = 0.02
 """A prediction that is off by no more holds."""
 
 
