@@ -219,7 +219,7 @@ def test_a_file_that_is_made_to_fill_the_memory(log: Path, tmp_path: Path) -> No
     ticks |= {f"{state}_change": np.zeros((8, 0), np.uint8) for state in ("qpos", "qvel", "ctrl")}
     wide = {**header, "nq": count, "nv": count}
     bad = put_together(tmp_path / "bad.log", wide, [(b"T", ticks)])
-    assert is_refused(bad, "too much memory for a file of its size")
+    assert is_refused(bad, "the states in a block of it take too much memory")
     zeros = {"mesh/a": np.zeros(10**6, np.uint8)}
     bad = put_together(tmp_path / "bad.log", header, [(b"M", zeros)])
     assert is_refused(bad, "unpacks to more than 200 times")
@@ -232,7 +232,7 @@ def test_a_log_that_does_not_fit(
     def full(*_: object) -> None:
         raise error("too much")
 
-    monkeypatch.setattr("factory.record.log.reader.unpack_rows", full)
+    monkeypatch.setattr("factory.record.log.states.unpack_rows", full)
     assert is_refused(log, "too much")
 
 

@@ -110,8 +110,8 @@ class _Recorder:
         m, found = self.motion.m, []
         for joint in range(m.njnt):
             if m.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE:
-                position = float(self.log.qpos[row, m.jnt_qposadr[joint]])
-                speed = float(self.log.qvel[row, m.jnt_dofadr[joint]])
+                position = float(self.log.qpos[row][m.jnt_qposadr[joint]])
+                speed = float(self.log.qvel[row][m.jnt_dofadr[joint]])
                 name = m.joint(joint).name
                 state = self.schemas.JointState(name=name, position=position, velocity=speed)
                 found.append(state)

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 RATE = 50.0
 """Frames a second, at most."""
 
+MOST = 8_000_000
+"""Poses in all frames, at most: 450 MB of them."""
+
 STILL = 1e-6
 """What moves less from frame to frame [m], or in a component of its quaternion, stands still."""
 
@@ -67,7 +70,7 @@ def motion_of(log: Log) -> BodyMotion:
     from factory.record.log.model import model_of
 
     m = model_of(log)
-    replica, rows = Replica(m), _frames(log)
+    replica, rows = Replica(m), _frames(log, m.nbody)
     d = replica.d
     position = np.empty((len(rows), m.nbody, 3))
     quaternion = np.empty((len(rows), m.nbody, 4))
@@ -93,11 +96,13 @@ def _relative(d: mujoco.MjData, parent: int, body: int, position: Array, turn: A
     mujoco.mju_mulQuat(turn, back, d.xquat[body])
 
 
-def _frames(log: Log) -> Indices:
-    """Rows of a log at most RATE a second, the first and the last among them."""
+def _frames(log: Log, bodies: int) -> Indices:
+    """Rows of a log at most RATE a second, the first and the last among them; fewer of a run that
+    is so long, or has so many bodies, that their poses would be more than MOST."""
     kept, next_time = [], -np.inf
+    rate = min(RATE, MOST / max(1.0, bodies * float(log.time[-1])))
     for row, time in enumerate(log.time.tolist()):
         if time >= next_time - 1e-9 or row == len(log) - 1:
             kept.append(row)
-            next_time = time + 1 / RATE
+            next_time = time + 1 / rate
     return np.array(kept, np.int64)

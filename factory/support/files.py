@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import mmap
 import os
 import select
 import shutil
@@ -23,6 +24,9 @@ TEXT, TABLE, NET, MESH, RECORD = 32 * MIB, MIB, 256 * MIB, 256 * MIB, 4096 * MIB
 """Upper bounds on the bytes of a file that is read: a text (PAG, operation, tree, bill, LDraw), a
 table in TOML, a net or a certificate, a mesh, a log. A text takes up to 150 times its bytes of
 memory, a net 15 times. 10^6 labels are 20 MiB of text, and a net of 10,000 parts is 40 MiB."""
+
+LARGE = 64 * MIB
+"""A record of more is mapped, not read."""
 
 PATIENCE = 2.0
 """Time to wait for the first byte of a pipe that no process has open for writing [s]."""
@@ -57,6 +61,16 @@ def read_bytes(path: Path, most: int) -> bytes:
     if is_pipe and not content:
         raise OSError(errno.EPIPE, "nothing is written to this pipe", str(path))
     return b"".join(content)
+
+
+def mapped(path: Path, most: int) -> memoryview:
+    """The content of a file, or what comes through a pipe, as `read_bytes` gives it; of a large
+    file what is asked for alone is read."""
+    status = os.stat(path)
+    if not (stat.S_ISREG(status.st_mode) and LARGE < status.st_size <= most):
+        return memoryview(read_bytes(path, most))
+    with path.open("rb") as stream:
+        return memoryview(mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ))
 
 
 def _open(path: str, flags: int) -> int:

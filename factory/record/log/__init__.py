@@ -15,7 +15,7 @@ appended to.
        before the engine goes on, in the order of time:
        time (n,) [s], delivered (n,)      products that have left since the run began
        qpos (n, nq), qvel (n, nv)         the engine's; in the ideal world arc lengths and speeds
-       ctrl (n, nu)                       the engine's setpoints
+       ctrl (n, nu)                       the engine's setpoints; these and qvel to a nanometre
        marking_at, _count, marking        rows where the marking changes, how many places, which
        active_at, _count, active          the same for the active constraints: number, two bodies
        contact_at, _count, contact        rows with contacts, how many, pairs of geoms

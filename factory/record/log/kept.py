@@ -10,7 +10,7 @@ from typing import Any
 from factory.record.log.blocks import Arrays, bad_log, blocks
 from factory.record.log.reader import Log, header_in, log_in
 from factory.support.errors import InputError
-from factory.support.files import RECORD, read_bytes
+from factory.support.files import RECORD, mapped
 
 BROKEN = (
     *(ValueError, KeyError, IndexError, TypeError, AttributeError),
@@ -50,7 +50,7 @@ def kept_run(path: Path) -> KeptRun:
     """The run in a log that this process has claimed. Raises InputError (BadLog) where it is no
     log, or ends before its ticks begin."""
     try:
-        data = memoryview(read_bytes(path, RECORD))
+        data = mapped(path, RECORD)
     except OSError as error:
         raise InputError(bad_log(path, f"cannot be read: {error.strerror}")) from error
     try:

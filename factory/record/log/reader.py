@@ -16,22 +16,29 @@ from numpy.typing import NDArray
 from factory.nets.undone import Entry, lasting
 from factory.record.ending import CutOff
 from factory.record.failures import Failures
-from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, blocks, is_cut, unpack_rows
+from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, blocks, is_cut
 from factory.record.log.failed import failures_in, failures_so_far
 from factory.record.log.header import check_header
+from factory.record.log.states import (
+    StateRows,
+    StoredRows,
+    Unpacking,
+    all_rows,
+    locked,
+    without_states,
+)
 from factory.record.log.ticks import check_block, check_course, state_bytes
 from factory.record.log.undone import Placed, undone_in
 from factory.record.verdict import check_figures
 from factory.support.claim import is_claimed
 from factory.support.errors import InputError
-from factory.support.files import RECORD, head_of, read_bytes
+from factory.support.files import RECORD, head_of, mapped
 
 Index = NDArray[np.int32]
 
-ROOM, FOLD = 1 << 30, 1000
-"""Upper bound on the bytes of a log's states: ROOM, plus FOLD times the bytes of its file. Runs
-take 5 to 15 times those; one in which 1,000 robots stand still for hours takes 200 times."""
-
+ROOM, WIDEST = 1 << 29, 1 << 27
+"""Upper bounds on the bytes of the states that are unpacked at once, of all blocks and of one. A
+day of the paper's example takes 30 times the first, its blocks, of a second, 200 kB each."""
 
 ROUNDING = 1e-9
 """Times that differ by less are one [s]."""
@@ -61,9 +68,9 @@ class Ends:
 
     row: NDArray[np.int64] = field(repr=False)
     time: NDArray[np.float64] = field(repr=False)
-    qpos: NDArray[np.float64] = field(repr=False)
-    qvel: NDArray[np.float64] = field(repr=False)
-    ctrl: NDArray[np.float64] = field(repr=False)
+    qpos: StateRows = field(repr=False)
+    qvel: StateRows = field(repr=False)
+    ctrl: StateRows = field(repr=False)
     active: Ragged = field(repr=False)
 
 
@@ -86,15 +93,15 @@ class Log:
     files: Mapping[str, bytes] = field(repr=False)
     time: NDArray[np.float64] = field(repr=False)
     delivered: Index = field(repr=False)
-    qpos: NDArray[np.float64] = field(repr=False)
-    qvel: NDArray[np.float64] = field(repr=False)
+    qpos: StateRows = field(repr=False)
+    qvel: StateRows = field(repr=False)
     marking: Ragged = field(repr=False)
     active: Ragged = field(repr=False)
     contacts: Ragged = field(repr=False)
     distances: Ragged = field(repr=False)
     fired: Index = field(repr=False)
     fired_t: NDArray[np.float64] = field(repr=False)
-    ctrl: NDArray[np.float64] | None = field(default=None, repr=False)
+    ctrl: StateRows | None = field(default=None, repr=False)
     complete: bool = True
     cut_off: CutOff | None = None
     ends: Ends | None = field(default=None, repr=False)
@@ -143,13 +150,13 @@ def read_log(path: Path | str) -> Log:
     """The log in a file, whole or cut off. Raises InputError (BadLog) where it is not one."""
     path = Path(path)
     try:
-        written, data = is_claimed(path), read_bytes(path, RECORD)
+        written, data = is_claimed(path), mapped(path, RECORD)
     except OSError as error:
         raise InputError(bad_log(path, f"cannot be read: {error.strerror}")) from error
-    if not data.startswith(MAGIC):
+    if data[: len(MAGIC)] != MAGIC:
         raise InputError(bad_log(path, "is no log of factory"))
     try:
-        return log_in(memoryview(data), written)
+        return log_in(data, written)
     except MemoryError as error:
         raise InputError(bad_log(path, f"takes more memory than there is: {error}")) from error
     except UnicodeDecodeError as error:
@@ -179,20 +186,25 @@ def log_in(data: memoryview, written: bool = False) -> Log:
     """The log in the bytes of a file; `written`: its run is still going on. Raises ValueError,
     KeyError, IndexError, TypeError, OverflowError or RecursionError where they are none."""
     header, kept = header_in(data)
-    left = ROOM + FOLD * len(data)
     xml, files, complete = "", {}, False
     trouble: Arrays = {}
     ticks: list[Arrays] = []
+    begins, size, wide = list[int](), 0, None
     for kind, arrays, end in blocks(data, kept):
         if kind == b"M":
             xml = arrays["xml"].tobytes().decode()
             files = {k[5:]: a.tobytes() for k, a in arrays.items() if k.startswith("mesh/")}
         elif kind == b"T":
             check_block(arrays, header)
-            left -= state_bytes(arrays)
-            if left < 0:
-                raise ValueError("its states take too much memory for a file of its size")
+            wide = len(arrays["ctrl_first"]) if "ctrl_first" in arrays else None
+            if (more := state_bytes(arrays)) > WIDEST:
+                raise ValueError("the states in a block of it take too much memory")
             ticks.append(arrays)
+            begins.append(kept)
+            size += more
+            if size > ROOM:  # from here on they are unpacked when they are asked for
+                first = 0 if size - more <= ROOM else -1
+                ticks[first:] = [*map(without_states, ticks[first:])]
         complete, kept = kind == b"E", end
         trouble = arrays if complete else {}
     counts = [len(a["time"]) for a in ticks]
@@ -206,20 +218,32 @@ def log_in(data: memoryview, written: bool = False) -> Log:
     made, units = int(delivered[-1]) if len(time) else 0, header["units"]
     last = float(time[-1]) if len(time) else 0.0
     cut = made < units or any(why)
-    wide = len(ticks[0]["ctrl_first"]) if ticks and "ctrl_first" in ticks[0] else None
     at_end = _at_end(ticks, counts)
     tick = ~at_end
-    qpos, qpos_ended = _states("qpos", header["nq"], ticks, at_end)
-    qvel, qvel_ended = _states("qvel", header["nv"], ticks, at_end)
-    ctrl, ctrl_ended = (None, None) if wide is None else _states("ctrl", wide, ticks, at_end)
+    unpacking = Unpacking(data, begins, counts) if size > ROOM else None
+    numbers = np.flatnonzero(tick), np.flatnonzero(at_end)
+
+    def states(name: str, width: int) -> tuple[Any, Any]:
+        """The rows of a state, those that are ends of operations apart."""
+        if unpacking is not None:
+            here, ended = (StoredRows(unpacking, name, width, each) for each in numbers)
+            return here, ended
+        rows = all_rows(name, width, ticks)
+        return locked(rows[tick]), locked(rows[at_end])
+
+    (qpos, qpos_ended), (qvel, qvel_ended) = (
+        states("qpos", header["nq"]),
+        states("qvel", header["nv"]),
+    )
+    ctrl, ctrl_ended = (None, None) if wide is None else states("ctrl", wide)
     active = _lasting("active", ticks, counts)
     follows = np.cumsum(tick, dtype=np.int64)[at_end]
     return Log(
         MappingProxyType(header),
         xml,
         MappingProxyType(files),
-        _locked(time[tick]),
-        _locked(delivered[tick]),
+        locked(time[tick]),
+        locked(delivered[tick]),
         qpos,
         qvel,
         _lasting("marking", ticks, counts).chosen(tick),
@@ -274,28 +298,8 @@ def _broken(data: memoryview, kept: int, written: bool) -> str:
     return f"the log is damaged in the block that begins at byte {kept} of {len(data)}"
 
 
-def _states(
-    name: str, width: int, ticks: Sequence[Arrays], at_end: NDArray[np.bool_]
-) -> tuple[Any, Any]:
-    """The rows of a state, those that are ends of operations apart."""
-    none = np.zeros((0, width))
-    kept, ended, base = [none], [none], 0
-    for arrays in ticks:
-        rows = unpack_rows(name, arrays, len(arrays["time"]))
-        ends = at_end[base : base + len(rows)]
-        kept.append(rows[~ends])
-        ended.append(rows[ends])
-        base += len(rows)
-    return _locked(np.concatenate(kept)), _locked(np.concatenate(ended))
-
-
-def _locked(values: Any) -> Any:
-    values.setflags(write=False)
-    return values
-
-
 def _joined(name: str, ticks: Sequence[Arrays], kind: Any) -> Any:
-    return _locked(np.concatenate([np.zeros(0, kind), *(a[name] for a in ticks)]))
+    return locked(np.concatenate([np.zeros(0, kind), *(a[name] for a in ticks)]))
 
 
 def _spans(
@@ -316,11 +320,11 @@ def _lasting(name: str, ticks: Sequence[Arrays], counts: Sequence[int]) -> Ragge
     values = np.concatenate([a[name] for a in ticks]) if ticks else np.zeros((0,), np.int32)
     if not len(at):
         nothing = np.zeros(sum(counts), int)
-        return Ragged(_locked(values.reshape(0, *values.shape[1:])), nothing, nothing)
+        return Ragged(locked(values.reshape(0, *values.shape[1:])), nothing, nothing)
     which = np.searchsorted(at, np.arange(sum(counts)), side="right") - 1
     if which.min(initial=0) < 0:
         raise ValueError(f"the first tick has no {name}")
-    return Ragged(_locked(values), starts[which], ends[which])
+    return Ragged(locked(values), starts[which], ends[which])
 
 
 def _single(name: str, values: str, ticks: Sequence[Arrays], counts: Sequence[int]) -> Ragged:
@@ -329,4 +333,4 @@ def _single(name: str, values: str, ticks: Sequence[Arrays], counts: Sequence[in
     starts, ends = np.zeros(sum(counts), int), np.zeros(sum(counts), int)
     starts[at], ends[at] = first, last
     found = np.concatenate([a[values] for a in ticks]) if ticks else np.zeros(0)
-    return Ragged(_locked(found), starts, ends)
+    return Ragged(locked(found), starts, ends)

@@ -22,6 +22,7 @@ from factory.nets.undone import Undone
 from factory.problem.pag import PAG
 from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, block, pack_rows
 from factory.record.log.failed import Told
+from factory.record.log.states import STATES
 from factory.record.log.undone import undone_as_json
 from factory.record.monitor.observation import EngineView
 from factory.record.monitor.subject import subject_of_run
@@ -33,7 +34,9 @@ from factory.support.files import unwritten
 from factory.support.settings import AUTO
 from factory.support.version import release
 
-STATES = ("qpos", "qvel", "ctrl")
+GRAIN = 2.0**-30
+"""What speeds [m/s] and setpoints [m] are whole multiples of, a nanometre: their last bits are
+noise, which takes half of a log. Positions are kept to the last bit."""
 
 
 class _Ticks:
@@ -233,7 +236,12 @@ class LogWriter(Recorder):
         if self.view is None:
             return self.world.x.copy(), self.world.v.copy()
         d = self.view.d
-        return d.qpos.copy(), d.qvel.copy(), d.ctrl.copy()
+        return d.qpos.copy(), _coarse(d.qvel), _coarse(d.ctrl)
+
+
+def _coarse(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values as whole multiples of GRAIN, without a negative zero."""
+    return np.rint(values / GRAIN) * GRAIN + 0.0
 
 
 def _text(text: str) -> NDArray[np.uint8]:

@@ -9,7 +9,7 @@ undone is the least that had to be is judged apart, from the record (`factory.ne
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import islice
 from typing import Any
@@ -59,8 +59,12 @@ class Crews:
         return self._factories[bisect_left(self._since, t + ROUNDING)]
 
 
-def judge_calm(log: Log, subject: MonitorSubject, m: Any, seen: Sequence[Observation]) -> Report:
-    """The verdict of a monitor on each spell of a run whose observations these are, all in one."""
+Seen = Callable[[int, int], Iterator[Observation]]
+"""The observations from one row of a log up to another."""
+
+
+def judge_calm(log: Log, subject: MonitorSubject, m: Any, seen: Seen) -> Report:
+    """The verdict of a monitor on each spell of a run, from its observations, all in one."""
     rows, times = [], log.time
     crews, units = Crews(log, subject), _Units(log, subject)
     for begin, end in spells(log, crews, m):
@@ -82,22 +86,17 @@ def _judged(
     log: Log,
     subject: MonitorSubject,
     m: Any,
-    seen: Sequence[Observation],
+    seen: Seen,
     units: _Units,
     span: tuple[int, int],
 ) -> Report:
     begin, end = (float(log.time[row]) for row in (span[0], span[1] - 1))
-    at = [bisect_left(seen, t, key=lambda o: o.time) for t in (begin - ROUNDING, end + ROUNDING)]
-    inside = [*seen[at[0] : at[1]]]
-    while inside[0].at_end:
-        del inside[0]
-    while inside[-1].at_end:
-        del inside[-1]
+    inside = seen(*span)
     start: Marking = frozenset(log.marking[span[0]].tolist())
     here = replace(subject, start=start, wip=None)
-    monitor = Monitor(here, Anatomy.of(m, subject.factory), inside[0])
+    monitor = Monitor(here, Anatomy.of(m, subject.factory), next(inside))
     monitor.motion.came[:] = -np.inf  # whoever is there may have come long ago
-    for observation in inside[1:]:
+    for observation in inside:
         monitor.see(observation)
     first, last = np.searchsorted(log.fired_t, [begin - ROUNDING, end - ROUNDING]).tolist()
     recorded = [*log.events[first:last]]

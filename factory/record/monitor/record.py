@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -45,7 +46,7 @@ def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
     with of_its_factory():
         subject = recorded_subject(log.header)
         if log.failures is not None and log.failures != Failures():
-            report = judge_calm(log, subject, m, [*observations(log)])
+            report = judge_calm(log, subject, m, partial(observations, log))
         else:
             report = _seen(log, subject, m)
         if report.refines_net:
@@ -85,11 +86,11 @@ def _markings(log: Log) -> Iterator[tuple[float, list[int]]]:
     return ((float(log.time[row]), log.marking[row].tolist()) for row in rows.tolist())
 
 
-def observations(log: Log) -> Iterator[Observation]:
-    """The observations in a log, in the order of time; `welds` is one array as long as none is
-    switched."""
+def observations(log: Log, first: int = 0, last: int | None = None) -> Iterator[Observation]:
+    """The observations in a log, in the order of time, from a row on, or in a log's rows from one
+    up to another; `welds` is one array as long as none is switched."""
     welds = np.empty((0, 3), np.intp)
-    for rows, row, at_end in _rows(log):
+    for rows, row, at_end in _rows(log, first, last):
         assert rows.ctrl is not None
         found = rows.active[row]
         if not np.array_equal(found, welds):
@@ -98,10 +99,13 @@ def observations(log: Log) -> Iterator[Observation]:
         yield Observation(float(rows.time[row]), *state, welds, at_end)
 
 
-def _rows(log: Log) -> Iterator[tuple[Log | Ends, int, bool]]:
-    """The rows of a log and of the ends of operations in it, and whether they are of those."""
+def _rows(log: Log, first: int, last: int | None) -> Iterator[tuple[Log | Ends, int, bool]]:
+    """The rows of a log and of the ends of operations between them, and whether they are of those;
+    without a last row, the ends after that too."""
     ends, ended = log.ends, 0
-    for row in range(len(log) + 1):
+    if ends is not None and first:
+        ended = int(np.searchsorted(ends.row, first, side="right"))
+    for row in range(first, len(log) + 1 if last is None else last):
         while ends is not None and ended < len(ends.row) and ends.row[ended] == row:
             yield ends, ended, True
             ended += 1

@@ -69,12 +69,9 @@ def _tracking(recording: Recording) -> float | None:
     log, m = recording.log, recording.motion.m
     if log.ctrl is None:
         return None
-    worst = 0.0
-    for actuator, setpoint in enumerate(m.actuator_ctrladr):
-        joint = int(m.actuator_trnid[actuator, 0])
-        error = np.abs(log.qpos[:, m.jnt_qposadr[joint]] - log.ctrl[:, setpoint])
-        worst = max(worst, float(error.max(initial=0.0)))
-    return 1e3 * worst
+    joint, setpoint = m.jnt_qposadr[m.actuator_trnid[:, 0]], m.actuator_ctrladr
+    rows = (log.qpos[row][joint] - log.ctrl[row][setpoint] for row in range(len(log)))
+    return 1e3 * max(float(np.abs(error).max(initial=0.0)) for error in rows)
 
 
 def _welds(recording: Recording) -> dict[str, float | None]:
