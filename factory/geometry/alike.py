@@ -93,6 +93,7 @@ class Alike:
     twins: tuple[tuple[int, int], ...]
 
 
+@np.errstate(all="ignore")
 def shape_of(vertices: Array, faces: Indices) -> PartShape:
     """The shape of a mesh in which vertices in one place may be several, and some unused."""
     import trimesh
