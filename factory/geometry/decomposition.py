@@ -66,13 +66,18 @@ def in_pieces(mesh: Mesh) -> Mesh:
     bodies = closed_bodies(mesh.vertices, mesh.faces)
     if len(bodies) > 1 and all(is_convex(*body) for body in bodies):
         return Mesh(mesh.name, *joined(bodies), tuple(vertices for vertices, _ in bodies))
-    if _fills(mesh, FULL) or not release("coacd"):
+    if _fills(mesh, FULL) or not can_decompose():
         return mesh
     alone = [Mesh(mesh.name, *body) for body in bodies]
     if any(volume_of(body.vertices, body.faces) <= 0 for body in alone):
         alone = [mesh]  # a cavity is no body
     pieces = tuple(piece for body in alone or [mesh] for piece in _decomposed(body))
     return replace(mesh, pieces=pieces) if len(pieces) > 1 else mesh
+
+
+def can_decompose() -> bool:
+    """Whether CoACD is installed."""
+    return bool(release("coacd"))
 
 
 def _fills(mesh: Mesh, share: float) -> bool:

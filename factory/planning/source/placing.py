@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from factory.geometry.alike import PartShape, shape_of
+from factory.geometry.decomposition import can_decompose
 from factory.geometry.meshes import Array, Indices, hull_mesh
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import Solid, rotation
@@ -14,7 +15,6 @@ from factory.planning.hulls import EXTRA, hull_stands
 from factory.planning.parts import PlacedPart
 from factory.problem.pag import PAG
 from factory.support.errors import Diagnostic
-from factory.support.version import release
 
 DECOMPOSE = f"{EXTRA}: then it is decomposed into convex bodies"
 
@@ -42,7 +42,7 @@ def _hulls(parts: Sequence[PlacedPart]) -> list[Diagnostic]:
         file = str(part.node.parameter("mesh"))
         if file not in found and hull_stands(part.solid.mesh):
             message = f"{file} is not convex; its convex hull stands for it"
-            hint = AS_BODIES if release("coacd") else DECOMPOSE
+            hint = AS_BODIES if can_decompose() else DECOMPOSE
             many = f"meshes are not convex: their convex hulls stand for them ({hint})"
             found[file] = Diagnostic("BadMesh", message, part.node.position, hint, many)
     return list(found.values())
