@@ -345,7 +345,8 @@ def test_a_run_says_how_many_pairs_it_did_not_test(run: Terminal, tmp_path: Path
     assert f"{told}\n  not tested: a - b\n" in verbose
     document = run("run", file, "--json").json
     assert (document["pairs_tested"], document["pairs_excluded"]) == (5, 1)
-    assert document["excluded"] == [["a", "b"]] and document["warnings"] == []
+    assert document["excluded"] == [["a", "b"]]
+    assert [one["code"] for one in document["warnings"]] == ["Overlap"]
     whole = run("run", file, "--overlap", 0.003).out
     assert "0 unintended contacts, 0 engine warnings" in whole and "not tested" not in whole
 
@@ -364,7 +365,7 @@ def test_a_report_says_how_many_pairs_were_not_tested(run: Terminal, tmp_path: P
     file, page = tmp_path / "four.pag", tmp_path / "four.html"
     for text, expected in ((FOUR, True), (PRESSED, False)):
         file.write_text(text)
-        assert run("report", file, "-o", page, "--units", 1).status == 0
+        assert run("report", file, "-o", page, "--units", 1).status == 1  # they overlap
         words = page.read_text()
         told = "1 of 6 pairs of parts were not tested against each other."
         listed = words.partition(told)[2].partition("</ul>")[0]

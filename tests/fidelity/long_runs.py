@@ -59,7 +59,7 @@ class Diary:
             return
         self.seen = len(world.dropoffs)
         inspection = world.inspection
-        self.error_mm.append(1e3 * (inspection.error or 0.0))
+        self.error_mm.append(1e3 * (inspection.error.vertex if inspection.error else 0.0))
         self.gap_mm.append(1e3 * world.parts.welds.taken.gap)
         self.residual_mm.append(1e3 * inspection.residual)
         inspection.error, inspection.residual, world.parts.welds.taken.gap = None, 0.0, 0.0
