@@ -55,7 +55,7 @@ class HandsApart:
         hand = self.hand_of(carrier, t)
         if hand.kind == "below" and kind == "below":
             half = max(FINGER / 2, hand.radius) + BESIDE
-            free &= (hand.places[0][axis] - found.at[:, axis]) * side >= found.radius + half
+            free &= (hand.places[0][axis] - found.at[:, axis]) * side >= halves(found.radius) + half
         last = self.holding.last(robot)
         brought = [label for label in last.before if label != NOPART]
         if last.before[last.template.carrier - 1] == NOPART and len(brought) > 1:
@@ -65,14 +65,15 @@ class HandsApart:
         return free
 
     def crossing(self, robot: int, found: Places, u: Way, t: Way) -> Array:
-        """How far a hand reaches over the line of a carrier whose tall mast comes along there (n,)
-        [m]."""
+        """How far a hand reaches over the line of a carrier whose tall mast comes along there, or
+        over what is broader of its hand (n,) [m]."""
         carrier = self.holding.on[robot]
-        if carrier < 0 or not self.hand_of(carrier, t).tall:
+        if carrier < 0 or not (hand := self.hand_of(carrier, t)).tall:
             return np.zeros(len(found))
         axis, side = (0, u[0]) if u[0] else (1, u[1])
-        over = (found.at[:, axis] - self.hand_of(carrier, t).places[0][axis]) * side
-        return np.maximum(0.0, over + halves(found.radius) + MAST / 2 + BESIDE)
+        over = (found.at[:, axis] - hand.places[0][axis]) * side
+        half = max(MAST / 2, float(halves(np.array(hand.radius))))
+        return np.maximum(0.0, over + halves(found.radius) + half + BESIDE)
 
     def beam(self, robot: int, at: Places, frames: Sequence[tuple[Way, Way]]) -> float:
         """How high the beam of a hand above at some places is at its lower edge [m]: over all that

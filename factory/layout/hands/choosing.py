@@ -24,7 +24,7 @@ from factory.layout.hands.holding import Holding, held
 from factory.layout.hands.in_the_way import InTheWay
 from factory.layout.hands.lines import Fit, LineHands
 from factory.layout.hands.places import PUSH, Places, centre_of, strain_of_two
-from factory.layout.hands.reach import back
+from factory.layout.hands.reach import back, halves
 from factory.layout.hands.surfaces import Way
 from factory.layout.hands.tips import STRONG, TipName, tip
 from factory.layout.hands.tours import Tours
@@ -195,8 +195,9 @@ class Hands:
                 if guest != robot and label != NOPART:
                     under = self.holding.places(held(self.holding.factory, guest), "below", 2, -1)
                     at, bad = under.at[:, across], _bad(under.share, under.pinned)
-                    before = _least(at + under.radius, bad, line - spare)
-                    after = _least(under.radius - at, bad, -line - spare)
+                    half = halves(under.radius)
+                    before = _least(at + half, bad, line - spare)
+                    after = _least(half - at, bad, -line - spare)
                     sides.append((before, after))
             if len(sides) == 1:
                 total += np.minimum(*sides[0])

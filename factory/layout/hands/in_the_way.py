@@ -207,10 +207,10 @@ class InTheWay:
         if kind != "behind":
             yield (*gone, self.holding.boxes(last.label))
             return
-        # its payload comes along the same way, or takes the bar down with it
+        # its payload comes along the same way, or takes the bar down with it, which then rises
         gone[1][:, 2] += 10.0 * lifted
         for other, guest in zip(last.before, last.robots, strict=True):
-            if guest != robot and other != NOPART:
+            if other != NOPART and (guest != robot or lifted):
                 yield (*gone, self.holding.boxes(other))
 
     def _going_on(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Array:
