@@ -91,12 +91,16 @@ class HandsApart:
     def carriers_hand(
         self, robot: int, kind: Kind, found: Places, u: Way, t: Way
     ) -> Iterator[Swept]:
-        """A hand with all that is behind it, and the tall hand of the carrier with all that is
-        behind that: both are there at once."""
+        """A hand with all that is behind it, and the hand of the carrier: a tall one with all that
+        is behind that, since both are there at once; of one below the column, with all its way
+        ahead, where it comes from and goes."""
         carrier = self.holding.on[robot]
-        if carrier < 0 or not (hand := self.hand_of(carrier, t)).tall:
+        if carrier < 0 or (hand := self.hand_of(carrier, t)).kind == "none":
+            return
+        if kind == hand.kind == "below":  # fingers keep to their sides
             return
         own = swept(*reach(self.holding.product, kind, found.at, found.radius, u), back(u))
+        own[1][:, 2] += self.holding.factory.strokes.get(robot, 0.0)
         at, radius = np.array(hand.places), np.full(len(hand.places), hand.radius)
         low, high = reach(self.holding.product, hand.kind, at, radius, t)
         if hand.kind == "above":
@@ -104,4 +108,8 @@ class HandsApart:
             half = max(FINGER, hand.width) / 2
             low, high = at - half, at + half
             low[:, 2], high[:, 2] = hand.beam, hand.beam + BEAM
-        yield (*own, np.stack(swept(low, high, back(t)), axis=1))
+        ways = [back(t) if hand.tall else t]
+        if carrier in self.holding.turning and not hand.tall:
+            ways.append(back(t))
+        for way in ways:
+            yield (*own, np.stack(swept(low, high, way), axis=1))

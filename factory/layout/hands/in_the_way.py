@@ -230,16 +230,17 @@ class InTheWay:
 
     def _met_onward(self, robot: int) -> Onward:
         """What a hand could meet in its carrier's next operations: all that is there by the end of
-        the first, and what each later one adds."""
+        the first, and what each later one adds, down from above or not."""
         factory, last = self.holding.factory, self.holding.last(robot)
         if last.index not in self._onward:
             made = [o for o in self.holding.made(last.carrier) if not factory.drops(o.index)]
-            labels = [o.label for o in made[made.index(last) + 1 :]] if last in made else []
             there, found = set[str](), list[Array]()
-            for label in labels or [last.label]:
-                added = [part for part in factory.contents[label] if part not in there]
+            for o in made[made.index(last) + 1 :] if last in made else ():
+                added = [part for part in factory.contents[o.label] if part not in there]
                 there.update(added)
-                found.append(self.holding.surfaces.boxes(added))
+                above = list(self._from_above(o, last.carrier, ()))
+                found.append(np.concatenate([self.holding.surfaces.boxes(added), *above]))
+            found = found or [self.holding.boxes(last.label)]
             of = np.repeat(np.arange(len(found)), [len(boxes) for boxes in found])
             self._onward[last.index] = Onward(np.concatenate(found), of, len(found))
         return self._onward[last.index]
@@ -269,17 +270,20 @@ class InTheWay:
         self, robot: int, kind: Kind, found: Places, u: Way, t: Way
     ) -> Iterator[tuple[bool, Swept]]:
         """The same of each input of its operations, which comes from either side when it is there
-        already; with it whether that is so whatever else, since it has a pile by then."""
+        already, and as its lift rises; with it whether that is so whatever else, since it has a
+        pile by then, and the lift is up."""
         low, high = self.reach(kind, found, u)
         if kind == "behind":
             low, high = swept(low, high, back(u))
+        rising = low.copy()
+        rising[:, 2] -= self.holding.factory.strokes.get(robot, 0.0)
         for operation in self.holding.made(robot):
             later = operation.before[operation.template.carrier - 1] != NOPART
             for guest, label in zip(operation.robots, operation.before, strict=True):
                 if guest != robot and label != NOPART:
                     parts = self.holding.boxes(label)
                     for side in (t, back(t)):
-                        yield later, (*swept(low, high, side), parts)
+                        yield later, (*swept(low if later else rising, high, side), parts)
 
     def _lowered(self, robot: int, kind: Kind, found: Places, u: Way) -> Iterator[Swept]:
         """The same of each input that comes down to a carrier from above."""
