@@ -283,7 +283,9 @@ class Layout:
         if slot == carrier or label == NOPART:
             return 0.0
         if pile == NOPART:
-            return self._beside_hand(operation, slot)
+            lowered = operation.lowered  # that waits for this one, and so for the carrier
+            chained = lowered >= 0 and self._beside_hand(operation, lowered) > 0
+            return max(BESIDE * chained, self._beside_hand(operation, slot))
         path = self.guidepaths[operation.robots[slot]]
         ahead = path.frame(self.payloads[label])[1]
         towards = -path.frame(self.payloads[pile])[0]

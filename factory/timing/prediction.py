@@ -17,6 +17,7 @@ from factory.control.profile import SpeedProfile, World, mode_time
 from factory.geometry.meshes import Array
 from factory.layout.hands.leaving import Leaving, going_on, raised
 from factory.layout.hands.limbs import rises_first
+from factory.layout.hands.meeting import delivered_at
 from factory.layout.layout import Layout
 from factory.modes.modes import operation_modes, operation_starts, robot_limits
 from factory.modes.staging import HeadStart, staged, stages_of, with_time
@@ -136,7 +137,8 @@ def _gone(layout: Layout, leaving: Leaving, limits: Limits) -> float:
     path, rises = layout.guidepaths[axis], 0.0
     if rises_first(layout, axis):
         rises = _gone(layout, raised(layout, axis), limits)
-    return rises + profile.passes(path.length - path.reach, leaving.least - path.reach)
+    begin = min(delivered_at(layout, axis))
+    return rises + profile.passes(path.length - begin, leaving.least - begin)
 
 
 def all_ways(

@@ -214,11 +214,12 @@ class InTheWay:
                 yield (*gone, self.holding.boxes(other))
 
     def _going_on(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Array:
-        """How far a hand has to go back (n, k) [m] until each of the next k operations of its
-        carrier may start, which leaves along t, or either way where it turns."""
+        """How far a hand has to go back (n, k) [m], as its lift rises, until each of the next k
+        operations of its carrier may start, which leaves along t, or either way where it turns."""
         if self.holding.factory.drops(self.holding.last(robot).index):
             return np.zeros((len(found), 1))
         low, high = self.reach(kind, found, u)
+        high[:, 2] += self.holding.factory.strokes.get(robot, 0.0)
         onward = self._met_onward(robot)
         past = retreat(low, high, onward.boxes, (back(u), back(t)))
         if self.holding.on[robot] in self.holding.turning:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from factory.layout.hands.hand import Hand
 from factory.layout.hands.limbs import rises_first
-from factory.layout.hands.meeting import following, guests, meetings
+from factory.layout.hands.meeting import delivered_at, following, guests, meetings
 from factory.layout.layout import Layout
 from factory.plant.factory import Operation
 
@@ -131,19 +131,8 @@ def _gone(layout: Layout, robot: int, back: float) -> Leaving:
 
 def _back(layout: Layout, robot: int, back: float) -> Leaving:
     """When a robot has gone back by so much [m], wherever it has delivered."""
-    path = layout.guidepaths[robot]
-    return Leaving(
-        robot, min(path.reach + _short(layout, robot) + back + SPARE, path.length - SPARE)
-    )
-
-
-def _short(layout: Layout, robot: int) -> float:
-    """How far from the end of its guidepath a robot delivers at the most [m]."""
-    if not layout.shifts:
-        return 0.0
-    delivers = (tour[-1] for tour in layout.factory.tours[robot])
-    slots = ((n, layout.factory.operations[n].robots.index(robot)) for n in delivers)
-    return max(layout.apart(number, slot)[0] for number, slot in slots)
+    least = max(delivered_at(layout, robot)) + back + SPARE
+    return Leaving(robot, min(least, layout.guidepaths[robot].length - SPARE))
 
 
 def _gone_behind(layout: Layout, robot: int, operation: Operation) -> Leaving:

@@ -2,8 +2,9 @@
 the other: how far the one goes back before the other comes.
 
 What robots that come at once have to do with each other is settled where hands are chosen
-(`apart.py`), and so is what a hand without a lift has to do with the parts that come later. One
-that is lifted goes up, and stays there over the station, unless something here makes it go back.
+(`apart.py`), and so is what a hand has to do with the parts that come later, but for its tower,
+which stands behind what it has delivered to then. One that is lifted goes up, and stays there over
+the station, unless something here makes it go back.
 """
 
 from __future__ import annotations
@@ -46,11 +47,13 @@ def meetings(layout: Layout, carrier: int) -> Iterator[tuple[int, int, float]]:
     beside = max(breadths, default=0.0)
     for at, operation, robot, own in coming_here:
         heading, lifted = layout.guidepaths[robot].heading, rises_first(layout, robot)
+        tall = own if lifted else own[[limb.name == "tower" for limb in limbs(layout, robot)]]
         near = slice(bisect_left(places, at - beside), bisect_right(places, at + beside))
         for _, later, other, _ in coming_here[near]:
             if later is not operation and layout.guidepaths[other].heading != heading:
-                coming = _coming(layout, other, carrier if lifted else -1)
-                if back := _back(own, coming, heading):
+                back = _back(own, _coming(layout, other), heading)
+                back = max(back, _back(tall, _brought(layout, other, carrier), heading))
+                if back:
                     yield later.index, robot, back
         if lifted and (back := _back(own, _going(layout, carrier, operation), heading)):
             yield following(layout, carrier, operation.index), robot, back
@@ -88,6 +91,12 @@ def _delivered(layout: Layout, robot: int) -> Iterator[Box]:
         yield layout.held(robot, tour[-1], label)
 
 
+def delivered_at(layout: Layout, robot: int) -> list[float]:
+    """Where a robot delivers on each of its tours, arc lengths [m]."""
+    operations = (layout.factory.operations[tour[-1]] for tour in layout.factory.tours[robot])
+    return [_goal(layout, operation, robot) for operation in operations]
+
+
 def _goal(layout: Layout, operation: Operation, robot: int) -> float:
     """Where a robot has its goal in an operation, an arc length [m]."""
     path = layout.guidepaths[robot]
@@ -110,25 +119,26 @@ def _boxes(layout: Layout, robot: int, at: float | None = None, up: float | None
     return np.array(found).reshape(-1, 2, 3)
 
 
-def _coming(layout: Layout, robot: int, carrier: int = -1) -> Array:
-    """What the hand of a robot sweeps as it comes to its station, up or down; and what it brings,
-    where that is to be added on a `carrier`."""
+def _coming(layout: Layout, robot: int) -> Array:
+    """What the hand of a robot sweeps as it comes to its station, up or down."""
     down, raised = _boxes(layout, robot, up=0.0), _boxes(layout, robot)
-    found = [np.stack([down[:, 0], raised[:, 1]], axis=1)]
+    (u, v), swept = layout.guidepaths[robot].heading, np.stack([down[:, 0], raised[:, 1]], axis=1)
+    return _onward(swept, (-u, -v))
+
+
+def _brought(layout: Layout, robot: int, carrier: int) -> Array:
+    """What the parts sweep that a robot brings to be added on a carrier."""
     path, product = layout.guidepaths[robot], layout.product
-    if carrier >= 0:
-        contents, labels = layout.factory.contents, layout.factory.deliveries(robot)
-        tours = zip(layout.factory.tours[robot], labels, strict=True)
-        parts = [(product.solids[p], tour[-1]) for tour, label in tours for p in contents[label]]
-        boxes = np.array([[part.low, part.high] for part, _ in parts]) - product.middle
-        boxes[:, :, :2] += path.a
-        boxes[:, :, :2] += np.array([layout.shift(robot, last) for _, last in parts])[:, None]
-        over = [layout.elevation(carrier, last) for _, last in parts]
-        boxes[:, :, 2] += PAYLOAD + np.array(over)[:, None] + product.middle[2] - product.low[2]
-        boxes[:, 1, 2] += layout.strokes.get(robot, 0.0)
-        found.append(boxes)
-    swept = np.concatenate(found)
-    return _onward(swept, (-path.heading[0], -path.heading[1]))
+    contents, labels = layout.factory.contents, layout.factory.deliveries(robot)
+    tours = zip(layout.factory.tours[robot], labels, strict=True)
+    parts = [(product.solids[p], tour[-1]) for tour, label in tours for p in contents[label]]
+    boxes = np.array([[part.low, part.high] for part, _ in parts]) - product.middle
+    boxes[:, :, :2] += path.a
+    boxes[:, :, :2] += np.array([layout.shift(robot, last) for _, last in parts])[:, None]
+    over = [layout.elevation(carrier, last) for _, last in parts]
+    boxes[:, :, 2] += PAYLOAD + np.array(over)[:, None] + product.middle[2] - product.low[2]
+    boxes[:, 1, 2] += layout.strokes.get(robot, 0.0)
+    return _onward(boxes, (-path.heading[0], -path.heading[1]))
 
 
 def _going(layout: Layout, carrier: int, operation: Operation) -> Array:
