@@ -143,7 +143,8 @@ def test_hands_from_either_side_wait_for_each_other(distributed: bool, tmp_path:
 def test_if_they_did_not_they_would_meet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(leaving, "meetings", lambda *_: ())
     run = watched(Simulation(laid_out(BOX, tmp_path), RunRequest(units=1)), (), 60.0)
-    assert {"Contact", "Dropped"} <= {failure.code for failure in run.verdict.failures}
+    codes = {failure.code for failure in run.verdict.failures}
+    assert "Contact" in codes and codes & {"Dropped", "Stalled"}
 
 
 @pytest.mark.parametrize("text", [ASKEW, CROSSED, PARTS["a beam under what is lowered"]])

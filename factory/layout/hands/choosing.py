@@ -263,7 +263,7 @@ class Hands:
             with_tip,
             early,
             (*late,),
-            covered=float(found.covered[at].min()) if holds_well else 1.0,
+            covered=(float(found.covered[at].min()) if holds_well else 1.0,),
         )
 
     def _bad(self, robot: int, kind: Kind, found: Places, waits: Array) -> Array:

@@ -22,9 +22,9 @@ def outward(hand: Hand, heading: Point2) -> Array:
     return np.array([0.0, 0.0, -1.0 if hand.kind == "above" else 1.0])
 
 
-def gauge(hand: Hand, heading: Point2) -> Array:
+def gauge(hand: Hand, heading: Point2, tour: int = 0) -> Array:
     """From a force [N] and a moment [Nm] about the middle of a hand's tips to the terms of what
-    they use of its strength (11, 6), as `tips.shares` takes them."""
+    they use of its strength on a tour (11, 6), as `tips.shares` takes them."""
     apart = np.subtract(hand.places[-1], hand.places[0])
     found = tip(hand.tip).gauge(outward(hand, heading), np.array(hand.radius), apart)
-    return found / hand.covered
+    return found / hand.covered[tour]

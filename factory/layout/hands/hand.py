@@ -45,12 +45,12 @@ class Hand:
     """How a robot holds: `places`: the points of the payload's surface that the middles of its tips
     are at, in the frame of the finished product [m]: one, or, from below, two on one line along its
     heading; `radius` of a tip [m]; `beam`: how high the beam of a hand above is, in that frame, at
-    its lower edge [m]; `covered`: which share of a tip's face the surface covers, where that holds
-    by suction; `share`: which share of the strength of its tips weight and acceleration
-    take, as predicted; `tip`: what it holds with; `first`: whether it has to be in its place before
-    what it takes comes there; `waits`: how far it has to go back until each of its carrier's next
-    operations may start [m], none where they need not wait. Of the kind `none` where nothing can
-    hold."""
+    its lower edge [m]; `covered`: which share of a tip's face the surface covers on each tour of
+    its robot, where that holds by suction; `share`: which share of the strength of its tips weight
+    and acceleration take, as predicted; `tip`: what it holds with; `first`: whether it has to be in
+    its place before what it takes comes there; `waits`: how far it has to go back until each of its
+    carrier's next operations may start [m], none where they need not wait. Of the kind `none` where
+    nothing can hold."""
 
     kind: Kind
     places: tuple[Point3, ...]
@@ -60,7 +60,7 @@ class Hand:
     tip: TipName = "suction"
     first: bool = False
     waits: tuple[float, ...] = ()
-    covered: float = 1.0
+    covered: tuple[float, ...] = (1.0,)
 
     @property
     def tall(self) -> bool:

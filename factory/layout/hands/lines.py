@@ -194,7 +194,7 @@ class LineHands:
             tip,
             any(bool(option.first[0]) for option in options),
             (*most,),
-            float(min(at.covered[0] for at in found)) if suction else 1.0,
+            tuple(float(at.covered[0]) if suction else 1.0 for at in found),
         )
         return tuple(
             replace(hand, places=((x, y, z),), beam=z + stem if stem else 0.0) for x, y, z in points

@@ -10,10 +10,11 @@ the station, unless something here makes it go back.
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from factory.control.mode import Index
 from factory.geometry.meshes import Array
 from factory.layout.dimensions import PAYLOAD
 from factory.layout.guidepath import Box, hull
@@ -44,19 +45,20 @@ def meetings(layout: Layout, carrier: int) -> Iterator[tuple[int, int, float]]:
     coming_here.sort(key=lambda guest: guest[0])
     places = [at for at, _, _, _ in coming_here]
     breadths = (_breadth(layout, robot, own, axis) for _, _, robot, own in coming_here)
-    beside = max(breadths, default=0.0)
+    beside, added = max(breadths, default=0.0), [*_added(layout, carrier)]
     for at, operation, robot, own in coming_here:
         heading, lifted = layout.guidepaths[robot].heading, rises_first(layout, robot)
-        tall = own if lifted else own[[limb.name == "tower" for limb in limbs(layout, robot)]]
         near = slice(bisect_left(places, at - beside), bisect_right(places, at + beside))
         for _, later, other, _ in coming_here[near]:
             if later is not operation and layout.guidepaths[other].heading != heading:
                 back = _back(own, _coming(layout, other), heading)
-                back = max(back, _back(tall, _brought(layout, other, carrier), heading))
+                if lifted:
+                    back = max(back, _back(own, _brought(layout, other, carrier), heading))
                 if back:
                     yield later.index, robot, back
         if lifted and (back := _back(own, _going(layout, carrier, operation), heading)):
             yield following(layout, carrier, operation.index), robot, back
+        yield from _past(layout, carrier, (operation, robot, own), added)
 
 
 def following(layout: Layout, robot: int, operation: int) -> int:
@@ -128,17 +130,77 @@ def _coming(layout: Layout, robot: int) -> Array:
 
 def _brought(layout: Layout, robot: int, carrier: int) -> Array:
     """What the parts sweep that a robot brings to be added on a carrier."""
-    path, product = layout.guidepaths[robot], layout.product
-    contents, labels = layout.factory.contents, layout.factory.deliveries(robot)
+    path, labels = layout.guidepaths[robot], layout.factory.deliveries(robot)
     tours = zip(layout.factory.tours[robot], labels, strict=True)
-    parts = [(product.solids[p], tour[-1]) for tour, label in tours for p in contents[label]]
-    boxes = np.array([[part.low, part.high] for part, _ in parts]) - product.middle
+    contents = layout.factory.contents
+    boxes = np.concatenate(
+        [_parts(layout, contents[label], (robot, carrier), tour[-1]) for tour, label in tours]
+    )
     boxes[:, :, :2] += path.a
-    boxes[:, :, :2] += np.array([layout.shift(robot, last) for _, last in parts])[:, None]
-    over = [layout.elevation(carrier, last) for _, last in parts]
-    boxes[:, :, 2] += PAYLOAD + np.array(over)[:, None] + product.middle[2] - product.low[2]
     boxes[:, 1, 2] += layout.strokes.get(robot, 0.0)
     return _onward(boxes, (-path.heading[0], -path.heading[1]))
+
+
+def _past(
+    layout: Layout,
+    carrier: int,
+    guest: tuple[Operation, int, Array],
+    added: Iterable[tuple[tuple[int, ...], Array, Index]],
+) -> Iterator[tuple[int, int, float]]:
+    """How far a robot that has delivered to a carrier in an operation, with a hand in some boxes
+    there, goes back from what the carrier then takes past it: its tower from what is added on the
+    same tour, or all of it, which is up, from all that is there; and from what comes from home on
+    another. As `meetings`."""
+    (operation, robot, own), path = guest, layout.guidepaths[carrier]
+    x, y = path.middle(layout.goal(operation.index, operation.robots.index(carrier)))
+    tower = own[[limb.name == "tower" for limb in limbs(layout, robot)]]
+    heading, back = layout.guidepaths[robot].heading, (-path.heading[0], -path.heading[1])
+    for tour, boxes, step in added:
+        swept = _onward(boxes + np.array([x, y, 0.0]), path.heading)
+        if layout.factory.folded:  # it goes back to stations where it was
+            swept = _onward(swept, back)
+        if operation.index not in tour:
+            begins = tour[min(1, len(tour) - 1)]
+            if far := _back(own, swept, heading, 0.0):
+                yield begins, robot, far
+            continue
+        at = tour.index(operation.index)
+        if rises_first(layout, robot):
+            ways, then = _ways(own, swept, heading, 0.0), np.maximum(step, at + 1)
+        else:
+            ways, then = _ways(tower, swept, heading, 0.0) * (step > at), step
+        for later in np.unique(then[ways > 0]).tolist():
+            begins = tour[later] if later < len(tour) else following(layout, carrier, tour[-1])
+            yield begins, robot, round(float(ways[then == later].max()), 6)
+
+
+def _added(layout: Layout, carrier: int) -> Iterator[tuple[tuple[int, ...], Array, Index]]:
+    """The tours of a carrier on which it takes something, with the boxes (n, 2, 3) of the parts
+    that it has in the end, about its middle, and for each in which step of the tour it comes
+    (n,)."""
+    factory = layout.factory
+    for tour in factory.tours[carrier]:
+        comes = dict[str, int]()
+        for step, number in enumerate(tour):
+            operation = factory.operations[number]
+            if operation.carrier == carrier and not factory.drops(number):
+                for part in factory.contents[operation.label]:
+                    comes.setdefault(part, step)
+        if comes:
+            boxes = _parts(layout, comes, (carrier, carrier), tour[0])
+            yield tour, boxes, np.array([*comes.values()])
+
+
+def _parts(layout: Layout, parts: Iterable[str], robots: tuple[int, int], operation: int) -> Array:
+    """The boxes (n, 2, 3) of parts about the middle that the guidepath of the first of two robots
+    tells, on its tour with an operation (index), as high as the second has them there."""
+    product, (robot, carrier) = layout.product, robots
+    solids = [product.solids[part] for part in parts]
+    boxes = np.array([[solid.low, solid.high] for solid in solids]) - product.middle
+    boxes[:, :, :2] += layout.shift(robot, operation)
+    boxes[:, :, 2] += PAYLOAD + product.middle[2] - product.low[2]
+    boxes[:, :, 2] += layout.elevation(carrier, operation)
+    return boxes
 
 
 def _going(layout: Layout, carrier: int, operation: Operation) -> Array:
@@ -161,14 +223,22 @@ def _onward(boxes: Array, way: tuple[float, float]) -> Array:
     return found
 
 
-def _back(own: Array, others: Array, heading: tuple[float, float]) -> float:
-    """How far boxes (n, 2, 3) go back against a heading until they meet no others (m, 2, 3) [m]."""
+def _back(own: Array, others: Array, heading: tuple[float, float], over: float = BESIDE) -> float:
+    """How far boxes (n, 2, 3) go back against a heading until they meet no others (m, 2, 3), nor
+    are less than so far `over` or under them [m]."""
+    return round(float(_ways(own, others, heading, over).max(initial=0.0)), 6)
+
+
+def _ways(own: Array, others: Array, heading: tuple[float, float], over: float = BESIDE) -> Array:
+    """The same for each of the others (m,), which they may not meet, nor be less than so far `over`
+    or under [m]."""
     axis = 0 if heading[0] else 1
-    beside = [a for a in range(3) if a != axis]
     low = np.maximum(own[:, None, 0], others[None, :, 0])
     high = np.minimum(own[:, None, 1], others[None, :, 1])
-    meets = (high - low > -BESIDE)[:, :, beside].all(axis=2) & (high - low > 0)[:, :, axis]
+    spare = np.array([BESIDE, BESIDE, over])
+    spare[axis] = 0.0
+    meets = (high - low > -spare).all(axis=2)
     front = own[:, 1, axis] if heading[axis] > 0 else -own[:, 0, axis]
     near = others[:, 0, axis] if heading[axis] > 0 else -others[:, 1, axis]
     ways = np.where(meets, front[:, None] - near[None] + BESIDE, 0.0)
-    return round(float(ways.max(initial=0.0)), 6)
+    return np.asarray(ways.max(axis=0, initial=0.0))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from math import inf
 
 from factory.control.mode import Index
@@ -15,10 +15,17 @@ from factory.support.engine import mujoco
 
 
 class HandsAway:
-    """The axes of robots, `qpos` (axes,) of their addresses, and what each operation waits for."""
+    """The axes of robots, `qpos` (axes,) of their addresses, and what each operation waits for.
 
-    def __init__(self, d: mujoco.MjData, layout: Layout, qpos: Index) -> None:
+    A robot that `holds` something (index) has been at home since it delivered: nothing waits for
+    it. One that holds nothing gets out of the way whatever others do, so every wait ends."""
+
+    def __init__(
+        self, d: mujoco.MjData, layout: Layout, qpos: Index, holds: Container[int]
+    ) -> None:
         self._d, self._qpos, self._leavings = d, qpos, leavings(layout)
+        self._holds = holds
+        self._robots = (*range(len(layout.factory.robots)), *layout.lifts)
         self._held: dict[int, tuple[Leaving, ...]] = {}
 
     def hold_up(self, operation: Operation) -> bool:
@@ -69,4 +76,8 @@ class HandsAway:
 
     def _in_the_way(self, awaited: Iterable[Leaving]) -> tuple[Leaving, ...]:
         at = self._d.qpos
-        return tuple(one for one in awaited if at[self._qpos[one.axis]] < one.least)
+        return tuple(
+            one
+            for one in awaited
+            if at[self._qpos[one.axis]] < one.least and self._robots[one.axis] not in self._holds
+        )

@@ -71,9 +71,8 @@ class MujocoWorld:
         self._before = model.factory.units(counts)
         self._unseen = 0
         self.motion = Motion(self.m, self.d, model, start, gains)
-        self._away = HandsAway(self.d, model.layout, self.motion.axes.qpos)
         self.parts = Parts(self.m, self.d, model, self.motion, request, counts)
-        parts = self.parts
+        self._away, parts = self._hands_away(model.layout), self.parts
         soundness = Soundness(self.m, self.d, model, parts.masks, parts.copies.body, parts.grips)
         self.inspection = Inspection(self.m, self.d, model, soundness)
         for operation in model.factory.operations:
@@ -181,7 +180,10 @@ class MujocoWorld:
         self.inspection.soundness.gone.update(gone)
         self.parts.feeders.exchange(robot, layout)
         self.inspection.exchange(layout)
-        self._away = HandsAway(self.d, layout, self.motion.axes.qpos)
+        self._away = self._hands_away(layout)
+
+    def _hands_away(self, layout: Layout) -> HandsAway:
+        return HandsAway(self.d, layout, self.motion.axes.qpos, self.parts.hands.of)
 
     def in_the_way(self, under_way: Iterable[int]) -> set[int]:
         """The robots (index) that stand where a part comes late that they wait for, but for those
