@@ -18,10 +18,14 @@ from factory.layout.dimensions import Clearance
 from factory.layout.durations import Pace
 from factory.layout.guidepath import Point2
 from factory.layout.hands.choosing import Hands
+from factory.layout.hands.leaving import crowded
 from factory.layout.layout import Layout
 from factory.layout.optimising import bounds, optimised
 from factory.plant.factory import Factory
 from factory.support.errors import Diagnostic, RunError
+
+AGAIN = 3
+"""So often a factory is laid out again where robots have to go further."""
 
 
 def lay_out(
@@ -36,9 +40,15 @@ def lay_out(
     `pace`, with those of `hands` that suit it, if any. Raises RunError (Layout) where it
     does not fit a floor of the given width and depth, saying by how much and where, or where an
     operation's template asks for what cannot be kept clear."""
-    known = judged(factory, product)
-    c = Clearance(clearance)
-    return certified(optimised(known, product, c, pace or Pace(), floor, (), hands), floor)
+    known, c, pace = judged(factory, product), Clearance(clearance), pace or Pace()
+    layout = optimised(known, product, c, pace, floor, (), hands)
+    for _ in range(AGAIN if hands else 0):
+        if not (further := crowded(layout)):
+            break
+        assert hands is not None
+        hands.travels |= further
+        layout = optimised(known, product, c, pace, floor, (), hands)
+    return certified(layout, floor)
 
 
 def certified(layout: Layout, floor: Point2 | None = None) -> Layout:

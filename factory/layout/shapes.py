@@ -197,6 +197,7 @@ def held_shape(
             if hand.waits and not factory.lowers(robot):
                 thick = 2 * max(hand.radius, FINGER / 2)
                 least = last[1] + max(ahead) - min(ahead) + thick - rear + 2 * c.c
+    least = max(least, hands.travels.get(robot, 0.0))
     over = PAYLOAD - float(hands.holding.product.low[2])
     grip, nest = grip_of(hand, Mount(u, t, reach, arm, offset, (x, y), over)), round(max(ahead), 6)
     return Shape(

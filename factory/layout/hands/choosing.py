@@ -73,7 +73,8 @@ class TipPlaces:
 
 class Hands:
     """The hands of a factory's robots. That of a carrier depends on its heading alone, since those
-    that deliver to it depend on its line; that of another on its frame."""
+    that deliver to it depend on its line; that of another on its frame. `travels`: how far robots
+    are to go at the least [m], as layouts have shown."""
 
     def __init__(self, factory: Factory, product: Product, push: float = PUSH) -> None:
         self.factory, self.tours = factory, Tours.apart(factory)
@@ -85,6 +86,7 @@ class Hands:
         self._carriers: dict[tuple[int, Way], Hand] = {}
         self._lines: dict[tuple[tuple[int, ...], object], tuple[Hand, ...]] = {}
         self._fits: dict[int, frozenset[Fit]] = {}
+        self.travels: dict[int, float] = {}
         self._on = {tour: of for of in self.tours.of for tour in of}
 
     def hand(self, robot: int, u: Way, t: Way) -> Hand | None:

@@ -11,6 +11,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from factory.control.mode import ROUNDING
+from factory.layout.dimensions import up
+from factory.layout.feeding import passing
 from factory.layout.hands.hand import Hand
 from factory.layout.hands.limbs import rises_first
 from factory.layout.hands.meeting import delivered_at, following, guests, meetings
@@ -19,6 +22,9 @@ from factory.plant.factory import Operation
 
 SPARE = 0.001
 """A hand is clear that is so far from all that it has delivered to [m]."""
+
+NEAR = 0.001
+"""A robot that has to be clear goes on by so much at the least [m]."""
 
 ON = 0.009
 """A robot whose hand has to be clear goes on by so much: it does not slow down before [m]."""
@@ -105,9 +111,30 @@ def awaited_positions(layout: Layout) -> dict[int, float]:
             continue
         back = max(backs[robot], 0.0 if rises_first(layout, robot) else hand.clear)
         if back:
-            clear = _back(layout, robot, back).least + ON
-            found[robot] = min(clear, layout.guidepaths[robot].length)
+            least, end = _back(layout, robot, back).least, _before_next(layout, robot)
+            found[robot] = min(least + ON, max(least + NEAR, end))
     return found
+
+
+def crowded(layout: Layout) -> dict[int, float]:
+    """How far robots are to go at the least, from where they deliver, so that hands that hold from
+    above get out of the way before they come to where the next part comes down [m]."""
+    found = dict[int, float]()
+    for robot, at in awaited_positions(layout).items():
+        further = at - _before_next(layout, robot)
+        if further > ROUNDING:
+            found[robot] = up(layout.guidepaths[robot].travel + further)
+    return found
+
+
+def _before_next(layout: Layout, robot: int) -> float:
+    """How far back a robot may be while its next part comes down, an arc length [m]: not as far as
+    that where its hand is above what it takes."""
+    length, hand = layout.guidepaths[robot].length, layout.hand(robot)
+    tours = layout.factory.tours[robot] if hand is not None and hand.kind == "above" else ()
+    firsts = (layout.factory.operations[tour[0]] for tour in tours)
+    ways = (passing(layout, leaf) for leaf in firsts if not leaf.inputs)
+    return length - max(ways, default=0.0)
 
 
 def goes_early(layout: Layout) -> list[tuple[int, int]]:
