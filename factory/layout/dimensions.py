@@ -67,6 +67,9 @@ TOOL_TRAVEL = 0.12
 TRAY = 0.0025
 """Thickness of the tray on which a product leaves."""
 
+SLOT = 0.001
+"""How far the slot in tray and belt is from the hand that comes through it [m]."""
+
 BELT_GAP = 3e-4
 """The outfeed lies this much below z0, so that the output robot brings its product without
 touching."""

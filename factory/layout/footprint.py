@@ -125,9 +125,10 @@ class Footprint:
         come so far back are beside it: the last of them is the widest."""
         starts = [at + pile[0] - self.half for at, pile in piles]
         starts = list(accumulate(reversed(starts), min))[::-1]
+        widest = list(accumulate((pile for _, pile in piles), lambda *both: hull(both)))
 
         def found(side: int, end: float) -> Strip:
-            return self.strip(side, piles[max(bisect_left(starts, end), 1) - 1][1])
+            return self.strip(side, widest[max(bisect_left(starts, end), 1) - 1])
 
         return found
 
@@ -148,7 +149,9 @@ class Footprint:
 
     def blocks(self, piles: Sequence[Placed]) -> list[tuple[Block, ...]]:
         """What it takes of each layer: a block as wide as the strips on both sides, or none."""
-        spans = zip(self.along(piles), self.strips[-1], self.strips[+1], strict=True)
+        widest = hull([self.shape.laden(self.shape.last), *(pile for _, pile in piles)])
+        sides = (self.strip(side, widest) for side in (-1, +1))
+        spans = zip(self.along(piles), *sides, strict=True)
         return [((*span, -low, high),) if span[0] <= span[1] else () for span, low, high in spans]
 
     def least(self, stop: Stop, station: float) -> float:
@@ -158,11 +161,21 @@ class Footprint:
             return station
         return max(station, up(self.housing[1] + self.clearance.c - self.pile(stop)[0]))
 
-    def placed(self, stop: Stop, station: float, further: Mapping[int, float]) -> Placed:
-        """The pile that is there at a stop at a station, `further` for some of its operations."""
+    def placed(
+        self,
+        stop: Stop,
+        station: float,
+        further: Mapping[int, float],
+        guests: Iterable[tuple[int, Shape]],
+    ) -> Placed:
+        """The pile that is there at a stop at a station, `further` for some of its operations, with
+        the hands that reach over it, of robots that deliver from a side."""
         rear, front, low, high = self.shape.laden(self.pile(stop))
         if further:
             rear, front = rear + min(further.values()), front + max(further.values())
+        for side, shape in guests:
+            ahead = shape.grip[1] if shape.grip else -inf
+            low, high = (min(low, -ahead), high) if side > 0 else (low, max(high, ahead))
         return station + ahead_of(stop.first, self.shape.reach), (rear, front, low, high)
 
     def further(self, stop: Stop, guests: Iterable[tuple[int, Shape]]) -> dict[int, float]:

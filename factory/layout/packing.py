@@ -183,12 +183,13 @@ class Packing:
 
     def _added(self, way: _Way, stop: Stop, station: float, guests: Sequence[Guest]) -> _Way:
         time = self._time(way, stop, station, guests)
+        coming = [(guest.side, guest.outline.shape) for guest in guests]
         return _Way(
             station,
             _taken(way.beside, guests),
             (*way.guests, *guests),
             (*way.stations, station),
-            (*way.piles, self.own.placed(stop, station, self._further(stop, guests))),
+            (*way.piles, self.own.placed(stop, station, self._further(stop, guests), coming)),
             way.time + time,
             way.cost + self._cost(way, time, station, guests, len(stop.operations)),
         )

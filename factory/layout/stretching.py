@@ -87,7 +87,8 @@ class _Builder:
             for layer in LAYERS:
                 frontier[layer] = max(frontier[layer], self.station + high[layer])
             self.guests.append((guest, self.station))
-        self.piles.append(self.own.placed(stop, self.station, self.further(stop)))
+        coming = [(self.sides[guest], self.outlines[guest].shape) for guest in guests]
+        self.piles.append(self.own.placed(stop, self.station, self.further(stop), coming))
         return self.station
 
     def further(self, stop: Stop) -> dict[int, float]:

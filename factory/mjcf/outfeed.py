@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from xml.etree.ElementTree import Element
 
-from factory.layout.dimensions import BELT_GAP, FINGER_TOP, PAYLOAD, PLAY, TRAY, WALL
+from factory.layout.dimensions import BELT_GAP, FINGER_TOP, PAYLOAD, PLAY, SLOT, TRAY, WALL
 from factory.layout.guidepath import Box
 from factory.layout.hands.limbs import limbs
 from factory.layout.layout import Layout, Point2
@@ -32,9 +32,6 @@ SHUTTER_MASS = 0.4
 
 BELT = PAYLOAD - BELT_GAP - TRAY
 """Height of the belt [m]."""
-
-SLOT = 0.001
-"""How far the slot in tray and belt is from the hand that comes through it [m]."""
 
 SLIT = 2e-4
 """Between the shutter when it is down and the belt [m]."""

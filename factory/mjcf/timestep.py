@@ -46,6 +46,11 @@ SLACK = 0.3
 """Share of a lift's weight that its drive must hold without having been told: drives that are a
 third stronger or weaker, and parts half as heavy again, are survived (docs/fidelity.md)."""
 
+DIP, DEEPEST = 1.9e-5, 2.5e-4
+"""So far [m] a part is below where a slider is to bring it as a hand comes there, for each kg and
+each m/s² of the slider, in timesteps of a tick, measured; and it may be so far: a pad then presses
+on it by half as much as it may."""
+
 SURE = 1.25
 """Measured errors are up to so many times the formula's: 630 random runs at 10 ms."""
 
@@ -113,8 +118,11 @@ def timed(
         return _usual(found)
     fastest = max(settings.speed * (1 + jitter), settings.outfeed)
     found = [s for s in found if fastest * s.step < layout.clearance] or found[-1:]
-    axes = tuple(_axes(settings, layout, jitter))
-    return next((s for s in found if _good(s, axes)), _usual(found))
+    axes, heaviest_fed = tuple(_axes(settings, layout, jitter)), 0.0
+    if settings.hands:
+        heaviest_fed = max(layout.product.solids[o.label].mass for o in layout.factory.leaves)
+    good = (s for s in found if _good(s, axes) and _dip(s, heaviest_fed) < DEEPEST)
+    return next(good, _usual(found))
 
 
 def _usual(found: Sequence[Settings]) -> Settings:
@@ -138,6 +146,11 @@ def _good(settings: Settings, axes: Sequence[DrivenAxis]) -> bool:
         and axis.rest(settings) <= max(settings.eps, axis.rest(usual))
         for axis in axes
     )
+
+
+def _dip(settings: Settings, load: float) -> float:
+    """How far a part is below where its feeder is to bring it, as a hand comes there [m]."""
+    return DIP * load * settings.feeder_limits[1] * (settings.step / TICK) ** 3
 
 
 def _axes(settings: Settings, layout: Layout, jitter: float) -> Iterator[DrivenAxis]:

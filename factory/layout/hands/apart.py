@@ -91,9 +91,9 @@ class HandsApart:
     def carriers_hand(
         self, robot: int, kind: Kind, found: Places, u: Way, t: Way
     ) -> Iterator[Swept]:
-        """A hand with all that is behind it, and the hand of the carrier: a tall one with all that
-        is behind that, since both are there at once; of one below the column, with all its way
-        ahead, where it comes from and goes."""
+        """A hand with all that is behind it, and the hand of the carrier: a tall one, as its lift
+        rises, with all that is behind that, since both are there at once; of one below the column,
+        with all its way ahead, where it comes from and goes."""
         carrier = self.holding.on[robot]
         if carrier < 0 or (hand := self.hand_of(carrier, t)).kind == "none":
             return
@@ -103,6 +103,7 @@ class HandsApart:
         own[1][:, 2] += self.holding.factory.strokes.get(robot, 0.0)
         at, radius = np.array(hand.places), np.full(len(hand.places), hand.radius)
         low, high = reach(self.holding.product, hand.kind, at, radius, t)
+        low[:, 2] -= self.holding.factory.strokes.get(carrier, 0.0)
         if hand.kind == "above":
             yield (*own, np.stack((low, high), axis=1))
             half = max(FINGER, hand.width) / 2

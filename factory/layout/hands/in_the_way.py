@@ -12,6 +12,7 @@ import numpy as np
 
 from factory.control.mode import Index, Truth
 from factory.geometry.meshes import Array
+from factory.layout.dimensions import SLOT
 from factory.layout.hands.apart import BESIDE, HandsApart, Swept
 from factory.layout.hands.hand import Hand, Kind
 from factory.layout.hands.holding import Holding, held
@@ -30,6 +31,7 @@ IN_THE_WAY = {
     "own": "other surfaces of its own are in the way",
     "hands": "hands that hold beside it are in the way",
     "feeder": "there is no room beside its feeder's pad",
+    "tray": "nothing would be left of the outfeed's tray beside it",
 }
 """What can be in the way of a hand."""
 
@@ -38,6 +40,11 @@ PLAY = 1e-6
 
 ROD = 0.008
 """Radius of the pad by which a feeder holds a part, at most [m]."""
+
+
+DIP, PUSHED = 0.02, 0.01
+"""A product dips so deep into the slot of the outfeed's tray at the most, which begins so far ahead
+of the hand [m]."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -132,6 +139,8 @@ class InTheWay:
             free["own"] &= ~first
         if self.holding.is_fed(robot) and kind == "above":
             free["feeder"] &= self._beside_rod(label, found, *frames[0])
+        if kind == "below" and self.holding.factory.drops(self.holding.last(robot).index):
+            free["tray"] &= self._beside_slot(found, frames[0][0])
         if kind == "behind" or (kind == "above" and not self.holding.is_fed(robot)):
             first |= True
         for passed in passing:
@@ -187,6 +196,17 @@ class InTheWay:
             least = min(ROD, width / (8 if width <= SMALL else 4))
             room |= left >= least + BESIDE
         return room
+
+    def _beside_slot(self, found: Places, u: Way) -> Truth:
+        """Whether something low of the product is over what is left of the tray: on a side of the
+        slot through which a hand comes, or ahead of that."""
+        along, ahead = (0, u[0]) if u[0] else (1, u[1])
+        boxes = self.holding.boxes(self._at_last(0))
+        boxes = boxes[boxes[:, 0, 2] < self.holding.product.low[2] + DIP]
+        half, at = halves(found.radius) + SLOT + BESIDE, found.at[:, 1 - along]
+        sides = boxes[:, 0, 1 - along].min() < at - half, boxes[:, 1, 1 - along].max() > at + half
+        end = (boxes[:, :, along] * ahead).max() - PUSHED
+        return np.asarray(sides[0] | sides[1] | (end > found.at[:, along] * ahead + half))
 
     def _leaving(self, robot: int, kind: Kind, found: Places, u: Way) -> Iterator[Swept]:
         """What a hand sweeps as seen from the parts of what it has delivered to, with their boxes,

@@ -153,7 +153,7 @@ class _Search:
                     part = "" if why == "hands" else self._part(box)
                     own = why == "joined" and part in self._own
                     yield ("own" if own else why, part), met, (low, high), box
-        for why in ("weak", "hands", "feeder"):
+        for why in ("weak", "hands", "feeder", "tray"):
             if not checks[why].all():
                 yield (why, ""), ~checks[why], None, None
 
