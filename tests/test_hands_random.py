@@ -54,3 +54,48 @@ def succeeds(project: Project, seed: int, units: int, jitter: float) -> None:
     assert (run.physics.grip_strength_share_max or 0.0) < 1
     deep = hidden.found()
     assert max((p.depth_mm for p in deep), default=0.0) < AT_MOST_MM, deep
+
+
+@pytest.mark.parametrize(("text", "units"), [(CROSSED, 1), (SPOOL, 2)], ids=["crossed", "spool"])
+def test_hands_that_met(text: str, units: int, tmp_path: Path) -> None:
+    succeeds(project_of(text, tmp_path), 0, units, 0.0)
+
+
+MET = {
+    2471: "a finger is broader than its pad",
+    2418: "a bar under what its carrier takes is in the way of the carrier's column",
+    2269: "a hand stays where a part comes down later",
+    3171: "a lift rises beside what its carrier takes along",
+    3287: "what is lowered comes before the carrier's hand",
+    2499: "a lift rises through what is brought",
+}
+"""Random products whose hands met, each for a cause of its own."""
+
+MET_LATER = {
+    2316: "what is lowered from behind passes the carrier's bar",
+    2341: "a carrier's column goes through another's bar",
+    3040: "a tower stands where a carrier comes with more",
+    2257: "a tray is so high that the shutter is down on it",
+}
+"""More of these, that take longer."""
+
+
+@pytest.mark.parametrize(
+    "seed", [*MET, *(pytest.param(seed, marks=pytest.mark.slow) for seed in MET_LATER)]
+)
+def test_random_products_whose_hands_met(seed: int, tmp_path: Path) -> None:
+    succeeds(project_of(random_product(seed), tmp_path), seed, 1 + seed % 2, 0.3 * (seed == 3287))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(100, 160))
+def test_hands_hold_and_meet_nothing(seed: int, tmp_path: Path) -> None:
+    text = random_blocks(seed) if seed % 4 == 0 else random_product(seed)
+    succeeds(project_of(text, tmp_path), seed, 3 - 2 * (seed // 2 % 2), 0.3 * (seed % 2))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(200, 220))
+def test_hands_of_few_robots_meet_nothing(seed: int, tmp_path: Path) -> None:
+    project = allocated(project_of(random_blocks(seed), tmp_path), Aim(LEAST, None, 2.0))
+    succeeds(project, seed, 3, 0.3 * (seed % 2))
