@@ -97,5 +97,5 @@ def test_hands_hold_and_meet_nothing(seed: int, tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(200, 220))
 def test_hands_of_few_robots_meet_nothing(seed: int, tmp_path: Path) -> None:
-    project = allocated(project_of(random_blocks(seed), tmp_path), Aim(LEAST, None, 2.0))
+    project = allocated(project_of(random_blocks(seed), tmp_path), Aim(LEAST, effort=12))
     succeeds(project, seed, 3, 0.3 * (seed % 2))

@@ -103,7 +103,8 @@ class HandsApart:
         own[1][:, 2] += self.holding.factory.strokes.get(robot, 0.0)
         at, radius = np.array(hand.places), np.full(len(hand.places), hand.radius)
         low, high = reach(self.holding.product, hand.kind, at, radius, t)
-        low[:, 2] -= self.holding.factory.strokes.get(carrier, 0.0)
+        if hand.kind == "behind":
+            low[:, 2] -= self.holding.factory.strokes.get(carrier, 0.0)
         if hand.kind == "above":
             yield (*own, np.stack((low, high), axis=1))
             half = max(FINGER, hand.width) / 2

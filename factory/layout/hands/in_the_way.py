@@ -294,10 +294,10 @@ class InTheWay:
         already, and as its lift rises; with it whether that is so whatever else, since it has a
         pile by then, and the lift is up."""
         low, high = self.reach(kind, found, u)
+        rising = low
         if kind == "behind":
             low, high = swept(low, high, back(u))
-        rising = low.copy()
-        rising[:, 2] -= self.holding.factory.strokes.get(robot, 0.0)
+            rising = low - [0.0, 0.0, self.holding.factory.strokes.get(robot, 0.0)]
         for operation in self.holding.made(robot):
             later = operation.before[operation.template.carrier - 1] != NOPART
             for guest, label in zip(operation.robots, operation.before, strict=True):
