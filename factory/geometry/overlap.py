@@ -37,6 +37,9 @@ FACING = 1e-9
 SAMPLES = 128
 """The most corners, and the most chords, of a common volume at which its depth is looked for."""
 
+LEAST = 1e-15
+"""Less in common than this [m³] is rounding: a millionth of a cubic millimetre."""
+
 BEYOND = 1e-9
 """A chord is followed from this far behind the face that it begins at [m]."""
 
@@ -186,7 +189,7 @@ def common(one: Any, other: Any, both: bool = True, samples: int = SAMPLES) -> C
     is that of the `other`. With few `samples` the depth is a lower bound, found sooner."""
     shared = one ^ other
     volume = float(shared.volume())
-    if shared.is_empty() or volume <= 0:
+    if shared.is_empty() or volume <= LEAST:
         return APART
     points = _within(shared, samples)
     bodies = (one, other) if both else (other,)
@@ -233,22 +236,30 @@ def _distances(points: Array, body: Any, shared: Any) -> Array:
 
 
 def _to_triangles(points: Array, triangles: Array) -> Array:
-    """The distance (n,) of each point from the nearest of triangles (m, 3, 3)."""
-    origin, edges = triangles[:, 0], np.roll(triangles, -1, axis=1) - triangles
+    """The distance (n,) of each point from the nearest of triangles (m, 3, 3), sought among those
+    whose balls come as near as the nearest middle of one."""
+    middles = triangles.mean(axis=1)
+    balls = np.linalg.norm(triangles - middles[:, None], axis=2).max(axis=1)
+    squared = (points**2).sum(axis=1)[:, None] + (middles**2).sum(axis=1)
+    apart = np.sqrt(np.maximum(squared - 2 * points @ middles.T, 0.0))
+    row, column = np.nonzero(apart - balls <= apart.min(axis=1)[:, None] + BEYOND)
+    found = np.full(len(points), np.inf)
+    np.minimum.at(found, row, _to_each(points[row], triangles[column]))
+    return found
+
+
+def _to_each(points: Array, triangles: Array) -> Array:
+    """The distance (n,) of each point from the triangle (n, 3, 3) beside it."""
+    edges = np.roll(triangles, -1, axis=1) - triangles
     normals = np.cross(edges[:, 0], -edges[:, 2])
     area = np.einsum("ij,ij->i", normals, normals)
-    flat = area <= 0
-    area[flat] = 1.0
-    height = (points @ normals.T - np.einsum("ij,ij->i", origin, normals)) / np.sqrt(area)
-    squared, inside = np.full(height.shape, np.inf), np.broadcast_to(~flat, height.shape).copy()
+    inside, squared = area > 0, np.full(len(points), np.inf)
+    height = np.einsum("ij,ij->i", points - triangles[:, 0], normals) ** 2
     for corner in range(3):
-        start, edge = triangles[:, corner], edges[:, corner]
+        off, edge = points - triangles[:, corner], edges[:, corner]
         length = np.maximum(np.einsum("ij,ij->i", edge, edge), 1e-300)
-        along = (points @ edge.T - np.einsum("ij,ij->i", start, edge)) / length
-        foot = np.clip(along, 0.0, 1.0)[..., None] * edge
-        off = points[:, None] - start - foot
-        squared = np.minimum(squared, np.einsum("ijk,ijk->ij", off, off))
-        inner = np.cross(normals, edge)
-        inside &= points @ inner.T >= np.einsum("ij,ij->i", start, inner)
-    squared = np.where(inside, height**2, squared)
-    return np.asarray(np.sqrt(squared.min(axis=1)))
+        share = np.clip(np.einsum("ij,ij->i", off, edge) / length, 0.0, 1.0)
+        beside = off - share[:, None] * edge
+        squared = np.minimum(squared, np.einsum("ij,ij->i", beside, beside))
+        inside &= np.einsum("ij,ij->i", off, np.cross(normals, edge)) >= 0
+    return np.asarray(np.sqrt(np.where(inside, height / np.where(area > 0, area, 1.0), squared)))

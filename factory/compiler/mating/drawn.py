@@ -25,9 +25,6 @@ from factory.geometry.solids import Solid
 ALIKE = 1e-6
 """Convex bodies are all of a mesh if their volumes differ by no more than this share."""
 
-LEAST = 1e-15
-"""Less in common than this [m³] is rounding: a millionth of a cubic millimetre."""
-
 QUICK, SURELY = 8, 10 * TOLERANCE
 """With so few samples a clash that is deeper than this [m] is told from a touch."""
 
@@ -122,9 +119,7 @@ class DrawnWays:
     def finished(self, one: int, other: int) -> float:
         """How deep two parts are in each other in the finished product [m]."""
         if (one, other) not in self._finished:
-            bodies = self._body(one), self._body(other)
-            empty = (bodies[0] ^ bodies[1]).volume() <= LEAST
-            self._finished[one, other] = 0.0 if empty else common(*bodies).depth
+            self._finished[one, other] = common(self._body(one), self._body(other)).depth
         return self._finished[one, other]
 
     def _path(self, moving: int, standing: int, axis: int, sign: int) -> tuple[float, float]:
@@ -147,9 +142,8 @@ class DrawnWays:
     def _cut(self, moving: int, standing: int, axis: int, sign: int, samples: int) -> Common | None:
         """What a part cuts out of another on its way; None for nothing."""
         swept, body = self._swept(moving, axis, sign), self._body(standing)
-        if (swept ^ body).volume() <= LEAST:
-            return None
-        return common(swept, body, both=False, samples=samples)
+        found = common(swept, body, both=False, samples=samples)
+        return found if found.volume else None
 
     def _shift(self, found: Common, moving: int, axis: int, sign: int) -> float:
         """How far the moving part has come where it meets the deepest point of a clash [m]."""
