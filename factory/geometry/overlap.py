@@ -80,6 +80,10 @@ class DrawnSolids:
             body = body.translate(shift)
         return common(body, self._body(other))
 
+    def shared(self, one: str, other: str) -> float:
+        """The volume [m³] that two parts have in common."""
+        return float((self._body(one) ^ self._body(other)).volume())
+
     def cut(self, one: str, other: str, shift: Array) -> Common:
         """What a part has in common with another anywhere on its way from its place to `shift` (3,)
         [m] from there, its place included. The depth is that in the second part alone: by how

@@ -24,6 +24,9 @@ NOTHING = 1e-15
 EVERYWHERE = 5e-4
 """So deep do parts of a drawing without fits overlap [m]."""
 
+NAMED = 6
+"""So many pairs are named that are allowed."""
+
 ROUNDING = 1e-9
 """A depth is allowed that is larger by no more than this [m]."""
 
@@ -74,7 +77,9 @@ class DrawnOverlaps:
             if pair.fault(allowed) is None:
                 named = any(a.parts and a.covers(pair.one, pair.other) for a in allowed)
                 (said if named else every).append(pair)
-        words = [f"{pair}, which is allowed" for pair in said]
+        words = [f"{pair}, which is allowed" for pair in said[:NAMED]]
+        if more := len(said[NAMED:]):
+            words.append(f"{more} more pairs of parts overlap, which is allowed")
         if every:
             most = max(a.depth for a in allowed if not a.parts)
             count = "a pair of parts overlaps"
@@ -121,11 +126,11 @@ def _found(product: Product) -> DrawnOverlaps:
     drawn = np.array([bodies.is_drawn(solid.label) for solid in solids], bool)
     pairs = []
     for one, other in _near(product):
-        if drawn[one] and drawn[other]:
-            labels = solids[one].label, solids[other].label
-            common = bodies.overlap(*labels)
-            if common.depth > SILENT and common.volume > NOTHING:
-                pairs.append(Overlapping(*labels, common.depth))
+        labels = solids[one].label, solids[other].label
+        if drawn[one] and drawn[other] and bodies.shared(*labels) > NOTHING:
+            depth = bodies.overlap(*labels).depth
+            if depth > SILENT:
+                pairs.append(Overlapping(*labels, depth))
     pairs.sort(key=lambda pair: -pair.depth)
     return DrawnOverlaps(
         tuple(pairs), tuple(s.label for s, good in zip(solids, drawn, strict=True) if not good)
