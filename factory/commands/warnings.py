@@ -34,8 +34,7 @@ def told(warnings: Sequence[Diagnostic], verbose: bool) -> list[Diagnostic]:
             listed[warning.code].append(warning)
         else:
             causes.setdefault(warning.many or number, []).append(warning)
-    first, *others = listed["Overlap"] or [None]
-    listed["Overlap"] = [*([first] if first else []), *(replace(one, hint="") for one in others)]
+    listed["Overlap"][1:] = [replace(one, hint="") for one in listed["Overlap"][1:]]
     for code, (most, words) in LISTED.items():
         if (more := len(listed[code]) - most) > 0:
             listed[code][most:] = [Diagnostic(code, f"and {more} more {words}", None, "list: -v")]
