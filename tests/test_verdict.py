@@ -24,6 +24,7 @@ from factory.record.log import read_log
 from factory.record.log.writer import LogWriter
 from factory.record.monitor import beside
 from factory.record.monitor.record import verdict_on, watch_log
+from factory.record.monitor.report import Report, Violation
 from factory.record.verdict import LIMITS, RunVerdict, check_figures, judged
 from factory.simulation.disturbance import Gain, Mass, Noise, disturb
 from factory.simulation.mujoco import world as mujoco_world
@@ -457,3 +458,26 @@ def test_every_limit_is_judged() -> None:
         assert not verdict.succeeded and replace(verdict, lenient=True).succeeded
     assert not judged(None, False, None, None, lenient=True).succeeded
     assert not judged(Diagnostic("Stalled", ""), True, None, None, lenient=True).succeeded
+
+
+def test_what_comes_first_is_the_cause_and_is_told_first() -> None:
+    """A contact before a load is dropped comes first, one after it does not; of many failures of a
+    code the first is told, and a hint for the cause alone."""
+    dropped = Diagnostic("Dropped", "r1 drops 'a'", None, "accelerate less")
+    seen = [Violation(2.3 + n, "r1", "a", "Dropped", f"nothing holds a#{n}") for n in range(17)]
+    report = Report((), (), tuple(seen))
+    hit = {"unintended_contacts": 3, "contacts": ["r2/pad - part/p13#1/2"], "dropped_s": 2.26}
+    before = judged(dropped, True, {**hit, "contact_first_s": 2.2}, report)
+    first, second = before.gathered
+    assert first.message.startswith("r2/pad hit p13 at 2.20 s; 3 unintended contacts: ")
+    assert second.message == "r1 drops 'a' (and 17 more)" and not second.hint
+    after = judged(dropped, True, {**hit, "contact_first_s": 2.27}, report).gathered
+    assert [line.code for line in after] == ["Dropped", "Contact"]
+    assert after[0].hint == "accelerate less"
+    model = judged(dropped, True, {**hit, "faults": [["NotSolid", "r2/pad is not solid"]]}, None)
+    assert model.failures[0].code == "NotSolid" and len(model.failures) == 3
+
+
+def test_figures_that_are_no_numbers_fail() -> None:
+    """An error that is nan is no small error."""
+    assert not judged(None, True, {"product_error_max_mm": float("nan")}, None).succeeded
