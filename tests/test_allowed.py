@@ -37,6 +37,8 @@ def test_an_overlap_is_named_and_fails_a_run(run: Terminal, deep: Path, tmp_path
     words = "base and peg overlap by 0.30 mm when finished"
     checked = run("check", deep)
     assert checked.status == 0 and f"Overlap warning: {words}" in checked.err
+    (pair,) = run("check", deep, "--json", "--allow", "base:peg:0.1mm").json["overlaps"]
+    assert pair == {"parts": ["base", "peg"], "depth_mm": pytest.approx(0.3), "allowed_mm": 0.1}
     log = tmp_path / "log"
     done = run("run", deep, "--log", log)
     assert done.status == 1

@@ -69,10 +69,28 @@ class Checked:
             "approaches": self.matings.as_json() if self.matings else None,
             "clashes": [mating.clashes_as_json() for mating in blocked],
             **({} if no_grips is None else {"no_grips": no_grips}),
+            **self._overlaps(),
             **self._allocation(),
             **({} if self.failures is None else {"failures": self.failures.as_json()}),
             "warnings": [warning.as_json() for warning in self.warnings],
         }
+
+    def _overlaps(self) -> dict[str, Any]:
+        """Which parts overlap when finished, by how much, and how much is allowed [mm]."""
+        if self.product is None or self.factory is None:
+            return {}
+        from factory.geometry.overlapping import overlaps_of
+
+        allowed = self.factory.pag.allowed
+        rows = [
+            {
+                "parts": [pair.one, pair.other],
+                "depth_mm": round(1e3 * pair.depth, 6),
+                "allowed_mm": round(1e3 * pair.most(allowed), 6),
+            }
+            for pair in overlaps_of(self.product).pairs
+        ]
+        return {"overlaps": rows}
 
     def _allocation(self) -> dict[str, Any]:
         """Which robots serve several labels, how few could do, and a live order."""
