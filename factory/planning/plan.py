@@ -187,7 +187,7 @@ def _planned(pose: Pose, asked: PlanOptions, budget: Budget) -> Planned:
         if all(left for _, left in made):
             lost = min((left for _, left in made), key=len)
             return sought_for(tuple(n for n in screws if n not in lost))
-        return Trees(tuple(judged for judged, left in made if not left), sought.optimal)
+        return Trees(tuple(judged for judged, left in made if not left), optimal=False)
 
     sought = sought_for(_screws(source, found, asked))
     layouts = Layouts(source, templates, asked.settings)
