@@ -25,20 +25,29 @@ WORDS = re.compile(
 
 HEAD, SHANK, SHORT, ROUND = 0.85, 0.75, 0.5, 0.16
 """A head is what reaches further from the axis than the first share of the widest; a shank no
-further than the second, and longer than the head; what is round is as wide as deep up to the
-last."""
+further than the second, longer than the head, and than half its width; what is round is as wide as
+deep up to the last."""
 
 
 def fasteners(source: InPlace, named: Sequence[str]) -> tuple[str, ...]:
     """The units of a source that are screws: those `named`, those whose names say so, and those
-    with a head that is wider than their shank."""
+    with a head that is wider than their shank, which is in another part."""
     kept = {keep.label for keep in source.kept}
+
+    def is_screw(part: PlacedPart) -> bool:
+        return _is_called(part) or _is_in_another(_shank(part.vertices), part, source)
+
     return tuple(
         label
         for label, parts in source.units()
-        if label in named
-        or (label not in kept and (_is_called(parts[0]) or _has_head(parts[0].vertices)))
+        if label in named or (label not in kept and is_screw(parts[0]))
     )
+
+
+def _is_in_another(point: Array | None, part: PlacedPart, source: InPlace) -> bool:
+    """Whether a point is in the box of another part: an antenna stands in the open."""
+    boxes = ((o.solid.low, o.solid.high) for o in source.parts if o is not part)
+    return point is not None and any((a < point).all() and (point < b).all() for a, b in boxes)
 
 
 def _is_called(part: PlacedPart) -> bool:
@@ -46,8 +55,8 @@ def _is_called(part: PlacedPart) -> bool:
     return bool(WORDS.search(re.sub(r"(?<=\D)\d{1,2}(?=$|\W|_)", "", name)))
 
 
-def _has_head(vertices: Array) -> bool:
-    """Whether points (n, 3) are those of a bolt along an axis."""
+def _shank(vertices: Array) -> Array | None:
+    """The middle of the shank, if points (n, 3) are those of a bolt along an axis."""
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     for axis in range(3):
         across = np.delete(vertices - (low + high) / 2, axis, axis=1)
@@ -59,9 +68,12 @@ def _has_head(vertices: Array) -> bool:
         ends = along[head].min(), length - along[head].max()
         tip = along > along[head].max() + 1e-6 if ends[0] < ends[1] else along < ends[0] - 1e-6
         outer = min(ends) < SHORT * length / 4 and bool(tip.any())
-        if outer and radius[tip].max() <= SHANK * radius.max() and radius.max() < length:
-            return True
-    return False
+        slim = outer and radius[tip].max() <= SHANK * radius.max()
+        if slim and radius.max() < max(ends):  # a brick has a stud that is shorter
+            middle = (low + high) / 2
+            middle[axis] = (vertices[tip, axis].min() + vertices[tip, axis].max()) / 2
+            return np.asarray(middle)
+    return None
 
 
 @dataclass(frozen=True)
