@@ -271,7 +271,7 @@ def test_a_robot_that_dies_where_it_went_ahead() -> None:
 def test_what_a_dead_robots_feeder_shows_goes_back(monkeypatch: pytest.MonkeyPatch) -> None:
     """Planted: it does not, and the deputy pulls it out of there."""
     monkeypatch.setattr(Feeders, "elsewhere", lambda feeders, layout: [])
-    run = simulated(INSERTS, "r4", 5.0)[0].run(max_time=60.0)
+    run = simulated(STEPS, "r3", 5.0)[0].run(max_time=60.0)
     assert len(run.exchanges) == 1 and figures(run)[2] > 1.0
 
 
