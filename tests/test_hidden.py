@@ -116,7 +116,7 @@ def test_all_that_is_drawn_is_solid() -> None:
     simulation = Simulation(laid_out(PAPER.read_text()), RunRequest())
     m = simulation.physical.m
     solid = {m.geom(int(i)).name for i in np.flatnonzero(drawn(m))}
-    assert {"r1/lid", "r2/rail", "outfeed/roof", "feeder/part1/boom", "part/part1#1"} <= solid
+    assert {"r1/number", "r2/rail", "outfeed/roof", "feeder/part1/boom", "part/part1#1"} <= solid
     assert not {"floor", "ground", "compass/1"} & solid
 
 

@@ -187,13 +187,13 @@ def test_everything_is_looked_at_for_a_while_after_a_push(
     monkeypatch.setattr(neighbours, "CALM", calm)
     simulation, shares, later = ready("20"), list[float](), list[float]()
     world = simulation.physical
-    while world.time < 2.0:
-        if world.time == pytest.approx(0.9):
+    while world.time < 2.9:
+        if world.time == pytest.approx(1.8):
             Interventions(simulation).push(0, 0.1, 0.05)
         simulation.supervisor.step()
-        if 0.91 < world.time < 0.95 + 0.9 * CALM:
+        if 1.81 < world.time < 1.85 + 0.9 * CALM:
             shares.append(looked_at(simulation))
-        elif world.time > 1.5:
+        elif world.time > 2.4:
             later.append(looked_at(simulation))
     assert not world.inspection.unintended
     assert (min(shares) == 1.0) == (calm > 0.0)

@@ -643,7 +643,8 @@ def test_summaries_are_told_and_drawn(tmp_path: Path, run: Terminal, here: None)
     pytest.importorskip("matplotlib")
     database = tmp_path / "r.db"
     words = ["--world", "ideal", "--vary", "seed=0:3", "--vary", "speed=0.3,0.5"]
-    assert run("sweep", PAPER, *words, "-o", database, "-q").out == ""
+    quiet = run("sweep", PAPER, *words, "-o", database, "-q")
+    assert quiet.err == "" and quiet.out.startswith("6 runs, 0 failed")
     told = run("sweep", database, "--summary")
     assert "speed 0.3: 3 runs" in told.out and "cycle_time_s" in told.out
     drawn = run("sweep", "--plots", tmp_path / "plots", "-o", database, "--json").json
