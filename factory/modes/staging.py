@@ -124,12 +124,14 @@ def stages_of(layout: Layout, modes: Sequence[Mode], settings: Settings) -> tupl
     return tuple(stage for stage in found if stage.axis in awaited or stage.axis != stage.robot)
 
 
-def with_time(layout: Layout, ahead: Sequence[HeadStart], world: World) -> tuple[HeadStart, ...]:
+def with_time(
+    layout: Layout, ahead: Sequence[HeadStart], world: World, wip: int | None = None
+) -> tuple[HeadStart, ...]:
     """Those of ways ahead for which robots have the time. In the ideal world none waits for a
     feeder, or for its own hand to be away: it takes the next part at once, and its operation moves
-    all of it together."""
-    operations = layout.factory.operations
-    return tuple(s for s in ahead if world == "mujoco" or operations[s.operation].inputs)
+    all of it together, unless `wip` bounds what is inside."""
+    late, operations = world == "mujoco" or wip is not None, layout.factory.operations
+    return tuple(s for s in ahead if late or operations[s.operation].inputs)
 
 
 def staged(starts: Sequence[Array], ahead: Sequence[HeadStart]) -> list[Array]:

@@ -12,7 +12,7 @@ from factory.control.mode import Limits, Mode
 from factory.layout.layout import Layout
 from factory.mjcf.timestep import timed
 from factory.modes.modes import operation_modes, robot_limits
-from factory.modes.staging import HeadStart, stages_of
+from factory.modes.staging import HeadStart, stages_of, with_time
 from factory.nets.history import firings
 from factory.nets.petri import Marking
 from factory.nets.replay import replay
@@ -83,9 +83,10 @@ class Simulation:
         self.modes = compiled.modes if compiled else operation_modes(layout, settings.eps)
         self.limits, gains = robot_limits(layout, settings, request.seed, request.jitter)
         stages = stages_of(layout, self.modes, settings)
-        self.delays = operation_delays(layout, self.modes, self.limits, settings, world, stages)
+        ahead = with_time(layout, stages, world, request.wip)
+        self.delays = operation_delays(layout, self.modes, self.limits, settings, world, ahead)
         told = self.delays, self.limits, settings, world
-        self.ways = all_ways(layout, self.modes, stages, *told)
+        self.ways = all_ways(layout, self.modes, ahead, *told)
         self.counts = firings(net, self.start)
         self.model: Model | None = None
         self.world: World

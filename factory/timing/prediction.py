@@ -20,7 +20,7 @@ from factory.layout.hands.limbs import rises_first
 from factory.layout.hands.meeting import delivered_at
 from factory.layout.layout import Layout
 from factory.modes.modes import operation_modes, operation_starts, robot_limits
-from factory.modes.staging import HeadStart, staged, stages_of, with_time
+from factory.modes.staging import HeadStart, staged, stages_of
 from factory.nets.ways import with_ways
 from factory.support.settings import Settings
 from factory.timing.cycle_time import (
@@ -41,10 +41,10 @@ def operation_delays(
     ahead: Sequence[HeadStart] = (),
 ) -> list[float]:
     """The time [s] from X_s to X_e of every operation, and the tick until what follows can fire.
-    `ahead`: the ways that robots go while they wait."""
+    `ahead`: the ways that robots go while they wait, those that they have the time for."""
     factory = layout.factory
     settle = settings.settle if world == "mujoco" else 0.0
-    starts = staged(operation_starts(layout), with_time(layout, ahead, world))
+    starts = staged(operation_starts(layout), ahead)
     return [
         mode_time(mode, start, limits.of(axes), world) + settle + settings.tick
         for axes, mode, start in zip(factory.axes, modes, starts, strict=True)
@@ -152,7 +152,6 @@ def all_ways(
 ) -> dict[tuple[int, int], float]:
     """The ways ahead, with what waits for these robots, and in MuJoCo the waits for hands, which
     the ideal world has not."""
-    stages = with_time(layout, stages, world)
     found = longer(
         ways_ahead(stages, limits, settings, world),
         held_up(layout, modes, limits, settings, world, stages),

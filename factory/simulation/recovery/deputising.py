@@ -10,7 +10,7 @@ from factory.layout.layout import Layout
 from factory.layout.scrapping import not_carried_back
 from factory.layout.standby import deputies_in, part_of
 from factory.modes.modes import operation_modes, robot_limits
-from factory.modes.staging import stages_of
+from factory.modes.staging import stages_of, with_time
 from factory.nets.undone import Undone
 from factory.nets.verify import proved
 from factory.record.exchange import Exchange
@@ -94,6 +94,7 @@ class Deputising:
         limits = robot_limits(first, settings, request.seed, request.jitter)[0].of(axes)
         modes = operation_modes(alone, settings.eps)
         stages = stages_of(alone, modes, settings)
+        stages = with_time(alone, stages, world, request.wip)
         delays = operation_delays(alone, modes, limits, settings, world, stages)
         ways = all_ways(alone, modes, stages, delays, limits, settings, world)
         predicted = predict(alone, delays, settings, world, request.wip, ways).seconds
