@@ -94,9 +94,9 @@ class Deputising:
         limits = robot_limits(first, settings, request.seed, request.jitter)[0].of(axes)
         modes = operation_modes(alone, settings.eps)
         stages = stages_of(alone, modes, settings)
-        stages = with_time(alone, stages, world, request.wip)
-        delays = operation_delays(alone, modes, limits, settings, world, stages)
-        ways = all_ways(alone, modes, stages, delays, limits, settings, world)
+        ahead = with_time(alone, stages, world, request.wip)
+        delays = operation_delays(alone, modes, limits, settings, world, ahead)
+        ways = all_ways(alone, modes, ahead, delays, limits, settings, world)
         predicted = predict(alone, delays, settings, world, request.wip, ways).seconds
         simulation.modes, simulation.delays, self._books.layout = modes, delays, change.layout
         own = [replace(s, robot=stay[s.robot], axis=axes[s.axis]) for s in stages]
