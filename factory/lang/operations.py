@@ -21,36 +21,34 @@ from factory.problem.template import Template
 from factory.support.errors import Position, did_you_mean
 from factory.support.settings import DWELL
 
-MEANT: Mapping[str, str] = MappingProxyType(
+
+def _words(meant: Mapping[str, str]) -> Mapping[str, str]:
+    """What each word means, of names with the words that are written in their place."""
+    return MappingProxyType({word: name for name, line in meant.items() for word in line.split()})
+
+
+MEANT = _words(
     {
-        word: name
-        for name, words in {
-            "pos": "position at place location xyz translate origin",
-            "rgba": "color colour rgb col",
-            "quat": "rotation rotate rot orientation turn angle euler rpy quaternion",
-            "box": "size dimensions dims cube cuboid block",
-            "cylinder": "cyl radius height rod tube",
-            "sphere": "ball",
-            "mesh": "file path stl obj model shape geometry",
-            "mass": "weight kg",
-            "dwell": "time duration seconds wait",
-        }.items()
-        for word in words.split()
+        "pos": "position at place location xyz translate origin",
+        "rgba": "color colour rgb col",
+        "quat": "rotation rotate rot orientation turn angle euler rpy quaternion",
+        "box": "size dimensions dims cube cuboid block",
+        "cylinder": "cyl radius height rod tube",
+        "sphere": "ball",
+        "mesh": "file path stl obj model shape geometry",
+        "mass": "weight kg",
+        "dwell": "time duration seconds wait",
     }
 )
 """The parameters that are meant by words that people write in their place."""
 
-MEANT_OPERATIONS: Mapping[str, str] = MappingProxyType(
+MEANT_OPERATIONS = _words(
     {
-        word: name
-        for name, words in {
-            "atomic": "part box cylinder sphere mesh component primitive leaf",
-            "mate": "join assemble attach combine connect merge union add fit",
-            "insert": "put place",
-            "weld": "solder fasten",
-            "glue": "bond stick",
-        }.items()
-        for word in words.split()
+        "atomic": "part box cylinder sphere mesh component primitive leaf",
+        "mate": "join assemble attach combine connect merge union add fit",
+        "insert": "put place",
+        "weld": "solder fasten",
+        "glue": "bond stick",
     }
 )
 """The operations that are meant by words that people write in their place."""
