@@ -6,20 +6,23 @@ checked.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from factory.compiler.compiler import compile_pag
+from factory.compiler.expanding import expand
 from factory.lang.pag_reader import load_pag
 from factory.lang.template_reader import load_templates
 from factory.layout.request import Ground
 from factory.plant.approaches import Approach
 from factory.plant.factory import Factory
 from factory.problem.pag import PAG
+from factory.problem.plan import Plan
+from factory.problem.plan_file import read_plan
 from factory.problem.robot_types import Catalogue, load_catalogue
 from factory.problem.shapes import is_plain, is_shaped
 from factory.problem.template import Template
@@ -39,7 +42,7 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class Project:
     """A PAG with all that follows from it: its geometry, factory and layout, each computed when it
-    is first used. `templates` and `catalogue` are what it is compiled with, `settings` and
+    is first used. `templates`, `catalogue` and `plan` are what it is compiled with, `settings` and
     `ground` what it is laid out for."""
 
     pag: PAG
@@ -47,16 +50,43 @@ class Project:
     catalogue: Catalogue = field(default_factory=load_catalogue, repr=False)
     settings: Settings = field(default_factory=Settings)
     ground: Ground = field(default_factory=Ground)
+    plan: Plan = field(default_factory=Plan)
 
-    def with_pag(self, pag: PAG, ground: Ground) -> Project:
-        """The same product by another tree, or on another ground; what is known of its parts is
-        kept."""
-        found = replace(self, pag=pag, ground=ground)
-        known = {"product"} if pag is not self.pag else {"product", "matings", "compiled"}
-        if pag is self.pag and _program(ground) == _program(self.ground):
-            known |= {"plain", "_hands"}
-        found.__dict__.update({name: self.__dict__[name] for name in known & set(self.__dict__)})
-        return found
+    def with_pag(self, pag: PAG) -> Project:
+        """The same parts with another PAG."""
+        return self._changed({"product"}, pag=pag)
+
+    def with_plan(self, plan: Plan) -> Project:
+        """The same product by another plan."""
+        if plan.forms == self.plan.forms:
+            return self._changed({"product", "matings", "compiled"}, plan=plan)
+        return self._changed({"product"}, plan=plan)
+
+    def with_ground(self, ground: Ground) -> Project:
+        """The same factory on another ground."""
+        return self._changed({"product", "matings", "compiled", "plain", "_hands"}, ground=ground)
+
+    def with_lines(self, lines: Sequence[Sequence[str]]) -> Project:
+        """The project in which the robots that bring the labels of a line are one robot. Raises
+        InputError (BadLine)."""
+        from factory.compiler.folding import fold, lines_of_labels
+
+        factory = self.planned
+        made = fold(factory, lines_of_labels(factory, lines), self.catalogue)
+        return self.with_plan(made.plan)
+
+    def with_branches(self, branches: Sequence[tuple[str, int]]) -> Project:
+        """The project in which the branches that bring some labels are there several times. Raises
+        InputError (Parallel)."""
+        from factory.compiler.parallel import in_parallel
+
+        return self.with_plan(in_parallel(self.planned, branches).plan)
+
+    def _changed(self, known: Collection[str], **values: Any) -> Project:
+        """With other values, and what is `known` of it already."""
+        made = replace(self, **values)
+        made.__dict__.update({name: self.__dict__[name] for name in known & self.__dict__.keys()})
+        return made
 
     @property
     def file(self) -> Path:
@@ -93,7 +123,7 @@ class Project:
             return None
         from factory.compiler.mating.mating import matings
 
-        return matings(self.pag, self.templates, self.product)
+        return matings(expand(self.pag, self.templates, self._single), self.product)
 
     @property
     def overlaps(self) -> DrawnOverlaps:
@@ -136,20 +166,9 @@ class Project:
 
     @cached_property
     def plain(self) -> Factory:
-        """Compile(P), folded where the ground has lines, unrolled where it has parallel branches,
-        without relays. Raises InputError where there is no such factory."""
-        lines, branches = self.ground.lines, self.ground.parallel
-        if not (lines or branches):
-            return self.compiled
-        from factory.compiler.folding import fold, lines_of_labels
-        from factory.compiler.mating.mating import judged
-        from factory.compiler.parallel import in_parallel
-
-        factory = judged(self.compiled, self.product)
-        if lines:
-            factory = fold(factory, lines_of_labels(factory, lines), self.catalogue)
-        factory = in_parallel(factory, branches)
-        if not self.settings.hands:
+        """The factory of the plan, without relays. Raises InputError where there is none."""
+        factory, plan = self.planned, self.plan
+        if not (self.settings.hands and plan.turns) or plan.lifts is not None:
             return factory
         from factory.layout.hands.adjusting import with_lifts
         from factory.layout.repeated import repeated
@@ -158,10 +177,27 @@ class Project:
         return with_lifts(factory, product, self.catalogue, self.settings.acceleration)
 
     @cached_property
+    def planned(self) -> Factory:
+        """The same, but for lifts of robots with several tours."""
+        if not self.plan.turns:
+            return self.compiled
+        from factory.compiler.assigning import shared
+        from factory.compiler.mating.mating import judged
+
+        return shared(judged(self.compiled, self.product), self.plan, self.catalogue)
+
+    @property
+    def _single(self) -> Plan:
+        """The plan with a robot for each tour, and without relays."""
+        return Plan(self.plan.forms)
+
+    @cached_property
     def compiled(self) -> Factory:
-        """Compile(P): a robot for each label, neither folded nor relayed. Raises InputError where
-        there is no such factory."""
-        factory = compile_pag(self.pag, self.templates, self.catalogue, self.approaches)
+        """The factory of the plan, with a robot for each tour and without relays. Raises InputError
+        where there is no such factory."""
+        factory = compile_pag(
+            self.pag, self.templates, self.catalogue, self.approaches, self._single
+        )
         own = {name for name, template in self.templates.items() if not _is_shipped(template)}
         tried = own and own & {operation.template.name for operation in factory.operations}
         if tried:
@@ -182,11 +218,6 @@ class Project:
         """The factory with the relays of its layout if its ground asks for them, else the plain
         one. Raises as these do."""
         return self.layout.factory if self.ground.relays else self.plain
-
-
-def _program(ground: Ground) -> object:
-    """What of a ground the plain factory depends on."""
-    return ground.lines, ground.parallel
 
 
 def _is_shipped(template: Template) -> bool:
@@ -212,8 +243,10 @@ def read(
     settings: Settings | None = None,
     ground: Ground = Ground(),  # noqa: B008 (frozen)
 ) -> Project:
-    """The project of a PAG file. Raises InputError with every error found in the file."""
-    templates = all_templates(folders)
-    return Project(
-        load_pag(path, templates), templates, load_catalogue(), settings or Settings(), ground
-    )
+    """The project of a PAG file, or of the file of a plan. Raises InputError with every error
+    found in the file."""
+    templates, plan = all_templates(folders), Plan()
+    if Path(path).suffix == ".json":
+        path, plan = read_plan(Path(path))
+    pag, settings = load_pag(path, templates), settings or Settings()
+    return Project(pag, templates, load_catalogue(), settings, ground, plan)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 
-from factory.compiler.compiler import compile_pag, gear_net
+from factory.compiler.compiler import compile_pag
 from factory.compiler.folding import (
     Line,
     delivery,
@@ -17,6 +17,7 @@ from factory.compiler.folding import (
     mismatch,
     sides_of,
 )
+from factory.compiler.gearing import gear_net
 from factory.compiler.mating.mating import judged
 from factory.layout.durations import Pace
 from factory.layout.embedding import lay_out

@@ -12,6 +12,7 @@ import numpy as np
 
 import factory
 from factory.compiler.compiler import compile_pag
+from factory.compiler.expanding import expand
 from factory.compiler.mating.mating import matings
 from factory.geometry.product import product_geometry
 from factory.lang import read_pag
@@ -38,7 +39,7 @@ def laid_out_with_lifts(text: str) -> Layout:
     templates = all_templates()
     pag = read_pag(text, templates)
     product = product_geometry(pag)
-    found = matings(pag, templates, product).approaches
+    found = matings(expand(pag, templates), product).approaches
     made = compile_pag(pag, templates, load_catalogue(), found)
     return factory.lay_out(made)
 

@@ -7,7 +7,8 @@ from dataclasses import replace
 import pytest
 from hypothesis import given
 
-from factory.compiler.compiler import compile_pag, expand
+from factory.compiler.compiler import compile_pag
+from factory.compiler.expanding import expand
 from factory.lang import read_pag
 from factory.problem.pag import PAG
 from factory.problem.robot_types import Catalogue, RobotType, load_catalogue

@@ -3,6 +3,7 @@ the same, the net is proved as before, and the choice is the best for what it go
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
@@ -18,27 +19,26 @@ from pag_values import TEMPLATES as OWN
 
 import factory
 from factory.compiler.compiler import compile_pag
+from factory.compiler.expanding import expand, joins
 from factory.compiler.mating.admitting import Admitted, admitted
-from factory.lang import read_pag, write_pag
 from factory.lang.template_reader import load_templates
 from factory.layout.durations import Pace
 from factory.nets.verify import verify
 from factory.pipeline import Project, read
+from factory.plant.factory import Factory
 from factory.problem.pag import PAG
+from factory.problem.plan import THIRD, Plan
 from factory.problem.robot_types import load_catalogue
 from factory.problem.template import Template
 from factory.study.allocation.aim import Aim
 from factory.study.allocation.candidate import Candidate
 from factory.study.allocation.forms import (
-    THIRD,
     FormsTask,
     Option,
     _finished,
     _joined,
     best_forms,
     forms_task,
-    joins,
-    reformed,
     written_forms,
 )
 from factory.study.allocation.search import Search, allocated
@@ -62,9 +62,8 @@ def task_of(pag: PAG, admits: dict[str, Admitted] | None = None) -> FormsTask:
     return forms_task(pag, TEMPLATES, admits or {}, boxes, Pace())
 
 
-def parts_made(pag: PAG) -> set[frozenset[str]]:
+def parts_made(plain: Factory) -> set[frozenset[str]]:
     """The parts of all that is joined."""
-    plain = compile_pag(pag, TEMPLATES, load_catalogue())
     return {frozenset(plain.contents[o.label]) for o in plain.operations[:-1] if len(o.inputs) > 1}
 
 
@@ -74,11 +73,10 @@ def test_the_same_is_joined_with_the_robots_that_are_counted(
 ) -> None:
     pag = random_pag(size, seed, shape)
     forms, _ = best_forms(task_of(pag), bound)
-    again = reformed(pag, TEMPLATES, forms)
-    assert parts_made(again) == parts_made(pag)
-    read_again = read_pag(write_pag(again), TEMPLATES)
-    assert write_pag(read_again) == write_pag(again), "it is a PAG that can be written down"
-    made = compile_pag(again, TEMPLATES, load_catalogue())
+    plan = Plan(forms)
+    assert Plan.of_json(json.loads(json.dumps(plan.as_json()))) == plan, "it can be written down"
+    made = compile_pag(pag, TEMPLATES, load_catalogue(), plan=plan)
+    assert parts_made(made) == parts_made(compile_pag(pag, TEMPLATES, load_catalogue()))
     assert verify(made.net).holds
     parts = len(made.leaves)
     tools = sum(robot.type == "tool" for robot in made.robots)
@@ -141,18 +139,20 @@ def _forms(task: FormsTask, option: Option) -> dict[str, int]:
 def test_a_statement_of_many_inputs_is_cut_where_its_pile_changes_hands() -> None:
     pag = table_pag("s", ("s", "mate", "a b c d e", {}), *((x, "atomic", "", {}) for x in "abcde"))
     forms = {"s/2": 1, "s/3": 0, "s/4": THIRD, "s": 1}
-    text = write_pag(reformed(pag, TEMPLATES, forms))
-    assert "s = insert ( e, s.4 );" in text
-    assert "s.4 = mate ( s.3, d );" in text
-    assert "s.3 = insert ( s.2, c );" in text
-    assert "s.2 = insert ( b, a );" in text
+    nodes = expand(pag, TEMPLATES, Plan(forms)).items()
+    assert {x: (node.template.name, node.inputs) for x, node in nodes if node.inputs} == {
+        "s/2": ("insert", ("b", "a")),
+        "s/3": ("insert", ("s/2", "c")),
+        "s/4": ("mate", ("s/3", "d")),
+        "s": ("insert", ("e", "s/4")),
+    }
 
 
 @given(sizes, seeds, shapes)
 def test_forms_as_they_are_written_change_nothing(size: int, seed: int, shape: str) -> None:
     pag = random_pag(size, seed, shape)
-    again = reformed(pag, TEMPLATES, written_forms(task_of(pag)))
-    assert again.nodes == pag.nodes
+    plan = Plan(written_forms(task_of(pag)))
+    assert expand(pag, TEMPLATES, plan) == expand(pag, TEMPLATES)
 
 
 def test_a_form_that_is_refused_is_not_chosen() -> None:
@@ -165,7 +165,7 @@ def test_a_form_that_is_refused_is_not_chosen() -> None:
 
 def test_both_axes_are_looked_at_as_matings_does() -> None:
     project = read(EXAMPLES / "truck.pag")
-    found = admitted(project.pag, project.templates, project.product)
+    found = admitted(expand(project.pag, project.templates), project.product)
     assert project.matings is not None
     for mating in project.matings.all:
         assert found[mating.label].slides[mating.approach.axis] == mating.slide

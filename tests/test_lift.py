@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from factory.compiler.expanding import expand
 from factory.compiler.mating.mating import matings
 from factory.geometry.product import product_geometry
 from factory.lang.pag_reader import read_pag
@@ -194,6 +195,6 @@ def test_a_catalogue_without_lifts_is_told() -> None:
 
     templates = all_templates()
     pag = read_pag(FENCE, templates)
-    found = matings(pag, templates, product_geometry(pag)).approaches
+    found = matings(expand(pag, templates), product_geometry(pag)).approaches
     with pytest.raises(InputError, match="must be lowered, and a 'dot' has no lift"):
         compile_pag(pag, templates, catalogue(), found)

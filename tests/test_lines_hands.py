@@ -17,7 +17,6 @@ from factory.layout.hands.choosing import Hands
 from factory.layout.hands.hand import AIR, Hand
 from factory.layout.hands.limbs import limbs
 from factory.layout.layout import Layout
-from factory.layout.request import Ground
 from factory.mjcf import hanging
 from factory.mjcf.hanging import Hanging
 from factory.pipeline import Project, read
@@ -102,7 +101,8 @@ def planned(text: str, line: tuple[str, ...], hands: int = 1, shared: bool = Tru
     with TemporaryDirectory() as folder:
         file = Path(folder) / "product.pag"
         file.write_text(text)
-        found = read(file, (), Settings(hands=hands), Ground(lines=(line,) if shared else ()))
+        found = read(file, (), Settings(hands=hands))
+        found = found.with_lines([line]) if shared else found
         assert found.layout
         return found
 

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 from factory.commands.warnings import LISTED, told
-from factory.compiler.compiler import expand
+from factory.compiler.expanding import expand
 from factory.compiler.mating import overlaps, seeking
 from factory.compiler.mating.depth import Difference, exact, polytope, rough, summits
 from factory.compiler.mating.findings import (
@@ -89,7 +89,7 @@ def plate(hole: float, axis: int, size: float = 30, thick: float = 5) -> list[np
 def judged(text: str, **pieces: list[np.ndarray]) -> Matings:
     """The matings of a PAG whose parts `pieces` are made of these convex bodies."""
     pag, product = made_of(text, **pieces)
-    return matings(pag, TEMPLATES, product)
+    return matings(expand(pag, TEMPLATES), product)
 
 
 def made_of(text: str, **pieces: list[np.ndarray]) -> tuple[PAG, Product]:
@@ -289,7 +289,7 @@ def test_axes_alternate_with_the_robots_that_bring() -> None:
     text = """root = r; r = weld ( t ); t = mate ( u, d, e ); u = weld ( v ); v = mate ( a, b );
     e = mate ( f, g ); a = atomic(); b = atomic(); d = atomic(); f = atomic(); g = atomic()"""
     pag = read_pag(text, TEMPLATES)
-    found = {m.label: (m.axis, m.either) for m in meetings(expand(pag, TEMPLATES), "r").all}
+    found = {m.label: (m.axis, m.either) for m in meetings(expand(pag, TEMPLATES)).all}
     assert found == {"v": (0, True), "t/2": (1, True), "e": (0, True), "t": (1, False)}
 
 
@@ -297,7 +297,7 @@ def test_axes_alternate_with_the_robots_that_bring() -> None:
 @settings(max_examples=60)
 def test_parts_meet_at_their_lowest_common_operation(pag: PAG) -> None:
     nodes = expand(pag, TEMPLATES)
-    found = meetings(nodes, pag.root)
+    found = meetings(nodes)
     above = {name: label for label, node in nodes.items() for name in node.inputs}
 
     def ancestors(label: str) -> list[str]:
@@ -326,14 +326,14 @@ def test_default_boxes_always_slide(pag: PAG) -> None:
     plain = tuple(n if n.inputs else replace(n, parameters=()) for n in pag.nodes)
     bare = replace(pag, nodes=plain)
     assert not is_shaped(bare)
-    found = matings(bare, TEMPLATES, product_geometry(bare))
+    found = matings(expand(bare, TEMPLATES), product_geometry(bare))
     assert all(m.approach.kind == "slide" and m.level == STRICT for m in found.all)
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_large_default_products_always_slide(seed: int) -> None:
     pag = read_pag(random_pag_text(1500 + seed, seed), TEMPLATES)
-    found = matings(pag, TEMPLATES, product_geometry(pag))
+    found = matings(expand(pag, TEMPLATES), product_geometry(pag))
     assert found.count(STRICT) == len(found.all) and not found.of_kind("lower")
 
 
@@ -341,7 +341,7 @@ def test_ten_thousand_parts_are_judged_fast() -> None:
     pag = read_pag(random_pag_text(19_999, 1), TEMPLATES)
     product = product_geometry(pag)
     begin = time.process_time()
-    assert len(matings(pag, TEMPLATES, product).approaches) == 9_999
+    assert len(matings(expand(pag, TEMPLATES), product).approaches) == 9_999
     assert time.process_time() - begin < 2.0
     assert len(product.solids) > CHUNK
 
@@ -671,10 +671,10 @@ def test_names_of_pictures_are_safe_and_differ() -> None:
 def test_a_picture_is_the_same_every_time_and_survives_odd_labels() -> None:
     pag = read_pag(CLOSED.replace("front", "fé"), TEMPLATES)
     product = product_geometry(pag)
-    found = matings(pag, TEMPLATES, product)
+    found = matings(expand(pag, TEMPLATES), product)
     (mating,) = found.of_kind("blocked")
     picture = draw(mating, found, product)
-    assert picture == draw(mating, matings(pag, TEMPLATES, product), product)
+    assert picture == draw(mating, matings(expand(pag, TEMPLATES), product), product)
     odd = ElementTree.fromstring(draw(replace(mating, label="<&>" + "x" * 90), found, product))
     assert "<&>xxxx" in "".join(odd.itertext())
 
@@ -699,4 +699,4 @@ def test_random_products_have_nested_levels_and_consistent_exclusions(seed: int)
 
 def test_matings_of_a_single_part_are_none(templates: Mapping[str, Template]) -> None:
     pag = read_pag("root = a; a = atomic ( sphere = 0.1 )", templates)
-    assert matings(pag, templates, product_geometry(pag)).all == ()
+    assert matings(expand(pag, templates), product_geometry(pag)).all == ()

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from factory.compiler.compiler import expand
+from factory.compiler.expanding import expand
 from factory.nets import threads as nets_threads
 from factory.nets.petri import PetriNet, Place, Transition
 from factory.nets.threaded import Slot, ThreadedNet

@@ -17,7 +17,6 @@ from factory.export.certificate.writer import certificate
 from factory.foreign_nets.explore import explore
 from factory.layout.bounds import cycle_time_bound
 from factory.layout.durations import Pace, cycle_of
-from factory.layout.request import Ground
 from factory.nets.history import legal_marking
 from factory.nets.marked import marked
 from factory.nets.replay import replay
@@ -224,8 +223,8 @@ def test_a_mate_has_one_junction() -> None:
 def project(k: int, hands: int = 0) -> Project:
     """That product with so many branches."""
     settings = Settings(hands=hands)
-    ground = Ground(parallel=(("sub2", k),))
-    return Project(slow(), all_templates(), load_catalogue(), settings, ground)
+    made = Project(slow(), all_templates(), load_catalogue(), settings)
+    return made.with_branches([("sub2", k)])
 
 
 def carried_out(k: int, world: WorldName, units: int, hands: int = 0, **more: Any) -> Run:

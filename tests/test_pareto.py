@@ -180,7 +180,7 @@ def test_files_stand_alone_and_stay_in_their_folder(out: Path, own_folder: Path)
     for name in own_folder.rglob("*.*"):
         name.unlink()
     for number, one in enumerate(front.points):
-        again = read_back_with_operations(out / "a" / "b" / f"p{number + 1:02d}" / "product.pag")
+        again = read_back_with_operations(out / "a" / "b" / f"p{number + 1:02d}" / "plan.json")
         assert len(again.plain.robots) == one.robots - one.relays
 
 

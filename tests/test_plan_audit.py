@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from manifold3d import Manifold, OpType
 
+from factory.compiler.expanding import expand
 from factory.compiler.mating.findings import Mating
 from factory.compiler.mating.mating import matings
 from factory.geometry.overlap import drawn
@@ -52,7 +53,7 @@ def test_no_way_of_a_plan_leads_through_solid(name: str) -> None:
     assert isinstance(found, Planned)
     made = planned_product(source, found.tree, found.orientation)
     product = product_geometry(made.pag, made.files)
-    judged = matings(made.pag, TEMPLATES, product)
+    judged = matings(expand(made.pag, TEMPLATES), product)
     assert len(judged.all) == len(source.units()) - 1 and not judged.of_kind("blocked")
     bodies = {label: drawn(solid) for label, solid in product.solids.items()}
     for mating in judged.all:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from factory.compiler.expanding import expand
 from factory.compiler.mating.mating import matings
 from factory.geometry.product import product_geometry
 from factory.pipeline import all_templates, read
@@ -30,7 +31,7 @@ def blocked(file: Path, found: Planned) -> tuple[int, int]:
     """How many operations `check` finds blocked: as written, and as planned."""
     source = read_source(file, TEMPLATES, SourceOptions(replan=True))
     made = planned_product(source, found.tree, found.orientation)
-    theirs = matings(made.pag, TEMPLATES, product_geometry(made.pag, made.files))
+    theirs = matings(expand(made.pag, TEMPLATES), product_geometry(made.pag, made.files))
     written = read(file).matings
     assert written is not None and len(theirs.all) == len(written.all) == found.figures.operations
     return len(written.of_kind("blocked")), len(theirs.of_kind("blocked"))

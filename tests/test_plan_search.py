@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from factory.compiler.expanding import expand
 from factory.compiler.mating.admitting import admitted
 from factory.compiler.mating.findings import BLOCKED, LEFT_OUT, NO_DEEPER, STRICT
 from factory.compiler.mating.mating import matings
@@ -257,7 +258,10 @@ def test_what_is_free_is_what_check_calls_free(source: InPlace, stance: Stance, 
 
     pag = planned_product(source, named(made[0]), stance.rotation).pag
     solids = product_geometry(pag)
-    theirs, admits = matings(pag, TEMPLATES, solids), admitted(pag, TEMPLATES, solids)
+    theirs, admits = (
+        matings(expand(pag, TEMPLATES), solids),
+        admitted(expand(pag, TEMPLATES), solids),
+    )
     inside: dict[str, frozenset[int]] = {
         p.label: frozenset([n]) for n, p in enumerate(source.parts)
     }

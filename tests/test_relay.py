@@ -14,9 +14,11 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from layout_values import STYLES, paper_layout, random_layout, row_of_inserts, table_pag
-from pag_values import SHAPES, factory_of
+from layout_values import STYLES, paper_layout, random_layout, row_of_inserts
+from pag_values import SHAPES
 
+from factory.compiler.compiler import compile_pag
+from factory.compiler.expanding import expand, nodes_of
 from factory.lang import read_pag, write_pag
 from factory.lang.template_reader import load_templates
 from factory.layout.clearance import certify
@@ -26,11 +28,11 @@ from factory.layout.embedding import lay_out
 from factory.layout.layout import Layout
 from factory.layout.optimising import optimised
 from factory.layout.relaying import relayed
-from factory.layout.relaying.naming import named
 from factory.layout.relaying.splitting import split
 from factory.layout.relaying.ways import Way, ways
 from factory.nets.verify import verify
 from factory.pipeline import read
+from factory.problem.plan import Plan
 from factory.problem.robot_types import load_catalogue
 from factory.problem.template import Template
 from factory.record.monitor import beside
@@ -90,7 +92,7 @@ def cuttable(plain: Layout) -> tuple[Layout, dict[str, Way]]:
 
 
 def cut(layout: Layout, found: dict[str, Way], numbers: dict[str, int]) -> Layout:
-    return split(layout, found, numbers, templates_of(layout), load_catalogue())[0]
+    return split(layout, found, numbers, templates_of(layout), load_catalogue())
 
 
 def cut_at_random(plain: Layout, seed: int, most: bool = False) -> tuple[Layout, Layout, int]:
@@ -147,30 +149,25 @@ def test_a_source_line_is_kept() -> None:
     relays = [o for o in after.factory.operations if o.template.name == "relay"]
     assert relays
     for relay in relays:
-        assert relay.position == after.factory.by_label[relay.label.partition(".")[0]].position
+        assert relay.position == after.factory.by_label[relay.label.partition("/")[0]].position
 
 
-def test_piles_are_written_out_where_they_are_relayed() -> None:
-    factory = row_of_inserts(5).factory
-    pag = named(factory, {"x/3": 1}).pag
-    lines = write_pag(replace(pag, nodes=tuple(node for node in pag.nodes if node.inputs)))
-    assert lines.splitlines() == [
-        "root = x;",
-        "x.2 = mate ( p0, p1 );",
-        "x.3 = insert ( x.2, p2 );",
-        "x.3.relay1 = relay ( x.3 );",
-        "x.4 = insert ( x.3.relay1, p3 );",
-        "x = insert ( x.4, p4 );",
-    ]
-    whole = named(factory, {"x": 2}).pag
-    assert whole.root == "x.relay2"
-    assert whole["x"].inputs == ("p0", "p1", "p2", "p3", "p4")
-
-
-def test_labels_of_the_user_are_not_taken() -> None:
-    rows = [("a.relay1", "weld", "a", {}), ("a", "atomic", "", {})]
-    factory = factory_of(table_pag("a.relay1", *rows))
-    assert named(factory, {"a": 1}).pag["a.relay1"].inputs == ("a.relay1_",)
+def test_piles_and_the_product_are_handed_over() -> None:
+    pag, templates = row_of_inserts(5).factory.pag, load_templates([templates_folder()])
+    plan = Plan(relays={"x/3": 1, "x": 2})
+    nodes = expand(pag, templates, plan)
+    assert {x: (node.template.name, node.inputs) for x, node in nodes.items() if node.inputs} == {
+        "x/2": ("mate", ("p0", "p1")),
+        "x/3": ("insert", ("x/2", "p2")),
+        "x/3/relay1": ("relay", ("x/3",)),
+        "x/4": ("insert", ("x/3/relay1", "p3")),
+        "x": ("insert", ("x/4", "p4")),
+        "x/relay1": ("relay", ("x",)),
+        "x/relay2": ("relay", ("x/relay1",)),
+    }
+    made = compile_pag(pag, templates, load_catalogue(), plan=plan)
+    assert made.products == ("x/relay2",)
+    assert nodes_of(made) == nodes
 
 
 @pytest.mark.parametrize("change", ["step", "lane"])

@@ -95,7 +95,7 @@ def chained(seed: int, label: str, number: int) -> Layout:
     room = RoomForLanes(found, Pace.of(SETTINGS), None, hands)
     layout = room.layout(room.cuttable())
     way, templates = ways(layout)[label], templates_of(layout)
-    found, _ = split(layout, {label: way}, {label: number}, templates, load_catalogue())
+    found = split(layout, {label: way}, {label: number}, templates, load_catalogue())
     return certified(found, None)
 
 

@@ -197,8 +197,7 @@ def _by_property(faults: Sequence[Witness]) -> list[list[Witness]]:
 def _has_places(project: Project) -> bool:
     """Whether where robots come from is known without boxes, or matters: parts have shapes, or
     robots serve several labels or branches."""
-    ground = project.ground
-    return is_shaped(project.pag) or bool(ground.lines or ground.parallel)
+    return is_shaped(project.pag) or bool(project.plan.turns)
 
 
 def _describe_failures(study: FailureStudy, verbose: bool) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import count
 from math import inf
@@ -80,30 +79,14 @@ class ProjectOptions:
     def ground(self) -> Ground:
         """What FLOOR and RELAY ask for. Raises InputError (BadValue)."""
         from factory.layout.request import Ground
-        from factory.support.user_defaults import defaults_for
 
         floor = None if self.floor is None else pair(self.floor, "--floor", "4x3", float, WIDEST)
-        kept = defaults_for(self.file)
-        branches = {**kept.parallel(), **dict(self.parallel)}
-        several = tuple((label, k) for label, k in branches.items() if k > 1)
-        pace = {"--relay": self.relay, "--cycle": self.cycle}
-        if several:
-            hint = "leave it out, or leave out --parallel and [parallel] in factory.toml"
-            self._alone("parallel branches", {**pace, "--robots": self.robots}, hint)
-        if self.deputies:
-            given = {**pace, "--parallel": several}
-            self._alone("--deputies", given, "leave out one of the two")
-        lines = kept.lines()
-        return Ground(
-            floor, self.relay, self.cycle, lines, parallel=several, deputies=self.deputies
-        )
-
-    def _alone(self, what: str, others: Mapping[str, object], hint: str) -> None:
-        """Raises InputError (BadValue) for options that something does not go with."""
-        for option, value in others.items():
-            if value:
-                message = f"{option} does not go with {what}"
-                raise InputError(Diagnostic("BadValue", message, None, hint))
+        if self.deputies and (self.relay or self.cycle):
+            option = "--relay" if self.relay else "--cycle"
+            message = f"{option} does not go with --deputies"
+            hint = "leave out one of the two"
+            raise InputError(Diagnostic("BadValue", message, None, hint))
+        return Ground(floor, self.relay, self.cycle, self.deputies)
 
     def _allowing(self, pag: PAG) -> PAG:
         """The PAG with the overlaps that are allowed. Raises InputError (Usage) for names that are
@@ -118,16 +101,26 @@ class ProjectOptions:
         return replace(pag, allowed=(*pag.allowed, *self.allow))
 
     def project(self, silent: bool = True, settings: Settings | None = None) -> Project:
-        """The project that the options describe, with the forms and lines that they ask for, for
-        these `settings` if any are given; unless `silent` the search for those shows its progress.
+        """The project that the options describe, with the plan that they ask for, for these
+        `settings` if any are given; unless `silent` the search for few robots shows its progress.
         Raises InputError."""
         from factory.pipeline import read
+        from factory.support.user_defaults import defaults_for
 
         project = read(self.file, self.folders, settings or self.settings(), self.ground())
         if self.allow:
-            project = project.with_pag(self._allowing(project.pag), project.ground)
-        if self.robots is None and self.cycle is None:
-            return project
+            project = project.with_pag(self._allowing(project.pag))
+        kept = defaults_for(self.file)
+        if self.robots is not None or self.cycle is not None:
+            project = self._with_few_robots(project, silent)
+        elif lines := kept.lines():
+            project = project.with_lines(lines)
+        branches = {**kept.parallel(), **dict(self.parallel)}
+        several = [(label, k) for label, k in branches.items() if k > 1]
+        return project.with_branches(several) if several else project
+
+    def _with_few_robots(self, project: Project, silent: bool) -> Project:
+        """The project with the plan that is found for the robots and the cycle time asked for."""
         from factory.study.allocation.aim import Aim, usual_effort
         from factory.study.allocation.search import allocated
         from factory.support.console import warn

@@ -15,10 +15,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from factory.compiler.compiler import gear_net
+from factory.compiler.gearing import gear_net
 from factory.plant.approaches import Approach, Overlap
 from factory.plant.factory import Factory, Operation, Robot, in_turn
 from factory.problem.pag import NOPART
+from factory.problem.plan import Plan
+from factory.problem.robot_types import LIFT, Catalogue
 
 
 def assigned(base: Factory, robots: Sequence[Robot], turns: Sequence[Sequence[int]]) -> Factory:
@@ -50,8 +52,34 @@ def assigned(base: Factory, robots: Sequence[Robot], turns: Sequence[Sequence[in
         operations=operations,
         net=gear_net(crew, operations),
         parents=tuple(parents),
+        plan=base.plan.then(turns),
         period=base.period * period,
     )
+
+
+def shared(base: Factory, plan: Plan, catalogue: Catalogue) -> Factory:
+    """The factory of a plan, from that with a robot for each tour. The type of each robot fits all
+    its tours. Raises ValueError where the tours or robots of the plan are others."""
+    if not plan.turns:
+        return base
+    every, tours = range(1 + max(map(max, plan.turns))), range(len(base.robots))
+    if any(len(turn) != len(tours) or min(turn) < 0 for turn in plan.turns):
+        raise ValueError(f"each turn must name a robot for each of {len(tours)} tours")
+    types, first = dict[int, str](), dict[int, Robot]()
+    for tour in tours:
+        own = base.robots[tour]
+        for robot in dict.fromkeys(turn[tour] for turn in plan.turns):
+            first.setdefault(robot, own)
+            kind = types.setdefault(robot, own.type)
+            types[robot] = catalogue.meet(kind, own.type) or kind
+    if len(types) < len(every):
+        raise ValueError(f"{len(every)} robots are named, and {len(types)} have tours")
+    lifts = plan.lifts or frozenset()
+    for robot in lifts:
+        types[robot] = catalogue.meet(types[robot], LIFT) or LIFT
+    robots = [replace(first[n], index=n, name=f"r{n + 1}", type=types[n]) for n in every]
+    made = assigned(base, robots, plan.turns)
+    return replace(made, plan=plan, adjusted=lifts)
 
 
 def _for_unit(o: Operation, index: int, turn: int, does: Sequence[int]) -> Operation:

@@ -8,51 +8,34 @@ in the PAG.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import cache
 from types import MappingProxyType
 
 from factory.compiler.domains import check_prepared
-from factory.nets.gears import Gear, GearNet
-from factory.nets.petri import PetriNet, Place, Transition
-from factory.nets.threaded import Redistribution, ThreadedNet
+from factory.compiler.expanding import Node, expand
+from factory.compiler.gearing import gear_net
 from factory.plant.approaches import Approach
 from factory.plant.factory import Factory, Operation, Robot
-from factory.problem.pag import NOPART, PAG, Assembly
-from factory.problem.robot_types import Catalogue
+from factory.problem.pag import NOPART, PAG
+from factory.problem.plan import AS_WRITTEN, Plan
+from factory.problem.robot_types import LIFT, Catalogue
 from factory.problem.template import Template, variable_number
 from factory.support.collector import collector_paused
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 
 DROPOFF = "dropoff"
 
-LIFT = "lift"
-"""The type of a robot that lowers what it brings."""
 
-
-@dataclass(frozen=True, slots=True)
-class Node:
-    """An operation to compile: a node of the PAG, or one pile of a node with many inputs.
-
-    `size` counts the operation instances of its subtree, itself included.
-    """
-
-    label: str
-    template: Template
-    inputs: tuple[str, ...]
-    dwell: float
-    size: int
-    position: Position | None
-
-
-@collector_paused()
 def compile_pag(
     pag: PAG,
     templates: Mapping[str, Template],
     catalogue: Catalogue,
     approaches: Mapping[str, Approach] = MappingProxyType({}),
+    plan: Plan = AS_WRITTEN,
 ) -> Factory:
-    """The factory that makes the product `pag`.
+    """The factory that makes the product `pag` with the forms and hand-overs of a plan, and a robot
+    for each tour.
 
     `approaches`: how the inputs of operations (by label, see `expand`) can come together; where one
     is to be lowered, a lift brings it.
@@ -61,7 +44,20 @@ def compile_pag(
     numbered as in the specification of the net: the output robot is r1; an operation numbers all
     its new robots at once, the input with fewest operation instances first, tools last.
     """
-    nodes = expand(pag, templates)
+    return compile_nodes(pag, expand(pag, templates, plan), templates, catalogue, approaches, plan)
+
+
+@collector_paused()
+def compile_nodes(
+    pag: PAG,
+    nodes: dict[str, Node],
+    templates: Mapping[str, Template],
+    catalogue: Catalogue,
+    approaches: Mapping[str, Approach],
+    plan: Plan,
+) -> Factory:
+    """The factory with these operations, which make the product `pag`. Raises InputError as
+    `compile_pag` does."""
     output = templates[DROPOFF]
     _check_types(nodes, output, catalogue)
     draft = _Draft(nodes, catalogue, approaches)
@@ -70,7 +66,8 @@ def compile_pag(
     troubles = draft.troubles or [*check_prepared(robots, operations)]
     if troubles:
         raise InputError(troubles)
-    return Factory(pag, robots, operations, gear_net(robots, operations), tuple(draft.parents))
+    net, parents = gear_net(robots, operations), tuple(draft.parents)
+    return Factory(pag, robots, operations, net, parents, replace(plan, turns=(), lifts=None))
 
 
 def _check_types(nodes: Mapping[str, Node], output: Template, catalogue: Catalogue) -> None:
@@ -92,43 +89,6 @@ def _check_types(nodes: Mapping[str, Node], output: Template, catalogue: Catalog
         raise InputError(troubles)
 
 
-def expand(pag: PAG, templates: Mapping[str, Template]) -> dict[str, Node]:
-    """The operation instances by label, with the inputs of each beyond those of its template
-    inserted one by one: `mate(a, b, c)` becomes `x/2 = mate(a, b)`, `x = insert(x/2, c)`."""
-    nodes: dict[str, Node] = {}
-    for assembly in pag.postorder():
-        template = templates[assembly.operation]
-        taken = len(template.inputs)
-        inputs, spare = assembly.inputs[:taken], assembly.inputs[taken:]
-        label = f"{assembly.label}/{taken}" if spare else assembly.label
-        _add_node(nodes, label, template, inputs, assembly)
-        for number, further in enumerate(spare, start=taken + 1):
-            pile, label = label, f"{assembly.label}/{number}"
-            if number == len(assembly.inputs):
-                label = assembly.label
-            _add_node(nodes, label, templates[template.further], (pile, further), assembly)
-    return nodes
-
-
-def _add_node(
-    nodes: dict[str, Node],
-    label: str,
-    template: Template,
-    inputs: tuple[str, ...],
-    assembly: Assembly,
-) -> None:
-    size = 1 + sum(nodes[i].size for i in inputs)
-    dwell = _dwell(template, assembly)
-    nodes[label] = Node(label, template, inputs, dwell, size, assembly.position)
-
-
-def _dwell(template: Template, assembly: Assembly) -> float:
-    wanted = template.law.dwell
-    if isinstance(wanted, str):
-        wanted = assembly.parameter(wanted, dict(template.parameters).get(wanted))  # type: ignore[assignment]
-    return float(wanted) if isinstance(wanted, int | float) else 0.0
-
-
 class _Draft:
     """What CompileNode has allocated so far: operations with their parents and, per robot, its
     type, the position that made it necessary and its operations from the last of its cycle to the
@@ -136,7 +96,7 @@ class _Draft:
 
     def __init__(
         self,
-        nodes: Mapping[str, Node],
+        nodes: dict[str, Node],
         catalogue: Catalogue,
         approaches: Mapping[str, Approach],
     ) -> None:
@@ -151,9 +111,9 @@ class _Draft:
     def compile(self, pag: PAG, output: Template) -> None:
         """CompileNode(P, carrier) for every node in preorder, with a stack in place of recursion,
         and dropoff."""
-        position = pag[pag.root].position
+        position, product = pag[pag.root].position, next(reversed(self.nodes))
         carrier = self._new_robot(output.robots[0], position)
-        stack: list[tuple[str, int, int]] = [(pag.root, carrier, -1)]
+        stack: list[tuple[str, int, int]] = [(product, carrier, -1)]
         while stack:
             label, robot, parent = stack.pop()
             operation = self._operation(self.nodes[label], robot)
@@ -165,7 +125,7 @@ class _Draft:
             inputs = sorted((r, x) for r, x in brought if x != NOPART)
             stack.extend((x, robot, operation.index) for robot, x in reversed(inputs))
         index = len(self.operations)
-        last = Operation(index, DROPOFF, output, (carrier,), (pag.root,), (NOPART,), 0.0, position)
+        last = Operation(index, DROPOFF, output, (carrier,), (product,), (NOPART,), 0.0, position)
         self.operations.append(last)
         self.parents = [index, *self.parents[1:], -1]
         self.visits[carrier].insert(0, index)
@@ -251,71 +211,3 @@ def _arguments(before: tuple[str, ...]) -> tuple[int, ...]:
     """For each label of a template's a the number of the input that it stands for, -1 for none."""
     variables = sorted({*before} - {NOPART}, key=variable_number)
     return tuple(-1 if label == NOPART else variables.index(label) for label in before)
-
-
-def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> GearNet:
-    """N: for each operation a start, an end and a place; for each robot a gear through them.
-
-    Operation i has transitions 2i and 2i + 1 and place i; the wait places follow, robot by robot. A
-    robot that is gone has no operations, and a gear without places.
-    """
-    transitions = tuple(
-        Transition(f"{o.label}_{end}", o.position) for o in operations for end in ("s", "e")
-    )
-    places = [
-        Place(
-            o.label,
-            (o.start,),
-            (o.end,),
-            o.template.name,
-            "" if o.after[o.template.carrier - 1] == NOPART else o.label,
-            len(o.robots),
-            o.position,
-        )
-        for o in operations
-    ]
-    slots = [o.robots for o in operations]
-    slot_of = [{robot: i for i, robot in enumerate(o.robots)} for o in operations]
-    pairs: list[list[tuple[tuple[int, int], tuple[int, int]]]] = [[] for _ in transitions]
-    gears = []
-    for robot in robots:
-        gear_places, gear_events = [], []
-        several = (
-            sum(operations[n].before[slot_of[n][robot.index]] == NOPART for n in robot.operations)
-            > 1
-        )
-        for step, number in enumerate(robot.operations):
-            before, operation = operations[robot.operations[step - 1]], operations[number]
-            done, begun = before.end, operation.start
-            slot = slot_of[number][robot.index]
-            label = operation.before[slot]
-            stays = label != NOPART and operation.after[slot] != NOPART
-            wait = len(places)
-            places.append(
-                Place(
-                    _wait_name(robot, label, operation, several),
-                    (done,),
-                    (begun,),
-                    "hold" if stays else "wait",
-                    label,
-                    1,
-                    operation.position,
-                )
-            )
-            slots.append((robot.index,))
-            pairs[begun].append(((wait, 0), (number, slot)))
-            pairs[done].append(((before.place, slot_of[before.index][robot.index]), (wait, 0)))
-            gear_places += [wait, number]
-            gear_events += [done, begun]
-        gears.append(Gear(robot.name, robot.type, tuple(gear_places), tuple(gear_events)))
-    redistribution: tuple[Redistribution, ...] = tuple(tuple(sorted(p)) for p in pairs)
-    net = ThreadedNet(PetriNet(transitions, tuple(places)), redistribution)
-    return GearNet(net, tuple(gears), tuple(g.places[0] for g in gears if g.places), tuple(slots))
-
-
-def _wait_name(robot: Robot, label: str, onward: Operation, several: bool) -> str:
-    """What the place is called where a robot waits for an operation `onward`: `r2:part1`. One that
-    comes home several times in its gear waits with nothing for each tour, `r2:nopart/part3`."""
-    if label == NOPART and several:
-        return f"{robot.name}:{label}/{onward.label}"
-    return f"{robot.name}:{label}"

@@ -24,6 +24,7 @@ from itertools import pairwise
 from factory.compiler.assigning import assigned
 from factory.plant.factory import Factory, Operation, Robot
 from factory.problem.pag import NOPART
+from factory.problem.plan import Plan
 from factory.problem.robot_types import Catalogue
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 
@@ -86,6 +87,14 @@ def line_of(count: int, lines: Iterable[Line]) -> list[int]:
         for robot in line:
             on[robot] = min(line)
     return on
+
+
+def lines_of(plan: Plan) -> tuple[Line, ...]:
+    """The lines of a plan for one unit: the tours of each robot that has several."""
+    on: dict[int, list[int]] = {}
+    for tour, robot in enumerate(plan.turns[0] if plan.turns else ()):
+        on.setdefault(robot, []).append(tour)
+    return tuple(tuple(tours) for tours in on.values() if len(tours) > 1)
 
 
 def lines_of_labels(factory: Factory, sides: Iterable[Sequence[str]]) -> tuple[Line, ...]:

@@ -96,7 +96,7 @@ class _Bound:
         """The least way to where a robot delivers, by the operation in which it does; 0 for a
         tool."""
         if robot == 0:
-            product = self._box(self.factory.pag.root, 0)
+            product = self._box(self.factory.products[0], 0)
             way = product.high - product.low + 1.5 * self.c
             return {dropoff.index: way for dropoff in self.factory.dropoffs}
         axis, legs = self.axis[robot], dict[int, float]()

@@ -315,14 +315,14 @@ class Layout:
     @property
     def hand_ahead(self) -> float:
         """How far the hand of the output robot reaches ahead of the product [m]."""
-        grip, ahead = self.grip(0), self.payloads[self.factory.pag.root][1]
+        grip, ahead = self.grip(0), self.payloads[self.factory.products[0]][1]
         return 0.0 if grip is None else up(max(0.0, grip[1] - ahead))
 
     @property
     def shed(self) -> Box:
         """The shed that the outfeed takes products into, in the world: its shutter is a clearance
         ahead of a product that is dropped off, and of the hand that does so."""
-        xlo, xhi, ylo, yhi = self.payloads[self.factory.pag.root]
+        xlo, xhi, ylo, yhi = self.payloads[self.factory.products[0]]
         x, y = self.guidepaths[0].a
         start = x + xhi + self.hand_ahead + self.clearance
         return start, start + WALL + BEHIND + xhi - xlo + SIDE, y + ylo - SIDE, y + yhi + SIDE
@@ -336,7 +336,7 @@ class Layout:
     @cached_property
     def product_length(self) -> float:
         """Length of the finished product along the output robot's heading [m]."""
-        xlo, xhi, _, _ = self.payloads[self.factory.pag.root]
+        xlo, xhi, _, _ = self.payloads[self.factory.products[0]]
         return xhi - xlo
 
 

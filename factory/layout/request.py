@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING
 
 from factory.plant.factory import Factory
+from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import Settings
 
 if TYPE_CHECKING:
@@ -15,21 +16,23 @@ if TYPE_CHECKING:
     from factory.problem.robot_types import Catalogue
 
 
+SEVERAL_TOURS = Diagnostic(
+    "BadValue",
+    "--relay does not go with robots that have several tours: a relay cuts the way of one tour",
+    hint="leave out --relay, or what shares robots: --robots, --parallel, [lines] in factory.toml",
+)
+
+
 @dataclass(frozen=True, slots=True)
 class Ground:
     """What a layout is made for, beside settings: width and depth of the floor [m], None for as
     much as it takes; whether guidepaths are shared among `relay` robots, or the `cycle` time [s]
-    that those are to reach, None for the shortest; `lines`: labels that share a robot, line by
-    line; whether the forms of operations were chosen, so that the PAG is not as it was written
-    (`formed`); `parallel`: labels, and how often the branch that brings each is there; `deputies`:
-    whether robots can take over for others."""
+    that those are to reach, None for the shortest; `deputies`: whether robots can take over for
+    others."""
 
     floor: tuple[float, float] | None = None
     relay: bool = False
     cycle: float | None = None
-    lines: tuple[tuple[str, ...], ...] = ()
-    formed: bool = False
-    parallel: tuple[tuple[str, int], ...] = ()
     deputies: bool = False
 
     @property
@@ -64,6 +67,8 @@ class Ground:
         if self.relays:
             from factory.layout.relaying import relayed
 
+            if self.relay and factory.folded:
+                raise InputError(SEVERAL_TOURS)
             layout = relayed(layout, settings, self.cycle, self.floor, hands)
         return replace(layout, ground=self.kept())
 
@@ -92,12 +97,8 @@ class Ground:
         known = replace(whole, product=product, standby=whole, ground=self.kept())
         layout = part_of(known, factory, robots)
         assert layout is not None, "its robots have their own tours"
-        return layout
+        return replace(layout, ground=self.kept())
 
     def kept(self) -> dict[str, object]:
-        """What a log keeps: by name, without branches where there are none."""
-        found = asdict(self)
-        for name in ("parallel", "deputies"):
-            if not found[name]:
-                del found[name]
-        return found
+        """What a log keeps, by name."""
+        return asdict(self)

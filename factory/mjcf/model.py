@@ -202,7 +202,7 @@ def build_model(
     add_scene(world, section["statistic"], layout)
     hoists = _hoists(layout, masses, settings)
     add_robots(Repertoire.of(layout).layout, catalogue, drives, hoists, section)
-    load = masses[factory.pag.root]
+    load = masses[factory.products[0]]
     fast = settings.outfeed_acceleration
     tray = drive_for(TRAY_MASS, load, fast, settings)
     shutter = drive_for(

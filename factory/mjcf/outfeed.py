@@ -60,7 +60,7 @@ def _add_tray(world: Element, actuator: Element, layout: Layout, drive: Drive) -
     """It touches the product that it holds by design, so it is masked as what it holds. It is as
     much higher as a round bottom dips into its slot."""
     x, y = layout.guidepaths[0].a
-    xlo, xhi, ylo, yhi = layout.payloads[layout.factory.pag.root]
+    xlo, xhi, ylo, yhi = layout.payloads[layout.factory.products[0]]
     body = add(world, "body", name=names.OUTFEED_TRAY, pos=(x, y, 0), sleep="allowed")
     slide = names.OUTFEED_SLIDE
     joint = add(body, "joint", name=slide, type="slide", axis="1 0 0", frictionloss=0.2)
@@ -145,7 +145,7 @@ def _add_table(world: Element, layout: Layout) -> None:
         shown.append((f"upright{side}", upright, (UPRIGHT, WALL / 2, stroke / 2)))
     for name, pos, size in shown:
         add_station(body, f"outfeed/{name}", pos=pos, size=size, material="housing")
-    leg, front = min(LEG, *half), layout.payloads[layout.factory.pag.root][1]
+    leg, front = min(LEG, *half), layout.payloads[layout.factory.products[0]][1]
     for side in (-1, 1):
         foot = a[0] + front + 2 * leg - x, side * (half[1] - leg), (BELT - thick) / 2
         size = leg, leg, (BELT - thick) / 2
@@ -170,7 +170,7 @@ def _dip(layout: Layout, slot: tuple[float, float, float] | None) -> float:
     """How far the product dips into the tray's slot [m]."""
     if slot is None:
         return 0.0
-    (_, xhi, ylo, yhi), (end, low, high) = layout.payloads[layout.factory.pag.root], slot
+    (_, xhi, ylo, yhi), (end, low, high) = layout.payloads[layout.factory.products[0]], slot
     x, y = layout.product.middle[:2].tolist()
     beside = (1, y + low, -1, low - ylo), (1, y + high, 1, yhi - high), (0, x + end, 1, xhi - end)
     plates = [(axis, at, way) for axis, at, way, room in beside if room > SLOT]

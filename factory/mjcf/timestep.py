@@ -172,7 +172,7 @@ def _axes(settings: Settings, layout: Layout, jitter: float) -> Iterator[DrivenA
         yield DrivenAxis(HOIST_MASS, load, a, push, stiff, 1 - jitter, held=held, room=room)
     fast = settings.outfeed_acceleration
     reverses = layout.outfeed_way * fast < 1.2 * settings.outfeed**2
-    product = masses[factory.pag.root]
+    product = masses[factory.products[0]]
     jump = 1.0 if reverses else 0.7
     yield DrivenAxis.loaded(TRAY_MASS, product, fast, gain=1.0, jump=jump, room=far)
     shut = settings.shutter_limits[1]

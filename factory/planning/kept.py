@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from factory.compiler.expanding import expand
 from factory.compiler.mating.mating import matings
 from factory.geometry.meshes import Array
 from factory.geometry.product import product_geometry
@@ -45,6 +46,6 @@ class KeptPrices:
             alone = replace(self.source, parts=parts, kept=(keep,))
             nodes = planned_product(alone, keep.label, stance.rotation).pag.nodes
             pag = PAG(keep.label, nodes)
-            found = matings(pag, self.templates, product_geometry(pag, self.source.files))
+            found = matings(expand(pag, self.templates), product_geometry(pag, self.source.files))
             self._known[keep.label, stance] = BLOCKED * len(found.of_kind("blocked"))
         return self._known[keep.label, stance]

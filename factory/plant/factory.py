@@ -15,6 +15,7 @@ from types import MappingProxyType
 from factory.nets.gears import GearNet
 from factory.plant.approaches import Approach
 from factory.problem.pag import NOPART, PAG
+from factory.problem.plan import Plan
 from factory.problem.template import Template, variable_number
 from factory.support.errors import Position
 
@@ -113,7 +114,8 @@ class Factory:
     """F = (R, ~, N) with the operations it is made of; the last operation is dropoff.
 
     ~ is the union of the templates' identifications over `operations`. `parents[i]` is the
-    operation that takes the result of operation i (dropoff has none, -1). `adjusted`: robots with a
+    operation that takes the result of operation i (dropoff has none, -1). `plan`: the variant that
+    it is. `adjusted`: robots with a
     lift that is set for each of their tours, to where the one hand holds what they bring. `period`:
     how many units are made in one cycle of the net, with operations of their own; the last so many
     operations are their dropoffs, in that order.
@@ -124,6 +126,7 @@ class Factory:
     operations: tuple[Operation, ...]
     net: GearNet
     parents: tuple[int, ...] = field(repr=False)
+    plan: Plan = field(default_factory=Plan, repr=False)
     adjusted: frozenset[int] = frozenset()
     period: int = 1
 

@@ -11,6 +11,9 @@ from types import MappingProxyType
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 from factory.support.resources import mjcf_folder
 
+LIFT = "lift"
+"""The type of a robot that can lower what it brings, or set its hand to different heights."""
+
 
 @dataclass(frozen=True, slots=True)
 class RobotType:

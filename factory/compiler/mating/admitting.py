@@ -8,15 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.compiler.compiler import expand
+from factory.compiler.expanding import Node
 from factory.compiler.mating.bodies import bodies
 from factory.compiler.mating.findings import STRICT
 from factory.compiler.mating.mating import UPRIGHT, levels_of
 from factory.compiler.mating.meetings import meetings
 from factory.compiler.mating.overlaps import Finder
 from factory.geometry.solids import Product
-from factory.problem.pag import PAG
-from factory.problem.template import Template
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,12 +26,10 @@ class Admitted:
     lowers: tuple[int, int] = (STRICT, STRICT)
 
 
-def admitted(
-    pag: PAG, templates: Mapping[str, Template], product: Product
-) -> Mapping[str, Admitted]:
+def admitted(nodes: Mapping[str, Node], product: Product) -> Mapping[str, Admitted]:
     """What each operation with two inputs or more admits, by its label. As costly as `matings`
     twice."""
-    found = meetings(expand(pag, templates), pag.root)
+    found = meetings(nodes)
     if not found.all:
         return {}
     finder, count = Finder(bodies(product, found.parts), found), len(found.all)

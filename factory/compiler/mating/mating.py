@@ -10,7 +10,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.compiler.compiler import expand
+from factory.compiler.expanding import Node, nodes_of
 from factory.compiler.mating.bodies import bodies
 from factory.compiler.mating.findings import (
     BLOCKED,
@@ -27,24 +27,20 @@ from factory.compiler.mating.paths import SIGNS
 from factory.geometry.solids import Product
 from factory.plant.approaches import MARGIN, Approach, Kind, Overlap, Pair
 from factory.plant.factory import Factory
-from factory.problem.pag import PAG
-from factory.problem.template import Template
 from factory.support.errors import Position
 
 UPRIGHT = 2
 """The axis z, along which inputs are lowered."""
 
 
-def matings(
-    pag: PAG, templates: Mapping[str, Template], product: Product, lifts: bool = True
-) -> Matings:
+def matings(nodes: Mapping[str, Node], product: Product, lifts: bool = True) -> Matings:
     """Judges every operation with two inputs or more, with `lifts` or without. Near-linear in the
     parts, except where very many lie behind one another."""
-    found = meetings(expand(pag, templates), pag.root)
+    found = meetings(nodes)
     if not found.all:
         return Matings((), {})
     finder = Finder(bodies(product, found.parts), found)
-    judge = _Judge(found, product, pag)
+    judge = _Judge(found, product, {label: node.last for label, node in nodes.items()})
     for axis in (0, 1):
         judge.slide(axis, finder.along(axis, found.axes == axis))
     unclean = judge.slides.max(axis=1) < STRICT
@@ -59,8 +55,7 @@ def judged(factory: Factory, product: Product) -> Factory:
     to join: its robots have no lifts, so all inputs slide, or are blocked."""
     if all(o.approach is not None for o in factory.operations if len(o.inputs) > 1):
         return factory
-    templates = {o.template.name: o.template for o in factory.operations}
-    found = matings(factory.pag, templates, product, lifts=False).approaches
+    found = matings(nodes_of(factory), product, lifts=False).approaches
     operations = tuple(
         replace(o, approach=o.approach or found.get(o.label)) for o in factory.operations
     )
@@ -70,8 +65,10 @@ def judged(factory: Factory, product: Product) -> Factory:
 class _Judge:
     """The levels of all meetings, and the choice among them."""
 
-    def __init__(self, found: Meetings, product: Product, pag: PAG) -> None:
-        self.meetings, self.product, self.pag = found, product, pag
+    def __init__(
+        self, found: Meetings, product: Product, at: Mapping[str, Position | None]
+    ) -> None:
+        self.meetings, self.product, self.at = found, product, at
         count = len(found.all)
         self.slides = np.zeros((count, 2), np.int64)
         self.lowers = np.full((count, 2), BLOCKED)
@@ -109,7 +106,7 @@ class _Judge:
             approach = self._along(number, "slide", columns)
         else:
             approach = self._lowering(number, lower)
-        position = _position(self.pag, meeting)
+        position = self.at[meeting.label] or meeting.position
         return Mating(meeting.label, meeting.inputs, approach, slide, lower, clashes, position)
 
     def _along(self, number: int, kind: Kind, columns: list[int]) -> Approach:
@@ -190,15 +187,6 @@ class _Judge:
             if mating.approach.kind == "blocked":
                 found[meeting.inputs[0]], found[meeting.inputs[-1]] = self._sides(meeting)
         return found
-
-
-def _position(pag: PAG, meeting: Meeting) -> Position | None:
-    """Where the last input of an operation is written; a pile is labelled as what it becomes, with
-    a slash and a number."""
-    node = pag.by_label.get(meeting.label) or pag[meeting.label.rpartition("/")[0]]
-    if len(node.input_positions) != len(node.inputs):
-        return meeting.position
-    return node.input_positions[node.inputs.index(meeting.inputs[-1])]
 
 
 def levels_of(overlaps: Overlaps, count: int) -> tuple[Ints, Ints]:

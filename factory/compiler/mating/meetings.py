@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.compiler.compiler import Node
+from factory.compiler.expanding import Node
 from factory.problem.pag import NOPART
 from factory.problem.template import variable_number
 from factory.support.errors import Position
@@ -81,13 +81,14 @@ class Meetings:
         return found % max(1, len(self.all))
 
 
-def meetings(nodes: Mapping[str, Node], root: str) -> Meetings:
+def meetings(nodes: Mapping[str, Node]) -> Meetings:
     """The meetings of a product, from its operations in postorder (as `expand` gives them).
 
     The output robot heads along x, so its inputs come along y; what a robot of its own brings is
     made by a robot that heads across; what the carrier holds was made on its own way.
     """
     spans, parts = _spans(nodes)
+    root = next(reversed([*nodes]), "")
     turns, levels = {root: 1}, {root: 0}
     for label in reversed(list(nodes)):
         held = _held(nodes[label])

@@ -6,15 +6,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from factory.compiler.compiler import expand
+from factory.compiler.expanding import Node
 from factory.compiler.mating.bodies import bodies
 from factory.compiler.mating.meetings import Meeting, meetings
 from factory.compiler.mating.overlaps import Finder
 from factory.compiler.mating.paths import SIGNS
 from factory.geometry.solids import Product
 from factory.plant.approaches import Approach
-from factory.problem.pag import PAG
-from factory.problem.template import Template
 
 AMPLE = 5e-3
 """More room than this [m] is not measured."""
@@ -24,12 +22,12 @@ UPRIGHT = 2
 
 
 def rooms(
-    pag: PAG, templates: Mapping[str, Template], product: Product, chosen: Mapping[str, Approach]
+    nodes: Mapping[str, Node], product: Product, chosen: Mapping[str, Approach]
 ) -> Mapping[str, float]:
     """The least room [m] between the inputs of each operation on the way that was chosen for it
     (from all of its `sides`), by its label: less than 0 where parts overlap, infinite where it is
     more than AMPLE. But for the last millimetre: finished parts may touch."""
-    found = meetings(expand(pag, templates), pag.root)
+    found = meetings(nodes)
     ways = [_way(meeting, chosen.get(meeting.label)) for meeting in found.all]
     least = np.full(len(found.all), np.inf)
     if not found.all:

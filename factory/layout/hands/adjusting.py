@@ -9,34 +9,29 @@ from factory.layout.hands.choosing import Hands
 from factory.layout.hands.holding import held
 from factory.layout.hands.places import PUSH
 from factory.plant.factory import Factory
-from factory.problem.robot_types import Catalogue
-
-LIFT = "lift"
-"""The type of robots that have a lift."""
+from factory.problem.robot_types import LIFT, Catalogue
 
 
 def with_lifts(
     factory: Factory, product: Product, catalogue: Catalogue, push: float = PUSH
 ) -> Factory:
     """The factory, in which robots with several tours have lifts where one hand then holds all that
-    they bring, but without lifts none does. Itself where there are no such robots."""
-    if not factory.folded:
-        return factory
+    they bring, but without lifts none does; its plan says which."""
     types = [catalogue.meet(robot.type, LIFT) for robot in factory.robots]
     lacking = {
         robot.index
         for robot, kind in zip(factory.robots, types, strict=True)
         if kind is not None and robot.index not in factory.strokes
     } & without_hands(Hands(factory, product, push))
-    if not lacking:
-        return factory
     tried = replace(factory, adjusted=frozenset(lacking))
-    adjusted = frozenset(lacking - without_hands(Hands(tried, product, push), however=True))
+    still = without_hands(Hands(tried, product, push), however=True) if lacking else set()
+    adjusted = frozenset(lacking - still)
     robots = tuple(
         replace(robot, type=types[robot.index] or LIFT) if robot.index in adjusted else robot
         for robot in factory.robots
     )
-    return replace(factory, robots=robots, adjusted=adjusted)
+    plan = replace(factory.plan, lifts=adjusted)
+    return replace(factory, robots=robots, adjusted=adjusted, plan=plan)
 
 
 def without_hands(hands: Hands, however: bool = False) -> set[int]:

@@ -104,7 +104,7 @@ class Holding:
     def top(self, operation: Operation) -> float:
         """How high the result of an operation is [m]."""
         parts = self.factory.contents.get(
-            operation.label, self.factory.contents[self.factory.pag.root]
+            operation.label, self.factory.contents[self.factory.products[0]]
         )
         return float(max(self.product.solids[part].high[2] for part in parts))
 

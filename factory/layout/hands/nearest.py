@@ -70,7 +70,7 @@ class _Search:
     def found(self, bare: bool = False) -> NoGrip:
         """What is told of it; nothing of misses if that is to be `bare`."""
         factory, last = self.holding.factory, self.holding.last(self.robot).label
-        made = factory.contents.get(last, factory.contents[factory.pag.root])
+        made = factory.contents.get(last, factory.contents[factory.products[0]])
         return NoGrip(
             self.label,
             factory.robots[self.robot].name,

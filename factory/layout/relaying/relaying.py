@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 
+from factory.compiler.expanding import taken_over
 from factory.lang.template_reader import load_templates
 from factory.layout.clearance import certify
 from factory.layout.dimensions import Clearance
@@ -51,7 +52,7 @@ def relayed(
     near the least there can be; `plain` itself where no relay makes it faster, or some robot holds
     its labels in several places. `hands`: those to choose from, where they are known. Raises
     RunError (Layout) where it does not fit the floor."""
-    if plain.shifts:
+    if plain.factory.folded:
         return plain
     if hands is None and settings.hands:
         hands = Hands(plain.factory, plain.product, settings.acceleration)
@@ -136,7 +137,6 @@ class _Search:
         self.templates, self.catalogue = templates, catalogue
         self.numbers: dict[str, int] = {}
         self.found = layout
-        self.origins: Mapping[str, str] = {}
         self.cycle = 0.0
 
     def seconds(self, layout: Layout) -> float:
@@ -148,16 +148,16 @@ class _Search:
         """For few relays that make it as fast as wanted, or as can be."""
         pace = Pace.of(self.settings)
         if cycle is None:
-            most, _ = self._split({label: way.most for label, way in self.ways.items()})
+            most = self._split({label: way.most for label, way in self.ways.items()})
             cycle = max(WITHIN * cycle_of(most, pace), self.seconds(most))
         times = robot_times(self.layout, self.settings)
         late = {label: way for label, way in self.ways.items() if times[way.robot] > cycle}
         self.cycle, self.numbers = cycle, dict.fromkeys(self.ways, 0)
         self.numbers |= {label: self._guess(way, GUESS * cycle) for label, way in late.items()}
-        self.found, self.origins = self._split(self.numbers)
+        self.found = self._split(self.numbers)
         while more := self._more():
             self.numbers = {label: n + (label in more) for label, n in self.numbers.items()}
-            self.found, self.origins = self._split(self.numbers)
+            self.found = self._split(self.numbers)
 
     def faulty(self) -> set[str]:
         """The robots (by name) of what was found that no hand can hold, though it can without
@@ -175,11 +175,11 @@ class _Search:
         """Cut no way any more that one of these robots (by name) has a piece of; where they have
         none, no way at all."""
         chosen = (r for r in self.found.factory.robots if r.name in robots)
-        labels = {self._way(x) for robot in chosen for x in _carried(self.found, robot)}
+        labels = {taken_over(x) for robot in chosen for x in _carried(self.found, robot)}
         shared = labels & set(self.ways)
         self.ways = {k: way for k, way in self.ways.items() if shared and k not in shared}
 
-    def _split(self, numbers: Mapping[str, int]) -> tuple[Layout, Mapping[str, str]]:
+    def _split(self, numbers: Mapping[str, int]) -> Layout:
         return split(self.layout, self.ways, numbers, self.templates, self.catalogue)
 
     def _guess(self, way: Way, seconds: float) -> int:
@@ -195,15 +195,11 @@ class _Search:
         times, numbers = robot_times(self.found, self.settings), self.numbers
         for robot in self.found.factory.robots:
             if times[robot.index] > self.cycle + 1e-9:
-                labels = map(self._way, _carried(self.found, robot))
+                labels = map(taken_over, _carried(self.found, robot))
                 left = [x for x in labels if x in self.ways and numbers[x] < self.ways[x].most]
                 if left:
                     found.add(max(left, key=lambda x: (self.ways[x].longest(numbers[x]), x)))
         return found
-
-    def _way(self, label: str) -> str:
-        """The label of the way on which a label of the layout found is carried."""
-        return self.origins.get(label, "")
 
 
 def _carried(layout: Layout, robot: Robot) -> Iterator[str]:

@@ -9,16 +9,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from factory.compiler.compiler import compile_pag
+from factory.compiler.compiler import compile_nodes
+from factory.compiler.expanding import delivered, handed_over, nodes_of, relay_label, taken_over
 from factory.layout.dimensions import Clearance
 from factory.layout.layout import Guidepath, Layout
 from factory.layout.relaying.in_line import InLine, hands_in_line
-from factory.layout.relaying.naming import Named, named
 from factory.layout.relaying.ways import Way
 from factory.layout.shapes import payload_boxes
 from factory.plant.approaches import Approach
 from factory.plant.factory import Factory
 from factory.problem.pag import NOPART
+from factory.problem.plan import Plan
 from factory.problem.robot_types import Catalogue
 from factory.problem.template import Template
 
@@ -39,14 +40,15 @@ def split(
     numbers: Mapping[str, int],
     templates: Mapping[str, Template],
     catalogue: Catalogue,
-) -> tuple[Layout, Mapping[str, str]]:
-    """The layout with so many relays on the way of each label; and for each label of it what that
-    was called before. Linear."""
+) -> Layout:
+    """The layout with so many relays on the way of each label. Linear."""
     before = layout.factory
-    names = named(before, numbers)
-    factory = compile_pag(names.pag, templates, catalogue, _approaches(before, names))
-    cut = {r: list(_pieces(layout, r, ways, names, factory)) for r in range(len(before.robots))}
-    found = _hands(layout, factory, names, cut)
+    plan = replace(before.plan, relays={label: n for label, n in numbers.items() if n})
+    nodes = handed_over(nodes_of(before), plan.relays, templates)
+    approaches = _approaches(before, plan)
+    factory = compile_nodes(before.pag, nodes, templates, catalogue, approaches, plan)
+    cut = {r: list(_pieces(layout, r, ways, factory)) for r in range(len(before.robots))}
+    found = _hands(layout, factory, cut)
     paths: dict[int, Guidepath] = {}
     starts: dict[int, float] = {}
     for robot, pieces in cut.items():
@@ -57,12 +59,12 @@ def split(
             starts[piece.robot] = piece.start
     stations = [0.0] * len(factory.operations)
     for operation in before.operations:
-        made = _made(names, factory, operation.label)
+        made = factory.by_label[operation.label].index
         station = layout.stations[operation.index]
         if operation.index != before.dropoff.index:
             station = round(station - starts[factory.operations[made].carrier], 3)
         stations[made] = station
-    relayed = replace(
+    return replace(
         layout,
         factory=factory,
         guidepaths=tuple(paths[robot.index] for robot in factory.robots),
@@ -71,53 +73,42 @@ def split(
         payloads=payload_boxes(factory, layout.product),
         certificate=None,
     )
-    return relayed, names.origins
 
 
-def _hands(
-    layout: Layout, factory: Factory, names: Named, cut: Mapping[int, Sequence[Piece]]
-) -> InLine:
+def _hands(layout: Layout, factory: Factory, cut: Mapping[int, Sequence[Piece]]) -> InLine:
     """The hands of robots with relays; none where they are not chosen."""
     if not layout.hands:
         return InLine((), frozenset())
     origins = {piece.robot: robot for robot, pieces in cut.items() for piece in pieces}
     lines = {r: [p.robot for p in reversed(pieces)] for r, pieces in cut.items() if len(pieces) > 1}
-    relays = {factory.by_label[name].index for added in names.relays.values() for name in added}
+    relays = {o.index for o in factory.making if taken_over(o.label) != o.label}
     return hands_in_line(layout, factory, [origins[r.index] for r in factory.robots], lines, relays)
 
 
-def _made(names: Named, factory: Factory, label: str) -> int:
-    """The number of an operation after relays are added, by its label before."""
-    return factory.by_label[names.made.get(label, label)].index
-
-
-def _approaches(factory: Factory, names: Named) -> dict[str, Approach]:
+def _approaches(factory: Factory, plan: Plan) -> dict[str, Approach]:
     """How inputs come together is as before: a relay turns nothing."""
     return {
-        names.made[o.label]: replace(
-            o.approach, lowered=names.delivered(o.approach.lowered) if o.approach.lowered else ""
-        )
+        o.label: replace(o.approach, lowered=delivered(o.approach.lowered, plan))
         for o in factory.operations
         if o.approach is not None
     }
 
 
 def _pieces(
-    layout: Layout, robot: int, ways: Mapping[str, Way], names: Named, factory: Factory
+    layout: Layout, robot: int, ways: Mapping[str, Way], factory: Factory
 ) -> Iterator[Piece]:
     """The pieces of one guidepath, from B to A."""
     start, before = 0.0, layout.factory
     for number in before.robots[robot].operations:
         operation = before.operations[number]
         slot = operation.robots.index(robot)
-        chosen = factory.operations[_made(names, factory, operation.label)].robots[slot]
+        chosen = factory.by_label[operation.label].robots[slot]
         label = operation.after[slot]
-        if label == NOPART or not names.relays[label]:
+        if label == NOPART or label not in factory.plan.relays:
             continue
-        relays = names.relays[label]
-        for relay, cut in zip(relays, ways[label].cuts(len(relays)), strict=True):
+        for relay, cut in enumerate(ways[label].cuts(factory.plan.relays[label])):
             yield Piece(chosen, start, cut)
-            start, chosen = cut, factory.by_label[relay].carrier
+            start, chosen = cut, factory.by_label[relay_label(label, relay)].carrier
     yield Piece(chosen, start, layout.guidepaths[robot].travel)
 
 

@@ -83,16 +83,6 @@ def is_positive(value: Any) -> bool:
 is_table, is_text, is_count = of(dict), of(str), whole(0, LARGE)
 
 
-def is_branch(value: Any) -> bool:
-    """Whether a value is a label with how often its branch is there."""
-    return (
-        isinstance(value, list)
-        and len(value) == 2
-        and is_text(value[0])
-        and whole(1, LARGE)(value[1])
-    )
-
-
 def listed(test: Test, length: int | None = None) -> Test:
     """A list of such values, of so many if a length is given."""
     return lambda v: isinstance(v, list) and length in (None, len(v)) and all(map(test, v))
@@ -134,15 +124,16 @@ KEYS = (
     Key("pag.file", "a text", is_text),
     Key("pag.text", "a text", is_text),
     Key("pag.sha256", "a text", is_text),
-    Key("pag.plain", "a text, or null", maybe(is_text), later=True),
     Key("templates", "a table of texts", tabled(is_text), later=True),
+    Key("plan", "a table", is_table, later=True),
+    Key("plan.forms", "numbers by labels", tabled(whole(-1, 1))),
+    Key("plan.relays", "numbers by labels", tabled(is_count)),
+    Key("plan.turns", "lists of numbers of robots", listed(listed(is_count))),
+    Key("plan.lifts", "a list of numbers of robots, or null", maybe(listed(is_count))),
     Key("ground", "a table", is_table, later=True),
     Key("ground.floor", "two lengths in m, or null", maybe(listed(is_positive, 2)), later=True),
     Key("ground.relay", "true or false", of(bool), later=True),
     Key("ground.cycle", "a time in s, or null", maybe(is_positive), later=True),
-    Key("ground.lines", "lists of labels", listed(listed(is_text)), later=True),
-    Key("ground.parallel", "pairs of a label and a number", listed(is_branch), later=True),
-    Key("ground.formed", "true or false", of(bool), later=True),
     Key("ground.deputies", "true or false", of(bool), later=True),
     Key("monitor", "a table", is_table, later=True),
     Key("monitor.goals", "lists of numbers", listed(listed(is_number)), later=True),

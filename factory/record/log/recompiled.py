@@ -6,12 +6,12 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
+from factory.compiler.assigning import shared
 from factory.compiler.compiler import compile_pag
-from factory.compiler.folding import fold, lines_of_labels
-from factory.compiler.parallel import in_parallel
 from factory.lang import read_pag, read_template
 from factory.nets.history import firings
 from factory.plant.factory import Factory
+from factory.problem.plan import Plan
 from factory.problem.robot_types import load_catalogue
 from factory.support.errors import Diagnostic, InputError
 
@@ -39,12 +39,8 @@ def factory_of(header: Mapping[str, Any]) -> Factory:
     templates = {name: read_template(text, name) for name, text in header["templates"].items()}
     pag = read_pag(header["pag"]["text"], templates, header["pag"]["file"], None)
     catalogue = load_catalogue()
-    factory = compile_pag(pag, templates, catalogue)
-    ground = header.get("ground", {})
-    if lines := ground.get("lines"):
-        factory = fold(factory, lines_of_labels(factory, lines), catalogue)
-    if branches := ground.get("parallel"):
-        factory = in_parallel(factory, branches)
+    plan = Plan.of_json(header["plan"])
+    factory = shared(compile_pag(pag, templates, catalogue, {}, plan), plan, catalogue)
     net = factory.net.threaded
     made = [[x.name for x in found] for found in (net.transitions, net.places, factory.robots)]
     if made != [header["transitions"], header["places"], header["robots"]]:

@@ -271,13 +271,11 @@ def _header(
     simulation: Observed, pag: PAG | None, command: Sequence[str] | None, nq: int, nv: int
 ) -> dict[str, Any]:
     layout, net = simulation.layout, simulation.layout.factory.net.threaded
-    factory, plain = layout.factory, layout.plain or layout
-    given, account = plain.factory.pag if pag is None else pag, simulation.world.hooks.account
+    factory = layout.factory
+    given, account = factory.pag if pag is None else pag, simulation.world.hooks.account
     file = Path(given.file)
-    written = file.is_file() and not layout.ground.get("formed")
-    written &= all(allowed.position for allowed in given.allowed)  # others are options
-    said = file.read_text("utf-8", errors="replace") if written else write_pag(given)
-    text = said if layout.plain is None else write_pag(factory.pag)
+    written = file.is_file() and all(allowed.position for allowed in given.allowed)
+    text = file.read_text("utf-8", errors="replace") if written else write_pag(given)
     templates = {o.template.name: o.template for o in factory.operations}
     return {
         "versions": {"python": platform.python_version(), **versions()},
@@ -301,8 +299,8 @@ def _header(
             "file": str(file),
             "text": text,
             "sha256": hashlib.sha256(text.encode()).hexdigest(),
-            "plain": None if layout.plain is None else said,
         },
+        "plan": factory.plan.as_json(),
         "ground": dict(layout.ground),
         "templates": {name: write_template(made) for name, made in sorted(templates.items())},
         "monitor": subject_of_run(simulation).as_json(),

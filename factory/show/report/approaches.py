@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from html import escape
 
+from factory.compiler.expanding import nodes_of
 from factory.compiler.mating.rooms import AMPLE, rooms
 from factory.plant.approaches import Approach, Pair
 from factory.plant.factory import Operation
@@ -55,9 +56,7 @@ def _rooms(recording: Recording, chosen: Mapping[str, Approach]) -> Mapping[str,
     """The room on each way by label; nothing where the meshes are gone."""
     if recording.layout is None:
         return {}
-    factory = recording.factory
-    templates = {o.template.name: o.template for o in factory.operations}
-    return rooms(factory.pag, templates, recording.layout.product, chosen)
+    return rooms(nodes_of(recording.factory), recording.layout.product, chosen)
 
 
 def _row(o: Operation, approach: Approach, room: float | None, labels: Mapping[str, int]) -> str:

@@ -32,7 +32,7 @@ class ProductError:
 
     def __init__(self, model: Model) -> None:
         solids, bodies = model.layout.product.solids, model.carried
-        found = bodies.carried[model.factory.pag.root]
+        found = bodies.carried[model.factory.products[0]]
         corners = [
             np.concatenate([solids[part].corners for part in bodies.parts(body)]) for body in found
         ]

@@ -7,12 +7,14 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
 
+from factory.compiler.expanding import expand
 from factory.compiler.folding import Line
 from factory.compiler.mating.admitting import admitted
 from factory.compiler.mating.mating import judged
 from factory.layout.durations import Pace
 from factory.layout.shapes import payload_boxes
 from factory.pipeline import Project
+from factory.problem.plan import Plan
 from factory.problem.shapes import is_shaped
 from factory.study.allocation.aim import STEP
 from factory.study.allocation.bundles import Filling
@@ -22,10 +24,9 @@ from factory.study.allocation.forms import (
     Order,
     best_forms,
     forms_task,
-    reformed,
     written_forms,
 )
-from factory.study.allocation.lines import SLACKS, Shift, labels_on
+from factory.study.allocation.lines import SLACKS, Shift
 from factory.support.allowance import Allowance
 
 WIDE = 1.3
@@ -76,7 +77,7 @@ class Estimator:
         """What forms are estimated by."""
         project = self.project
         pag, templates, product = project.pag, project.templates, project.product
-        admits = admitted(pag, templates, product) if is_shaped(pag) else {}
+        admits = admitted(expand(pag, templates), product) if is_shaped(pag) else {}
         boxes = payload_boxes(project.compiled, product)
         return forms_task(pag, templates, admits, boxes, Pace.of(project.settings))
 
@@ -88,11 +89,9 @@ class Estimator:
     def candidate(self, forms: Mapping[str, int], filling: Filling | None = None) -> Candidate:
         """The product with these forms, and with lines that are filled if that is
         said."""
-        project = self._reformed(forms)
+        project = self._formed(forms)
         if filling is not None:
-            shift = self._shift(project)
-            lines = labels_on(shift.factory, shift.lines(filling))
-            project = project.with_pag(project.pag, replace(project.ground, lines=lines))
+            project = project.with_plan(self._shift(project).plan(filling))
         return Candidate(project, forms, filling)
 
     def front(self, budget: Allowance, robots: float = inf) -> list[Estimate]:
@@ -126,13 +125,13 @@ class Estimator:
     def of_forms(self, forms: Mapping[str, int], robots: float = inf) -> Iterator[Estimate]:
         """The estimates of forms, none where more operations are blocked than as the product is
         written."""
-        project = self._reformed(forms)
+        project = self._formed(forms)
         if _blocked(project) <= self._blocked_as_written:
             yield from self._filled(project, forms, robots)
 
     @cached_property
     def _blocked_as_written(self) -> int:
-        return _blocked(self._reformed(self.written))
+        return _blocked(self._formed(self.written))
 
     def _tasks(self) -> Iterator[FormsTask]:
         orders: tuple[Order, ...] = ("lines", "fewest", "robots")
@@ -172,13 +171,10 @@ class Estimator:
         boxes = payload_boxes(factory, project.product)
         return Shift.of(factory, project.catalogue, boxes, self.task.pace)
 
-    def _reformed(self, forms: Mapping[str, int]) -> Project:
+    def _formed(self, forms: Mapping[str, int]) -> Project:
         """The product with these forms, a robot for each label."""
-        ground = replace(self.project.ground, formed=forms != self.written, lines=())
-        if not ground.formed:
-            return self.project.with_pag(self.project.pag, ground)
-        pag = reformed(self.project.pag, self.project.templates, forms)
-        return self.project.with_pag(pag, ground)
+        other = {label: form for label, form in forms.items() if form != self.written[label]}
+        return self.project.with_plan(Plan(other))
 
 
 def _blocked(project: Project) -> int:

@@ -19,24 +19,20 @@ from functools import cached_property
 from math import inf
 from typing import Literal
 
-from factory.compiler.compiler import Node, expand
+from factory.compiler.expanding import Node, expand, joins
 from factory.compiler.mating.admitting import Admitted
 from factory.compiler.mating.findings import BLOCKED, NO_DEEPER
 from factory.layout.durations import Pace
 from factory.layout.guidepath import Box
-from factory.layout.relaying.naming import free_label
-from factory.problem.pag import NOPART, PAG, Assembly
+from factory.problem.pag import NOPART, PAG
+from factory.problem.plan import THIRD
 from factory.problem.template import Template, variable_number
-from factory.support.errors import Position
 
 APART = 0.06
 """What lies on a guidepath beside a sub-assembly, from one station to the next [m]."""
 
 GRAIN = 0.1
 """By how much estimated cycles above the bound are told apart [s]."""
-
-THIRD = -1
-"""The pile of an operation that a third robot takes; else the number of the input that is kept."""
 
 Order = Literal["robots", "lines", "fewest"]
 """What forms are chosen by: few robots that serve one label each, few lines, or few lines even
@@ -103,13 +99,6 @@ class FormsTask:
             if template.instead:
                 found |= dict.fromkeys(joins(node), template)
         return found
-
-
-def joins(node: Assembly) -> Iterator[str]:
-    """The labels of what a statement of two inputs or more makes one after the other (`expand`)."""
-    for number in range(2, len(node.inputs)):
-        yield f"{node.label}/{number}"
-    yield node.label
 
 
 def best_forms(task: FormsTask, bound: float = inf) -> tuple[dict[str, int], float]:
@@ -248,51 +237,6 @@ def _held(node: Node) -> int:
     if variable == NOPART or not node.inputs:
         return -1
     return sorted(node.template.inputs, key=variable_number).index(variable)
-
-
-def reformed(pag: PAG, templates: Mapping[str, Template], forms: Mapping[str, int]) -> PAG:
-    """The same product with these forms (`best_forms`). A statement of many inputs is written as
-    several where its pile goes from one robot to another."""
-    taken, nodes = set(pag.by_label), list[Assembly]()
-    for node in pag.nodes:
-        template = templates[node.operation]
-        if template.instead and len(node.inputs) > 1:
-            nodes += _statements(node, templates, forms, taken)
-        else:
-            nodes.append(node)
-    return replace(pag, nodes=tuple(nodes), count=None)
-
-
-def _statements(
-    node: Assembly, templates: Mapping[str, Template], forms: Mapping[str, int], taken: set[str]
-) -> list[Assembly]:
-    """A statement with its forms, what is taken first last."""
-    template = templates[node.operation]
-    at = node.input_positions or (None,) * len(node.inputs)
-    first, *rest = zip(node.inputs, at, strict=True)
-    found, pile = list[Assembly](), [first]
-    operation = before = ""
-    for label, come in zip(joins(node), rest, strict=True):
-        form = forms[label]
-        last, before = before, label
-        if operation and form == 0 and templates[operation].further:
-            pile.append(come)
-            continue
-        if operation:
-            made = free_label(last.replace("/", "."), taken)
-            found.append(_statement(node, made, operation, pile))
-            pile = [(made, come[1])]
-        operation = template.name if form == THIRD else template.instead
-        pile = [come, *pile] if form == 1 else [*pile, come]
-    return [_statement(node, node.label, operation, pile), *reversed(found)]
-
-
-def _statement(
-    node: Assembly, label: str, operation: str, inputs: Sequence[tuple[str, Position | None]]
-) -> Assembly:
-    names, at = zip(*inputs, strict=True)
-    known = tuple(position for position in at if position is not None)
-    return replace(node, label=label, operation=operation, inputs=names, input_positions=known)
 
 
 def forms_task(

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
-from factory.compiler.compiler import Node, expand
+from factory.compiler.expanding import Node, expand
 from factory.problem.pag import NOPART, PAG
 from factory.problem.template import Template
 

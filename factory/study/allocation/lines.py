@@ -10,12 +10,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 
-from factory.compiler.folding import Line, count_of, delivery, folded
+from factory.compiler.folding import Line, count_of, fold, folded
 from factory.layout.durations import Pace
 from factory.layout.guidepath import Box
 from factory.nets.cycle_ratio import max_cycle_ratio
 from factory.nets.marked import marked
 from factory.plant.factory import Factory
+from factory.problem.plan import Plan
 from factory.problem.robot_types import Catalogue
 from factory.study.allocation.bundles import BETWEEN, LANE, Filling, SizeTiming, bundled
 
@@ -73,6 +74,10 @@ class Shift:
         timing = SizeTiming.of(self.factory, self.boxes, self.pace)
         return tuple(bundled(timing, filling).lines())
 
+    def plan(self, filling: Filling) -> Plan:
+        """The plan with the lines that are filled so."""
+        return fold(self.factory, self.lines(filling), self.catalogue).plan
+
 
 @dataclass(frozen=True)
 class Ways:
@@ -126,12 +131,3 @@ def estimated_delays(timing: SizeTiming) -> list[float]:
         longest = max(ways.out[robot] for robot in guests or [operation.carrier])
         found.append(timing.takes(operation.index, max(longest, stands[operation.index])))
     return found
-
-
-def labels_on(factory: Factory, lines: Sequence[Line]) -> tuple[tuple[str, ...], ...]:
-    """Lines by the labels that their robots bring."""
-    found = []
-    for line in lines:
-        ends = ((delivery(factory, robot), robot) for robot in line)
-        found.append(tuple(last.before[last.robots.index(robot)] for last, robot in ends))
-    return tuple(found)

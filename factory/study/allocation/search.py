@@ -13,15 +13,16 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from math import inf
 
-from factory.compiler.folding import kept_apart, lines_of_labels
+from factory.compiler.folding import kept_apart, lines_of
 from factory.compiler.mating.mating import judged
 from factory.pipeline import Project
+from factory.problem.plan import THIRD
 from factory.study.allocation.aim import Aim, usual_effort
-from factory.study.allocation.blame import blamed, joins_of
+from factory.study.allocation.blame import blamed
 from factory.study.allocation.bundles import Filling
 from factory.study.allocation.candidate import Candidate
 from factory.study.allocation.estimating import Estimator
-from factory.study.allocation.forms import THIRD, best_forms
+from factory.study.allocation.forms import best_forms
 from factory.study.allocation.least import least_robots
 from factory.support.allowance import Allowance
 from factory.support.errors import Diagnostic, FactoryError, InputError
@@ -72,8 +73,7 @@ def allocated(
         raise InputError(Diagnostic("TooFewRobots", message, None, hint))
     if aim.robots is None and aim.cycle is not None and best.seconds > aim.cycle:
         plain = best if best.filling is None else search.written
-        ground = replace(project.ground, formed=plain.project.ground.formed)
-        relayed = replace(plain, project=plain.project.with_pag(plain.project.pag, ground))
+        relayed = replace(plain, project=plain.project.with_ground(project.ground))
         best = min(best, relayed, key=search.rank)
     return best.project
 
@@ -86,7 +86,7 @@ class Search:
         self.budget = Allowance(effort, aim.seconds)
         self.forms = Allowance(effort, aim.seconds)
         bare = replace(project.ground, relay=False, cycle=None)
-        self.estimator = estimator or Estimator(project.with_pag(project.pag, bare))
+        self.estimator = estimator or Estimator(project.with_ground(bare))
         self.written = self.best = self.estimator.candidate(self.estimator.written)
 
     @property
@@ -114,8 +114,7 @@ class Search:
         """What keeps two lines of the best apart, in words; "" where nothing is known to."""
         best = self.best.project
         compiled = judged(best.compiled, best.product)
-        lines = lines_of_labels(compiled, best.ground.lines)
-        words = next(kept_apart(compiled, lines, best.catalogue), "")
+        words = next(kept_apart(compiled, lines_of(best.plan), best.catalogue), "")
         return f"; {words}" if words else ""
 
     def singles(self) -> Iterator[Candidate]:
@@ -129,7 +128,7 @@ class Search:
                 if forms == before or self.budget.over(SINGLE):
                     break
                 one, before = self._candidate(forms), forms
-                refused = task.refused | frozenset(blamed(task, one.project, forms))
+                refused = task.refused | frozenset(blamed(one.project, forms))
                 if one.troubles <= self.written.troubles or refused == task.refused:
                     yield one
                     break
@@ -180,9 +179,8 @@ class Search:
         """The best with one form changed: those of joins of the slowest robot first; on lines that
         are filled for the same."""
         best, factory = self.best, self.best.project.plain
-        known = joins_of(self.estimator.task, best.project)
         slow = [r for r in factory.robots if r.name == best.pace.bottleneck]
-        first = [known.get(factory.operations[n].label, "") for r in slow for n in r.operations]
+        first = [factory.operations[n].written for r in slow for n in r.operations]
         order = dict.fromkeys(label for label in (*first, *best.forms) if label in best.forms)
         for label in order:
             for form in (THIRD, 0, 1):

@@ -68,7 +68,9 @@ class FrontPoint:
     @property
     def lines(self) -> tuple[tuple[str, ...], ...]:
         """The labels that share a robot, line by line."""
-        return self.project.ground.lines
+        factory = self.project.plain
+        served = (factory.deliveries(robot.index) for robot in factory.robots)
+        return tuple(labels for labels in served if len(labels) > 1)
 
     @property
     def certified(self) -> bool:

@@ -1,5 +1,5 @@
-"""The files from which a point of a front is made again: for each a PAG with its forms, and a
-`factory.toml` with its lines and settings; meshes and operations of the user's lie beside them."""
+"""The files from which a point of a front is made again: for each the PAG, its plan, and a
+`factory.toml` with its settings; meshes and operations of the user's lie beside them."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ from factory.importing.mesh_files import MeshStore
 from factory.lang.writer import write_pag, write_template
 from factory.pipeline import Project
 from factory.problem.pag import PAG, Assembly
+from factory.problem.plan_file import PLAN_NAME, plan_table
 from factory.study.pareto.front import FrontPoint, ParetoFront
 from factory.support.files import MESH, read_bytes
 from factory.support.resources import templates_folder
 from factory.support.settings import Settings
-from factory.support.user_defaults import LINES, NAME
+from factory.support.user_defaults import NAME
 
 PAG_NAME = "product.pag"
 
@@ -32,14 +33,14 @@ def point_name(number: int) -> str:
 
 
 def command_of(point: FrontPoint, file: Path) -> str:
-    """The command that builds and runs a point whose PAG is in a file."""
+    """The command that builds and runs a point whose plan is in a file."""
     return shlex.join(["factory", "run", str(file), *["--relay"] * bool(point.relays)])
 
 
 def commands_of(front: ParetoFront, folder: Path) -> list[str]:
     """Those of all points, in their order."""
     return [
-        command_of(point, folder / point_name(number) / PAG_NAME)
+        command_of(point, folder / point_name(number) / PLAN_NAME)
         for number, point in enumerate(front.points)
     ]
 
@@ -51,7 +52,10 @@ def point_files(front: ParetoFront, folder: Path) -> dict[Path, bytes]:
     kept: dict[tuple[str, str], str] = {}
     for number, point in enumerate(front.points):
         own, project = folder / point_name(number), point.project
-        found[own / PAG_NAME] = write_pag(_with_meshes(project.pag, store, kept)).encode()
+        pag = write_pag(_with_meshes(project.pag, store, kept))
+        found[own / PAG_NAME] = pag.encode()
+        plan = plan_table(PAG_NAME, pag, project.plain.plan)
+        found[own / PLAN_NAME] = (json.dumps(plan, indent=1) + "\n").encode()
         found[own / NAME] = "".join(f"{line}\n" for line in _settings(project)).encode()
     found |= {folder / path: content for path, content in store.files.items()}
     if front.points:
@@ -107,11 +111,6 @@ def _settings(project: Project) -> Iterator[str]:
         yield f"floor = {_written('x'.join(map(str, ground.floor)))}"
     if _own_operations(project):
         yield f"templates = {_written([f'../{OPERATIONS}'])}"
-    if ground.lines:
-        yield ""
-        yield f"[{LINES}]"
-        for number, line in enumerate(ground.lines, 1):
-            yield f"line{number} = {_written(list(line))}"
 
 
 def _written(value: Any) -> str:

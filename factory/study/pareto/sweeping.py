@@ -18,12 +18,10 @@ from itertools import product
 from math import ceil, inf
 
 from factory.pipeline import Project
-from factory.problem.pag import Assembly
-from factory.problem.shapes import SHAPED
+from factory.problem.plan import THIRD, Plan
 from factory.study.allocation.aim import Aim, usual_effort
 from factory.study.allocation.candidate import Candidate
 from factory.study.allocation.estimating import Estimate, Estimator
-from factory.study.allocation.forms import THIRD
 from factory.study.allocation.least import least_robots
 from factory.study.allocation.search import SINGLE, Search
 from factory.study.pareto.front import (
@@ -99,8 +97,8 @@ class FrontSweep:
         self.forms = Allowance(factories, effort.seconds)
         self.changes = Allowance(factories, effort.seconds)
         self.budget = Allowance(factories, effort.seconds)
-        bare = replace(project.ground, relay=False, cycle=None, lines=())
-        self.estimator = Estimator(project.with_pag(project.pag, bare))
+        bare = replace(project.ground, relay=False, cycle=None)
+        self.estimator = Estimator(project.with_plan(Plan()).with_ground(bare))
         self.written: FrontPoint | None = None
         self.points: list[FrontPoint] = []
         self.estimates: list[Estimate] = []
@@ -218,18 +216,12 @@ class FrontSweep:
                 return False
             self._say("with relays", number, len(every))
             ground = replace(one.project.ground, relay=True)
-            relayed = one.project.with_pag(one.project.pag, ground)
-            self._added(replace(one, project=relayed))
+            self._added(replace(one, project=one.project.with_ground(ground)))
         return True
 
     def _candidate(self, one: Estimate) -> Candidate:
-        """The factory of an estimate. Default boxes lie in the order of the text, so those of a
-        product with other forms are computed anew, as they are where that is read."""
-        made = self.estimator.candidate(one.forms, one.filling)
-        project = made.project
-        if project.ground.formed and any(map(_is_default, project.pag.parts())):
-            made = replace(made, project=replace(project))
-        return made
+        """The factory of an estimate."""
+        return self.estimator.candidate(one.forms, one.filling)
 
     def _added(self, one: Candidate, estimated: float | None = None) -> FrontPoint | None:
         """The point of a candidate, which is then on the front unless others are as good; None
@@ -241,8 +233,3 @@ class FrontSweep:
             return None
         self.points = undominated([*self.points, point])
         return point
-
-
-def _is_default(part: Assembly) -> bool:
-    """Whether a part says nothing of where it is."""
-    return not any(p.name in SHAPED for p in part.parameters)

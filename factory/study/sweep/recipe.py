@@ -55,8 +55,7 @@ class Recipe:
             "floor": list(self.ground.floor) if self.ground.floor else None,
             "relay": self.ground.relay,
             "cycle": self.ground.cycle,
-            "lines": [list(line) for line in self.ground.lines],
-            **({"parallel": dict(self.ground.parallel)} if self.ground.parallel else {}),
+            "plan": self.factory.plan.as_json(),
             "fuse": self.fuse,
             **fixed,
         }
