@@ -260,7 +260,13 @@ def test_the_command_tells_its_points(run: Terminal, out: Path) -> None:
     assert all(p["validated"] and abs(p["validation"]["error"]) <= 0.02 for p in tried_ones)
     written = files_in(out / "front")
     assert set(document["files"]) == {str(out / "front" / name) for name in written}
-    assert {"pareto.html", "p01/product.pag", "p01/factory.toml", "p01/floor.svg"} <= set(written)
+    assert {
+        "pareto.html",
+        "p01/product.pag",
+        "p01/plan.json",
+        "p01/factory.toml",
+        "p01/floor.svg",
+    } <= set(written)
     assert not any(p["validated"] for p in document["points"] if p["validation"] is None)
     told = run("pareto", PAPER, "--no-hands", "-o", out / "front")
     count = len(document["points"])
@@ -272,7 +278,7 @@ def test_the_command_tells_its_points(run: Terminal, out: Path) -> None:
 
 
 def test_what_fits_a_floor_is_found_where_the_product_as_written_does_not(run: Terminal) -> None:
-    done = run("pareto", PAPER, "--no-hands", "--floor", "0.7x0.39", "--json")
+    done = run("pareto", PAPER, "--no-hands", "--floor", "0.7x0.52", "--json")
     assert done.status == 0, done.err
     assert done.json["written"] is None
     assert {p["robots"] for p in done.json["points"]} == {5}

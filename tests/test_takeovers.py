@@ -262,7 +262,6 @@ def test_check_lists_those_laid_out(pag: Path, run: Terminal) -> None:
     [
         (("--relay",), "BadValue"),
         (("--cycle", 3), "BadValue"),
-        (("--parallel", "part2=2"), "BadValue"),
     ],
 )
 def test_what_does_not_go_with_it(

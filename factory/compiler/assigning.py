@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from factory.compiler.gearing import gear_net
-from factory.plant.approaches import Approach, Overlap
+from factory.plant.approaches import Overlap
 from factory.plant.factory import Factory, Operation, Robot, in_turn
 from factory.problem.pag import NOPART
 from factory.problem.plan import Plan
@@ -25,14 +25,14 @@ from factory.problem.robot_types import LIFT, Catalogue
 
 def assigned(base: Factory, robots: Sequence[Robot], turns: Sequence[Sequence[int]]) -> Factory:
     """The factory with these `robots`, whose programs are made anew, where in turn t robot
-    `turns[t][r]` (index) does the tours of robot r of `base`. Several turns are of a base that
-    makes one unit. Near-linear."""
+    `turns[t][r]` (index) does the tours of robot r of `base`. Near-linear."""
     period, when = len(turns), base.postorder
     makes, drops = range(len(base.making)), range(len(base.making), len(base.operations))
     every = ((o, turn) for part in (makes, drops) for turn in range(period) for o in part)
     number = {unit: n for n, unit in enumerate(every)}
     operations = tuple(
-        _for_unit(base.operations[o], n, turn, turns[turn]) for (o, turn), n in number.items()
+        _for_unit(o := base.operations[i], n, turn * base.period + o.turn, turns[turn])
+        for (i, turn), n in number.items()
     )
     programs: list[list[int]] = [[] for _ in robots]
     tours = sorted(
@@ -82,16 +82,25 @@ def shared(base: Factory, plan: Plan, catalogue: Catalogue) -> Factory:
     return replace(made, plan=plan, adjusted=lifts)
 
 
-def _for_unit(o: Operation, index: int, turn: int, does: Sequence[int]) -> Operation:
+def _for_unit(o: Operation, index: int, unit: int, does: Sequence[int]) -> Operation:
     """An operation for a unit of a period; `does`: for each of its robots who does its tours."""
     robots = tuple(does[robot] for robot in o.robots)
-    if not turn:
+    if unit == o.turn:
         return replace(o, index=index, robots=robots)
 
     def named(label: str) -> str:
-        return label if label == NOPART else in_turn(label, turn)
+        return label if label == NOPART else in_turn(label.removesuffix(in_turn("", o.turn)), unit)
+
+    def overlapping(overlap: Overlap) -> Overlap:
+        one, other = overlap.parts
+        return replace(overlap, parts=(named(one), named(other)))
 
     before, after = (tuple(map(named, labels)) for labels in (o.before, o.after))
+    approach = o.approach and replace(
+        o.approach,
+        lowered=o.approach.lowered and named(o.approach.lowered),
+        overlaps=tuple(tuple(map(overlapping, side)) for side in o.approach.overlaps),
+    )
     return replace(
         o,
         index=index,
@@ -99,20 +108,6 @@ def _for_unit(o: Operation, index: int, turn: int, does: Sequence[int]) -> Opera
         robots=robots,
         before=before,
         after=after,
-        approach=o.approach and _approach_for_unit(o.approach, turn),
-        turn=turn,
-    )
-
-
-def _approach_for_unit(approach: Approach, turn: int) -> Approach:
-    """How inputs come together, by their names for a unit of a period."""
-
-    def named(overlap: Overlap) -> Overlap:
-        one, other = overlap.parts
-        return replace(overlap, parts=(in_turn(one, turn), in_turn(other, turn)))
-
-    return replace(
-        approach,
-        lowered=approach.lowered and in_turn(approach.lowered, turn),
-        overlaps=tuple(tuple(map(named, overlaps)) for overlaps in approach.overlaps),
+        approach=approach,
+        turn=unit,
     )

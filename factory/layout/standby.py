@@ -26,7 +26,8 @@ class Repertoire:
         """That of a layout; nothing more where deputies cannot take over."""
         if (whole := _whole(layout)) is None:
             return cls(layout, {label: label for label in layout.factory.by_label})
-        return cls(whole, {o.label: o.written for o in whole.factory.making})
+        period = layout.factory.period
+        return cls(whole, {o.label: o.within(period) for o in whole.factory.making})
 
     def delivered(self, robot: int) -> list[str]:
         """What a robot (index) may ever deliver, as it is called in the factory."""
@@ -39,8 +40,9 @@ def deputies_in(layout: Layout) -> Mapping[int, int]:
         return {}
     first, found = layout.factory.by_label, dict[int, int]()
     for o in whole.factory.operations:
-        pairs = zip(whole.factory.by_label[o.written].robots, o.robots, strict=True)
-        found |= {robot: other for robot, other in pairs if robot != other and o.written in first}
+        label = o.within(layout.factory.period)
+        pairs = zip(whole.factory.by_label[label].robots, o.robots, strict=True)
+        found |= {robot: other for robot, other in pairs if robot != other and label in first}
     return found
 
 
@@ -60,7 +62,7 @@ def part_of(layout: Layout, factory: Factory, robots: Sequence[int]) -> Layout |
         return None
     number, every = {robot: n for n, robot in enumerate(robots)}, whole.factory
     known = {
-        (o.written, tuple(number.get(robot, -1) for robot in o.robots)): o.index
+        (o.within(factory.period), tuple(number.get(robot, -1) for robot in o.robots)): o.index
         for o in reversed(every.operations)
     }
     found = [known.get((o.label, o.robots), -1) for o in factory.operations]

@@ -52,6 +52,11 @@ class Operation:
         """The label without its turn: as the PAG has it, or one pile of such a label."""
         return self.label.removesuffix(in_turn("", self.turn))
 
+    def within(self, period: int) -> str:
+        """The label in a factory whose period has so many units, where this one's has several times
+        as many."""
+        return in_turn(self.written, self.turn % period)
+
     @property
     def carrier(self) -> int:
         """The robot that holds the result (index into `Factory.robots`)."""

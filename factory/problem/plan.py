@@ -10,6 +10,9 @@ THIRD = -1
 """The form of a join whose inputs a third robot takes; others are the number of the input that
 stays on its robot."""
 
+MOST_RELAYS, MOST_ROBOTS = 99, 10**6
+"""Upper bounds on numbers in a table that comes from elsewhere."""
+
 Turns = Sequence[Sequence[int]]
 """For each unit of a period, and each robot of the factory that has one robot for each tour, the
 robot (index) that does its tour."""
@@ -50,11 +53,25 @@ class Plan:
 
     @classmethod
     def of_json(cls, table: Mapping[str, Any]) -> Plan:
-        """The plan in such a table. Raises ValueError, KeyError, TypeError where it is none."""
-        forms, relays = ({str(k): int(v) for k, v in table[n].items()} for n in ("forms", "relays"))
-        turns = tuple(tuple(map(int, turn)) for turn in table["turns"])
-        lifts = table["lifts"]
-        return cls(forms, relays, turns, None if lifts is None else frozenset(map(int, lifts)))
+        """The plan in such a table. Raises ValueError, KeyError, TypeError, AttributeError where it
+        is none."""
+        turns, lifts = table["turns"], table["lifts"]
+        return cls(
+            {str(label): _whole(form, THIRD, 1) for label, form in table["forms"].items()},
+            {
+                str(label): _whole(number, 1, MOST_RELAYS)
+                for label, number in table["relays"].items()
+            },
+            tuple(tuple(_whole(robot, 0, MOST_ROBOTS) for robot in turn) for turn in turns),
+            None if lifts is None else frozenset(_whole(robot, 0, MOST_ROBOTS) for robot in lifts),
+        )
+
+
+def _whole(value: object, least: int, most: int) -> int:
+    """A whole number from `least` to `most`. Raises ValueError for anything else."""
+    if type(value) is int and least <= value <= most:
+        return value
+    raise ValueError(f"a whole number from {least} to {most} is needed, not {value!r:.40}")
 
 
 AS_WRITTEN = Plan()

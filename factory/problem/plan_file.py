@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -32,7 +31,7 @@ def read_plan(path: Path) -> tuple[Path, Plan]:
         table = json.loads(read_bytes(path, TABLE))
         if table["schema"] != SCHEMA:
             raise ValueError(f"its schema is {table['schema']!r}, not {SCHEMA!r}")
-        pag, plan = path.parent / str(table["pag"]), _plan_of(table)
+        pag, plan = path.parent / str(table["pag"]), Plan.of_json(table)
     except OSError as error:
         raise InputError(_fault("BadFile", path, f"cannot be read: {error.strerror}")) from error
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
@@ -45,16 +44,6 @@ def read_plan(path: Path) -> tuple[Path, Plan]:
     if digest != table["sha256"]:
         raise InputError(_fault("BadPlan", path, f"is of another version of '{pag}'"))
     return pag, plan
-
-
-def _plan_of(table: Mapping[str, Any]) -> Plan:
-    """The plan in a table. Raises ValueError for values that no plan has."""
-    plan = Plan.of_json(table)
-    if not all(form in (-1, 0, 1) for form in plan.forms.values()):
-        raise ValueError("a form is -1, 0 or 1")
-    if not all(0 < number < 100 for number in plan.relays.values()):
-        raise ValueError("a label has 1 to 99 relays")
-    return plan
 
 
 def _fault(code: str, path: Path, words: str) -> Diagnostic:

@@ -8,6 +8,7 @@ from math import inf
 from typing import Any, get_args
 
 from factory.control.profile import World
+from factory.problem.plan import Plan
 from factory.support.settings import RANGES, Settings, wrong_type
 
 LARGE = 10**9
@@ -98,6 +99,15 @@ def maybe(test: Test) -> Test:
     return lambda v: v is None or test(v)
 
 
+def is_plan(value: Any) -> bool:
+    """Whether a value is the table of a plan."""
+    try:
+        Plan.of_json(value)
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError):
+        return False
+    return True
+
+
 def is_choice(value: Any) -> bool:
     """Whether a value says of timestep and wip whether they were chosen."""
     return tabled(of(bool))(value) and value.keys() == {"timestep", "wip"}
@@ -125,11 +135,7 @@ KEYS = (
     Key("pag.text", "a text", is_text),
     Key("pag.sha256", "a text", is_text),
     Key("templates", "a table of texts", tabled(is_text), later=True),
-    Key("plan", "a table", is_table, later=True),
-    Key("plan.forms", "numbers by labels", tabled(whole(-1, 1))),
-    Key("plan.relays", "numbers by labels", tabled(is_count)),
-    Key("plan.turns", "lists of numbers of robots", listed(listed(is_count))),
-    Key("plan.lifts", "a list of numbers of robots, or null", maybe(listed(is_count))),
+    Key("plan", "a plan", is_plan),
     Key("ground", "a table", is_table, later=True),
     Key("ground.floor", "two lengths in m, or null", maybe(listed(is_positive, 2)), later=True),
     Key("ground.relay", "true or false", of(bool), later=True),
