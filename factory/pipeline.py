@@ -170,21 +170,23 @@ class Project:
         factory, plan = self.planned, self.plan
         if not (self.settings.hands and plan.turns) or plan.lifts is not None:
             return factory
-        from factory.layout.hands.adjusting import with_lifts
+        from factory.layout.hands.adjusting import lifts_for
         from factory.layout.repeated import repeated
 
-        product = repeated(self.product, factory)
-        return with_lifts(factory, product, self.catalogue, self.settings.acceleration)
+        product, push = repeated(self.product, factory), self.settings.acceleration
+        lifts = lifts_for(factory, product, self.catalogue, push)
+        return self._shared(replace(plan, lifts=lifts))
 
     @cached_property
     def planned(self) -> Factory:
         """The same, but for lifts of robots with several tours."""
-        if not self.plan.turns:
-            return self.compiled
+        return self._shared(self.plan) if self.plan.turns else self.compiled
+
+    def _shared(self, plan: Plan) -> Factory:
         from factory.compiler.assigning import shared
         from factory.compiler.mating.mating import judged
 
-        return shared(judged(self.compiled, self.product), self.plan, self.catalogue)
+        return shared(judged(self.compiled, self.product), plan, self.catalogue)
 
     @property
     def _single(self) -> Plan:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import count
 from math import inf
@@ -20,6 +21,32 @@ if TYPE_CHECKING:
     from factory.simulation.request import RunRequest, WorldName
     from factory.study.allocation.candidate import Candidate
     from factory.support.settings import Settings
+
+
+APART = (
+    (
+        "--deputies",
+        ("--relay", "--cycle"),
+        "no robot can take over for one that relays",
+    ),
+    ("[lines]", ("--robots", "--cycle"), "the search chooses which labels share a robot"),
+    (
+        "--distributed",
+        ("--faults", "--spares", "--deputies"),
+        "robots that run their own programs do not recover",
+    ),
+)
+"""Options that exclude others, with the reason. All other pairs go together, but for --relay where
+robots have several tours, which is seen when the factory is laid out."""
+
+
+def check_together(given: Mapping[str, bool]) -> None:
+    """Raises InputError (BadValue) for options that exclude each other."""
+    for one, others, reason in APART:
+        for other in others:
+            if given.get(one) and given.get(other):
+                message = f"{one} does not go with {other}: {reason}"
+                raise InputError(Diagnostic("BadValue", message, None, "leave out one of the two"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,13 +106,18 @@ class ProjectOptions:
     def ground(self) -> Ground:
         """What FLOOR and RELAY ask for. Raises InputError (BadValue)."""
         from factory.layout.request import Ground
+        from factory.support.user_defaults import defaults_for
 
         floor = None if self.floor is None else pair(self.floor, "--floor", "4x3", float, WIDEST)
-        if self.deputies and (self.relay or self.cycle):
-            option = "--relay" if self.relay else "--cycle"
-            message = f"{option} does not go with --deputies"
-            hint = "leave out one of the two"
-            raise InputError(Diagnostic("BadValue", message, None, hint))
+        check_together(
+            {
+                "--relay": self.relay,
+                "--cycle": self.cycle is not None,
+                "--robots": self.robots is not None,
+                "--deputies": self.deputies,
+                "[lines]": bool(defaults_for(self.file).lines()),
+            }
+        )
         return Ground(floor, self.relay, self.cycle, self.deputies)
 
     def _allowing(self, pag: PAG) -> PAG:
@@ -180,6 +212,14 @@ class RunOptions:
         from factory.plant.fused_bodies import fusing_pays
         from factory.simulation.request import RunRequest
 
+        check_together(
+            {
+                "--distributed": self.distributed,
+                "--faults": self.faults is not None,
+                "--spares": self.spares > 0,
+                "--deputies": project.ground.deputies,
+            }
+        )
         layout, start = project.layout, self.start
         return RunRequest(
             self.world,

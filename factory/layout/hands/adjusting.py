@@ -12,26 +12,20 @@ from factory.plant.factory import Factory
 from factory.problem.robot_types import LIFT, Catalogue
 
 
-def with_lifts(
+def lifts_for(
     factory: Factory, product: Product, catalogue: Catalogue, push: float = PUSH
-) -> Factory:
-    """The factory, in which robots with several tours have lifts where one hand then holds all that
-    they bring, but without lifts none does; its plan says which."""
-    types = [catalogue.meet(robot.type, LIFT) for robot in factory.robots]
+) -> frozenset[int]:
+    """The robots (index) with several tours that have no lift, where one hand holds all that they
+    bring if they have one, and else none does."""
     lacking = {
         robot.index
-        for robot, kind in zip(factory.robots, types, strict=True)
-        if kind is not None and robot.index not in factory.strokes
-    } & without_hands(Hands(factory, product, push))
-    tried = replace(factory, adjusted=frozenset(lacking))
-    still = without_hands(Hands(tried, product, push), however=True) if lacking else set()
-    adjusted = frozenset(lacking - still)
-    robots = tuple(
-        replace(robot, type=types[robot.index] or LIFT) if robot.index in adjusted else robot
         for robot in factory.robots
-    )
-    plan = replace(factory.plan, lifts=adjusted)
-    return replace(factory, robots=robots, adjusted=adjusted, plan=plan)
+        if robot.index not in factory.strokes and catalogue.meet(robot.type, LIFT) is not None
+    } & without_hands(Hands(factory, product, push))
+    if not lacking:
+        return frozenset()
+    tried = replace(factory, adjusted=frozenset(lacking))
+    return frozenset(lacking - without_hands(Hands(tried, product, push), however=True))
 
 
 def without_hands(hands: Hands, however: bool = False) -> set[int]:

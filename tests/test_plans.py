@@ -1,0 +1,114 @@
+"""Plans: any plan of any product compiles to a factory that is live, laid out with its certificate,
+and runs as fast as is predicted; a plan written down is the same plan."""
+
+from __future__ import annotations
+
+import json
+import random
+from itertools import islice
+from pathlib import Path
+
+import pytest
+from net_values import explored
+from random_products import random_product
+
+from factory.compiler.assigning import shared
+from factory.compiler.expanding import joins
+from factory.compiler.mating.mating import judged
+from factory.layout.clearance import certify
+from factory.layout.durations import Pace
+from factory.layout.shapes import payload_boxes
+from factory.nets.marked import marked
+from factory.nets.verify import verify
+from factory.pipeline import Project, read
+from factory.problem.plan import THIRD, Plan
+from factory.problem.plan_file import PLAN_NAME, plan_table, read_plan
+from factory.simulation.request import RunRequest
+from factory.simulation.simulation import Simulation
+from factory.study.allocation.lines import Shift
+from factory.support.errors import InputError, RunError
+from factory.support.settings import Settings
+
+FEW, MANY = range(1, 6), range(100, 1100)
+
+
+def random_plan(project: Project, rng: random.Random) -> Project:
+    """A product by some plan: forms, lines, and a branch that is there several times."""
+    free = [
+        label
+        for node in project.pag.nodes
+        if project.templates[node.operation].instead and len(node.inputs) > 1
+        for label in joins(node)
+    ]
+    if rng.random() < 0.7:
+        forms = {label: rng.choice((THIRD, 0, 1)) for label in free if rng.random() < 0.5}
+        project = project.with_plan(Plan(forms))
+    base = judged(project.compiled, project.product)
+    if rng.random() < 0.7:
+        boxes = payload_boxes(base, project.product)
+        shift = Shift.of(base, project.catalogue, boxes, Pace.of(project.settings))
+        fillings = [*islice(shift.fillings(1.3), 40)]
+        if fillings:
+            project = project.with_plan(shift.plan(rng.choice(fillings)))
+    labels = [
+        x for robot in project.planned.robots[1:] for x in project.planned.deliveries(robot.index)
+    ]
+    for label in rng.sample(labels, min(2, len(labels))):
+        try:
+            return project.with_branches([(label, rng.choice((2, 3)))])
+        except InputError:
+            continue
+    return project
+
+
+def check(seed: int, folder: Path) -> None:
+    """One random product by one random plan."""
+    file, rng = folder / "product.pag", random.Random(seed)
+    file.write_text(random_product(seed))
+    project = random_plan(read(file, (), Settings(timestep=0.002, substeps=1)), rng)
+    try:
+        layout = project.layout
+    except RunError as error:
+        assert error.diagnostics[0].code == "Layout"
+        return
+    factory = layout.factory
+    assert verify(factory.net).holds
+    truth = explored(marked(factory.net), 500) if len(factory.operations) < 12 else None
+    assert truth is None or (truth.live, truth.safe, truth.reversible) == (True, True, True)
+    when = {number: n for n, number in enumerate(factory.order)}
+    for robot in factory.robots:
+        steps = [when[number] for number in robot.operations]
+        assert steps == sorted(steps), "one unit is made operation by operation"
+    assert certify(layout).holds
+    units = 6 * factory.period
+    request = RunRequest("ideal", units, settings=project.settings, shown=False)
+    run = Simulation(layout, request).run()
+    assert run.refines_net and run.products == units
+    assert run.cycle_time_s == pytest.approx(
+        run.predicted_cycle_time_s, rel=0.005, abs=3 * project.settings.tick
+    )
+    table = json.loads(json.dumps(plan_table("product.pag", file.read_text(), factory.plan)))
+    (folder / PLAN_NAME).write_text(json.dumps(table))
+    assert read_plan(folder / PLAN_NAME) == (file, factory.plan)
+    again = read(folder / PLAN_NAME, (), project.settings).layout
+    assert again.factory == factory
+    assert (again.guidepaths, again.stations) == (layout.guidepaths, layout.stations)
+
+
+@pytest.mark.parametrize("seed", FEW)
+def test_any_plan_of_any_product(seed: int, tmp_path: Path) -> None:
+    check(seed, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", MANY)
+def test_a_thousand_plans(seed: int, tmp_path: Path) -> None:
+    check(seed, tmp_path)
+
+
+def test_a_plan_with_other_tours_is_refused() -> None:
+    project = read("examples/paper.pag")
+    with pytest.raises(ValueError, match="6 tours"):
+        shared(project.compiled, Plan(turns=((0, 1),)), project.catalogue)
+    with pytest.raises(ValueError, match="robots are named"):
+        shared(project.compiled, Plan(turns=((0, 1, 2, 3, 4, 9),)), project.catalogue)
