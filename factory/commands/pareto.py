@@ -77,7 +77,8 @@ def pareto(
     writable_folder(output)
     project = given.project(out.silent)
     warnings = announced(project.warnings, out)
-    front, stopped = _found(project, Effort(layouts, given.effort, given.limit or inf), trials, out)
+    effort = Effort(layouts, given.effort, given.limit or inf, given.branches())
+    front, stopped = _found(project, effort, trials, out)
     commands, files = _written(front, project, output)
     if out.as_json:
         points = zip(front.points, commands, strict=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import count
-from math import inf
+from math import inf, prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -144,12 +144,17 @@ class ProjectOptions:
             project = project.with_pag(self._allowing(project.pag))
         kept = defaults_for(self.file)
         if self.robots is not None or self.cycle is not None:
-            project = self._with_few_robots(project, silent)
-        elif lines := kept.lines():
+            return self._with_few_robots(project, silent)
+        if lines := kept.lines():
             project = project.with_lines(lines)
-        branches = {**kept.parallel(), **dict(self.parallel)}
-        several = [(label, k) for label, k in branches.items() if k > 1]
-        return project.with_branches(several) if several else project
+        return project.with_branches(self.branches()) if self.branches() else project
+
+    def branches(self) -> tuple[tuple[str, int], ...]:
+        """The labels whose branches are to be there several times, and how often."""
+        from factory.support.user_defaults import defaults_for
+
+        asked = {**defaults_for(self.file).parallel(), **dict(self.parallel)}
+        return tuple((label, k) for label, k in asked.items() if k > 1)
 
     def _with_few_robots(self, project: Project, silent: bool) -> Project:
         """The project with the plan that is found for the robots and the cycle time asked for."""
@@ -158,8 +163,9 @@ class ProjectOptions:
         from factory.support.console import warn
         from factory.support.progress import StepBar
 
-        effort = self.effort or usual_effort(len(project.pag))
-        aim = Aim(self.robots, self.cycle, effort, self.limit or inf)
+        units = prod(k for _, k in self.branches())
+        effort = self.effort or usual_effort(len(project.pag) * units)
+        aim = Aim(self.robots, self.cycle, effort, self.limit or inf, self.branches())
         looked_at, warnings = count(1), list[Diagnostic]()
         with StepBar("looking for few robots", silent) as steps:
 

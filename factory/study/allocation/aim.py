@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import Literal
 
+from factory.compiler.parallel import Branches
 from factory.support.settings import LEAST
 
 STEP = 1.15
@@ -26,12 +27,14 @@ def usual_effort(labels: int) -> int:
 class Aim:
     """How many `robots` there are, LEAST for as few as found, None for as many as it takes; the
     `cycle` time to be reached [s], None for the shortest. `effort`: how many factories are laid
-    out at most, None for as many as is usual; none is begun after `seconds`."""
+    out at most, None for as many as is usual; none is begun after `seconds`. `branches`: labels,
+    and how often the branch that brings each is to be there."""
 
     robots: int | Literal["least"] | None = None
     cycle: float | None = None
     effort: int | None = None
     seconds: float = inf
+    branches: Branches = ()
 
     @property
     def asks(self) -> bool:

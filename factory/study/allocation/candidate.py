@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+from factory.compiler.parallel import Branches
 from factory.pipeline import Project
 from factory.study.allocation.bundles import Filling
 from factory.support.errors import FactoryError
@@ -16,18 +17,21 @@ from factory.timing.prediction import pace
 @dataclass(frozen=True)
 class Candidate:
     """A product with `forms` chosen, by the joins of the product as it is written, and with lines
-    that are filled for something (`filling`), None for a robot for each label, as a `project`."""
+    that are filled for something (`filling`), None for a robot for each label: as the project
+    `single`, without the `branches` that are asked for several times."""
 
-    project: Project
+    single: Project
     forms: Mapping[str, int]
     filling: Filling | None = None
+    branches: Branches = ()
 
     def __str__(self) -> str:
-        robots = f"{self.robots} robots"
-        try:
-            return f"{robots}, {self.seconds:.2f} s"
-        except FactoryError:
-            return f"{robots}, no layout"
+        return f"{self.robots} robots, {self.seconds:.2f} s" if self.has_layout else "no layout"
+
+    @cached_property
+    def project(self) -> Project:
+        """It with all its branches. Raises InputError (Parallel) where some cannot be."""
+        return self.single.with_branches(self.branches) if self.branches else self.single
 
     @property
     def robots(self) -> int:
@@ -57,9 +61,23 @@ class Candidate:
         return pace(self.project.layout, self.project.settings)
 
     @cached_property
+    def has_layout(self) -> bool:
+        """Whether there is a layout of it."""
+        try:
+            return bool(self.project.layout)
+        except FactoryError:
+            return False
+
+    def of_the_slowest(self) -> list[str]:
+        """The labels that the robot which allows no shorter cycle makes, or brings."""
+        factory, slowest = self.project.plain, self.pace.bottleneck
+        slow = [robot for robot in factory.robots if robot.name == slowest]
+        return [factory.operations[n].written for robot in slow for n in robot.operations]
+
+    @cached_property
     def troubles(self) -> int:
         """How many of its operations are blocked, or have what no hand of a robot for one label can
         hold."""
-        found = self.project.matings
+        found = self.single.matings
         blocked = len(found.of_kind("blocked")) if found else 0
-        return blocked + sum(not grip.shared for grip in self.project.no_grips)
+        return blocked + sum(not grip.shared for grip in self.single.no_grips)

@@ -11,6 +11,7 @@ from factory.compiler.expanding import expand
 from factory.compiler.folding import Line
 from factory.compiler.mating.admitting import admitted
 from factory.compiler.mating.mating import judged
+from factory.compiler.parallel import Branches
 from factory.layout.durations import Pace
 from factory.layout.shapes import payload_boxes
 from factory.pipeline import Project
@@ -68,9 +69,11 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Estimator:
-    """Estimates for the product of a `project` that has a robot for each label, and no relays."""
+    """Estimates for the product of a `project` that has a robot for each label, and no relays;
+    `branches`: those that its factories have several times."""
 
     project: Project
+    branches: Branches = ()
 
     @cached_property
     def task(self) -> FormsTask:
@@ -92,7 +95,7 @@ class Estimator:
         project = self._formed(forms)
         if filling is not None:
             project = project.with_plan(self._shift(project).plan(filling))
-        return Candidate(project, forms, filling)
+        return Candidate(project, forms, filling, self.branches)
 
     def front(self, budget: Allowance, robots: float = inf) -> list[Estimate]:
         """The estimates of which no other is clearly better, with at most so many `robots`, and no

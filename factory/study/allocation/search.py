@@ -25,7 +25,7 @@ from factory.study.allocation.estimating import Estimator
 from factory.study.allocation.forms import best_forms
 from factory.study.allocation.least import least_robots
 from factory.support.allowance import Allowance
-from factory.support.errors import Diagnostic, FactoryError, InputError
+from factory.support.errors import Diagnostic, InputError
 
 ROUNDS = 8
 """So often forms are chosen anew where no hand can hold what they ask for."""
@@ -73,7 +73,7 @@ def allocated(
         raise InputError(Diagnostic("TooFewRobots", message, None, hint))
     if aim.robots is None and aim.cycle is not None and best.seconds > aim.cycle:
         plain = best if best.filling is None else search.written
-        relayed = replace(plain, project=plain.project.with_ground(project.ground))
+        relayed = replace(plain, single=plain.single.with_ground(project.ground))
         best = min(best, relayed, key=search.rank)
     return best.project
 
@@ -86,7 +86,7 @@ class Search:
         self.budget = Allowance(effort, aim.seconds)
         self.forms = Allowance(effort, aim.seconds)
         bare = replace(project.ground, relay=False, cycle=None)
-        self.estimator = estimator or Estimator(project.with_ground(bare))
+        self.estimator = estimator or Estimator(project.with_ground(bare), aim.branches)
         self.written = self.best = self.estimator.candidate(self.estimator.written)
 
     @property
@@ -95,9 +95,9 @@ class Search:
         return self.budget.cut_off or self.forms.cut_off
 
     def rank(self, one: Candidate) -> tuple[float, ...]:
-        """What a candidate is judged by, the less the better."""
+        """What a candidate is judged by, the less the better; one without a layout is the worst."""
         troubles = max(0, one.troubles - self.written.troubles)
-        return self.aim.rank(one.robots, one.seconds, troubles)
+        return self.aim.rank(one.robots, one.seconds, troubles) if one.has_layout else (inf,)
 
     def look(self, seen: Seen = lambda *_: None) -> None:
         """For forms and lines, as long as there is effort left and something better may be found.
@@ -112,7 +112,7 @@ class Search:
 
     def why(self) -> str:
         """What keeps two lines of the best apart, in words; "" where nothing is known to."""
-        best = self.best.project
+        best = self.best.single
         compiled = judged(best.compiled, best.product)
         words = next(kept_apart(compiled, lines_of(best.plan), best.catalogue), "")
         return f"; {words}" if words else ""
@@ -128,7 +128,7 @@ class Search:
                 if forms == before or self.budget.over(SINGLE):
                     break
                 one, before = self._candidate(forms), forms
-                refused = task.refused | frozenset(blamed(one.project, forms))
+                refused = task.refused | frozenset(blamed(one.single, forms))
                 if one.troubles <= self.written.troubles or refused == task.refused:
                     yield one
                     break
@@ -155,10 +155,7 @@ class Search:
 
     def _judge(self, one: Candidate) -> bool:
         """Whether it is better than the best so far; then it is the best."""
-        try:
-            better = self.rank(one) < self.rank(self.best)
-        except FactoryError:  # there is no layout of it
-            return False
+        better = self.rank(one) < self.rank(self.best)
         if better:
             self.best = one
         return better
@@ -178,9 +175,8 @@ class Search:
     def _changed(self) -> Iterator[Candidate]:
         """The best with one form changed: those of joins of the slowest robot first; on lines that
         are filled for the same."""
-        best, factory = self.best, self.best.project.plain
-        slow = [r for r in factory.robots if r.name == best.pace.bottleneck]
-        first = [factory.operations[n].written for r in slow for n in r.operations]
+        best = self.best
+        first = best.of_the_slowest() if best.has_layout else []
         order = dict.fromkeys(label for label in (*first, *best.forms) if label in best.forms)
         for label in order:
             for form in (THIRD, 0, 1):

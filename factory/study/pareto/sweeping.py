@@ -17,6 +17,7 @@ from functools import cached_property
 from itertools import product
 from math import ceil, inf
 
+from factory.compiler.parallel import Branches
 from factory.pipeline import Project
 from factory.problem.plan import THIRD, Plan
 from factory.study.allocation.aim import Aim, usual_effort
@@ -54,11 +55,13 @@ with relays."""
 class Effort:
     """What is spent on a front: whether `layouts` are made; how many, at most (`factories`), and of
     how many forms there are estimates, None for as many as is usual; nothing is begun after
-    `seconds`."""
+    `seconds`. `branches` of all its factories: labels, and how often that which brings each is
+    there."""
 
     layouts: bool = True
     factories: int | None = None
     seconds: float = inf
+    branches: Branches = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +101,7 @@ class FrontSweep:
         self.changes = Allowance(factories, effort.seconds)
         self.budget = Allowance(factories, effort.seconds)
         bare = replace(project.ground, relay=False, cycle=None)
-        self.estimator = Estimator(project.with_plan(Plan()).with_ground(bare))
+        self.estimator = Estimator(project.with_plan(Plan()).with_ground(bare), effort.branches)
         self.written: FrontPoint | None = None
         self.points: list[FrontPoint] = []
         self.estimates: list[Estimate] = []
@@ -215,8 +218,8 @@ class FrontSweep:
             if self.budget.over():
                 return False
             self._say("with relays", number, len(every))
-            ground = replace(one.project.ground, relay=True)
-            self._added(replace(one, project=one.project.with_ground(ground)))
+            ground = replace(one.single.ground, relay=True)
+            self._added(replace(one, single=one.single.with_ground(ground)))
         return True
 
     def _candidate(self, one: Estimate) -> Candidate:
