@@ -137,7 +137,7 @@ class Project:
         """What is wrong with the geometry of its parts, what overlaps, what is blocked, and what no
         hand can hold, unless the product is of an unlikely size."""
         product = () if is_plain(self.pag) else self.product.warnings
-        blocked = self.matings.warnings if self.matings else ()
+        blocked = self.matings.faults(self.pag.allowed) if self.matings else ()
         sized = any(warning.code == "Size" for warning in product)
         grips = () if sized else tuple(found.warning() for found in self.no_grips)
         overlaps = self.overlaps.faults(self.pag.allowed) if is_shaped(self.pag) else ()

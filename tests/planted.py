@@ -26,10 +26,14 @@ from factory.record.monitor.record import verdict_on, watch_log
 from factory.record.verdict import RunVerdict
 from factory.simulation.mujoco import world as mujoco_world
 from factory.simulation.mujoco.parts import Parts
+from factory.simulation.remade import model_faults
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.simulation.watched import watched
 from factory.support.engine import mujoco
+from factory.support.errors import InputError
+from factory.support.settings import Settings
+from tests.command_line import ROOT
 from tests.examples import with_hands
 from tests.pag_texts import laid_out
 
@@ -69,6 +73,11 @@ def _run(layout: Layout, **more: Any) -> RunVerdict:
     return watched(Simulation(layout, RunRequest(shown=False, **more))).verdict
 
 
+def _of_settings(settings: Settings) -> RunVerdict:
+    """A run with other settings."""
+    return _run(paper(), units=2, settings=settings)
+
+
 def _of_engine(act: Callable[[Any], None]) -> RunVerdict:
     """A run in a model that was changed after it had been compiled."""
     load = mujoco_world.load
@@ -92,7 +101,10 @@ def _of_xml(change: Callable[[str], str]) -> RunVerdict:
         return load(replace(model, xml=xml))
 
     with patch.object(mujoco_world, "load", changed):
-        return _run(paper(), units=2)
+        try:
+            return _run(paper(), units=2)
+        except InputError as error:  # what is lacking is said before the run
+            return RunVerdict(error.diagnostics[0])
 
 
 def _of_run(act: Acts) -> RunVerdict:
@@ -136,7 +148,8 @@ def _of_product(text: str) -> RunVerdict:
 def _of_log(change: Callable[[Log], Log]) -> RunVerdict:
     changed = change(honest_log())
     report, subject = watch_log(changed)
-    return verdict_on(changed, subject.factory, report)
+    faults, _ = model_faults(changed, ROOT / "examples")
+    return verdict_on(changed, subject.factory, report, faults)
 
 
 @cache
@@ -168,6 +181,7 @@ RUNNERS: dict[str, Callable[[Any], RunVerdict]] = {
     "switch": _of_switch,
     "product": _of_product,
     "log": _of_log,
+    "settings": _of_settings,
 }
 
 # --- what is done ---------------------------------------------------------------------------------
@@ -351,6 +365,17 @@ def swapped(log: Log) -> Log:
     return replace(log, fired=fired)
 
 
+def model_text(pattern: str, by: str) -> Callable[[Log], Log]:
+    """The model's text in a log has another in the place of a pattern."""
+
+    def change(log: Log) -> Log:
+        changed = re.sub(pattern, by, log.xml, count=1)
+        assert changed != log.xml
+        return replace(log, xml=changed)
+
+    return change
+
+
 def loosened(log: Log) -> Log:
     """The log no longer has the constraint by which something is held, in some rows."""
     values, grips = log.active.values.copy(), 0
@@ -369,6 +394,14 @@ a = atomic ( box = (0.04, 0.04, 0.04), pos = (0, 0, 0.02) );
 b = atomic ( box = (0.04, 0.04, %s), pos = (0, %s, 0.02) )"""
 """Two boxes side by side, that overlap where they are less than 40 mm apart."""
 
+CLOSED = """root = all; all = mate ( shell, core ); shell = mate ( front, back, roof, floor ); %s
+core = atomic ( box = ( 0.05, 0.05, 0.05 ) );
+front = atomic ( box = ( 0.1, 0.02, 0.1 ), pos = ( 0, -0.06, 0 ) );
+back = atomic ( box = ( 0.1, 0.02, 0.1 ), pos = ( 0, 0.06, 0 ) );
+roof = atomic ( box = ( 0.1, 0.1, 0.02 ), pos = ( 0, 0, 0.06 ) );
+floor = atomic ( box = ( 0.1, 0.1, 0.02 ), pos = ( 0, 0, -0.06 ) )"""
+"""A box that is closed before its core comes in, 35 mm deep through a wall."""
+
 # --- the table ------------------------------------------------------------------------------------
 
 PLANTS = (
@@ -385,6 +418,18 @@ PLANTS = (
         ("NotSolid",),
     ),
     Plant("a pad is missing", "xml", text(r'<geom name="r5/pad"[^>]*/>', ""), ("NotSolid",)),
+    Plant("a grip is missing", "xml", text(r'<weld name="grip/r3/part2"[^>]*/>', ""), ("Engine",)),
+    Plant(
+        "a tray's hold is missing", "xml", text(r'<weld name="hold/part1"[^>]*/>', ""), ("Engine",)
+    ),
+    Plant("a drive is missing", "xml", text(r'<pid name="r3/drive"[^>]*/>', ""), ("Engine",)),
+    Plant("the floor is missing", "xml", text(r'<geom name="ground"[^>]*/>', ""), ("NotSolid",)),
+    Plant(
+        "a magazine's lid is missing",
+        "xml",
+        text(r'<geom name="feeder/part1/lid"[^>]*/>', ""),
+        ("NotSolid",),
+    ),
     Plant(
         "a magazine is only shown",
         "xml",
@@ -520,6 +565,13 @@ PLANTS = (
         OVERLAP % ("allow ( 0.0001 );", "0.04", "0.0397"),
         ("Overlap",),
     ),
+    Plant("a part comes through a wall", "product", CLOSED % "", ("Blocked",)),
+    Plant(
+        "a part comes through more of a wall than is allowed",
+        "product",
+        CLOSED % "allow ( core, front, 0.034 ); allow ( 0.0005 );",
+        ("Blocked",),
+    ),
     Plant(
         "the log says 0 contacts",
         "log",
@@ -557,6 +609,24 @@ PLANTS = (
         ("Record",),
     ),
     Plant("a grip is on another part in the log", "log", loosened, ("TwoHolders",)),
+    Plant(
+        "a pad is only shown in the log's model",
+        "log",
+        model_text(r'(<geom name="r5/pad" )', r'\1contype="0" conaffinity="0" '),
+        ("Record",),
+    ),
+    Plant(
+        "a part is lighter in the log's model",
+        "log",
+        model_text(r'(?s)(name="part/part1#1".*?mass=")', r"\g<1>0"),
+        ("Record",),
+    ),
+    Plant(
+        "a robot is paler in the log's model",
+        "log",
+        model_text(r'(class="shown" type="sphere" pos=")-1', r"\g<1>-2"),
+        ("Record",),
+    ),
 )
 """What must be found."""
 
@@ -588,6 +658,12 @@ BENIGN = (
         "product",
         OVERLAP % ("allow ( a, b, 0.0003 );", "0.04", "0.0397"),
     ),
+    Plant(
+        "parts pass through each other by what is allowed",
+        "product",
+        CLOSED % "allow ( core, front, 0.036 );",
+    ),
+    Plant("goal balls are ten times as large", "settings", Settings(eps=2e-3)),
     Plant("the log is as it was", "log", lambda log: log),
 )
 """What must not fail a run."""

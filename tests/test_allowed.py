@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,9 +11,12 @@ from factory.geometry.overlapping import overlaps_of
 from factory.lang import read_pag, write_pag
 from factory.pipeline import read
 from factory.problem.pag import AllowedOverlap
+from factory.record.log import read_log
+from factory.simulation.remade import model_faults
 from factory.support.errors import InputError
 from tests.command_line import ROOT, Terminal
 from tests.pag_texts import TEMPLATES
+from tests.planted import CLOSED
 
 CASES = ROOT / ".." / "shared" / "cases"
 
@@ -73,6 +77,34 @@ def test_an_overlap_is_allowed_by_an_option(
     assert run("monitor", tmp_path / "log").status == status
     assert "0.30 mm when finished" in done.out
     assert ("and 0.20 mm is allowed" in done.out) == (allow[0] in ("peg:base:0.02cm", "0.2mm"))
+
+
+@pytest.mark.parametrize(
+    ("allow", "status"), [((), 1), (("core:front",), 0), (("front:core:36mm",), 0), (("34mm",), 1)]
+)
+def test_a_blocked_way_fails_a_run_unless_it_is_allowed(
+    run: Terminal, tmp_path: Path, allow: tuple[str, ...], status: int
+) -> None:
+    """The core comes through a wall, 35 mm deep; from the log too, even where that does not say
+    it; what is allowed is no warning, but said."""
+    file, log = tmp_path / "closed.pag", tmp_path / "log"
+    file.write_text(CLOSED % "")
+    options = [word for one in allow for word in ("--allow", one)]
+    words = "core cannot come to all: core and front 35.00 mm"
+    checked = run("check", file, "--no-hands", *options)
+    assert checked.status == 0 and (words in checked.err) == bool(status)
+    passes = "a pair of parts passes through each other on the way by up to 35.00 mm"
+    assert (passes in checked.out) == (not status)
+    done = run("run", file, "--no-hands", *options, "--log", log)
+    assert done.status == status
+    assert (done.out.splitlines()[0] == f"the run FAILED: Blocked: {words}") == bool(status)
+    assert run("monitor", log).status == status
+    if status:
+        kept = read_log(log)
+        silent = replace(kept, figures={**(kept.figures or {}), "faults": []})
+        faults, why = model_faults(silent, tmp_path)
+        assert [fault.code for fault in faults] == ["Record", "Blocked"] and not why
+        assert run("run", file, "--no-hands", "--lenient").status == 0
 
 
 @pytest.mark.parametrize("word", ["base:pg", "peg:peg", "a:b:c:d", "0.5mi", "-1mm", "peg:", ":1mm"])

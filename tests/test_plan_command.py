@@ -168,14 +168,27 @@ def test_what_is_drawn_out_is_clear_of_each_other(tmp_path: Path) -> None:
         assert not still.any()
 
 
-def test_clashes_that_are_allowed_are_counted(planning: Planning) -> None:
+def test_clashes_that_are_allowed_are_counted_and_written(
+    planning: Planning, terminal: Terminal
+) -> None:
+    """Of a part that may pass through all others, or of a pair, whatever overlaps when finished:
+    `check` knows that they are allowed, as deep as they are and no deeper."""
     refused = planning(CHAIN, "--no-look")
     (label,) = refused.json["removal"]["labels"]
     done = planning(CHAIN, "--allow", label, "--no-look")
     assert done.status == 0, done.err
     assert done.json["figures"]["blocked"] == done.json["approaches"]["blocked"] > 0
-    assert [w["code"] for w in done.json["warnings"]].count("Blocked") > 0
     assert planning(CHAIN, "--allow", f"{label}s", "--no-look").codes == ["Usage"]
+    pairs = [a.parts for a in read(Path(done.json["pag"])).pag.allowed]
+    again = planning(
+        CHAIN, *(w for pair in pairs for w in ("--allow", ":".join(pair))), "--no-look"
+    )
+    for one in (done, again):
+        found = read(Path(one.json["pag"])).pag
+        assert found.allowed and all(0 < a.depth < 0.1 for a in found.allowed)
+        checked = terminal("check", one.json["pag"], "--json").json
+        codes = [w["code"] for w in (*one.json["warnings"], *checked["warnings"])]
+        assert checked["approaches"]["blocked"] > 0 and "Blocked" not in codes
 
 
 STACK = """root = stack; stack = mate ( pair, third );

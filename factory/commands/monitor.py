@@ -33,10 +33,12 @@ def monitor(file: Path, lenient: bool, out: OutputOptions) -> int:
     is anything to judge."""
     from factory.record.log import read_log
     from factory.record.monitor.record import verdict_on, watch_log
+    from factory.simulation.remade import model_faults
 
     log = read_log(file)
     report, subject = watch_log(log)
-    verdict = replace(verdict_on(log, subject.factory, report), lenient=lenient)
+    faults, why = model_faults(log, file.parent)
+    verdict = replace(verdict_on(log, subject.factory, report, faults), lenient=lenient)
     if out.as_json:
         document = {
             "log": str(file),
@@ -47,6 +49,7 @@ def monitor(file: Path, lenient: bool, out: OutputOptions) -> int:
             **report.as_json(),
             "refines_net": verdict.refines and report.refines_net,
             "monitor_time_s": report.time_s,
+            "model_compared": not why,
             "verdict": verdict.as_json(),
             **({} if log.failures is None else {"failures": log.failures.as_json()}),
         }
@@ -55,6 +58,8 @@ def monitor(file: Path, lenient: bool, out: OutputOptions) -> int:
         if not verdict.succeeded:
             say_verdict(verdict, out.verbose)
         say(found_by(report, log.cut_off))
+        if why:
+            say(f"its model was not compared with that of its PAG: {why}")
         if log.failures is not None:
             say_failures(log.failures, out.verbose)
         if verdict.succeeded:

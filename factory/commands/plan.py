@@ -143,7 +143,7 @@ def plan(
     planned, stopped = _sought(found, search, out)
     if isinstance(planned, CannotAssemble):
         return refuse(found, planned, folder, look, out)
-    made = planned_product(found, planned.tree, planned.orientation, source.name, allow)
+    made = planned_product(found, planned.tree, planned.orientation, source.name, allow, templates)
     files = {folder / name: content for name, content in made.files.items()}
     own_names(folder, files, [source])
     write_all(files)

@@ -60,6 +60,9 @@ def announced(warnings: Sequence[Diagnostic], out: OutputOptions) -> list[dict[s
 
 
 def say_allowed(project: Project) -> None:
-    """Say which overlaps of parts are there, and allowed."""
-    for note in project.overlaps.notes(project.pag.allowed) if project.pag.allowed else ():
-        say(note)
+    """Say which overlaps of parts are there, when finished or on the way, and allowed."""
+    allowed = project.pag.allowed
+    if allowed:
+        ways = project.matings.notes(allowed) if project.matings else []
+        for note in (*project.overlaps.notes(allowed), *ways):
+            say(note)

@@ -3,7 +3,7 @@ allowed."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from weakref import finalize
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from factory.geometry.overlap import DrawnSolids
 from factory.geometry.solids import Product
-from factory.problem.pag import AllowedOverlap
+from factory.problem.pag import ROUNDING, AllowedOverlap, most_allowed
 from factory.support.errors import Diagnostic
 
 SILENT = 2e-5
@@ -27,9 +27,6 @@ EVERYWHERE = 5e-4
 NAMED = 6
 """So many pairs are named that are allowed."""
 
-ROUNDING = 1e-9
-"""A depth is allowed that is larger by no more than this [m]."""
-
 
 @dataclass(frozen=True, slots=True)
 class Overlapping:
@@ -42,13 +39,9 @@ class Overlapping:
     def __str__(self) -> str:
         return f"{self.one} and {self.other} overlap by {1e3 * self.depth:.2f} mm when finished"
 
-    def most(self, allowed: Iterable[AllowedOverlap]) -> float:
-        """The depth that is allowed of them [m]."""
-        return max((a.depth for a in allowed if a.covers(self.one, self.other)), default=0.0)
-
     def fault(self, allowed: Sequence[AllowedOverlap]) -> Diagnostic | None:
         """What is said of them unless it is allowed (Overlap)."""
-        most = self.most(allowed)
+        most = most_allowed(allowed, self.one, self.other)
         if self.depth <= most + ROUNDING:
             return None
         words = f"{self}, and {1e3 * most:.2f} mm is allowed" if most else str(self)

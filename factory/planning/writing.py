@@ -6,19 +6,22 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count
 from math import ceil
+from types import MappingProxyType
 from typing import Any, Generic, TypeVar, Union
 
 import numpy as np
 
+from factory.compiler.mating.mating import matings
 from factory.geometry.meshes import Array
-from factory.geometry.overlap import DrawnSolids
-from factory.geometry.overlapping import SILENT
-from factory.geometry.solids import Product, rotation
+from factory.geometry.overlapping import overlaps_of
+from factory.geometry.product import product_geometry
+from factory.geometry.solids import rotation
 from factory.importing.labels import file_stem, label_of
 from factory.importing.places import UNTURNED, quaternion, rounded
 from factory.lang.writer import write_pag
 from factory.planning.parts import InPlace
 from factory.problem.pag import PAG, AllowedOverlap, Assembly, Parameter
+from factory.problem.template import Template
 
 Unit = TypeVar("Unit", str, int)
 
@@ -64,12 +67,13 @@ def planned_product(
     orientation: Array | None = None,
     by: str = "",
     allow: Sequence[str] = (),
+    templates: Mapping[str, Template] = MappingProxyType({}),
 ) -> PlannedProduct:
     """The product that a tree makes of a source's parts, turned by a rotation (3, 3) about the
-    origin. `by` is said in the first line of the PAG; of pairs `a:b` that `allow` has, the overlap
-    is allowed as deep as it is. Only templates that the package ships are used: `mate`, with its
-    further inputs inserted, `screw` and `relay`, besides what kept sub-trees
-    name."""
+    origin. `by` is said in the first line of the PAG. Of units, or pairs `a:b`, that `allow` has,
+    what they pass through is allowed as deep as it is. Only those of the `templates` that the
+    package ships are used: `mate`, with its further inputs inserted, `screw` and `relay`, besides
+    what kept sub-trees name."""
     turn = np.eye(3) if orientation is None else orientation
     kept = {keep.label: keep.nodes for keep in source.kept}
     taken = {part.label for part in source.parts}
@@ -95,23 +99,35 @@ def planned_product(
     whole = [node for nodes in kept.values() for node in nodes if node.inputs]
     parts = [_turned(part.node, turn) for part in source.parts]
     nodes = (*made, *reversed(whole), *parts)
-    pag = PAG(root, nodes, len(nodes), allowed=(*source.allowed, *_meant(source, allow)))
+    pag = PAG(root, nodes, len(nodes), allowed=source.allowed)
+    if allow:
+        meant = _meant(source, pag, allow, templates)
+        pag = replace(pag, allowed=(*source.allowed, *meant))
     name = file_stem(source.name)
     head = f"// {name}, planned{f' from {by}' if by else ''}\n"
     text = (head + write_pag(pag)).encode()
     return PlannedProduct(pag, {f"{name}.pag": text, **source.files})
 
 
-def _meant(source: InPlace, allow: Sequence[str]) -> Iterator[AllowedOverlap]:
-    """What pairs `a:b` overlap by, up to a hundredth of a millimetre more."""
-    pairs = [pair for name in allow if len(pair := name.split(":")) == 2]
-    solids = {part.label: part.solid for part in source.parts}
-    bodies = DrawnSolids(Product(solids, np.zeros(3), np.zeros(3)))
-    for one, other in pairs:
-        if one in solids and other in solids and bodies.is_drawn(one) and bodies.is_drawn(other):
-            depth = bodies.overlap(one, other).depth
-            if depth > SILENT:
-                yield AllowedOverlap(ceil(1e5 * depth) / 1e5, (one, other))
+def _meant(
+    source: InPlace, pag: PAG, allow: Sequence[str], templates: Mapping[str, Template]
+) -> Iterator[AllowedOverlap]:
+    """How deep units that may pass through others do so on their ways, and pairs `a:b` also when
+    finished, up to a hundredth of a millimetre more."""
+    product = product_geometry(pag, source.files)
+    units = {part.label: label for label, parts in source.units() for part in parts}
+    pairs = [{*name.split(":")} for name in allow]
+    deep: dict[tuple[str, str], float] = {}
+    for found in overlaps_of(product).pairs:
+        if {units[found.one], units[found.other]} in pairs:
+            deep[found.one, found.other] = found.depth
+    for clash in (c for mating in matings(pag, templates, product).all for c in mating.clashes):
+        both = {units[part] for part in clash.parts}
+        if both in pairs or both & {*allow}:
+            pair = next((p for p in deep if {*p} == {*clash.parts}), clash.parts)
+            deep[pair] = max(clash.depth, deep.get(pair, 0.0))
+    for pair, depth in deep.items():
+        yield AllowedOverlap(ceil(1e5 * depth) / 1e5, pair)
 
 
 def _free(name: str, taken: set[str]) -> str:

@@ -3,8 +3,12 @@ geometry of a product, used by Compile (robot types), the layout (sides) and the
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
+
+from factory.problem.pag import ROUNDING, AllowedOverlap, most_allowed
+from factory.support.errors import Diagnostic, Position
 
 Kind = Literal["slide", "lower", "blocked"]
 
@@ -13,6 +17,9 @@ Pair = tuple[str, str]
 
 MARGIN = 0.02
 """What is to be lowered comes at least this far above everything of the others [m]."""
+
+NAMED = 3
+"""The most pairs that clash that a diagnostic names."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +35,21 @@ class Overlap:
 
 
 @dataclass(frozen=True, slots=True)
+class Clash:
+    """Two parts that pass through each other: how deep [m] on the way and in the finished product,
+    and how far [m] from its place the last input is where they are deepest."""
+
+    parts: Pair
+    depth: float
+    finished: float
+    shift: float
+
+    def is_allowed(self, allowed: Iterable[AllowedOverlap]) -> bool:
+        """Whether they may get so deep into each other."""
+        return self.depth <= most_allowed(allowed, *self.parts) + ROUNDING
+
+
+@dataclass(frozen=True, slots=True)
 class Approach:
     """The admissible approaches of one operation with two inputs (or a pile and one more).
 
@@ -35,7 +57,9 @@ class Approach:
     the sides of that axis, +1 or -1, from which the *last* input may come (moving against it); the
     other comes from, or stands on, the opposite side. `lowered`: the label of the input that comes
     `stroke` [m] above its place and is lowered when all others stand, "" where none is. `overlaps`:
-    for each of `sides` the parts that cannot come so without overlapping or scraping.
+    for each of `sides` the parts that cannot come so without overlapping or scraping. `clashes`:
+    where it is blocked, the pairs that pass through each other as they are drawn if the last input
+    comes from the first of its sides, the deepest first.
     """
 
     kind: Kind
@@ -44,6 +68,25 @@ class Approach:
     lowered: str = ""
     stroke: float = 0.0
     overlaps: tuple[tuple[Overlap, ...], ...] = ((), ())
+    clashes: tuple[Clash, ...] = ()
+
+    def fault(
+        self,
+        label: str,
+        coming: str,
+        position: Position | None,
+        allowed: Iterable[AllowedOverlap],
+    ) -> Diagnostic | None:
+        """What is said of the operation that makes a label, where an input, the last, cannot come
+        (Blocked); None where it can, or all that it passes through is allowed."""
+        allowed = [*allowed]
+        clashes = [clash for clash in self.clashes if not clash.is_allowed(allowed)]
+        if not clashes:
+            return None
+        named = [f"{' and '.join(c.parts)} {c.depth * 1e3:.2f} mm" for c in clashes[:NAMED]]
+        more = f", and {len(clashes) - NAMED} more" if len(clashes) > NAMED else ""
+        message = f"{coming} cannot come to {label}: {', '.join(named)}{more}"
+        return Diagnostic("Blocked", message, position)
 
     @property
     def told(self) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
@@ -48,12 +48,15 @@ class Assembly:
 ANY_DEPTH = 1000.0
 """A depth that no overlap has [m]."""
 
+ROUNDING = 1e-9
+"""A depth is allowed that is larger by no more than this [m]."""
+
 
 @dataclass(frozen=True, slots=True)
 class AllowedOverlap:
-    """An overlap in the finished product that is meant, such as a press fit: up to a `depth` [m],
-    of two `parts` or, where none are named, of any two. Its position does not count in
-    comparisons; an option has none."""
+    """An overlap that is meant, in the finished product, such as a press fit, or on the way of a
+    part to its place, such as a snap fit: up to a `depth` [m], of two `parts` or, where none are
+    named, of any two. Its position does not count in comparisons; an option has none."""
 
     depth: float
     parts: tuple[str, ...] = ()
@@ -62,6 +65,11 @@ class AllowedOverlap:
     def covers(self, one: str, other: str) -> bool:
         """Whether it is about these two parts."""
         return not self.parts or {one, other} == {*self.parts}
+
+
+def most_allowed(allowed: Iterable[AllowedOverlap], one: str, other: str) -> float:
+    """The depth that two parts may overlap by [m], 0 where nothing is allowed of them."""
+    return max((a.depth for a in allowed if a.covers(one, other)), default=0.0)
 
 
 @dataclass(frozen=True)

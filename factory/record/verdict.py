@@ -171,7 +171,7 @@ def _failures(
     """What is wrong with the bodies of a run, each with its time [s]: that of the model is before
     all, that of figures without a time and of the product's drawing after all."""
     for code, words in figures.get(FAULTS, []):
-        yield inf if code == "Overlap" else -inf, Diagnostic(code, words)
+        yield inf if code in ("Overlap", "Blocked") else -inf, Diagnostic(code, words)
     for limit in LIMITS:
         failure = limit.exceeded(figures)
         if failure is not None:

@@ -42,12 +42,20 @@ def modelled(layout: Layout, request: RunRequest, under_way: Mapping[str, int]) 
 
 
 def _overlaps(layout: Layout) -> tuple[Diagnostic, ...]:
-    """What overlaps in a product, and is not allowed. Units are alike: one is looked at."""
+    """What overlaps in a product, or passes through each other on the way to its place in it, and
+    is not allowed. Units are alike: one is looked at."""
     factory = layout.factory
     if not is_shaped(factory.pag):
         return ()
     parts = {*factory.contents[factory.products[0]]}
-    return within(overlaps_of(layout.product), parts).faults(factory.pag.allowed)
+    allowed = factory.pag.allowed
+    blocked = (
+        o.approach.fault(o.label, o.inputs[-1], o.position, allowed)
+        for o in factory.operations
+        if o.approach is not None and not o.turn
+    )
+    found = within(overlaps_of(layout.product), parts).faults(allowed)
+    return (*found, *(fault for fault in blocked if fault is not None))
 
 
 def physical_model(

@@ -14,14 +14,14 @@ from factory.pipeline import Project
 from factory.record.ending import CutOff
 from factory.record.log import LogWriter
 from factory.record.log.blocks import bad_log
-from factory.record.log.header import settings_of
 from factory.record.log.kept import BROKEN, KeptRun, kept_run
 from factory.record.log.recompiled import AGAIN, of_its_factory
 from factory.record.log.relaid import project_of
-from factory.record.log.writer import versions
+from factory.record.log.writer import packed, versions
 from factory.simulation.checkpoint import checkpoint, take_up
 from factory.simulation.recovery.faults import campaign_of
 from factory.simulation.recovery.recovery import recover
+from factory.simulation.remade import request_of
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.claim import claimed_again
@@ -97,7 +97,7 @@ def resume(path: Path) -> Resumed | CutOff:
         _check(kept)
         with of_its_factory():
             project = project_of(kept.header, path.parent)
-            request = _request(kept)
+            request = request_of(kept.header)
         simulation, end, skipped = _going_on(kept, project, request)
         file.truncate(end)
         file.seek(0, SEEK_END)
@@ -136,21 +136,6 @@ def _check(kept: KeptRun) -> None:
         if then != here:
             words = f"was kept with {package} {then or 'unknown'}, and this is {here}"
             raise InputError(_bad(kept.path, words, f"install {package} {then}, or {AGAIN}"))
-
-
-def _request(kept: KeptRun) -> RunRequest:
-    header = kept.header
-    return RunRequest(
-        header["world"],
-        header["units"],
-        header["seed"],
-        header["jitter"],
-        settings_of(header),
-        frozenset(header["start"]),
-        header["wip"],
-        fuse=header["fuse"],
-        recovers="faults" in header,
-    )
 
 
 def _asked(request: RunRequest, timestep: bool, wip: bool) -> RunRequest:
@@ -192,11 +177,8 @@ def _made(kept: KeptRun, project: Project, request: RunRequest) -> Simulation:
         names = [[x.name for x in found] for found in (net.transitions, net.places, factory.robots)]
         if names != [header["transitions"], header["places"], header["robots"]]:
             raise ValueError("its net is not that of its PAG")
-    if made.model is not None:
-        files = {f"mesh/{name}": content for name, content in made.model.files.items()}
-        model = {"xml": made.model.xml.encode(), **files}
-        if {k: a.tobytes() for k, a in (kept.model or {}).items()} != model:
-            raise InputError(_bad(kept.path, "is of another model than its PAG gives now", AGAIN))
+    if {k: a.tobytes() for k, a in (kept.model or {}).items()} != packed(made.model):
+        raise InputError(_bad(kept.path, "is of another model than its PAG gives now", AGAIN))
     return made
 
 

@@ -14,6 +14,7 @@ from factory.nets.verdict import Verdict
 from factory.nets.verify import verify
 from factory.pipeline import Project
 from factory.plant.factory import Factory
+from factory.problem.pag import most_allowed
 from factory.problem.shapes import is_plain
 from factory.study.allocation.least import Least, least_robots
 from factory.study.failures import FailureStudy, failure_study
@@ -86,7 +87,7 @@ class Checked:
             {
                 "parts": [pair.one, pair.other],
                 "depth_mm": round(1e3 * pair.depth, 6),
-                "allowed_mm": round(1e3 * pair.most(allowed), 6),
+                "allowed_mm": round(1e3 * most_allowed(allowed, pair.one, pair.other), 6),
             }
             for pair in overlaps_of(self.product).pairs
         ]

@@ -7,13 +7,14 @@ module that needs the engine imports it from here: `from factory.support.engine 
 
 from __future__ import annotations
 
+import re
 import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 from factory.support.environment import environment
-from factory.support.errors import Diagnostic, MissingError
+from factory.support.errors import Diagnostic, InputError, MissingError
 from factory.support.interruption import put_off
 
 with put_off():
@@ -45,6 +46,19 @@ def unwarned() -> Iterator[None]:
         mujoco.set_mju_user_warning(_warn)
 
 
+@contextmanager
+def by_name() -> Iterator[None]:
+    """Raises InputError (Engine) where a model lacks what is looked up in it by its name."""
+    try:
+        yield
+    except KeyError as error:
+        name = re.match(r"Invalid name ('.+?')\. Valid", str(error.args[0]))
+        if name is None:
+            raise
+        message, hint = f"the engine's model has no {name[1]}", "build the model anew"
+        raise InputError(Diagnostic("Engine", message, None, hint)) from error
+
+
 mujoco.set_mju_user_warning(_warn)
 
-__all__ = ["mujoco", "unwarned"]
+__all__ = ["by_name", "mujoco", "unwarned"]

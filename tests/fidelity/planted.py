@@ -12,6 +12,7 @@ WHERE = {
     "switch": "bodies, before a weld switches",
     "product": "PAG",
     "log": "log",
+    "settings": "settings",
 }
 
 

@@ -7,14 +7,15 @@ at the third, pairs that overlap in the finished product are *left out*. All of 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any, get_args
 
 from factory.compiler.mating.paths import TOLERANCE
-from factory.plant.approaches import Approach, Kind, Pair
+from factory.plant.approaches import Approach, Clash, Kind
+from factory.problem.pag import AllowedOverlap
 from factory.support.errors import Diagnostic, Position
 
 STRICT, NO_DEEPER, LEFT_OUT, BLOCKED = 3, 2, 1, 0
@@ -23,33 +24,17 @@ STRICT, NO_DEEPER, LEFT_OUT, BLOCKED = 3, 2, 1, 0
 LEVELS = ("none", "left_out", "no_deeper", "strict")
 """The names of the levels in documents."""
 
-NAMED = 3
-"""The most pairs that clash that a warning names."""
-
-
-@dataclass(frozen=True, slots=True)
-class Clash:
-    """Two parts that pass through each other: how deep [m] on the way and in the finished product,
-    and how far [m] from its place the last input is where they are deepest."""
-
-    parts: Pair
-    depth: float
-    finished: float
-    shift: float
-
 
 @dataclass(frozen=True, slots=True)
 class Mating:
-    """What was found of one operation: the approach chosen, the best levels at which its inputs
-    slide or one is lowered, and, where it is blocked, the pairs that clash if the last input comes
-    from the first of its sides, the deepest first."""
+    """What was found of one operation: the approach chosen, and the best levels at which its inputs
+    slide or one is lowered."""
 
     label: str
     inputs: tuple[str, ...]
     approach: Approach
     slide: int
     lower: int
-    clashes: tuple[Clash, ...] = ()
     position: Position | None = field(default=None, compare=False)
 
     @property
@@ -73,15 +58,10 @@ class Mating:
             "excluded": [len(overlaps) for overlaps in approach.overlaps],
         }
 
-    def warning(self) -> Diagnostic:
-        """What is told of a blocked operation: where, what cannot come and what it clashes with."""
-        named = [
-            f"{c.parts[0]} and {c.parts[1]} {c.depth * 1e3:.2f} mm" for c in self.clashes[:NAMED]
-        ]
-        more = len(self.clashes) - len(named)
-        pairs = ", ".join(named) + (f", and {more} more" if more else "")
-        message = f"{self.inputs[-1]} cannot come to {self.label}: {pairs}"
-        return Diagnostic("Blocked", message, self.position)
+    @property
+    def clashes(self) -> tuple[Clash, ...]:
+        """Where it is blocked, the pairs that pass through each other, the deepest first."""
+        return self.approach.clashes
 
     def clashes_as_json(self) -> dict[str, Any]:
         """The pairs that clash."""
@@ -124,10 +104,19 @@ class Matings:
         """The operations whose approach is of a kind."""
         return tuple(mating for mating in self.all if mating.approach.kind == kind)
 
-    @property
-    def warnings(self) -> tuple[Diagnostic, ...]:
-        """One for each blocked operation."""
-        return tuple(mating.warning() for mating in self.of_kind("blocked"))
+    def faults(self, allowed: Sequence[AllowedOverlap]) -> tuple[Diagnostic, ...]:
+        """What is said of blocked operations in which not all that happens is allowed."""
+        found = (m.approach.fault(m.label, m.inputs[-1], m.position, allowed) for m in self.all)
+        return tuple(fault for fault in found if fault is not None)
+
+    def notes(self, allowed: Sequence[AllowedOverlap]) -> list[str]:
+        """What is used of what is allowed, in words."""
+        used = [c for m in self.all for c in m.clashes if c.is_allowed(allowed)]
+        if not used:
+            return []
+        pairs = "a pair of parts passes" if len(used) == 1 else f"{len(used)} pairs of parts pass"
+        deepest = f"{1e3 * max(clash.depth for clash in used):.2f} mm"
+        return [f"{pairs} through each other on the way by up to {deepest}, which is allowed"]
 
     def as_json(self) -> dict[str, Any]:
         """How many operations are of each kind and attain each level, and all approaches."""

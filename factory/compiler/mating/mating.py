@@ -17,7 +17,6 @@ from factory.compiler.mating.findings import (
     LEFT_OUT,
     NO_DEEPER,
     STRICT,
-    Clash,
     Mating,
     Matings,
 )
@@ -25,7 +24,7 @@ from factory.compiler.mating.meetings import Ints, Meeting, Meetings, meetings
 from factory.compiler.mating.overlaps import Finder, Overlaps
 from factory.compiler.mating.paths import SIGNS
 from factory.geometry.solids import Product
-from factory.plant.approaches import MARGIN, Approach, Kind, Overlap, Pair
+from factory.plant.approaches import MARGIN, Approach, Clash, Kind, Overlap, Pair
 from factory.plant.factory import Factory
 from factory.support.errors import Position
 
@@ -94,20 +93,20 @@ class _Judge:
         meeting = self.meetings.all[number]
         slides, clashing = self.slides[number].tolist(), self.clashing[number].tolist()
         slide, lower = max(slides), max(self.lowers[number].tolist())
-        clashes: tuple[Clash, ...] = ()
         if slide == lower == BLOCKED:
             column = clashing.index(min(clashing))
             clashes = self._clashes(number, meeting.axis, column)
             other = self._clashes(number, meeting.axis, 1 - column)
             same = {c.parts for c in clashes} == {c.parts for c in other}
             approach = self._along(number, "blocked", [0, 1] if same else [column])
+            approach = replace(approach, clashes=clashes)
         elif slide >= lower:
             columns = [column for column in (0, 1) if slides[column] == slide]
             approach = self._along(number, "slide", columns)
         else:
             approach = self._lowering(number, lower)
         position = self.at[meeting.label] or meeting.position
-        return Mating(meeting.label, meeting.inputs, approach, slide, lower, clashes, position)
+        return Mating(meeting.label, meeting.inputs, approach, slide, lower, position)
 
     def _along(self, number: int, kind: Kind, columns: list[int]) -> Approach:
         """From some of the sides."""

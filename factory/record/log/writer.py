@@ -12,7 +12,7 @@ from dataclasses import asdict
 from io import FileIO
 from os import SEEK_CUR
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,9 @@ from factory.support.errors import Diagnostic, FactoryError, InputError
 from factory.support.files import unwritten
 from factory.support.settings import AUTO
 from factory.support.version import release
+
+if TYPE_CHECKING:
+    from factory.mjcf.model import Model
 
 GRAIN = 2.0**-30
 """What speeds [m/s] and setpoints [m] are whole multiples of, a nanometre: their last bits are
@@ -262,9 +265,15 @@ def _model(simulation: Observed) -> bytes:
     """The block of the engine's model; nothing in the ideal world."""
     if simulation.model is None:
         return b""
-    files = {f"mesh/{name}": content for name, content in simulation.model.files.items()}
-    packed = {"xml": simulation.model.xml.encode(), **files}
-    return block(b"M", {k: np.frombuffer(v, "u1") for k, v in packed.items()}, 6)
+    return block(b"M", {k: np.frombuffer(v, "u1") for k, v in packed(simulation.model).items()}, 6)
+
+
+def packed(model: Model | None) -> dict[str, bytes]:
+    """The texts and files of the engine's model as a log has them; none in the ideal world."""
+    if model is None:
+        return {}
+    files = {f"mesh/{name}": content for name, content in model.files.items()}
+    return {"xml": model.xml.encode(), **files}
 
 
 def _header(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -27,7 +27,7 @@ from factory.record.monitor.observation import Observation
 from factory.record.monitor.recount import differences, recounted, worst
 from factory.record.monitor.report import Report
 from factory.record.monitor.subject import MonitorSubject, subject_from
-from factory.record.verdict import RunVerdict, judged
+from factory.record.verdict import FAULTS, RunVerdict, judged
 from factory.support.errors import Diagnostic, InputError
 
 
@@ -68,15 +68,20 @@ def _seen(log: Log, subject: MonitorSubject, m: Any) -> Report:
     return replace(report, violations=(*report.violations, *wrong), figures=counted)
 
 
-def verdict_on(log: Log, factory: Factory, report: Report | None) -> RunVerdict:
+def verdict_on(
+    log: Log, factory: Factory, report: Report | None, faults: Sequence[Diagnostic] = ()
+) -> RunVerdict:
     """The verdict on a run of a factory that is recorded in a log, with a monitor's report on that
-    where there is one."""
+    where there is one, and with what is wrong with its model."""
     cut, start = log.cut_off, frozenset(log.header["start"])
     after = [*nets_after(factory, log.entries)]
     refines = replay(factory.net, log.entries, start, joins_of(factory), after).refines
     trouble = None if cut is None else cut.failure
     counted = report.figures if report else None
     figures = log.figures if counted is None else worst(log.figures, counted)
+    if faults:
+        said = [[fault.code, fault.message] for fault in faults]
+        figures = {**(figures or {}), FAULTS: [*(figures or {}).get(FAULTS, []), *said]}
     return judged(trouble, refines, figures, report)
 
 

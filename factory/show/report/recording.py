@@ -21,13 +21,15 @@ from factory.record.monitor import Report, subject_of
 from factory.record.monitor.record import verdict_on, watch_log
 from factory.record.verdict import RunVerdict
 from factory.show.report.scene import DrawnFactory, stations
+from factory.simulation.remade import model_faults
 from factory.study.analysis.recorded import conditions
-from factory.support.errors import InputError, RunError
+from factory.support.errors import Diagnostic, InputError, RunError
 
 
 @dataclass(frozen=True)
 class Recording:
-    """A recorded run. Predictions follow from `layout`; where it is None, `missing` says why."""
+    """A recorded run. Predictions follow from `layout`; where it is None, `missing` says why.
+    `faults`: what is wrong with its model."""
 
     file: str
     log: Log = field(repr=False)
@@ -35,6 +37,7 @@ class Recording:
     factory: Factory = field(repr=False)
     layout: Layout | None = field(default=None, repr=False)
     missing: str = ""
+    faults: tuple[Diagnostic, ...] = ()
 
     @property
     def name(self) -> str:
@@ -67,7 +70,7 @@ class Recording:
     @cached_property
     def verdict(self) -> RunVerdict:
         """Whether the run succeeded."""
-        return verdict_on(self.log, self.factory, self.monitor)
+        return verdict_on(self.log, self.factory, self.monitor, self.faults)
 
     @cached_property
     def stage(self) -> DrawnFactory:
@@ -97,16 +100,18 @@ class Recording:
 def recording_of(path: Path, layout: Layout | None = None) -> Recording:
     """The recording in a log, with the `layout` that it was made with, if given, else with one that
     is made again. Raises InputError (BadLog) where it is not a log of a run in MuJoCo."""
-    log, missing = read_log(path), ""
+    log, missing, faults = read_log(path), "", tuple[Diagnostic, ...]()
     motion, factory = motion_of(log), factory_of(log.header)
     if layout is None:
         try:
             layout = _laid_out(log, path.parent)
+            faults, _ = model_faults(log, path.parent, layout)
         except (InputError, RunError) as error:
             missing = error.diagnostics[0].message
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             missing = str(error)
-    return Recording(str(path), log, motion, layout.factory if layout else factory, layout, missing)
+    factory = layout.factory if layout else factory
+    return Recording(str(path), log, motion, factory, layout, missing, faults)
 
 
 def _laid_out(log: Log, beside: Path) -> Layout:

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 import numpy as np
 
 from factory.control.mode import Array, Index
+from factory.layout.feeding import lines_of
 from factory.layout.hands.limbs import limbs
 from factory.mjcf import names
 from factory.mjcf.feeders import SLIDER_MASS
@@ -31,6 +32,9 @@ STATION = 1
 
 STANDS = {"feeder", "outfeed", "bin", "ground"}
 """What stands, by the first word of its geoms' names; all of it is solid, but rods are not."""
+
+HOUSING = ("post", "lid", "end-1", "end1", "wall-1", "wall1")
+"""What a feeder's housing has."""
 
 ROD = "/rod"
 """What the names of geoms end with that slide in lids, which have no holes for them."""
@@ -122,7 +126,12 @@ class Soundness:
         loose = [self._name[geom] for geom in at[~solid].tolist()]
         robots = [robot for robot in layout.factory.robots if layout.hands]
         limbed = {f"{r.name}/{limb.name}" for r in robots for limb in limbs(layout, r.index)}
-        loose += sorted(limbed.difference(self._name[geom] for geom in self._stations.tolist()))
+        housed = [names.feeder(line[0].name) for line in lines_of(layout) if line]
+        wanted = {"ground", names.OUTFEED_TRAY, names.SHUTTER} | limbed
+        wanted |= {f"{feeder}/{kind}" for feeder in housed for kind in HOUSING}
+        sliders = [n for n in map(self._body, range(m.nbody)) if n.endswith("/slider")]
+        wanted |= {names.pad(n.removeprefix("feeder/").removesuffix("/slider")) for n in sliders}
+        loose += sorted(wanted.difference(self._name[geom] for geom in self._stations.tolist()))
         yield from _each("NotSolid", "{} is not solid", [*loose, *self._unmasked()])
         yield from _each("NotSolid", "{} do not collide", self._left_out())
 

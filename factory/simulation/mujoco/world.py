@@ -34,7 +34,7 @@ from factory.simulation.mujoco.stepping import SingleSteps
 from factory.simulation.request import RunRequest
 from factory.simulation.run import PhysicsFigures
 from factory.simulation.world import Drop, Hooks, Job
-from factory.support.engine import mujoco
+from factory.support.engine import by_name, mujoco
 
 ROUNDED = 0.01
 """What is due so much of a tick later is due."""
@@ -70,9 +70,10 @@ class MujocoWorld:
         self.dropoffs: list[float] = []
         self._before = model.factory.units(counts)
         self._unseen = 0
-        self.motion = Motion(self.m, self.d, model, start, gains)
-        self.parts = Parts(self.m, self.d, model, self.motion, request, counts)
-        self._away, parts = self._hands_away(model.layout), self.parts
+        with by_name():
+            self.motion = Motion(self.m, self.d, model, start, gains)
+            self.parts = Parts(self.m, self.d, model, self.motion, request, counts)
+            self._away, parts = self._hands_away(model.layout), self.parts
         soundness = Soundness(self.m, self.d, model, parts.masks, parts.copies.body, parts.grips)
         self.inspection = Inspection(self.m, self.d, model, soundness)
         for operation in model.factory.operations:

@@ -1,0 +1,87 @@
+"""The model of the run in a log, made again from its PAG: that in the log may be anyone's."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any
+
+from factory.layout.layout import Layout
+from factory.record.log import Log
+from factory.record.log.header import settings_of
+from factory.record.log.kept import BROKEN
+from factory.record.log.relaid import project_of
+from factory.record.log.writer import packed, versions
+from factory.record.monitor.subject import subject_of_run
+from factory.record.verdict import FAULTS
+from factory.simulation.request import RunRequest
+from factory.simulation.simulation import Simulation
+from factory.support.errors import Diagnostic, FactoryError
+
+TAG = re.compile(r"<[^>]+>")
+
+WIDTH = 120
+"""So many characters of an element are said."""
+
+
+def request_of(header: Mapping[str, Any]) -> RunRequest:
+    """What was asked of a recorded run."""
+    return RunRequest(
+        header["world"],
+        header["units"],
+        header["seed"],
+        header["jitter"],
+        settings_of(header),
+        frozenset(header["start"]),
+        header["wip"],
+        fuse=header["fuse"],
+        recovers="faults" in header,
+    )
+
+
+def model_faults(
+    log: Log, beside: Path, layout: Layout | None = None
+) -> tuple[tuple[Diagnostic, ...], str]:
+    """What is wrong with the model in a log of a run in MuJoCo in the folder `beside`, where it is
+    not the one that its PAG gives (Record), and what is wrong with its product that the log does
+    not say; and why the two cannot be compared, "" where they can. `layout`: where it is known."""
+    try:
+        if log.header["versions"] != {**log.header["versions"], **versions()}:
+            return (), "the log was kept with other versions"
+        layout = layout or project_of(log.header, beside).layout
+        request = request_of(log.header)
+        made = Simulation(layout, request)
+        if subject_of_run(made).as_json()["goals"] != log.header["monitor"]["goals"]:
+            return (), "the run was in another layout than the one that its PAG gets now"
+    except FactoryError as error:
+        return (), error.diagnostics[0].message
+    except BROKEN as error:
+        return (), str(error)
+    assert made.model is not None
+    said = [*map(tuple, (log.figures or {}).get(FAULTS, []))]
+    faults = [f for f in made.model.overlaps if (f.code, f.message) not in said]
+    if faults and log.figures is not None:
+        faults.insert(0, Diagnostic("Record", f"the log does not say: {faults[0].message}"))
+    files = {f"mesh/{name}": content for name, content in log.files.items()}
+    kept = {"xml": log.xml.encode(), **files}
+    words = _difference(packed(made.model), kept)
+    if words and kept != packed(Simulation(layout, replace(request, shown=False)).model):
+        faults.append(Diagnostic("Record", f"the log's model is not that of its PAG: {words}"))
+    return tuple(faults), ""
+
+
+def _difference(wanted: Mapping[str, bytes], kept: Mapping[str, bytes]) -> str:
+    """How a model that was kept differs first, in words; "" where it does not."""
+    for name in sorted({*wanted, *kept}, key=lambda name: name != "xml"):
+        if wanted.get(name) == kept.get(name):
+            continue
+        if name != "xml":
+            return f"its {name} is another"
+        tags = (TAG.findall(model[name].decode()) for model in (kept, wanted))
+        pairs = zip_longest(*tags, fillvalue="nothing more")
+        one, other = next((pair for pair in pairs if len({*pair}) > 1), ("text", "other text"))
+        return f"{one:.{WIDTH}} in place of {other:.{WIDTH}}"
+    return ""
