@@ -11,6 +11,7 @@ from typing import Any, Generic, TypeVar, Union
 
 import numpy as np
 
+from factory.compiler.expanding import expand
 from factory.compiler.mating.mating import matings
 from factory.geometry.meshes import Array
 from factory.geometry.overlapping import overlaps_of
@@ -121,7 +122,8 @@ def _meant(
     for found in overlaps_of(product).pairs:
         if {units[found.one], units[found.other]} in pairs:
             deep[found.one, found.other] = found.depth
-    for clash in (c for mating in matings(pag, templates, product).all for c in mating.clashes):
+    judged = matings(expand(pag, templates), product)
+    for clash in (clash for mating in judged.all for clash in mating.clashes):
         both = {units[part] for part in clash.parts}
         if both in pairs or both & {*allow}:
             pair = next((p for p in deep if {*p} == {*clash.parts}), clash.parts)
