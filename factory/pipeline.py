@@ -22,7 +22,6 @@ from factory.plant.approaches import Approach
 from factory.plant.factory import Factory
 from factory.problem.pag import PAG
 from factory.problem.plan import Plan
-from factory.problem.plan_file import read_plan
 from factory.problem.robot_types import Catalogue, load_catalogue
 from factory.problem.shapes import is_plain, is_shaped
 from factory.problem.template import Template
@@ -37,13 +36,15 @@ if TYPE_CHECKING:
     from factory.layout.hands.choosing import Hands
     from factory.layout.hands.misses import NoGrip
     from factory.layout.layout import Layout
+    from factory.layout.saved import LayoutTable
 
 
 @dataclass(frozen=True)
 class Project:
     """A PAG with all that follows from it: its geometry, factory and layout, each computed when it
     is first used. `templates`, `catalogue` and `plan` are what it is compiled with, `settings` and
-    `ground` what it is laid out for."""
+    `ground` what it is laid out for; `laid`: the table of its layout, None where one is looked
+    for."""
 
     pag: PAG
     templates: Mapping[str, Template] = field(repr=False)
@@ -51,6 +52,7 @@ class Project:
     settings: Settings = field(default_factory=Settings)
     ground: Ground = field(default_factory=Ground)
     plan: Plan = field(default_factory=Plan)
+    laid: LayoutTable | None = field(default=None, repr=False)
 
     def with_pag(self, pag: PAG) -> Project:
         """The same parts with another PAG."""
@@ -84,7 +86,7 @@ class Project:
 
     def _changed(self, known: Collection[str], **values: Any) -> Project:
         """With other values, and what is `known` of it already."""
-        made = replace(self, **values)
+        made = replace(self, **values, laid=None)
         made.__dict__.update({name: self.__dict__[name] for name in known & self.__dict__.keys()})
         return made
 
@@ -210,10 +212,26 @@ class Project:
 
     @cached_property
     def layout(self) -> Layout:
-        """The factory laid out, with relays where its ground asks for them. Raises InputError,
-        RunError (Layout) where there is no room."""
+        """The factory laid out: as it was, where it is kept (`laid`), or with relays where its
+        ground asks for them. Raises InputError, as BadPlan where what is kept is of another
+        factory; RunError (Layout) where there is no room."""
+        if self.laid is not None:
+            return self._laid_out(self.laid)
         given = self.plain, self.product, self.settings, self._hands, self.catalogue
         return self.ground.lay_out(*given)
+
+    def _laid_out(self, laid: LayoutTable) -> Layout:
+        from factory.compiler.mating.mating import judged
+        from factory.layout.relaying.splitting import with_relays
+
+        factory = plain = judged(self.plain, self.product)
+        if relays := self.plan.relays:
+            factory = with_relays(plain, relays, self.templates, self.catalogue)
+        try:
+            return laid.laid_out(factory, self.product, plain)
+        except ValueError as error:
+            message = f"the layout that is kept is not of this factory: {error}"
+            raise InputError(Diagnostic("BadPlan", message)) from error
 
     @property
     def factory(self) -> Factory:
@@ -245,10 +263,8 @@ def read(
     settings: Settings | None = None,
     ground: Ground = Ground(),  # noqa: B008 (frozen)
 ) -> Project:
-    """The project of a PAG file, or of the file of a plan. Raises InputError with every error
-    found in the file."""
-    templates, plan = all_templates(folders), Plan()
-    if Path(path).suffix == ".json":
-        path, plan = read_plan(Path(path))
-    pag, settings = load_pag(path, templates), settings or Settings()
-    return Project(pag, templates, load_catalogue(), settings, ground, plan)
+    """The project of a PAG file. Raises InputError with every error found in the file."""
+    templates = all_templates(folders)
+    return Project(
+        load_pag(path, templates), templates, load_catalogue(), settings or Settings(), ground
+    )

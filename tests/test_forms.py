@@ -44,6 +44,7 @@ from factory.study.allocation.forms import (
 from factory.study.allocation.search import Search, allocated
 from factory.support.resources import templates_folder
 from factory.support.settings import Settings
+from factory.support.tables import table_of, value_of
 from tests.command_line import Terminal
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
@@ -74,7 +75,7 @@ def test_the_same_is_joined_with_the_robots_that_are_counted(
     pag = random_pag(size, seed, shape)
     forms, _ = best_forms(task_of(pag), bound)
     plan = Plan(forms)
-    assert Plan.of_json(json.loads(json.dumps(plan.as_json()))) == plan, "it can be written down"
+    assert value_of(Plan, json.loads(json.dumps(table_of(plan)))) == plan, "it can be written down"
     made = compile_pag(pag, TEMPLATES, load_catalogue(), plan=plan)
     assert parts_made(made) == parts_made(compile_pag(pag, TEMPLATES, load_catalogue()))
     assert verify(made.net).holds

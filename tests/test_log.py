@@ -16,15 +16,14 @@ from hypothesis.extra import numpy as arrays
 
 import factory
 from factory.record.log import MAGIC, Log, LogWriter, is_log, read_log
-from factory.record.log import writer as writing
 from factory.record.log.blocks import HEAD, LENGTH, pack_rows, unpack_rows
+from factory.record.log.kept import kept_run
 from factory.record.log.states import StoredRows
 from factory.record.monitor.record import watch_log
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from factory.support.errors import InputError
-from factory.support.settings import Settings
 
 PAPER = Path(__file__).parent.parent / "examples" / "paper.pag"
 
@@ -132,23 +131,15 @@ def test_the_model_in_a_log_is_the_engines(recorded) -> None:
     assert log.xml == simulation.model.xml and dict(log.files) == dict(simulation.model.files)
 
 
-def test_a_log_without_setpoints_is_still_read(
-    layout, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Older versions kept none."""
-    arrays = writing._Ticks.arrays
-
-    def older(self: writing._Ticks) -> dict:
-        return {k: a for k, a in arrays(self).items() if not k.startswith("ctrl")}
-
-    monkeypatch.setattr(writing._Ticks, "arrays", older)
-    simulation = Simulation(
-        layout, RunRequest("mujoco", units=1, settings=Settings(timestep=0.002))
-    )
-    with LogWriter(tmp_path / "old", simulation) as writer:
-        simulation.run([writer.observe], 0.1)
-    log = read_log(tmp_path / "old")
-    assert log.complete and log.ctrl is None and len(log) == 11
+def test_a_log_of_another_version_is_to_be_recorded_again(recorded, tmp_path: Path) -> None:
+    data = recorded[0].read_bytes()
+    old = tmp_path / "old.log"
+    old.write_bytes(b"factory-log 1\n" + data[len(MAGIC) :])
+    assert is_log(old)
+    for read in (read_log, kept_run):
+        with pytest.raises(InputError, match="another version") as error:
+            read(old)
+        assert "record it again" in error.value.diagnostics[0].hint
 
 
 def test_what_is_read_is_locked(recorded) -> None:

@@ -506,8 +506,6 @@ def test_logs_that_cannot_be_watched(paper: Layout, tmp_path: Path, run: Termina
             watch_log(factory_log(log, header))
     with pytest.raises(InputError, match="not of the factory in its header"):
         watch_log(factory_log(log, {**log.header, "transitions": ["x_s"]}))
-    with pytest.raises(InputError, match="older version"):
-        watch_log(factory_log(log, dict(log.header), ctrl=None))
 
 
 def factory_log(log: Log, header: dict[str, Any], **changes: Any) -> Log:

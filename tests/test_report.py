@@ -357,18 +357,14 @@ def test_what_cannot_be_told_is_refused(run, log: Path, out: Path, tmp_path: Pat
     assert not files_in(out)
 
 
-def test_a_log_says_which_floor_its_layout_was_made_for(run: Terminal, tmp_path: Path) -> None:
-    log = tmp_path / "run.log"
-    assert run("run", PAPER, "--floor", "3x2.5", "--log", log, "-q").status == 0
-    told = recording_of(log)
-    assert told.layout, told.missing
-    assert told.log.header["ground"]["floor"] == [3.0, 2.5]
+def test_a_log_whose_layout_is_not_of_its_factory(log: Path, tmp_path: Path) -> None:
+    """The report says so, and leaves out what follows from the layout."""
 
-    def shrunk(header) -> None:
-        header["ground"]["floor"] = [0.3, 0.3]
+    def nearer(header) -> None:
+        header["layout"]["guidepaths"][4]["a"][1] += 0.03
 
-    told = recording_of(altered(log, tmp_path / "small.log", shrunk))
-    assert told.layout is None and "too wide" in told.missing
+    told = recording_of(altered(log, tmp_path / "near.log", nearer))
+    assert told.layout is None and "not clear" in told.missing
 
 
 def test_a_log_that_was_cut_off_is_told_as_far_as_it_goes(log: Path, tmp_path: Path) -> None:

@@ -256,12 +256,12 @@ def test_what_cannot_be_gone_on_with(
 
     refused("is no file")
     refused("is no file", path=tmp_path)
-    refused("is damaged", path=PAPER)
+    refused("is no log", path=PAPER)
     cut(whole, log, whole.stat().st_size // 2)
     with claimed(tmp_path / "other.log"):
         refused("is being written by another run", "BadFile", tmp_path / "other.log")
     rest = {name: value for name, value in header.items() if name != "chosen"}
-    refused("has no checkpoints", path=put_together(log, rest, blocks[:4]))
+    refused("'chosen'", path=put_together(log, rest, blocks[:4]))
     plain = [(kind, arrays) for kind, arrays in blocks[:-1] if kind != b"C"]
     refused("has no checkpoints", path=put_together(log, header, plain))
     refused("--distributed", path=put_together(log, {**header, "distributed": True}, blocks[:4]))

@@ -19,6 +19,7 @@ from factory.commands.warnings import told
 from factory.support.collector import collector_paused
 from factory.support.console import POOL_BOUND, emit, say, warning
 from factory.support.errors import printed
+from factory.support.files import is_plan
 from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
@@ -65,15 +66,18 @@ def build(
         from factory.export.build import BuildRequest, files_read
         from factory.export.build import build as build_files
         from factory.nets.verify import proved
+        from factory.record.plan_file import plan_and_layout
 
         project = given.project(out.silent)
         with Waiting("reading the shapes and laying out", out.silent):
             verdict = proved(project.layout.factory.net)
         spent = perf_counter() - begin
+        plan = plan_and_layout(given.file) if is_plan(given.file) else ()
+        request = BuildRequest(mjcf, output, units, wip, plan)
         with Waiting("compiling the model", out.silent):
-            built = build_files(project, verdict, BuildRequest(mjcf, output, units, wip))
+            built = build_files(project, verdict, request)
         kept = _printed(project, built, spent, wip)
-        inputs = (*files_read(project), *_shipped_and_own(given.folders))
+        inputs = (*files_read(project), *plan, *_shipped_and_own(given.folders))
         build_cache.keep(name, inputs, built.files, kept)
     else:
         kept["document"]["compile_s"] = perf_counter() - begin

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
+from factory.commands.requests import PLANNED
 from factory.support.errors import Diagnostic
 
 PARAMETERS = {"templates": "folders"}
@@ -32,12 +33,13 @@ def with_defaults(command: click.Command) -> click.Command:
 def _read(context: click.Context, parameter: click.Parameter, file: Path) -> Path:
     """FILE itself; what its `factory.toml` says is the default of the options after it, which are
     all that are not given. Raises InputError."""
+    from factory.support.files import is_plan
     from factory.support.user_defaults import defaults_for
 
     defaults = context.meta[META] = defaults_for(file)
-    context.default_map = {
-        PARAMETERS.get(key, key): value for key, value in defaults.options().items()
-    }
+    planned = PLANNED if is_plan(file) else {}
+    named = {PARAMETERS.get(key, key): value for key, value in defaults.options().items()}
+    context.default_map = {key: value for key, value in named.items() if key not in planned}
     return file
 
 

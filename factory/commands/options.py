@@ -87,13 +87,17 @@ def _pag(file: Path | None, folders: Sequence[Path]) -> PAG | None:
     from factory.lang import load_pag
     from factory.pipeline import all_templates
     from factory.record.log import is_log, read_log
-    from factory.record.log.recompiled import factory_of
+    from factory.record.plan_file import read_plan
+    from factory.record.project_table import factory_of, project_of
+    from factory.support.files import is_plan
 
     try:
         if file is None:
             return None
         if is_log(file):
             return factory_of(read_log(file).header).pag
+        if is_plan(file):
+            return project_of(read_plan(file).table, file.parent).pag
         return load_pag(file, all_templates(folders))
     except FactoryError:
         return None

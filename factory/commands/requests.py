@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from factory.pipeline import Project
     from factory.plant.factory import Factory
     from factory.problem.pag import PAG, AllowedOverlap
+    from factory.record.plan_file import PlanFile
     from factory.render import Picture
     from factory.simulation.recovery.faults import Campaign
     from factory.simulation.request import RunRequest, WorldName
@@ -91,8 +92,8 @@ class ProjectOptions:
     allow: tuple[AllowedOverlap, ...] = ()
 
     def settings(self) -> Settings:
-        """Options before the environment, that before the `factory.toml` beside the PAG or in the
-        current folder. Raises InputError."""
+        """Options before the environment, that before what is in a plan or, for a PAG, before the
+        `factory.toml` beside it or in the current folder. Raises InputError."""
         from factory.support.settings import environment
         from factory.support.user_defaults import defaults_for
 
@@ -100,8 +101,9 @@ class ProjectOptions:
         given = {name: getattr(self, name) for name in names}
         given["stage"] = None if self.stage is None else int(self.stage)
         given["hands"] = None if self.hands is None else int(self.hands)
-        settings = defaults_for(self.file).settings().with_options(environment())
-        return settings.with_options(given)
+        plan = self._plan()
+        settings = plan.settings if plan else defaults_for(self.file).settings()
+        return settings.with_options(environment()).with_options(given)
 
     def ground(self) -> Ground:
         """What FLOOR and RELAY ask for. Raises InputError (BadValue)."""
@@ -137,8 +139,15 @@ class ProjectOptions:
         `settings` if any are given; unless `silent` the search for few robots shows its progress.
         Raises InputError."""
         from factory.pipeline import read
+        from factory.support.console import warn
         from factory.support.user_defaults import defaults_for
 
+        if plan := self._plan():
+            ground, warnings = self.ground(), list[Diagnostic]()
+            ground = replace(plan.ground, floor=ground.floor or plan.ground.floor)
+            planned = plan.project(settings or self.settings(), ground, warnings.append)
+            warn(warnings, silent)
+            return planned
         project = read(self.file, self.folders, settings or self.settings(), self.ground())
         if self.allow:
             project = project.with_pag(self._allowing(project.pag))
@@ -155,6 +164,24 @@ class ProjectOptions:
 
         asked = {**defaults_for(self.file).parallel(), **dict(self.parallel)}
         return tuple((label, k) for label, k in asked.items() if k > 1)
+
+    def _plan(self) -> PlanFile | None:
+        """The plan in the file, None where that is a PAG. Raises InputError, of code Usage for
+        options that say what a plan says."""
+        from factory.support.files import is_plan
+
+        if not is_plan(self.file):
+            return None
+        faults = [
+            Diagnostic("Usage", f"{option} is for a PAG; '{self.file}' is a plan", None, OF_A_PLAN)
+            for name, option in PLANNED.items()
+            if getattr(self, name) not in (None, False, ())
+        ]
+        if faults:
+            raise InputError(faults)
+        from factory.record.plan_file import read_plan
+
+        return read_plan(self.file)
 
     def _with_few_robots(self, project: Project, silent: bool) -> Project:
         """The project with the plan that is found for the robots and the cycle time asked for."""
@@ -272,6 +299,21 @@ class PictureOptions:
             check_output(self.poster, size, still=True)
         return Picture(size, camera, panels=panels, title=self.title)
 
+
+PLANNED = {
+    "folders": "--templates",
+    "relay": "--relay",
+    "cycle": "--cycle",
+    "robots": "--robots",
+    "effort": "--effort",
+    "limit": "--seconds",
+    "parallel": "--parallel",
+    "deputies": "--deputies",
+    "allow": "--allow",
+}
+"""The options that say what a plan says, by the fields that they are."""
+
+OF_A_PLAN = "leave it out, or give the PAG and make another plan: `factory build FILE.pag -o DIR`"
 
 WIDEST, LARGEST = 10**5, 10**5
 """Upper bounds on the width and depth of a floor [m], and on those of a picture [px]."""

@@ -206,9 +206,7 @@ def run_project(
         from factory.record.log import LogWriter
         from factory.simulation.checkpoint import checkpoint
 
-        recorders.append(
-            lambda: LogWriter(log, made, project.pag, checkpoint=lambda: checkpoint(made))
-        )
+        recorders.append(lambda: LogWriter(log, made, project, checkpoint=lambda: checkpoint(made)))
     if film is not None:
         recorders.append(lambda: film(made))
     record = carry_out(made, silent, asked.max_time, recorders, monitor, log)

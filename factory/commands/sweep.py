@@ -162,7 +162,9 @@ def _carry_out(
     warnings = announced(project.product.warnings, out)
     fixed = {name: getattr(project.settings, name) for name in SETTINGS}
     fixed |= {key: asked[key] for key in DEFAULTS if asked[key] is not None}
-    recipe = Recipe(project.plain, project.product, fixed, runs.max_time, project.ground, runs.fuse)
+    laid = project.layout if project.laid else None
+    about = runs.max_time, project.ground, runs.fuse, laid
+    recipe = Recipe(project.plain, project.product, fixed, *about)
     jobs = runs.jobs or cores()
     return sweep(recipe, axes, database, jobs, runs.on, runs.retry, out.silent), warnings
 

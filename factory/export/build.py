@@ -18,6 +18,7 @@ from factory.modes.modes import operation_modes
 from factory.nets.verdict import Verdict
 from factory.pipeline import Project
 from factory.plant.programs import program_of, write_program
+from factory.record.plan_file import plan_files
 from factory.simulation.modelling import physical_model
 from factory.support.errors import RunError
 from factory.support.files import own_names, write_all
@@ -26,12 +27,14 @@ from factory.support.files import own_names, write_all
 @dataclass(frozen=True, slots=True)
 class BuildRequest:
     """What a build writes: the model at `mjcf`, and everything into the folder `output`. The model
-    has parts for so many `units` (None: for ever) with `wip` units inside at once."""
+    has parts for so many `units` (None: for ever) with `wip` units inside at once. `read`: files
+    that were read, beside the PAG and its meshes."""
 
     mjcf: Path | None = None
     output: Path | None = None
     units: int | None = None
     wip: int | None = None
+    read: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -57,7 +60,7 @@ def build(project: Project, verdict: Verdict, request: BuildRequest) -> Built:
     if not clearance.holds:
         raise RunError(fault.diagnostic() for fault in clearance.faults)
     model = physical_model(layout, request.units, settings, project.catalogue, request.wip)
-    mjcf, read = request.mjcf, files_read(project)
+    mjcf, read = request.mjcf, (*files_read(project), *request.read)
     if output is not None:
         mjcf = mjcf or output / f"{project.name}.xml"
     path = beside(mjcf) if mjcf else None
@@ -69,6 +72,7 @@ def build(project: Project, verdict: Verdict, request: BuildRequest) -> Built:
     if output is not None:
         texts = _documents(project, clearance, verdict)
         documents = {output / f"{project.name}.{end}": t.encode() for end, t in texts.items()}
+        documents |= plan_files(project, output)
         own_names(output, documents, read)
         files |= documents
     write_all(files | binary)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from factory.nets.undone import Undone
 from factory.plant.factory import Factory
 from factory.record.log import Log
-from factory.record.log.recompiled import factory_of
+from factory.record.project_table import factory_of
 
 
 @dataclass(frozen=True, slots=True)

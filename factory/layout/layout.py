@@ -44,8 +44,7 @@ class Layout:
     (docs/decisions/hands.md, Lines);
     `given`: the levels of robots on their tours, None where they follow from these;
     `plain`: the layout without relays, None where this is one; `standby`: that of which this is a
-    part, so that deputies can take over, None where none may; `ground`: what it was made for, by
-    the names that `request.Ground` has.
+    part, so that deputies can take over, None where none may.
     """
 
     factory: Factory
@@ -62,11 +61,9 @@ class Layout:
     certificate: Certificate | None = field(default=None, repr=False, compare=False)
     plain: Layout | None = field(default=None, repr=False, compare=False)
     standby: Layout | None = field(default=None, repr=False, compare=False)
-    ground: Mapping[str, object] = field(default_factory=dict, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "payloads", MappingProxyType(dict(self.payloads)))
-        object.__setattr__(self, "ground", MappingProxyType(dict(self.ground)))
 
     def hand(self, robot: int) -> Hand | None:
         """The hand of a robot; None for a tool, and where hands are not chosen."""

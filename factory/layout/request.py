@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from factory.plant.factory import Factory
@@ -70,7 +70,7 @@ class Ground:
             if self.relay and factory.folded:
                 raise InputError(SEVERAL_TOURS)
             layout = relayed(layout, settings, self.cycle, self.floor, hands)
-        return replace(layout, ground=self.kept())
+        return layout
 
     def _with_deputies(
         self,
@@ -94,11 +94,7 @@ class Ground:
 
         found = chosen_pairs(deputies(factory, catalogue or load_catalogue()))
         whole, robots = laid_out_for(found, lay_out), range(len(factory.robots))
-        known = replace(whole, product=product, standby=whole, ground=self.kept())
+        known = replace(whole, product=product, standby=whole)
         layout = part_of(known, factory, robots)
         assert layout is not None, "its robots have their own tours"
-        return replace(layout, ground=self.kept())
-
-    def kept(self) -> dict[str, object]:
-        """What a log keeps, by name."""
-        return asdict(self)
+        return layout

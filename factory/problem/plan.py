@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from itertools import chain
 
 THIRD = -1
 """The form of a join whose inputs a third robot takes; others are the number of the input that
@@ -34,6 +34,17 @@ class Plan:
     turns: tuple[tuple[int, ...], ...] = ()
     lifts: frozenset[int] | None = None
 
+    def __post_init__(self) -> None:
+        for name, values, least, most in (
+            ("forms", self.forms.values(), THIRD, 1),
+            ("relays", self.relays.values(), 1, MOST_RELAYS),
+            ("turns", chain.from_iterable(self.turns), 0, MOST_ROBOTS),
+            ("lifts", self.lifts or (), 0, MOST_ROBOTS),
+        ):
+            if wrong := [value for value in values if not least <= value <= most]:
+                words = f"whole numbers from {least} to {most}, not {wrong[0]}"
+                raise ValueError(f"{name} must be {words}")
+
     def then(self, turns: Turns) -> Plan:
         """The plan in which other robots do what the robots of this one do: in turn t robot
         `turns[t][r]` (index) what robot r does. Its lifts are to be found again."""
@@ -41,37 +52,6 @@ class Plan:
         every = tuple(tuple(turn[robot] for robot in unit) for turn in turns for unit in first)
         alone = len(every) == 1 and every[0] == tuple(range(len(every[0])))
         return replace(self, turns=() if alone else every, lifts=None)
-
-    def as_json(self) -> dict[str, object]:
-        """The plan as a table of JSON."""
-        return {
-            "forms": dict(sorted(self.forms.items())),
-            "relays": dict(sorted(self.relays.items())),
-            "turns": [list(turn) for turn in self.turns],
-            "lifts": None if self.lifts is None else sorted(self.lifts),
-        }
-
-    @classmethod
-    def of_json(cls, table: Mapping[str, Any]) -> Plan:
-        """The plan in such a table. Raises ValueError, KeyError, TypeError, AttributeError where it
-        is none."""
-        turns, lifts = table["turns"], table["lifts"]
-        return cls(
-            {str(label): _whole(form, THIRD, 1) for label, form in table["forms"].items()},
-            {
-                str(label): _whole(number, 1, MOST_RELAYS)
-                for label, number in table["relays"].items()
-            },
-            tuple(tuple(_whole(robot, 0, MOST_ROBOTS) for robot in turn) for turn in turns),
-            None if lifts is None else frozenset(_whole(robot, 0, MOST_ROBOTS) for robot in lifts),
-        )
-
-
-def _whole(value: object, least: int, most: int) -> int:
-    """A whole number from `least` to `most`. Raises ValueError for anything else."""
-    if type(value) is int and least <= value <= most:
-        return value
-    raise ValueError(f"a whole number from {least} to {most} is needed, not {value!r:.40}")
 
 
 AS_WRITTEN = Plan()

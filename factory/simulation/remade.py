@@ -11,11 +11,10 @@ from typing import Any
 
 from factory.layout.layout import Layout
 from factory.record.log import Log
-from factory.record.log.header import settings_of
 from factory.record.log.kept import BROKEN
-from factory.record.log.relaid import project_of
 from factory.record.log.writer import packed, versions
 from factory.record.monitor.subject import subject_of_run
+from factory.record.project_table import project_of, settings_of
 from factory.record.verdict import FAULTS
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
@@ -57,7 +56,10 @@ def model_faults(
         if subject_of_run(made).as_json()["goals"] != log.header["monitor"]["goals"]:
             return (), "the run was in another layout than the one that its PAG gets now"
     except FactoryError as error:
-        return (), error.diagnostics[0].message
+        found = error.diagnostics[0]
+        if found.code == "BadPlan":
+            return (Diagnostic("Record", found.message),), ""
+        return (), found.message
     except BROKEN as error:
         return (), str(error)
     assert made.model is not None

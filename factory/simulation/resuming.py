@@ -15,9 +15,8 @@ from factory.record.ending import CutOff
 from factory.record.log import LogWriter
 from factory.record.log.blocks import bad_log
 from factory.record.log.kept import BROKEN, KeptRun, kept_run
-from factory.record.log.recompiled import AGAIN, of_its_factory
-from factory.record.log.relaid import project_of
 from factory.record.log.writer import packed, versions
+from factory.record.project_table import check_names, of_its_factory, project_of
 from factory.simulation.checkpoint import checkpoint, take_up
 from factory.simulation.recovery.faults import campaign_of
 from factory.simulation.recovery.recovery import recover
@@ -26,6 +25,7 @@ from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.claim import claimed_again
 from factory.support.errors import Diagnostic, InputError
+from factory.support.files import AGAIN
 from factory.support.settings import AUTO
 
 IN_ITSELF = ("Stalled", "Dropped", "Unstable", "Failed")
@@ -59,7 +59,7 @@ class Resumed:
         return LogWriter(
             self.path,
             made,
-            self.project.pag,
+            self.project,
             checkpoint=lambda: checkpoint(made),
             going_on=self.file,
         )
@@ -125,11 +125,11 @@ def _done(kept: KeptRun) -> CutOff | None:
 def _check(kept: KeptRun) -> None:
     """Raises InputError (BadLog) where a run cannot be gone on with."""
     header, now = kept.header, versions()
-    if header.get("distributed"):
+    if header["distributed"]:
         words = "is of a run with --distributed, which has no checkpoints to go on from"
         raise InputError(_bad(kept.path, words, "leave out --distributed"))
     lacks = kept.ticks > 1 and not kept.checkpoints and "faults" not in header
-    if "chosen" not in header or lacks:
+    if lacks:
         raise InputError(_bad(kept.path, "has no checkpoints to go on from", AGAIN))
     for package in ("klavins-factory", "mujoco"):
         then, here = header["versions"].get(package, ""), now.get(package, "")
@@ -172,11 +172,7 @@ def _made(kept: KeptRun, project: Project, request: RunRequest) -> Simulation:
         made.asked = _asked(request, **header["chosen"])
         if request.recovers:
             recover(made, campaign_of(header["faults"]))
-        factory = made.layout.factory
-        net = factory.net.threaded
-        names = [[x.name for x in found] for found in (net.transitions, net.places, factory.robots)]
-        if names != [header["transitions"], header["places"], header["robots"]]:
-            raise ValueError("its net is not that of its PAG")
+        check_names(made.layout.factory, header)
     if {k: a.tobytes() for k, a in (kept.model or {}).items()} != packed(made.model):
         raise InputError(_bad(kept.path, "is of another model than its PAG gives now", AGAIN))
     return made

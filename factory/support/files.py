@@ -15,6 +15,9 @@ from pathlib import Path
 
 from factory.support.errors import Diagnostic, InputError
 
+AGAIN = "record it again: `factory run FILE.pag --log OUT`"
+"""What helps where a log cannot be used."""
+
 LOG = b"factory-log "
 """The first bytes of a log of a run, in every version."""
 
@@ -178,6 +181,11 @@ def is_net(file: Path) -> bool:
     if file.suffix.lower() == ".pnml":
         return True
     return head_of(file, 100).lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<")
+
+
+def is_plan(file: Path) -> bool:
+    """Whether a file is meant as a plan: by its ending."""
+    return file.suffix.lower() == ".json"
 
 
 def user_cache() -> Path:

@@ -43,10 +43,7 @@ def split(
 ) -> Layout:
     """The layout with so many relays on the way of each label. Linear."""
     before = layout.factory
-    plan = replace(before.plan, relays={label: n for label, n in numbers.items() if n})
-    nodes = handed_over(nodes_of(before), plan.relays, templates)
-    approaches = _approaches(before, plan)
-    factory = compile_nodes(before.pag, nodes, templates, catalogue, approaches, plan)
+    factory = with_relays(before, numbers, templates, catalogue)
     cut = {r: list(_pieces(layout, r, ways, factory)) for r in range(len(before.robots))}
     found = _hands(layout, factory, cut)
     paths: dict[int, Guidepath] = {}
@@ -73,6 +70,19 @@ def split(
         payloads=payload_boxes(factory, layout.product),
         certificate=None,
     )
+
+
+def with_relays(
+    before: Factory,
+    numbers: Mapping[str, int],
+    templates: Mapping[str, Template],
+    catalogue: Catalogue,
+) -> Factory:
+    """The factory in which so many robots more hand over each label. Linear."""
+    plan = replace(before.plan, relays={label: n for label, n in numbers.items() if n})
+    nodes = handed_over(nodes_of(before), plan.relays, templates)
+    approaches = _approaches(before, plan)
+    return compile_nodes(before.pag, nodes, templates, catalogue, approaches, plan)
 
 
 def _hands(layout: Layout, factory: Factory, cut: Mapping[int, Sequence[Piece]]) -> InLine:

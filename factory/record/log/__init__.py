@@ -1,13 +1,12 @@
 """The log of a run, `run --log OUT`: its whole state after every tick, in one file that is only
 appended to.
 
-    factory-log 1\\n          magic
+    factory-log 2\\n          magic
     <I length>{...}          header, JSON: versions, command line, world, seed, jitter, units,
                              wip, numbers of the places marked at the start, settings, names of
-                             robots, places and transitions, the PAG's name, text and SHA-256 (of
-                             one with relays the text without too), the templates that it uses,
-                             the floor and relays that the layout was made for, what a monitor
-                             knows of the layout, nq, nv
+                             robots, places and transitions, the PAG's name, text and SHA-256, its
+                             plan and the templates that it uses (`record.project_table`), its
+                             layout (`layout.saved`), what a monitor knows of that, nq, nv
     blocks                   see blocks.py: a letter, length, CRC-32, compressed arrays
 
     M  the model, once: `xml`, and `mesh/NAME` for each mesh file, bytes (mujoco only)

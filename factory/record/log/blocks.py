@@ -16,12 +16,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.support.errors import Diagnostic
-from factory.support.files import LOG
+from factory.support.errors import Diagnostic, InputError
+from factory.support.files import AGAIN, LOG
 
 Arrays = dict[str, NDArray[Any]]
 
-MAGIC = LOG + b"1\n"
+MAGIC = LOG + b"2\n"
+"""How a log begins, with the number of its format."""
 
 HEAD = struct.Struct("<cII")
 LENGTH = struct.Struct("<I")
@@ -106,8 +107,17 @@ def unpack_rows(name: str, arrays: Arrays, count: int) -> NDArray[np.float64]:
     return bits.view(np.float64)
 
 
-def bad_log(path: Path, words: str) -> Diagnostic:
+def bad_log(
+    path: Path, words: str, hint: str = "`factory run FILE.pag --log OUT` writes one"
+) -> Diagnostic:
     """The error of a file that should be a log."""
-    return Diagnostic(
-        "BadLog", f"'{path}' {words}", None, "`factory run FILE.pag --log OUT` writes one"
-    )
+    return Diagnostic("BadLog", f"'{path}' {words}", None, hint)
+
+
+def check_magic(path: Path, data: memoryview) -> None:
+    """Raises InputError (BadLog) where a file is no log, or one of another version."""
+    if data[: len(MAGIC)] == MAGIC:
+        return
+    if data[: len(LOG)] == LOG:
+        raise InputError(bad_log(path, "was kept by another version of factory", AGAIN))
+    raise InputError(bad_log(path, "is no log of factory"))

@@ -10,7 +10,8 @@ from typing import Any
 
 from factory.record.failures import Account, Failing, Failures, Stood
 from factory.record.log.blocks import Arrays
-from factory.record.log.header import LARGE, Key, is_count, is_table, is_text, listed
+from factory.record.log.header import Key, is_count, is_table, is_text, listed
+from factory.support.tables import LARGE
 
 
 def _is_time(value: Any) -> bool:

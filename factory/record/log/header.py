@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from math import inf
 from typing import Any, get_args
 
 from factory.control.profile import World
-from factory.problem.plan import Plan
-from factory.support.settings import RANGES, Settings, wrong_type
-
-LARGE = 10**9
-"""Upper bound on every length [m], time [s] and count in a header."""
+from factory.layout.saved import LayoutTable
+from factory.record.project_table import ProjectTable
+from factory.support.tables import LARGE, value_of
 
 Test = Callable[[Any], bool]
 
@@ -20,7 +18,7 @@ Test = Callable[[Any], bool]
 @dataclass(frozen=True, slots=True)
 class Key:
     """A key of the header, with a dot within a table: what its value must be, in words, and the
-    test of that; `later`: logs of older versions lack it."""
+    test of that; `later`: it may be missing."""
 
     name: str
     wanted: str
@@ -47,18 +45,10 @@ def check_header(header: Any) -> None:
         raise ValueError("its header is no table")
     for key in KEYS:
         key.check(header)
-    for name in RANGES.keys() & header["settings"].keys():
-        fault = wrong_type(name, header["settings"][name])
-        if fault is not None:
-            raise ValueError(f"in its header {fault.message}")
-    if any(place >= len(header["places"]) for place in header.get("start", ())):
+    ProjectTable.of(header)
+    value_of(LayoutTable, header["layout"], "layout")
+    if any(place >= len(header["places"]) for place in header["start"]):
         raise ValueError("in its header 'start' is out of range")
-
-
-def settings_of(header: Mapping[str, Any]) -> Settings:
-    """The settings of the run that this version knows."""
-    known = {field.name for field in fields(Settings)}
-    return Settings(**{k: v for k, v in header["settings"].items() if k in known})
 
 
 def of(kind: type) -> Test:
@@ -99,15 +89,6 @@ def maybe(test: Test) -> Test:
     return lambda v: v is None or test(v)
 
 
-def is_plan(value: Any) -> bool:
-    """Whether a value is the table of a plan."""
-    try:
-        Plan.of_json(value)
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError):
-        return False
-    return True
-
-
 def is_choice(value: Any) -> bool:
     """Whether a value says of timestep and wip whether they were chosen."""
     return tabled(of(bool))(value) and value.keys() == {"timestep", "wip"}
@@ -122,30 +103,20 @@ KEYS = (
     Key("seed", "a whole number from 0", whole(0, inf)),
     Key("jitter", "a number from 0 to less than 1", lambda v: is_number(v) and 0 <= v < 1),
     Key("units", "a whole number from 1", whole(1, LARGE)),
-    Key("wip", "a whole number from 1, or null", maybe(whole(1, LARGE)), later=True),
-    Key("fuse", "true or false", of(bool), later=True),
-    Key("chosen", "true or false for timestep and wip", is_choice, later=True),
-    Key("distributed", "true or false", of(bool), later=True),
+    Key("wip", "a whole number from 1, or null", maybe(whole(1, LARGE))),
+    Key("fuse", "true or false", of(bool)),
+    Key("chosen", "true or false for timestep and wip", is_choice),
+    Key("distributed", "true or false", of(bool)),
     Key("faults", "a table", of(dict), later=True),
-    Key("start", "a list of numbers of places", listed(is_count), later=True),
-    Key("settings", "a table of numbers", tabled(is_number)),
-    Key("product", "a text", is_text),
-    Key("pag", "a table", is_table),
-    Key("pag.file", "a text", is_text),
-    Key("pag.text", "a text", is_text),
-    Key("pag.sha256", "a text", is_text),
-    Key("templates", "a table of texts", tabled(is_text), later=True),
-    Key("plan", "a plan", is_plan),
-    Key("ground", "a table", is_table, later=True),
-    Key("ground.floor", "two lengths in m, or null", maybe(listed(is_positive, 2)), later=True),
-    Key("ground.relay", "true or false", of(bool), later=True),
-    Key("ground.cycle", "a time in s, or null", maybe(is_positive), later=True),
-    Key("ground.deputies", "true or false", of(bool), later=True),
-    Key("monitor", "a table", is_table, later=True),
-    Key("monitor.goals", "lists of numbers", listed(listed(is_number)), later=True),
-    Key("monitor.radii", "a list of numbers", listed(is_number), later=True),
-    Key("monitor.places", "a table of x, y, z", tabled(listed(is_number, 3)), later=True),
-    Key("monitor.patience", "a time in s", is_positive, later=True),
+    Key("start", "a list of numbers of places", listed(is_count)),
+    Key("settings", "a table", is_table),
+    Key("settings.timestep", "a number", is_number),
+    Key("layout", "a table", is_table),
+    Key("monitor", "a table", is_table),
+    Key("monitor.goals", "lists of numbers", listed(listed(is_number))),
+    Key("monitor.radii", "a list of numbers", listed(is_number)),
+    Key("monitor.places", "a table of x, y, z", tabled(listed(is_number, 3))),
+    Key("monitor.patience", "a time in s", is_positive),
     Key("robots", "a list of texts", listed(is_text)),
     Key("places", "a list of texts", listed(is_text)),
     Key("transitions", "a list of texts", listed(is_text)),

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from factory.record.log.blocks import Arrays, bad_log, blocks
+from factory.record.log.blocks import Arrays, bad_log, blocks, check_magic
 from factory.record.log.reader import Log, header_in, log_in
 from factory.support.errors import InputError
 from factory.support.files import RECORD, mapped
@@ -53,6 +53,7 @@ def kept_run(path: Path) -> KeptRun:
         data = mapped(path, RECORD)
     except OSError as error:
         raise InputError(bad_log(path, f"cannot be read: {error.strerror}")) from error
+    check_magic(path, data)
     try:
         header, begin = header_in(data)
     except BROKEN as error:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from factory.mjcf.loading import compiled
 from factory.record.log.admitted import admitted
 from factory.record.log.reader import Log, Ragged
-from factory.record.log.recompiled import AGAIN
 from factory.support.engine import mujoco
 from factory.support.errors import Diagnostic, InputError
+from factory.support.files import AGAIN
 
 
 def model_of(log: Log) -> mujoco.MjModel:
@@ -24,8 +24,7 @@ def model_of(log: Log) -> mujoco.MjModel:
         m = compiled(admitted(log.xml, log.files), log.files)
     except ValueError as error:
         raise _bad(f"the log's model is broken: {error}") from error
-    setpoints = m.nu if log.ctrl is None else log.ctrl.shape[1]
-    if (m.nq, m.nv, m.nu) != (log.qpos.shape[1], log.qvel.shape[1], setpoints):
+    if [m.nq, m.nv, m.nu] != [s.shape[1] for s in (log.qpos, log.qvel, log.ctrl) if s is not None]:
         raise _bad("the log's states are not those of its model")
     if not (_within(log.active, m.neq, m.nbody, m.nbody) and _within(log.contacts, *2 * [m.ngeom])):
         raise _bad("the log's constraints or contacts are not those of its model")

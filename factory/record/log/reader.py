@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from factory.nets.undone import Entry, lasting
 from factory.record.ending import CutOff
 from factory.record.failures import Failures
-from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, blocks, is_cut
+from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, blocks, check_magic, is_cut
 from factory.record.log.failed import failures_in, failures_so_far
 from factory.record.log.header import check_header
 from factory.record.log.states import (
@@ -32,7 +32,7 @@ from factory.record.log.undone import Placed, undone_in
 from factory.record.verdict import check_figures
 from factory.support.claim import is_claimed
 from factory.support.errors import InputError
-from factory.support.files import RECORD, head_of, mapped
+from factory.support.files import LOG, RECORD, head_of, mapped
 
 Index = NDArray[np.int32]
 
@@ -80,13 +80,13 @@ class Log:
 
     `marking[i]`: numbers of the marked places; `active[i]` (k, 3): active constraints, and the two
     bodies each joins; `contacts[i]` (k, 2) geoms, `distances[i]` (k,) [m]; `fired` and `fired_t`:
-    transitions by number and time [s]. `ctrl`: the setpoints; None in the ideal world, and in
-    logs of older versions. `complete`: whether the file was closed properly; `cut_off`: how far the
-    run came, None where all of its units were made and the log has all of it. `ends`: the state as
-    operations ended, and `figures` of the bodies, as `kept_figures` gives them; None in the ideal
-    world and in logs of older versions. `undone`: what was undone, each with how many transitions
-    had fired before it. `failures`: what went wrong, in a run that goes on when something does; of
-    one that was killed what was known as the last was found."""
+    transitions by number and time [s]. `ctrl`: the setpoints; None in the ideal world. `complete`:
+    whether the file was closed properly; `cut_off`: how far the run came, None where all of its
+    units were made and the log has all of it. `ends`: the state as operations ended, and `figures`
+    of the bodies, as `kept_figures` gives them; None in the ideal world. `undone`: what was undone,
+    each with how many transitions had fired before it. `failures`: what went wrong, in a run that
+    goes on when something does; of one that was killed what was known as the last was found.
+    """
 
     header: Mapping[str, Any] = field(repr=False)
     xml: str = field(repr=False)
@@ -153,8 +153,7 @@ def read_log(path: Path | str) -> Log:
         written, data = is_claimed(path), mapped(path, RECORD)
     except OSError as error:
         raise InputError(bad_log(path, f"cannot be read: {error.strerror}")) from error
-    if data[: len(MAGIC)] != MAGIC:
-        raise InputError(bad_log(path, "is no log of factory"))
+    check_magic(path, data)
     try:
         return log_in(data, written)
     except MemoryError as error:
@@ -167,7 +166,7 @@ def read_log(path: Path | str) -> Log:
 
 def is_log(path: Path | str) -> bool:
     """Whether a file begins as a log does."""
-    return head_of(Path(path), len(MAGIC)) == MAGIC
+    return head_of(Path(path), len(LOG)) == LOG
 
 
 def header_in(data: memoryview) -> tuple[dict[str, Any], int]:
@@ -268,7 +267,7 @@ def _at_end(ticks: Sequence[Arrays], counts: Sequence[int]) -> NDArray[np.bool_]
     """Whether each row is the end of an operation, not a tick."""
     found = np.zeros(sum(counts), bool)
     for arrays, base in zip(ticks, np.cumsum([0, *counts]), strict=False):
-        found[base + arrays.get("ended_at", np.zeros(0, np.int32))] = True
+        found[base + arrays["ended_at"]] = True
     return found
 
 

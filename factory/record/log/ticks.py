@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.record.log.blocks import Arrays
-from factory.record.log.header import LARGE
+from factory.support.tables import LARGE
 
 ARRAYS: Mapping[str, tuple[str, tuple[int, ...]]] = {
     "time": ("<f8", ()),
@@ -20,6 +20,7 @@ ARRAYS: Mapping[str, tuple[str, tuple[int, ...]]] = {
     "contact_dist": ("<f8", ()),
     "fired": ("<i4", ()),
     "fired_t": ("<f8", ()),
+    "ended_at": ("<i4", ()),
 }
 """The type of each array, and the shape of one row."""
 
@@ -38,16 +39,14 @@ def check_block(arrays: Arrays, header: Mapping[str, Any]) -> None:
         _check_kind(name, arrays[name], kind, row)
     count = len(arrays["time"])
     for name, width in (("qpos", header["nq"]), ("qvel", header["nv"]), ("ctrl", None)):
-        if f"{name}_first" in arrays or width is not None:
+        if width is not None or header["world"] != "ideal" or f"{name}_first" in arrays:
             _check_rows(name, arrays, width)
     for name in RAGGED:
         _check_ragged(name, arrays, count)
     for one, other in PAIRS:
         if len(arrays[one]) != len(arrays[other]):
             raise ValueError(f"{one} and {other} differ in length")
-    if "ended_at" in arrays:  # logs of older versions lack it
-        _check_kind("ended_at", arrays["ended_at"], "<i4", ())
-        _check_range("ended_at", arrays["ended_at"], count - 1)
+    _check_range("ended_at", arrays["ended_at"], count - 1)
     _check_range("time", arrays["time"], LARGE)
     _check_range("fired_t", arrays["fired_t"], LARGE)
     _check_range("marking", arrays["marking"], len(header["places"]) - 1)

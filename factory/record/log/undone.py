@@ -8,7 +8,8 @@ from typing import Any
 
 from factory.nets.undone import Undone
 from factory.record.log.blocks import Arrays
-from factory.record.log.header import LARGE, Key, is_text, listed, whole
+from factory.record.log.header import Key, is_text, listed, whole
+from factory.support.tables import LARGE
 
 Placed = tuple[int, Undone]
 """What was undone, and how many transitions had fired before it in the run."""

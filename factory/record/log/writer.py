@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import platform
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import asdict
 from io import FileIO
 from os import SEEK_CUR
 from pathlib import Path
@@ -17,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.lang import write_pag, write_template
+from factory.layout.saved import LayoutTable
 from factory.nets.undone import Undone
-from factory.problem.pag import PAG
+from factory.pipeline import Project
 from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, block, pack_rows
 from factory.record.log.failed import Told
 from factory.record.log.states import STATES
@@ -27,11 +25,13 @@ from factory.record.log.undone import undone_as_json
 from factory.record.monitor.observation import EngineView
 from factory.record.monitor.subject import subject_of_run
 from factory.record.observed import Observed, Recorder
+from factory.record.project_table import project_table
 from factory.record.verdict import kept_figures
 from factory.support.claim import claimed
 from factory.support.errors import Diagnostic, FactoryError, InputError
 from factory.support.files import unwritten
 from factory.support.settings import AUTO
+from factory.support.tables import table_of
 from factory.support.version import release
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ class LogWriter(Recorder):
     """Writes a log; to be closed, or used as a context manager. Other processes cannot write the
     same file meanwhile.
 
-    `pag`: the PAG as it was read, where the factory was compiled from more; `command`: the
+    `project`: what the factory was made from, where there is one; `command`: the
     command line, that of this process unless given; `checkpoint`: what gives the state of the run
     after a tick, to be gone on with, None where it has none; `going_on`: the log itself, claimed,
     of a run that is gone on with, at the place to write on. `trouble`: what ended the run early, if
@@ -99,7 +99,7 @@ class LogWriter(Recorder):
         self,
         path: Path | str,
         simulation: Observed,
-        pag: PAG | None = None,
+        project: Project | None = None,
         command: Sequence[str] | None = None,
         checkpoint: Callable[[], Arrays | None] = lambda: None,
         going_on: FileIO | None = None,
@@ -115,18 +115,18 @@ class LogWriter(Recorder):
             self.told.goes_on(self.world.hooks.account)
         self.trouble: Diagnostic | None = None
         self.checkpoint = checkpoint
-        self.file = self._begun(simulation, pag, command) if going_on is None else going_on
+        self.file = self._begun(simulation, project, command) if going_on is None else going_on
         if going_on is None or not self.world.time:
             self.observe(self.world, self.supervisor)
         if self.view is not None:
             self.world.hooks.ended.append(self.ended)
 
     def _begun(
-        self, simulation: Observed, pag: PAG | None, command: Sequence[str] | None
+        self, simulation: Observed, project: Project | None, command: Sequence[str] | None
     ) -> FileIO:
         """The file, with its header and the model."""
         sizes = [len(values) for values in self._state()[:2]]
-        header = json.dumps(_header(simulation, pag, command, *sizes)).encode()
+        header = json.dumps(_header(simulation, project, command, *sizes)).encode()
         content = MAGIC + LENGTH.pack(len(header)) + header + _model(simulation)
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -277,16 +277,14 @@ def packed(model: Model | None) -> dict[str, bytes]:
 
 
 def _header(
-    simulation: Observed, pag: PAG | None, command: Sequence[str] | None, nq: int, nv: int
+    simulation: Observed, project: Project | None, command: Sequence[str] | None, nq: int, nv: int
 ) -> dict[str, Any]:
     layout, net = simulation.layout, simulation.layout.factory.net.threaded
-    factory = layout.factory
-    given, account = factory.pag if pag is None else pag, simulation.world.hooks.account
-    file = Path(given.file)
-    written = file.is_file() and all(allowed.position for allowed in given.allowed)
-    text = file.read_text("utf-8", errors="replace") if written else write_pag(given)
-    templates = {o.template.name: o.template for o in factory.operations}
+    factory, account = layout.factory, simulation.world.hooks.account
+    pag, templates = (project.pag, project.templates) if project else (factory.pag, {})
     return {
+        **project_table(pag, templates, factory, simulation.request.settings),
+        "layout": table_of(LayoutTable.of(layout)),
         "versions": {"python": platform.python_version(), **versions()},
         "command": list(sys.argv if command is None else command),
         "world": simulation.request.world,
@@ -302,16 +300,6 @@ def _header(
         **({} if account is None else {"faults": account.given}),
         "fuse": simulation.request.fuse,
         "start": sorted(simulation.start),
-        "settings": asdict(simulation.request.settings),
-        "product": file.stem.strip("<>") or "factory",
-        "pag": {
-            "file": str(file),
-            "text": text,
-            "sha256": hashlib.sha256(text.encode()).hexdigest(),
-        },
-        "plan": factory.plan.as_json(),
-        "ground": dict(layout.ground),
-        "templates": {name: write_template(made) for name, made in sorted(templates.items())},
         "monitor": subject_of_run(simulation).as_json(),
         "robots": [robot.name for robot in factory.robots],
         "places": [place.name for place in net.places],

@@ -14,10 +14,8 @@ from factory.nets.replay import replay
 from factory.plant.factory import Factory
 from factory.plant.material import joins_of
 from factory.record.failures import Failures
-from factory.record.log.header import settings_of
 from factory.record.log.model import model_of
 from factory.record.log.reader import Ends, Log
-from factory.record.log.recompiled import AGAIN, factory_of, of_its_factory
 from factory.record.monitor.agreement import contradictions
 from factory.record.monitor.anatomy import Anatomy
 from factory.record.monitor.calm import judge_calm
@@ -27,8 +25,9 @@ from factory.record.monitor.observation import Observation
 from factory.record.monitor.recount import differences, recounted, worst
 from factory.record.monitor.report import Report
 from factory.record.monitor.subject import MonitorSubject, subject_from
+from factory.record.project_table import factory_of, of_its_factory, settings_of
 from factory.record.verdict import FAULTS, RunVerdict, judged
-from factory.support.errors import Diagnostic, InputError
+from factory.support.errors import Diagnostic
 
 
 def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
@@ -37,12 +36,9 @@ def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
     Only when nothing is wrong with the states are the log's firings and markings looked at: whether
     they agree with those, and with each other. States alone do not tell what was undone: where
     something failed, the states between failures are looked at (`calm`). Raises InputError (BadLog)
-    for a log of the ideal world, of an older version, or of another factory than its header says.
+    for a log of the ideal world, or of another factory than its header says.
     """
     m = model_of(log)
-    if log.ctrl is None or "monitor" not in log.header:
-        message = "the log was kept by an older version, without setpoints"
-        raise InputError(Diagnostic("BadLog", message, None, AGAIN))
     with of_its_factory():
         subject = recorded_subject(log.header)
         if log.failures is not None and log.failures != Failures():

@@ -15,10 +15,9 @@ from factory.geometry.meshes import Array
 from factory.layout.layout import Layout
 from factory.plant.factory import Factory, Operation
 from factory.record.log import Log, read_log
-from factory.record.log.recompiled import factory_of
-from factory.record.log.relaid import project_of
 from factory.record.monitor import Report, subject_of
 from factory.record.monitor.record import verdict_on, watch_log
+from factory.record.project_table import factory_of, project_of
 from factory.record.verdict import RunVerdict
 from factory.show.report.scene import DrawnFactory, stations
 from factory.simulation.remade import model_faults
@@ -82,7 +81,7 @@ class Recording:
             seen.position[0],
             seen.quaternion[0],
             np.stack([seen.position.min(axis=0), seen.position.max(axis=0)]),
-            self.log.header.get("monitor", {}).get("places", {}),
+            self.log.header["monitor"]["places"],
             stations(self.factory, m, self._ends()),
         )
 

@@ -9,7 +9,7 @@ from typing import Any
 from factory.control.profile import World
 from factory.plant.factory import Factory
 from factory.record.log import Log
-from factory.record.log.header import settings_of
+from factory.record.project_table import settings_of
 from factory.simulation.run import Event, Run
 from factory.study.analysis.measured import RunRecord, dropoff_times
 from factory.support.errors import Diagnostic, InputError
@@ -39,10 +39,10 @@ def logged_record(source: str, log: Log, factory: Factory) -> RunRecord:
     """The record of the run in a log. Raises InputError (BadLog) where it is not one of this
     factory, does not start from its initial marking, or finished no product."""
     net = factory.net.threaded
-    if log.header.get("transitions") != [transition.name for transition in net.transitions]:
+    if log.header["transitions"] != [transition.name for transition in net.transitions]:
         message = f"'{source}' is the log of another factory: other operations, or other robots"
         raise InputError(Diagnostic("BadLog", message, None, HINT))
-    if log.header.get("start") != sorted(factory.net.initial_marking):
+    if log.header["start"] != sorted(factory.net.initial_marking):
         message = f"the run in '{source}' began in the middle (--from)"
         hint = "take one that began at the beginning"
         raise InputError(Diagnostic("BadLog", message, None, hint))
@@ -60,4 +60,4 @@ def _checked(record: RunRecord) -> RunRecord:
 def conditions(header: Mapping[str, Any]) -> Conditions:
     """The conditions of the run in a log."""
     settings, jitter = settings_of(header), float(header["jitter"])
-    return Conditions(settings, header["world"], header["seed"], jitter, header.get("wip"))
+    return Conditions(settings, header["world"], header["seed"], jitter, header["wip"])

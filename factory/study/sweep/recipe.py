@@ -13,11 +13,14 @@ import numpy as np
 
 from factory.geometry.solids import Product
 from factory.lang.writer import write_pag, write_template
+from factory.layout.layout import Layout
 from factory.layout.request import Ground
+from factory.layout.saved import LayoutTable
 from factory.plant.factory import Factory
 from factory.study.sweep.grid import DEFAULTS, Axis, Point, Value
 from factory.support.pickling import pickle_locked_mappings
 from factory.support.resources import mjcf_folder
+from factory.support.tables import table_of
 from factory.support.version import __version__
 
 pickle_locked_mappings()  # of which factories are full
@@ -27,8 +30,8 @@ pickle_locked_mappings()  # of which factories are full
 class Recipe:
     """A factory, the solids of its product, the values of keys that are the same in all runs, the
     simulated time after which a run is given up [s], what it is laid out for, whether joined parts
-    become one body (None: where that pays). A worker needs nothing else, and reads no file of the
-    user's."""
+    become one body (None: where that pays), and its layout where that is kept (`laid`). A worker
+    needs nothing else, and reads no file of the user's."""
 
     factory: Factory
     product: Product
@@ -36,6 +39,7 @@ class Recipe:
     max_time: float | None = None
     ground: Ground = Ground()  # noqa: RUF009
     fuse: bool | None = None
+    laid: Layout | None = None
 
     def at(self, point: Point) -> dict[str, Value]:
         """The value of every key at a point."""
@@ -55,8 +59,9 @@ class Recipe:
             "floor": list(self.ground.floor) if self.ground.floor else None,
             "relay": self.ground.relay,
             "cycle": self.ground.cycle,
-            "plan": self.factory.plan.as_json(),
+            "plan": table_of(self.factory.plan),
             "fuse": self.fuse,
+            **({"layout": table_of(LayoutTable.of(self.laid))} if self.laid else {}),
             **fixed,
         }
 

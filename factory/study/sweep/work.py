@@ -12,6 +12,7 @@ from time import perf_counter
 from typing import Any, TypeVar
 
 from factory.layout.layout import Layout
+from factory.layout.saved import LAID_FOR
 from factory.mjcf.timestep import timed
 from factory.nets.verify import proved
 from factory.plant.fused_bodies import fusing_pays
@@ -134,6 +135,8 @@ class Runner:
 
     def _lay_out(self, settings: Settings) -> Layout | FactoryError:
         recipe = self.recipe
+        if recipe.laid and all(getattr(settings, k) == recipe.fixed[k] for k in LAID_FOR):
+            return recipe.laid
         try:
             layout = recipe.ground.lay_out(recipe.factory, recipe.product, settings)
             if layout.plain is not None:  # relays, and their net, depend on the settings

@@ -94,7 +94,7 @@ def _run(simulation: Simulation, file: Path) -> tuple[Run, bool]:
     nothing."""
     if simulation.model is None:
         return simulation.run(max_time=300.0), True
-    with LogWriter(file, simulation, simulation.layout.factory.pag) as log:
+    with LogWriter(file, simulation) as log:
         run = simulation.run([log.observe], max_time=300.0)
         log.end(run.trouble)
     return run, not watch_log(read_log(file))[0].violations

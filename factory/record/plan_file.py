@@ -1,0 +1,128 @@
+"""The files of a plan: `plan.json`, a project with its plan, which is read in place of a PAG, and
+`layout.json` beside it, how that was laid out."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from factory.layout.request import Ground
+from factory.layout.saved import LAID_FOR, LayoutTable
+from factory.pipeline import Project
+from factory.problem.pag import PAG
+from factory.record.project_table import ProjectTable, project_of, project_table
+from factory.support.errors import Diagnostic, InputError, Position
+from factory.support.files import MESH, TEXT, read_bytes
+from factory.support.settings import Settings
+from factory.support.tables import table_of, value_of
+
+PLAN_NAME, LAYOUT_NAME = "plan.json", "layout.json"
+
+SCHEMA, LAYOUT_SCHEMA = "factory.plan.1", "factory.layout.1"
+
+AGAIN = "write it again: `factory build FILE.pag -o DIR`"
+
+
+@dataclass(frozen=True)
+class PlanFile:
+    """A `plan.json`, read and checked: its table, and the settings and ground in it."""
+
+    path: Path
+    table: Mapping[str, Any] = field(repr=False)
+    settings: Settings
+    ground: Ground
+
+    def project(
+        self, settings: Settings, ground: Ground, warn: Callable[[Diagnostic], None]
+    ) -> Project:
+        """The project for settings and a ground, with the layout beside the file where that is of
+        this plan and for these; `warn` is told where it is not. Raises InputError."""
+        with _of_a_plan(self.path):
+            made = project_of(self.table, self.path.parent, settings, ground)
+        path = self.path.parent / LAYOUT_NAME
+        why = f"there is no '{path}'"
+        if path.is_file():
+            with _of_a_plan(path):
+                table = _table(path, LAYOUT_SCHEMA)
+                if table["plan"] == _digest(made.pag, self.table, made.settings, made.ground.floor):
+                    return replace(made, laid=value_of(LayoutTable, table["layout"], "layout"))
+            why = f"'{path}' is of another plan, or for other settings, meshes or another floor"
+        hint = "`factory build` with `-o DIR` writes both files"
+        warn(Diagnostic("BadPlan", f"{why}: the plan is laid out anew", None, hint))
+        return made
+
+
+def read_plan(path: Path) -> PlanFile:
+    """The plan in a file. Raises InputError: BadFile where it cannot be read, BadPlan where it is
+    none."""
+    with _of_a_plan(path):
+        table = _table(path, SCHEMA)
+        made, ground = ProjectTable.of(table), value_of(Ground, table["ground"], "ground")
+        if not made.pag.file.startswith("<"):
+            table["pag"]["file"] = os.path.normpath(path.parent / made.pag.file)
+        return PlanFile(path, table, made.settings, ground)
+
+
+def plan_and_layout(path: Path) -> tuple[Path, ...]:
+    """The file of a plan, the layout beside it where there is one, or else their folder."""
+    beside = path.parent / LAYOUT_NAME
+    return path, beside if beside.is_file() else path.parent
+
+
+def plan_files(project: Project, folder: Path, text: str | None = None) -> dict[Path, bytes]:
+    """The two files of a project that has been laid out, for a folder; `text`: that of its PAG
+    where its meshes are moved beside the folder. Raises OSError where a mesh cannot be read."""
+    pag, layout = project.pag, project.layout
+    table = project_table(pag, project.templates, layout.factory, project.settings, text)
+    if text is not None:
+        table["pag"]["file"] = f"{project.name}.pag"
+    elif not pag.file.startswith("<"):
+        table["pag"]["file"] = os.path.relpath(pag.file, folder)
+    digest = _digest(pag, table, project.settings, project.ground.floor)
+    plan = {"schema": SCHEMA, **table, "ground": table_of(project.ground)}
+    laid = {"schema": LAYOUT_SCHEMA, "plan": digest, "layout": table_of(LayoutTable.of(layout))}
+    named = {PLAN_NAME: plan, LAYOUT_NAME: laid}
+    return {folder / name: (json.dumps(own) + "\n").encode() for name, own in named.items()}
+
+
+def _digest(
+    pag: PAG, table: Mapping[str, Any], settings: Settings, floor: tuple[float, float] | None
+) -> str:
+    """Of all that a layout depends on: text, templates and plan of a table, the content of the
+    meshes that its PAG names, settings, floor."""
+    own = [table["pag"]["text"], table["templates"], table["plan"], table_of(floor)]
+    made = sha256(json.dumps([own, [getattr(settings, n) for n in LAID_FOR]]).encode())
+    for mesh in dict.fromkeys(filter(None, (part.parameter("mesh") for part in pag.parts()))):
+        made.update(sha256(read_bytes(Path(pag.folder) / str(mesh), MESH)).digest())
+    return made.hexdigest()
+
+
+def _table(path: Path, schema: str) -> dict[str, Any]:
+    """The table in a file. Raises OSError, ValueError."""
+    table = json.loads(read_bytes(path, TEXT))
+    if not isinstance(table, dict) or table.get("schema") != schema:
+        found = table.get("schema") if isinstance(table, dict) else table
+        raise ValueError(f"its schema must be '{schema}', not {found!r:.40}")
+    return table
+
+
+@contextmanager
+def _of_a_plan(path: Path) -> Iterator[None]:
+    """Raises InputError for the errors of a file that is read."""
+    try:
+        yield
+    except OSError as error:
+        message = f"'{path}' cannot be read: {error.strerror}"
+        raise InputError(Diagnostic("BadFile", message, None, AGAIN)) from error
+    except json.JSONDecodeError as error:
+        at = Position(str(path), error.lineno, error.colno)
+        raise InputError(Diagnostic("BadPlan", f"it is no JSON: {error.msg}", at, AGAIN)) from error
+    except (ValueError, KeyError, RecursionError) as error:
+        words = f"it has no {error}" if isinstance(error, KeyError) else str(error)
+        raise InputError(Diagnostic("BadPlan", words, Position(str(path), 1, 1), AGAIN)) from error

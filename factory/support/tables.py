@@ -1,0 +1,137 @@
+"""Values as tables: frozen dataclasses as what JSON holds, and back, by the types of their fields.
+
+A field that has its default is left out of a table. Numbers keep their last bit. A table may come
+from anyone: what is read is of the type that its place asks for, or refused with that place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import MISSING, Field, fields, is_dataclass
+from functools import cache
+from reprlib import repr as shortened
+from types import NoneType, UnionType
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+from factory.support.errors import did_you_mean
+
+T = TypeVar("T")
+
+LARGE = 10**9
+"""Upper bound on every length [m], time [s] and count in a table."""
+
+WORDS = {bool: "true or false", str: "a text", NoneType: "null"} | {
+    int: f"a whole number within ±{LARGE:g}",
+    float: f"a number within ±{LARGE:g}",
+}
+"""What values of a simple type are called."""
+
+
+def table_of(value: Any) -> Any:
+    """What JSON holds of a value: a table of a dataclass, with the fields that do not have their
+    defaults, or of a mapping; a list of a tuple or a set."""
+    if is_dataclass(value):
+        held = ((field, getattr(value, field.name)) for field in fields(value))
+        return {f.name: table_of(v) for f, v in held if not _is_default(f, v)}
+    if isinstance(value, Mapping):
+        return {key: table_of(item) for key, item in value.items()}
+    if isinstance(value, frozenset):
+        return sorted(value)
+    return [*map(table_of, value)] if isinstance(value, tuple) else value
+
+
+def value_of(kind: type[T], table: Any, place: str = "") -> T:
+    """The value of a type that a table holds: the inverse of `table_of`. Raises ValueError, which
+    names the place within the table, says what is there and what would have been valid."""
+    made: T = _value(kind, table, place)
+    return made
+
+
+def _value(kind: Any, table: Any, place: str) -> Any:
+    origin, kinds = get_origin(kind), get_args(kind)
+    if is_dataclass(kind):
+        return _record(kind, table, place)
+    if origin in (Union, UnionType):
+        return _one_of(kinds, table, place)
+    if origin is Literal:
+        if any(type(table) is type(word) and table == word for word in kinds):
+            return table
+        raise _wrong(place, f"one of {', '.join(map(str, kinds))}", table)
+    if origin is tuple:
+        return _tuple(kinds, table, place)
+    if origin is frozenset:
+        return frozenset(_tuple((kinds[0], Ellipsis), table, place))
+    if origin is Mapping:
+        if not isinstance(table, dict):
+            raise _wrong(place, "a table", table)
+        return {key: _value(kinds[1], item, f"{place}.{key}") for key, item in table.items()}
+    number = type(table) in (int, float) and abs(table) <= LARGE
+    if kind is float and number:
+        return float(table)
+    if type(table) is not kind or (kind in (int, float) and not number):
+        raise _wrong(place, WORDS[kind], table)
+    return table
+
+
+def _record(kind: Any, table: Any, place: str) -> Any:
+    """A dataclass; what it refuses itself is refused with its place."""
+    if not isinstance(table, dict):
+        raise _wrong(place, "a table", table)
+    known = {field.name: field for field in fields(kind)}
+    for name in table:
+        if name not in known:
+            hint = did_you_mean(str(name), [*known], "keys")
+            raise ValueError(f"{_named(place)} has no key {shortened(name)}: {hint}")
+    for name, field in known.items():
+        if name not in table and field.default is field.default_factory is MISSING:
+            raise ValueError(f"{_named(place)} lacks the key '{name}'")
+    kinds, start = _types(kind), f"{place}." if place else ""
+    values = {name: _value(kinds[name], table[name], start + name) for name in table}
+    try:
+        return kind(**values)
+    except ValueError as error:
+        raise ValueError(f"{_named(place)}: {error}") from error
+
+
+def _one_of(kinds: tuple[Any, ...], table: Any, place: str) -> Any:
+    """A value of one of several types: nothing where that is one of them, else the first that
+    fits."""
+    others = [kind for kind in kinds if kind is not NoneType]
+    if table is None and len(others) < len(kinds):
+        return None
+    for kind in others[:-1]:
+        try:
+            return _value(kind, table, place)
+        except ValueError:
+            continue
+    return _value(others[-1], table, place)
+
+
+def _tuple(kinds: tuple[Any, ...], table: Any, place: str) -> Any:
+    if not isinstance(table, list):
+        raise _wrong(place, "a list", table)
+    if kinds[-1] is Ellipsis:
+        kinds = kinds[:1] * len(table)
+    if len(table) != len(kinds):
+        raise _wrong(place, f"a list of {len(kinds)}", table)
+    pairs = enumerate(zip(kinds, table, strict=True))
+    return tuple(_value(kind, item, f"{place}[{n}]") for n, (kind, item) in pairs)
+
+
+def _is_default(field: Field[Any], value: Any) -> bool:
+    if field.default_factory is not MISSING:
+        return bool(value == field.default_factory())
+    return field.default is not MISSING and bool(value == field.default)
+
+
+@cache
+def _types(kind: Any) -> dict[str, Any]:
+    return get_type_hints(kind)
+
+
+def _named(place: str) -> str:
+    return f"'{place}'" if place else "the table"
+
+
+def _wrong(place: str, wanted: str, table: Any) -> ValueError:
+    return ValueError(f"{_named(place)} must be {wanted}, not {shortened(table)}")
