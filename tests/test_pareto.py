@@ -154,17 +154,17 @@ def test_each_point_is_made_again_by_its_command(
         built = run("check", *words[1:], "--json").json
         assert built["gear_train"]
         assert sum(g["type"] == "tool" for g in built["gears"]) == one["tools"]
-        project = read_back(Path(words[1]), bool(one["relays"]))
+        project = read_back(Path(words[1]))
         again_point = FrontPoint.laid_out(sweeping.Candidate(project, {}))
         assert again_point.predicted == pytest.approx(one["predicted_cycle_time_s"], abs=1e-9)
         assert again_point.area == pytest.approx(one["area_m2"], abs=1e-9)
 
 
-def read_back(file: Path, relay: bool) -> Project:
+def read_back(file: Path) -> Project:
     """A project as the command line reads it."""
     from factory.commands.requests import ProjectOptions
 
-    return ProjectOptions(file, relay=relay).project()
+    return ProjectOptions(file).project()
 
 
 def test_files_stand_alone_and_stay_in_their_folder(out: Path, own_folder: Path) -> None:
@@ -176,16 +176,12 @@ def test_files_stand_alone_and_stay_in_their_folder(out: Path, own_folder: Path)
     for path, content in files.items():
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)
-    assert {path.name for path in files} >= {"a.stl", "join.op", "product.pag", "factory.toml"}
+    assert {path.name for path in files} >= {"a.stl", "plan.json", "layout.json"}
     for name in own_folder.rglob("*.*"):
         name.unlink()
     for number, one in enumerate(front.points):
-        again = read_back_with_operations(out / "a" / "b" / f"p{number + 1:02d}" / "plan.json")
-        assert len(again.plain.robots) == one.robots - one.relays
-
-
-def read_back_with_operations(file: Path) -> Project:
-    return read(file, [file.parent.parent / "operations"], Settings(hands=0))
+        again = read_back(out / "a" / "b" / f"p{number + 1:02d}" / "plan.json")
+        assert again.laid is not None and again.layout.guidepaths == one.project.layout.guidepaths
 
 
 @pytest.fixture
@@ -260,13 +256,8 @@ def test_the_command_tells_its_points(run: Terminal, out: Path) -> None:
     assert all(p["validated"] and abs(p["validation"]["error"]) <= 0.02 for p in tried_ones)
     written = files_in(out / "front")
     assert set(document["files"]) == {str(out / "front" / name) for name in written}
-    assert {
-        "pareto.html",
-        "p01/product.pag",
-        "p01/plan.json",
-        "p01/factory.toml",
-        "p01/floor.svg",
-    } <= set(written)
+    names = {"p01/plan.json", "p01/layout.json", "p01/floor.svg"}
+    assert {"pareto.html", *names} <= set(written)
     assert not any(p["validated"] for p in document["points"] if p["validation"] is None)
     told = run("pareto", PAPER, "--no-hands", "-o", out / "front")
     count = len(document["points"])
@@ -323,7 +314,7 @@ def test_a_search_that_is_stopped_keeps_what_it_has(
     assert done.json["complete"] == ("running" in after)
     written = files_in(out / "front")
     assert {str(out / "front" / name) for name in written} == set(done.json["files"])
-    assert len(read(out / "front" / "p01" / "product.pag").plain.robots) >= 3
+    assert len(read_back(out / "front" / "p01" / "plan.json").plain.robots) >= 3
 
 
 def test_a_search_that_is_stopped_at_once_writes_nothing(

@@ -21,6 +21,7 @@ from factory.plant.factory import Factory, Operation, Robot, in_turn
 from factory.problem.pag import NOPART
 from factory.problem.plan import Plan
 from factory.problem.robot_types import LIFT, Catalogue
+from factory.support.errors import Diagnostic, InputError
 
 
 def assigned(base: Factory, robots: Sequence[Robot], turns: Sequence[Sequence[int]]) -> Factory:
@@ -59,12 +60,17 @@ def assigned(base: Factory, robots: Sequence[Robot], turns: Sequence[Sequence[in
 
 def shared(base: Factory, plan: Plan, catalogue: Catalogue) -> Factory:
     """The factory of a plan, from that with a robot for each tour. The type of each robot fits all
-    its tours. Raises ValueError where the tours or robots of the plan are others."""
+    its tours. Raises InputError (BadPlan) where the tours or robots of the plan are others."""
     if not plan.turns:
         return base
-    every, tours = range(1 + max(map(max, plan.turns))), range(len(base.robots))
-    if any(len(turn) != len(tours) or min(turn) < 0 for turn in plan.turns):
-        raise ValueError(f"each turn must name a robot for each of {len(tours)} tours")
+    tours = range(len(base.robots))
+    if any(len(turn) != len(tours) for turn in plan.turns):
+        raise _bad(f"each turn must name a robot for each of {len(tours)} tours")
+    every = range(1 + max(map(max, plan.turns)))
+    for turn in plan.turns:
+        for o in base.operations:
+            if len({turn[robot] for robot in o.robots}) < len(o.robots):
+                raise _bad(f"a robot cannot take two parts in '{o.label}'")
     types, first = dict[int, str](), dict[int, Robot]()
     for tour in tours:
         own = base.robots[tour]
@@ -73,13 +79,19 @@ def shared(base: Factory, plan: Plan, catalogue: Catalogue) -> Factory:
             kind = types.setdefault(robot, own.type)
             types[robot] = catalogue.meet(kind, own.type) or kind
     if len(types) < len(every):
-        raise ValueError(f"{len(every)} robots are named, and {len(types)} have tours")
+        raise _bad(f"{len(every)} robots are named, and {len(types)} have tours")
     lifts = plan.lifts or frozenset()
+    if lifts - {*every}:
+        raise _bad(f"r{max(lifts) + 1} has a lift, and there are {len(every)} robots")
     for robot in lifts:
         types[robot] = catalogue.meet(types[robot], LIFT) or LIFT
     robots = [replace(first[n], index=n, name=f"r{n + 1}", type=types[n]) for n in every]
     made = assigned(base, robots, plan.turns)
     return replace(made, plan=plan, adjusted=lifts)
+
+
+def _bad(words: str) -> InputError:
+    return InputError(Diagnostic("BadPlan", f"the plan is not of this product: {words}"))
 
 
 def _for_unit(o: Operation, index: int, unit: int, does: Sequence[int]) -> Operation:

@@ -75,19 +75,23 @@ def plan_and_layout(path: Path) -> tuple[Path, ...]:
     return path, beside if beside.is_file() else path.parent
 
 
-def plan_files(project: Project, folder: Path, text: str | None = None) -> dict[Path, bytes]:
-    """The two files of a project that has been laid out, for a folder; `text`: that of its PAG
-    where its meshes are moved beside the folder. Raises OSError where a mesh cannot be read."""
-    pag, layout = project.pag, project.layout
-    table = project_table(pag, project.templates, layout.factory, project.settings, text)
+def plan_files(
+    project: Project, folder: Path, text: str | None = None, laid: bool = True
+) -> dict[Path, bytes]:
+    """The two files of a project, for a folder, without the layout where it is not to be `laid`
+    out; `text`: that of its PAG where its meshes are moved beside the folder. Raises OSError where
+    a mesh cannot be read."""
+    pag, factory = project.pag, project.layout.factory if laid else project.plain
+    table = project_table(pag, project.templates, factory, project.settings, text)
     if text is not None:
         table["pag"]["file"] = f"{project.name}.pag"
     elif not pag.file.startswith("<"):
         table["pag"]["file"] = os.path.relpath(pag.file, folder)
-    digest = _digest(pag, table, project.settings, project.ground.floor)
-    plan = {"schema": SCHEMA, **table, "ground": table_of(project.ground)}
-    laid = {"schema": LAYOUT_SCHEMA, "plan": digest, "layout": table_of(LayoutTable.of(layout))}
-    named = {PLAN_NAME: plan, LAYOUT_NAME: laid}
+    named = {PLAN_NAME: {"schema": SCHEMA, **table, "ground": table_of(project.ground)}}
+    if laid:
+        digest = _digest(pag, table, project.settings, project.ground.floor)
+        layout = table_of(LayoutTable.of(project.layout))
+        named[LAYOUT_NAME] = {"schema": LAYOUT_SCHEMA, "plan": digest, "layout": layout}
     return {folder / name: (json.dumps(own) + "\n").encode() for name, own in named.items()}
 
 

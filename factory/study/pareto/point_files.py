@@ -42,7 +42,8 @@ def point_files(front: ParetoFront, folder: Path) -> dict[Path, bytes]:
     kept: dict[tuple[str, str], str] = {}
     for number, point in enumerate(front.points):
         pag = write_pag(_with_meshes(point.project.pag, store, kept))
-        found |= plan_files(point.project, folder / point_name(number), pag)
+        laid = point.predicted is not None
+        found |= plan_files(point.project, folder / point_name(number), pag, laid)
     return found | {folder / path: content for path, content in store.files.items()}
 
 
