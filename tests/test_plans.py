@@ -17,6 +17,7 @@ from factory.compiler.expanding import joins
 from factory.compiler.mating.mating import judged
 from factory.layout.clearance import certify
 from factory.layout.durations import Pace
+from factory.layout.saved import LayoutTable
 from factory.layout.shapes import payload_boxes
 from factory.nets.marked import marked
 from factory.nets.verify import verify
@@ -92,7 +93,8 @@ def check(seed: int, folder: Path) -> None:
         path.write_bytes(content)
     kept, said = read_plan(folder / PLAN_NAME), list[Diagnostic]()
     again = kept.project(kept.settings, kept.ground, said.append)
-    assert again.layout == layout and not said
+    assert LayoutTable.of(again.layout) == LayoutTable.of(layout) and not said
+    assert again.layout.factory == factory and again.layout.certificate == layout.certificate
     anew = replace(again, laid=None).layout
     assert anew.factory == factory
     assert (anew.guidepaths, anew.stations) == (layout.guidepaths, layout.stations)
