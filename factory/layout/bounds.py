@@ -24,7 +24,8 @@ from factory.layout.dimensions import CARRIAGE
 from factory.layout.durations import Pace
 from factory.layout.footprint import ahead_of
 from factory.layout.layout import BESIDE, carriers
-from factory.layout.shapes import carried, payload_boxes
+from factory.layout.shapes import payload_boxes
+from factory.layout.stops import carried
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
 

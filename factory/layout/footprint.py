@@ -16,8 +16,8 @@ from math import inf
 from factory.layout.dimensions import CARRIAGE, MAST, PAYLOADS, POST, SIDE, Clearance, up
 from factory.layout.guidepath import Extent, hull
 from factory.layout.shapes import Shape
+from factory.layout.stops import Stop, stops_of
 from factory.plant.factory import Factory, Operation
-from factory.support.errors import Diagnostic, InputError
 
 Block = tuple[float, float, float, float]
 """(ulo, uhi, tlo, thi) [m]; on one side of a path (from, to, near, far), away from its line."""
@@ -29,49 +29,21 @@ Strip = tuple[float, float, float]
 """How far to one side a path takes the floor, by layer [m]; -inf for not at all."""
 
 
-@dataclass(frozen=True, slots=True)
-class Stop:
-    """Where a robot stands for one operation or, on a line, for several: those to which the same
-    robots deliver. `visits`: how often it comes there from another stop, in a cycle."""
-
-    operations: tuple[Operation, ...]
-    visits: int = 1
-
-    @property
-    def first(self) -> Operation:
-        """The operation that is first in the robot's program."""
-        return self.operations[0]
-
-    @property
-    def guests(self) -> list[int]:
-        """The robots that deliver there. Raises InputError (Layout) as `guests_of`."""
-        return guests_of(self.first)
-
-    @property
-    def joins(self) -> bool:
-        """Whether something is added there to what the robot holds."""
-        return any(len(operation.inputs) > 1 for operation in self.operations)
-
-
 @dataclass(frozen=True)
 class Footprint:
     """The footprint of a robot with a `shape`.
 
-    `stops`: where it stands for the operations after which it carries something, in the order in
-    which it comes there first; the first may be at a feeder. `corridor`: whether its way ahead is
-    kept free for its last pile.
+    `stops`: where it stands for the operations after which it carries something, one after the
+    other; the first may be at a feeder. `returns`: whether it comes back to some: then all that it
+    ever holds may be anywhere from the first of them on. `corridor`: whether its way ahead is kept
+    free for its last pile.
     """
 
     shape: Shape
     clearance: Clearance
     stops: tuple[Stop, ...]
+    returns: bool = False
     corridor: bool = False
-
-    @cached_property
-    def returns(self) -> bool:
-        """Whether it comes to some stop more than once: then all that it ever holds may be
-        anywhere from the first of them on."""
-        return any(len(stop.operations) > 1 for stop in self.stops)
 
     def pile(self, stop: Stop) -> Extent:
         """The box of all that the robot may hold at a stop."""
@@ -193,18 +165,7 @@ def footprint(
     factory: Factory, robot: int, shape: Shape, clearance: Clearance, corridor: bool = False
 ) -> Footprint:
     """The footprint of a robot with a shape of its own."""
-    found: dict[frozenset[int] | int, list[Operation]] = {}
-    visits: dict[frozenset[int] | int, int] = {}
-    before: frozenset[int] | int = -2
-    for number in shape.piles:
-        operation = factory.operations[number]
-        guests = frozenset(operation.robots) - {robot}
-        stop = guests or (number if operation.inputs else -1)
-        found.setdefault(stop, []).append(operation)
-        visits[stop] = visits.get(stop, 0) + (stop != before)
-        before = stop
-    stops = tuple(Stop(tuple(operations), visits[stop]) for stop, operations in found.items())
-    return Footprint(shape, clearance, stops, corridor)
+    return Footprint(shape, clearance, *stops_of(factory, robot), corridor)
 
 
 def extent_to(pile: Extent, side: int) -> float:
@@ -217,23 +178,3 @@ def ahead_of(operation: Operation, reach: float) -> float:
     point = operation.template.law.goals[operation.template.carrier - 1]
     exact = {"B": 0.0, "S": 2.0}.get(point.end, point.multiple)
     return (exact - point.multiple) * reach / 2
-
-
-def guests_of(operation: Operation) -> list[int]:
-    """The robots that deliver to the carrier of an operation. Raises InputError (Layout) where the
-    layout cannot have them: two guidepaths can end at one point of a third, one from each side; a
-    third cannot."""
-    guests = [robot for robot in operation.robots if robot != operation.carrier]
-    goals = operation.template.law.goals
-    away = any(goals[operation.robots.index(guest)].end != "A" for guest in guests)
-    if len(guests) <= 2 and not away:
-        return guests
-    message, hint = (
-        f"{len(guests)} guidepaths would end at one point of the carrier's",
-        "give further inputs to another template (further = insert), two at a point at most",
-    )
-    if away:
-        message = "a robot that is not the carrier has its goal away from A"
-        hint = "write its goal as A + 2r: its guidepath ends where it meets the carrier"
-    position = operation.template.position or operation.position
-    raise InputError(Diagnostic("Layout", f"'{operation.label}': {message}", position, hint))

@@ -14,7 +14,7 @@ from math import inf
 
 from factory.layout.dimensions import PAYLOADS, Clearance, up
 from factory.layout.durations import Pace
-from factory.layout.footprint import Placed, Stop, extent_to, footprint
+from factory.layout.footprint import Placed, extent_to, footprint
 from factory.layout.guidepath import Extent
 from factory.layout.hands.choosing import Hands
 from factory.layout.hands.hand import Hand
@@ -22,6 +22,7 @@ from factory.layout.layout import BESIDE
 from factory.layout.outline import Choice, Guest, Outline, outlined
 from factory.layout.shapes import Shape, Sides
 from factory.layout.skyline import Skyline
+from factory.layout.stops import Stop
 from factory.plant.factory import Factory, Operation
 
 SPAN = 0.15
@@ -191,7 +192,7 @@ class Packing:
             (*way.stations, station),
             (*way.piles, self.own.placed(stop, station, self._further(stop, guests), coming)),
             way.time + time,
-            way.cost + self._cost(way, time, station, guests, len(stop.operations)),
+            way.cost + self._cost(way, time, station, guests, len(stop.unlike)),
         )
 
     def _further(self, stop: Stop, guests: Iterable[Guest]) -> dict[int, float]:
@@ -213,7 +214,7 @@ class Packing:
             standoff = self._standoff(operation, way.piles[-1][1], guest)
             longest = max(longest, pace.staged(guest.travel, standoff, pace.entered(rested)))
         again = max((2 * pace.rest(guest.travel) for guest in guests), default=0.0)
-        others = sum(o.dwell + pace.lost + again for o in stop.operations[1:])
+        others = sum(o.dwell + pace.lost + again for o in stop.unlike[1:])
         if len(way.piles) > 1:  # it comes from the stop before, or goes on to one that is further
             others += 2 * (stop.visits - 1) * pace.rest(station - way.station)
         return longest + operation.dwell + pace.lost + others

@@ -13,6 +13,7 @@ from factory.layout.hands.choosing import Hands
 from factory.layout.hands.hand import Hand, Point3
 from factory.layout.hands.mounted import Mount, grip_of
 from factory.layout.layout import carriers
+from factory.layout.stops import carried
 from factory.layout.sweeps import piles
 from factory.plant.factory import Factory
 
@@ -224,15 +225,6 @@ def _moves(hands: Hands, robot: int, carrier: int, frame: Frame) -> tuple[dict[i
             ahead -= x * u[0] + y * u[1]
         back = max(back, -ahead)
     return found, up(back)
-
-
-def carried(factory: Factory, robot: int) -> list[int]:
-    """The operations of a robot after which it carries something, in its gear's order."""
-    return [
-        number
-        for number in factory.robots[robot].operations
-        if factory.operations[number].carrier == robot and not factory.drops(number)
-    ]
 
 
 def is_tool(factory: Factory, robot: int) -> bool:

@@ -14,9 +14,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from factory.layout.dimensions import LAYERS, PAYLOADS, Clearance, up
-from factory.layout.footprint import Footprint, Placed, Stop, footprint
+from factory.layout.footprint import Footprint, Placed, footprint
 from factory.layout.outline import Choice, Guest, Outline, outlined
 from factory.layout.shapes import Shape, Sides
+from factory.layout.stops import Stop
 from factory.plant.factory import Factory
 
 

@@ -29,11 +29,11 @@ def lifts_for(
 
 
 def without_hands(hands: Hands, however: bool = False) -> set[int]:
-    """The robots with several tours that have no hand in some way that they may lie, or `however`
+    """The robots with unlike tours that have no hand in some way that they may lie, or `however`
     they lie."""
     found = set[int]()
     for robot, tours in enumerate(hands.tours.of):
-        if len(tours) > 1 and held(hands.holding.factory, tours[0]):
+        if len({*hands.tours.alike(tours)}) > 1 and held(hands.holding.factory, tours[0]):
             chosen = (hands.hand(robot, u, t) for u, t in hands.holding.frames(tours[0]))
             none = [hand is None or hand.kind == "none" for hand in chosen]
             if all(none) if however else any(none):

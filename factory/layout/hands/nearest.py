@@ -38,10 +38,11 @@ def no_grips(hands: Hands) -> tuple[NoGrip, ...]:
         frames = hands.holding.frames(tours[0])
         chosen = [hands.hand(robot, u, t) for u, t in frames]
         if chosen and all(hand is not None and hand.kind == "none" for hand in chosen):
-            labels = tuple(held(factory, tour) for tour in tours) if len(tours) > 1 else ()
-            lacking = [t for t in tours if not (labels and hands.line_hands.fits(t))]
+            unlike = tuple(dict.fromkeys(hands.tours.alike(tours)))
+            labels = tuple(held(factory, tour) for tour in unlike) if len(unlike) > 1 else ()
+            lacking = [t for t in unlike if not (labels and hands.one_hand.fits(t))]
             searches = [_Search(hands, tour, held(factory, tour)) for tour in lacking or tours[:1]]
-            ways = () if lacking else tuple(_ways(hands, tours))
+            ways = () if lacking else tuple(_ways(hands, unlike))
             found += [
                 replace(search.found(not lacking), line=labels, ways=ways) for search in searches
             ]
@@ -50,8 +51,8 @@ def no_grips(hands: Hands) -> tuple[NoGrip, ...]:
 
 def _ways(hands: Hands, tours: Sequence[int]) -> Iterator[tuple[Kind, tuple[str, ...]]]:
     """For each kind of hand which labels of a line it can hold, one by one."""
-    fits = {held(hands.holding.factory, tour): hands.line_hands.fits(tour) for tour in tours}
-    for kind in hands.line_hands.common(tours):
+    fits = {held(hands.holding.factory, tour): hands.one_hand.fits(tour) for tour in tours}
+    for kind in hands.one_hand.kinds(tours):
         yield kind, tuple(label for label, fit in fits.items() if any(kind in way for way in fit))
 
 
@@ -76,7 +77,9 @@ class _Search:
             factory.robots[self.robot].name,
             factory.contents[self.label],
             tuple(part for part in made if part not in self._own),
-            () if bare else tuple(self.nearest(kind) for kind in self.hands.kinds(self.robot)),
+            ()
+            if bare
+            else tuple(self.nearest(kind) for kind in self.hands.one_hand.kinds([self.robot])),
             factory.by_label[self.label].position,
         )
 

@@ -6,8 +6,10 @@ and what could be in its way is of one such tour; a hand of a line has to suit a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from factory.layout.stops import stops_of
 from factory.plant.factory import Factory, Robot
 
 
@@ -39,14 +41,20 @@ class Tours:
         )
         made = replace(factory, robots=tuple(robots), operations=operations, adjusted=frozenset())
         turning = (
-            tour for robot in factory.robots if _turns(factory, robot) for tour in of[robot.index]
+            tour
+            for robot in factory.robots
+            if stops_of(factory, robot.index)[1]
+            for tour in of[robot.index]
         )
         return cls(made, tuple(of), frozenset(turning))
 
+    def alike(self, tours: Sequence[int]) -> tuple[int, ...]:
+        """For each of some tours the first of them that is the same but for the unit of a period
+        that it is for: one hand has the same place on both."""
+        first = dict[object, int]()
+        return tuple(first.setdefault(self._done(tour), tour) for tour in tours)
 
-def _turns(factory: Factory, robot: Robot) -> bool:
-    """Whether some robot delivers to a robot more than once, or works on what it holds."""
-    operations = (factory.operations[number] for number in robot.operations)
-    guests = [g for o in operations if o.carrier == robot.index for g in o.robots]
-    others = [guest for guest in guests if guest != robot.index]
-    return len(set(others)) < len(others)
+    def _done(self, tour: int) -> object:
+        numbers = self.factory.robots[tour].operations
+        done = (self.factory.operations[number] for number in numbers)
+        return tuple((operation.written, operation.robots.index(tour)) for operation in done)

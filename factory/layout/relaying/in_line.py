@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from factory.layout.dimensions import ARM_WIDTH
-from factory.layout.hands.choosing import Hands
 from factory.layout.hands.hand import Hand
 from factory.layout.hands.holding import held
+from factory.layout.hands.one_hand import OneHand
 from factory.layout.hands.places import Places, centre_of
 from factory.layout.hands.surfaces import Way
 from factory.layout.hands.tips import STRONG
@@ -63,7 +63,7 @@ def _depth(on: Sequence[int], robot: int) -> int:
     return count
 
 
-class _Choice(Hands):
+class _Choice:
     """Chooses the hands of robots in lanes, those of carriers first, and of those that deliver to
     them; `settled`: those that are chosen."""
 
@@ -152,9 +152,9 @@ class _Choice(Hands):
         """The best hand from below of a robot, of whose strength no more than so much is used; of
         the kind `none` if there is none."""
         label = held(self.holding.factory, robot)
-        found = self._best(robot, label, "below", frames)
-        if found is not None and found.share <= most:
-            return found
+        found = OneHand(self.in_the_way).of_kind("below", [robot], frames)
+        if found and found[0].share <= most:
+            return found[0]
         parts = self.holding.factory.contents[label]
         x, y, z = centre_of(self.holding.product, parts)[1].tolist()
         return Hand("none", ((x, y, z),), share=most)

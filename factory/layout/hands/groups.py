@@ -1,0 +1,138 @@
+"""Groups of places by which one hand could hold a sub-assembly: each alone, and under a payload two
+on one line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product as pairs
+
+import numpy as np
+
+from factory.control.mode import Index, Truth
+from factory.geometry.meshes import Array
+from factory.layout.hands.hand import Point3
+from factory.layout.hands.places import Places
+from factory.layout.hands.tips import STRONG, TipName
+
+ENOUGH = 0.8
+"""A hand holds well if no more than this share of its strength is used."""
+
+APART = 0.03
+"""Two pads under a payload are at least so far apart [m]."""
+
+PINNED, WEAK = 1.0, 3.0
+"""How bad it is to hold by a pin, which needs a bore, and that there is no place at all. Suction
+that holds well costs nothing."""
+
+WAIT, LONG = 40.0, 1.5
+"""How bad each metre is that a carrier waits for, and all of it at most: 25 mm are as bad as a
+bore."""
+
+PAIRED = 8
+"""Of so many places on either side of the centre of mass pairs are tried."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Groups:
+    """Groups (g,) of clear `places`: the numbers of the two, or of one twice, `chosen` (g, 2); the
+    `share` (g,) of the strength of its tips that is used by suction and if they are `pinned` (g,);
+    how badly those that deliver to it would hold from below then, `served` (g,); if the hand has to
+    be there `first` (g,), and how far it `waits` (g, k) for each later operation [m]."""
+
+    places: Places
+    chosen: Index
+    share: Array
+    pinned: Array
+    served: Array
+    first: Truth
+    waits: Array
+
+    def __len__(self) -> int:
+        return len(self.chosen)
+
+    def among(self, which: Index | Truth) -> Groups:
+        """Some of them."""
+        return Groups(
+            self.places,
+            self.chosen[which],
+            self.share[which],
+            self.pinned[which],
+            self.served[which],
+            self.first[which],
+            self.waits[which],
+        )
+
+    @property
+    def radius(self) -> Array:
+        """That of their tips (g,) [m]."""
+        return np.asarray(self.places.radius[self.chosen].min(axis=1))
+
+    @property
+    def covered(self) -> Array:
+        """The share (g,) of a tip's face that the surface covers."""
+        return np.asarray(self.places.covered[self.chosen].min(axis=1))
+
+    @property
+    def height(self) -> Array:
+        """How high they are (g,) [m]."""
+        return np.asarray(self.places.at[self.chosen[:, 0], 2])
+
+    def across(self, way: tuple[float, float]) -> Array:
+        """How far along a way of the floor they are (g,) [m]."""
+        return np.asarray((self.places.at[:, :2] @ np.array(way))[self.chosen].mean(axis=1))
+
+    def cost(self, tip: TipName) -> Array:
+        """How bad it is (g,) to hold by a tip, inf where that is too weak."""
+        bad, wait = self.served + PINNED * (tip == "pin"), self.waits[:, 0]
+        strong = self.share <= ENOUGH if tip == "suction" else self.pinned <= STRONG
+        return np.where(strong, bad + np.minimum(WAIT * wait, LONG), np.inf)
+
+    def used(self, tip: TipName) -> Array:
+        """The share (g,) of the strength of such tips that is used."""
+        return self.share if tip == "suction" else self.pinned
+
+    def rank(self, tip: TipName) -> Index:
+        """The place of each (g,) in their order: the least bad first, then what never waits, is in
+        nobody's way, simple, strong."""
+        two, rank = self.chosen[:, 0] != self.chosen[:, 1], np.empty(len(self), np.intp)
+        keys = self.used(tip), two, self.first, self.waits[:, 0], self.cost(tip)
+        rank[np.lexsort(keys)] = np.arange(len(self))
+        return rank
+
+    def points(self) -> tuple[Point3, ...]:
+        """The places of the first group [m]."""
+        at = self.places.at[sorted({*self.chosen[0].tolist()})]
+        found = sorted((x, y, z) for x, y, z in at.round(6).tolist())
+        return tuple(found)
+
+
+def bad(share: Array, pinned: Array) -> Array:
+    """How bad it is (n,) to hold with tips of which these shares are used."""
+    return np.where(share <= ENOUGH, 0.0, np.where(pinned <= STRONG, PINNED, WEAK))
+
+
+def least(reach: Array, bad: Array, bound: Array) -> Array:
+    """How bad the best is of those that reach no further than a bound (n,)."""
+    order = np.argsort(reach)
+    found = np.minimum.accumulate(np.append(WEAK, bad[order]))
+    return np.asarray(found[np.searchsorted(reach[order], bound, side="right")])
+
+
+def in_line(at: Array, along: int, centre: float) -> Iterator[tuple[int, int]]:
+    """Pairs of places on one line along an axis, on either side of a centre and well apart."""
+    lines: dict[float, list[int]] = {}
+    for number, line in enumerate(np.round(at[:, 1 - along], 6).tolist()):
+        lines.setdefault(line, []).append(number)
+    for on in lines.values():
+        before = [n for n in on if at[n, along] < centre]
+        after = [n for n in on if at[n, along] >= centre]
+        for one, other in pairs(_spread(before), _spread(after)):
+            if at[other, along] - at[one, along] >= APART:
+                yield one, other
+
+
+def _spread(numbers: Sequence[int]) -> list[int]:
+    """Some of many, the first and others all over."""
+    step = max(1, len(numbers) // (PAIRED // 2))
+    return list(dict.fromkeys([*numbers[: PAIRED // 2], *numbers[::step]]))

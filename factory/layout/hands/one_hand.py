@@ -1,0 +1,290 @@
+"""One hand for all that a robot brings: of the places at which each label could be held, those that
+one hand serves.
+
+It is of one kind, with tips of one size. What differs from label to label is where on it the tip
+is: the robot holds each label in such a place about itself that its tip is there
+(docs/decisions/hands.md, Lines). Of a robot that brings one label each place has a tip of its own
+size, and under a payload there may be two.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from factory.control.mode import Truth
+from factory.geometry.meshes import Array
+from factory.layout.dimensions import FINGER
+from factory.layout.hands.apart import BESIDE
+from factory.layout.hands.groups import LONG, PINNED, WAIT, Groups, bad, in_line, least
+from factory.layout.hands.hand import Hand, Kind
+from factory.layout.hands.holding import held
+from factory.layout.hands.in_the_way import InTheWay
+from factory.layout.hands.places import Places, centre_of, strain_of_two
+from factory.layout.hands.reach import halves
+from factory.layout.hands.surfaces import Way
+from factory.layout.hands.tips import TipName, tip
+from factory.problem.pag import NOPART
+
+LEVEL = 5e-5
+"""Places are at one height that differ by no more [m]."""
+
+RISING = 0.075
+"""A tower behind is no higher than this over the top of what its robot takes [m]: so far a feeder's
+pad has risen when the tower, which is 20 mm behind, comes to where it was."""
+
+NEAR = 1e-3
+"""Places whose distances differ by no more are as near as each other [m]."""
+
+Frames = Sequence[tuple[Way, Way]]
+"""How a robot may lie: along u, to a carrier that lies along t."""
+
+Fit = tuple[Way, Way, Kind, float]
+"""A way to hold a label: u, t, the kind of hand, and the height of its tip."""
+
+
+@dataclass(frozen=True, slots=True)
+class OneHand:
+    """Looks for one hand for some tours, each given by its robot in a factory with a robot a tour.
+    `adjusted`: tours of robots with a lift that is set for each."""
+
+    in_the_way: InTheWay
+    adjusted: frozenset[int] = frozenset()
+
+    def kinds(self, tours: Sequence[int]) -> list[Kind]:
+        """The kinds that are tried for all of some tours, the first of them first."""
+        return [k for k in self._kinds(tours[0]) if all(k in self._kinds(t) for t in tours)]
+
+    def _kinds(self, tour: int) -> tuple[Kind, ...]:
+        holding = self.in_the_way.holding
+        if holding.is_fed(tour) and holding.is_carrier(tour):
+            return "below", "behind"  # the tower of a hand above stands beside a feeder's part
+        last = holding.last(tour)
+        if last.lowered >= 0 and last.robots[last.lowered] == tour:
+            return "above", "behind", "below"
+        return "below", "behind", "above"
+
+    def fits(self, tour: int) -> frozenset[Fit]:
+        """In which ways a hand of a line could hold the label of a tour: how its robot lies, of
+        what kind it is, and at which height, for one that a lift would take anywhere 0 [m]."""
+        holding, fits = self.in_the_way.holding, set[Fit]()
+        by_heading: dict[tuple[float, ...], list[tuple[Way, Way]]] = {}
+        for u, t in holding.frames(tour):
+            by_heading.setdefault(u if holding.is_carrier(tour) else (*u, *t), []).append((u, t))
+        for frames in by_heading.values():
+            for kind in self._kinds(tour):
+                if self._possible(kind, tour, frames):
+                    found, free, _ = self._clear(kind, tour, frames)
+                    lifted = tour in holding.factory.strokes or kind == "behind"
+                    heights = np.unique(np.round(found.at[free, 2], 4)) * (not lifted)
+                    fits |= {(u, t, kind, z) for u, t in frames for z in heights.tolist()}
+        return frozenset(fits)
+
+    def chosen(self, tours: Sequence[int], frames: Frames) -> tuple[Hand, ...]:
+        """The hand in its place on the label of each tour, the best of the first kind for which
+        there is one that is not bad at all, or that is least bad; nothing where there is none."""
+        best = tuple[Hand, ...]()
+        for kind in self.kinds(tours):
+            hands = self.of_kind(kind, tours, frames)
+            if hands and (not best or _cost(hands[0]) < _cost(best[0])):
+                best = hands
+            if best and not _cost(best[0]):
+                break
+        return best
+
+    def of_kind(self, kind: Kind, tours: Sequence[int], frames: Frames) -> tuple[Hand, ...]:
+        """The best hand of one kind, the one with the largest tips if others are as good; nothing
+        where there is none. Of one tour each place has the tip that is best there."""
+        alone = len(tours) == 1
+        lifted = alone or tours[0] in self.in_the_way.holding.factory.strokes
+        lifted |= kind == "behind" and tours[0] in self.adjusted
+        possible = all(self._possible(kind, tour, frames) for tour in tours)
+        if not possible or not (lifted or self._level(tours)):
+            return ()
+        best, lowest = tuple[Hand, ...](), np.inf
+        for radius in [0.0] if alone else self._radii(kind, tours, frames):
+            options = [self._groups(kind, tour, frames, radius) for tour in tours]
+            if not all(map(len, options)):
+                continue
+            cost, by, chosen = _level(options, frames[0][1], lifted)
+            if cost < lowest and (kind != "behind" or self._below_pads(tours, chosen)):
+                best, lowest = self._hands(kind, tours, frames, by, chosen), cost
+            if not lowest:
+                break
+        return best
+
+    def _radii(self, kind: Kind, tours: Sequence[int], frames: Frames) -> list[float]:
+        """The radii that a tip for several tours may have, the largest first [m]."""
+        places = [self.in_the_way.on_side(self._label(tour), kind, frames) for tour in tours]
+        most = min(float(found.radius.max(initial=0.0)) for found in places)
+        return sorted({r for p in places for r in p.radius.tolist() if r <= most})[::-1]
+
+    def _below_pads(self, tours: Sequence[int], chosen: Sequence[Groups]) -> bool:
+        """Whether the pads of a feeder have risen over a tower when it comes to them."""
+        high = max(float(one.height[0] + one.radius[0]) for one in chosen)
+        boxes = (self.in_the_way.holding.box(self._label(tour)) for tour in tours)
+        return high - min(float(box[1, 2]) for box in boxes) <= RISING
+
+    def _possible(self, kind: Kind, tour: int, frames: Frames) -> bool:
+        return self.in_the_way.possible(tour, self._label(tour), kind, frames)
+
+    def _level(self, tours: Sequence[int]) -> bool:
+        """Whether what tours deliver to is always at one height: it is one thing, or no robot that
+        carries it has a lift."""
+        holding = self.in_the_way.holding
+        carriers = {holding.on[tour] for tour in tours}
+        above = set[int]()
+        for carrier in carriers if len(carriers) > 1 else ():
+            while carrier >= 0 and carrier not in above:
+                above.add(carrier)
+                carrier = holding.on[carrier]
+        return above.isdisjoint(holding.factory.strokes)
+
+    def _label(self, tour: int) -> str:
+        return held(self.in_the_way.holding.factory, tour)
+
+    def _clear(
+        self, kind: Kind, tour: int, frames: Frames, radius: float = 0.0
+    ) -> tuple[Places, Truth, Truth]:
+        """The places for tips of a radius, or of the best at each if that is 0, for the label of a
+        tour; which of them (n,) are clear in every frame, and where the hand has to be first."""
+        label = self._label(tour)
+        found = self.in_the_way.on_side(label, kind, frames, radius)
+        checks, first = self.in_the_way.checks(tour, label, kind, found, frames)
+        return found, np.logical_and.reduce([*checks.values(), np.ones(len(found), bool)]), first
+
+    def _groups(self, kind: Kind, tour: int, frames: Frames, radius: float) -> Groups:
+        """The groups of clear places by which a hand with such tips holds the label of a tour."""
+        found, free, first = self._clear(kind, tour, frames, radius)
+        clear, first = found.chosen(free), first[free]
+        waits, every = self.in_the_way.waits(tour, kind, clear, frames), np.arange(len(clear))
+        alone = np.stack([every, every], axis=1)
+        carries = kind == "below" and self.in_the_way.holding.is_carrier(tour)
+        served = self._served(tour, clear) if carries else np.zeros(len(clear))
+        groups = Groups(clear, alone, clear.share, clear.pinned, served, first, waits)
+        return groups if radius or kind != "below" else self._paired(tour, groups)
+
+    def _paired(self, tour: int, alone: Groups) -> Groups:
+        """Groups of one place, and of two on one line under what a tour brings."""
+        holding, found = self.in_the_way.holding, alone.places
+        along, label = holding.axis[tour], self._label(tour)
+        _, centre = centre_of(holding.product, holding.factory.contents[label])
+        two = np.array(list(in_line(found.at, along, float(centre[along]))), int).reshape(-1, 2)
+        at, radius = found.at[two], found.radius[two].min(axis=1)
+        held = radius, at[:, 1] - at[:, 0], holding.loads(label).about(at.mean(axis=1))
+        share = strain_of_two(tip("suction"), *held) / found.covered[two].min(axis=1)
+        pinned = strain_of_two(tip("pin"), *held)
+        return Groups(
+            found,
+            np.concatenate([alone.chosen, two]),
+            np.concatenate([alone.share, share]),
+            np.concatenate([alone.pinned, pinned]),
+            np.concatenate([alone.served, alone.served[two].max(axis=1)]),
+            np.concatenate([alone.first, alone.first[two].any(axis=1)]),
+            np.concatenate([alone.waits, alone.waits[two].max(axis=1)]),
+        )
+
+    def _served(self, tour: int, found: Places) -> Array:
+        """How badly those that deliver to a carrier would hold from below on their own side of its
+        line, all together, by the place (n,) of its hand."""
+        holding = self.in_the_way.holding
+        across = 1 - holding.axis[tour]
+        line, spare = found.at[:, across], np.maximum(found.radius, FINGER / 2) + BESIDE
+        total = np.zeros(len(found))
+        for operation in holding.made(tour):
+            sides = []
+            for guest, label in zip(operation.robots, operation.before, strict=True):
+                if guest != tour and label != NOPART:
+                    under = holding.places(self._label(guest), "below", 2, -1)
+                    at, half = under.at[:, across], halves(under.radius)
+                    cost = bad(under.share, under.pinned)
+                    before = least(at + half, cost, line - spare)
+                    after = least(half - at, cost, -line - spare)
+                    sides.append((before, after))
+            if len(sides) == 1:
+                total += np.minimum(*sides[0])
+            elif sides:
+                (a, b), (c, d) = sides[:2]
+                total += np.minimum(a + d, b + c)
+        return total
+
+    def _hands(
+        self,
+        kind: Kind,
+        tours: Sequence[int],
+        frames: Frames,
+        by: TipName,
+        chosen: Sequence[Groups],
+    ) -> tuple[Hand, ...]:
+        """One hand, in its place on each label."""
+        longest = max(one.waits.shape[1] for one in chosen)
+        waits = np.zeros((len(chosen), longest))
+        for wait, one in zip(waits, chosen, strict=True):
+            wait[: one.waits.shape[1]] = one.waits[0]
+        most = waits.max(axis=0).round(6).tolist()
+        while most and not most[-1]:
+            most.pop()
+        points, beams = [one.points() for one in chosen], [0.0] * len(chosen)
+        if kind == "above":
+            apart, heights = self.in_the_way.apart, [z for ((_, _, z), *_) in points]
+            over = [
+                apart.beam(tour, one.places.chosen(one.chosen[0]), frames)
+                for tour, one in zip(tours, chosen, strict=True)
+            ]
+            beams = [max(b + (z - y) for b, y in zip(over, heights, strict=True)) for z in heights]
+        hand = Hand(
+            kind,
+            (),
+            min(float(one.radius[0]) for one in chosen),
+            0.0,
+            max(float(one.used(by)[0]) for one in chosen),
+            by,
+            any(bool(one.first[0]) for one in chosen),
+            (*most,),
+            tuple(float(one.covered[0]) if by == "suction" else 1.0 for one in chosen),
+        )
+        both = zip(points, beams, strict=True)
+        return tuple(replace(hand, places=places, beam=beam) for places, beam in both)
+
+
+def _cost(hand: Hand) -> float:
+    """How bad a hand is."""
+    wait = hand.waits[0] if hand.waits else 0.0
+    return PINNED * (hand.tip == "pin") + min(WAIT * wait, LONG)
+
+
+def _level(options: Sequence[Groups], t: Way, lifted: bool) -> tuple[float, TipName, list[Groups]]:
+    """Of groups that are at one height for all labels, or at any for a robot that is `lifted`, how
+    bad the least bad are together, with which tip, and one for each label; inf where there is no
+    such height."""
+    best: tuple[float, TipName, list[Groups]] = np.inf, "suction", []
+    tips: tuple[TipName, ...] = "suction", "pin"
+    for height in np.unique(np.round(options[0].height, 5)).tolist()[: 1 if lifted else None]:
+        level = [o.among((np.abs(o.height - height) <= LEVEL) | lifted) for o in options]
+        for by in tips:
+            costs = [option.cost(by) for option in level]
+            low = [float(cost.min(initial=np.inf)) for cost in costs]
+            if max(low) < best[0]:
+                good = [
+                    option.among(cost <= bound + 1e-3)
+                    for option, cost, bound in zip(level, costs, low, strict=True)
+                ]
+                best = max(low), by, _together(good, by, t)
+    return best
+
+
+def _together(options: Sequence[Groups], by: TipName, t: Way) -> list[Groups]:
+    """For each label one of its groups, the best that there is: such that the carrier stands in one
+    place for all of them if that can be."""
+    across = [option.across(t) for option in options]
+    tried = np.unique(np.round(np.concatenate(across), 4))
+    away, ranks, chosen = np.zeros(len(tried)), np.zeros(len(tried)), []
+    for option, at in zip(options, across, strict=True):
+        off, rank = np.round(np.abs(at[:, None] - tried) / NEAR), option.rank(by)
+        chosen.append(np.argmin(off * len(rank) + rank[:, None], axis=0))
+        away += np.sqrt(off[chosen[-1], np.arange(len(tried))])
+        ranks += rank[chosen[-1]]
+    line = np.lexsort((ranks, np.round(away, 4)))[0]
+    return [o.among(at[line : line + 1]) for o, at in zip(options, chosen, strict=True)]

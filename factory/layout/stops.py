@@ -1,0 +1,122 @@
+"""Where a robot stands for its operations, and in which order along its way."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Hashable, Iterable
+from dataclasses import dataclass
+from heapq import heappop, heappush
+
+from factory.plant.factory import Factory, Operation
+from factory.support.errors import Diagnostic, InputError
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """Where a robot stands for one operation or, on a line, for several: those to which the same
+    robots deliver. `visits`: how often it comes there from another stop, in all its tours but those
+    that are the same for another unit of a period."""
+
+    operations: tuple[Operation, ...]
+    visits: int = 1
+
+    @property
+    def first(self) -> Operation:
+        """The operation that is first in the robot's program."""
+        return self.operations[0]
+
+    @property
+    def unlike(self) -> tuple[Operation, ...]:
+        """The operations without those that are the same for another unit."""
+        return tuple({operation.written: operation for operation in self.operations}.values())
+
+    @property
+    def guests(self) -> list[int]:
+        """The robots that deliver there. Raises InputError (Layout) as `guests_of`."""
+        return guests_of(self.first)
+
+    @property
+    def joins(self) -> bool:
+        """Whether something is added there to what the robot holds."""
+        return any(len(operation.inputs) > 1 for operation in self.operations)
+
+
+def stops_of(factory: Factory, robot: int) -> tuple[tuple[Stop, ...], bool]:
+    """Where a robot stands for the operations after which it carries something, in an order in
+    which it goes ahead from one to the next on each of its tours, and whether there is none since
+    it comes back to some: then in the order in which it comes there first."""
+    kept = frozenset(carried(factory, robot))
+    tours = [
+        [(_where(factory.operations[n], robot), factory.operations[n]) for n in tour if n in kept]
+        for tour in factory.tours[robot]
+    ]
+    found, arrivals, onward = dict[Hashable, list[Operation]](), set[tuple[Hashable, str]](), set()
+    for tour in tours:
+        before: Hashable = None
+        for where, operation in tour:
+            found.setdefault(where, []).append(operation)
+            if where != before:
+                arrivals.add((where, operation.written))
+            if before is not None:
+                onward.add((before, where))
+            before = where
+    visits = Counter(where for where, _ in arrivals)
+    order = _ordered(found, onward)
+    stops = tuple(Stop(tuple(found[where]), visits[where]) for where in order or found)
+    return stops, not order
+
+
+def _where(operation: Operation, robot: int) -> Hashable:
+    """What tells where a robot stands for an operation: the others that come there, if any do."""
+    return frozenset(operation.robots) - {robot} or (operation.written if operation.inputs else "")
+
+
+def _ordered(
+    things: Iterable[Hashable], pairs: Iterable[tuple[Hashable, Hashable]]
+) -> list[Hashable]:
+    """Things in an order in which the first of each pair comes before the second, else as they are;
+    none where there is no such order."""
+    things = [*things]
+    numbers = {thing: number for number, thing in enumerate(things)}
+    waits, after = [0] * len(things), list[list[int]]([] for _ in things)
+    for one, other in pairs:
+        after[numbers[one]].append(numbers[other])
+        waits[numbers[other]] += 1
+    ready, order = [n for n, count in enumerate(waits) if not count], list[Hashable]()
+    while ready:
+        number = heappop(ready)
+        order.append(things[number])
+        for other in after[number]:
+            waits[other] -= 1
+            if not waits[other]:
+                heappush(ready, other)
+    return order if len(order) == len(things) else []
+
+
+def carried(factory: Factory, robot: int) -> list[int]:
+    """The operations of a robot after which it carries something, in its gear's order."""
+    return [
+        number
+        for number in factory.robots[robot].operations
+        if factory.operations[number].carrier == robot and not factory.drops(number)
+    ]
+
+
+def guests_of(operation: Operation) -> list[int]:
+    """The robots that deliver to the carrier of an operation. Raises InputError (Layout) where the
+    layout cannot have them: two guidepaths can end at one point of a third, one from each side; a
+    third cannot."""
+    guests = [robot for robot in operation.robots if robot != operation.carrier]
+    goals = operation.template.law.goals
+    away = any(goals[operation.robots.index(guest)].end != "A" for guest in guests)
+    if len(guests) <= 2 and not away:
+        return guests
+    message, hint = (
+        f"{len(guests)} guidepaths would end at one point of the carrier's",
+        "give further inputs to another template (further = insert), two at a point at most",
+    )
+    if away:
+        message = "a robot that is not the carrier has its goal away from A"
+        hint = "write its goal as A + 2r: its guidepath ends where it meets the carrier"
+    position = operation.template.position or operation.position
+    raise InputError(Diagnostic("Layout", f"'{operation.label}': {message}", position, hint))
