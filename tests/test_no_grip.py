@@ -11,8 +11,8 @@ import pytest
 
 import factory
 from factory.export.grip_picture import picture_names
-from factory.layout.hands.choosing import STRONG
 from factory.layout.hands.misses import NoGrip
+from factory.layout.hands.tips import STRONG
 from factory.pipeline import read
 from factory.support.settings import Settings
 from tests.command_line import ROOT, Terminal

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import random
 from dataclasses import replace
@@ -11,17 +12,23 @@ from typing import Any
 
 import pytest
 
+from factory.compiler.mating.mating import judged
 from factory.compiler.parallel import in_parallel
 from factory.export.certificate.check import check_certificate
 from factory.export.certificate.writer import certificate
 from factory.foreign_nets.explore import explore
 from factory.layout.bounds import cycle_time_bound
 from factory.layout.durations import Pace, cycle_of
+from factory.layout.hands.adjusting import with_lifts
+from factory.layout.hands.choosing import Hands
+from factory.layout.hands.hand import Hand
+from factory.layout.repeated import repeated
+from factory.layout.stops import stops_of
 from factory.nets.history import legal_marking
 from factory.nets.marked import marked
 from factory.nets.replay import replay
 from factory.nets.verify import verify
-from factory.pipeline import Project, all_templates
+from factory.pipeline import Project, all_templates, read
 from factory.plant.factory import Factory
 from factory.plant.programs import program_of, write_program
 from factory.problem.pag import PAG, Parameter
@@ -341,6 +348,63 @@ def test_a_report_links_what_belongs_together() -> None:
 
 
 # --- commands ------------------------------------------------------------------------------------
+
+
+def hands_of(name: str, *branches: tuple[str, int]) -> dict[tuple[object, ...], list[Hand | None]]:
+    """The hands that the robots of an example have, by what they take first, however they lie."""
+    example = read(f"examples/{name}.pag")
+    factory = in_parallel(judged(example.plain, example.product), branches)
+    product = repeated(example.product, factory)
+    factory = with_lifts(factory, product, example.catalogue) if branches else factory
+    hands = Hands(factory, product)
+    found: dict[tuple[object, ...], list[Hand | None]] = {}
+    for robot, tours in enumerate(hands.tours.of):
+        first = factory.operations[factory.robots[robot].operations[0]].written
+        for u, t in hands.holding.frames(tours[0]):
+            hand = hands.hand(robot, u, t)
+            same = replace(hand, covered=hand.covered[:1]) if hand else None
+            found.setdefault((first, factory.strokes.get(robot), u, t), []).append(same)
+    return found
+
+
+def branches_of(name: str) -> list[str]:
+    """The labels of an example whose branch can be there twice."""
+    factory, found = read(f"examples/{name}.pag").plain, []
+    for label in dict.fromkeys(o.written for o in factory.operations[:-1]):
+        with contextlib.suppress(InputError):
+            in_parallel(factory, ((label, 2),))
+            found.append(label)
+    return found
+
+
+EXAMPLES = ["chair", "chest", "gearbox", "lamp", "shelf", "stool", "truck"]
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[] if n == "stool" else pytest.mark.slow) for n in EXAMPLES]
+)
+def test_a_branch_that_is_there_twice_has_the_hands_of_one(name: str) -> None:
+    """Hands are chosen by one rule, whether a robot does the same once or for each unit."""
+    once, branches = hands_of(name), branches_of(name)
+    assert branches
+    for label in branches:
+        for where, hands in hands_of(name, (label, 2)).items():
+            assert all([hand] == once[where] for hand in hands), (label, where)
+
+
+def test_stations_of_a_branch_are_passed_one_way() -> None:
+    """A carrier goes ahead from stop to stop on each of its tours, though it meets the second
+    branch in the second tour first after one that is further on."""
+    factory = in_parallel(plain(beside()), (("sub2", 3),))
+    carrier = factory.operations[factory.dropoffs[0].index].carrier
+    stops, returns = stops_of(factory, carrier)
+    places = {o.index: n for n, stop in enumerate(stops) for o in stop.operations}
+    assert not returns
+    assert [o.written for stop in stops for o in stop.unlike].count("sub3") == 3
+    for tour in factory.tours[carrier]:
+        way = [places[number] for number in tour if number in places]
+        assert way == sorted(way)
+
 
 TEXT = """root = sub3;
 sub3 = insert ( part3, sub2 ); sub2 = weld ( sub1, dwell = 2 ); sub1 = insert ( part1, part2 );

@@ -217,7 +217,8 @@ class Packing:
         others = sum(o.dwell + pace.lost + again for o in stop.unlike[1:])
         if len(way.piles) > 1:  # it comes from the stop before, or goes on to one that is further
             others += 2 * (stop.visits - 1) * pace.rest(station - way.station)
-        return longest + operation.dwell + pace.lost + others
+        share = len({o.turn for o in stop.operations}) / self.task.factory.period
+        return share * (longest + operation.dwell + pace.lost + others)
 
     def _standoff(self, operation: Operation, pile: Extent, guest: Guest) -> float:
         if operation.robots.index(guest.robot) == operation.lowered:

@@ -92,11 +92,11 @@ class Groups:
         """The share (g,) of the strength of such tips that is used."""
         return self.share if tip == "suction" else self.pinned
 
-    def rank(self, tip: TipName) -> Index:
-        """The place of each (g,) in their order: the least bad first, then what never waits, is in
-        nobody's way, simple, strong."""
+    def rank(self, tip: TipName, beside: Array) -> Index:
+        """The place of each (g,) in their order: the least far `beside` the best (g,) first, then
+        the least bad, what never waits, is in nobody's way, simple, strong."""
         two, rank = self.chosen[:, 0] != self.chosen[:, 1], np.empty(len(self), np.intp)
-        keys = self.used(tip), two, self.first, self.waits[:, 0], self.cost(tip)
+        keys = self.used(tip), two, self.first, self.waits[:, 0], self.cost(tip), beside
         rank[np.lexsort(keys)] = np.arange(len(self))
         return rank
 

@@ -99,9 +99,10 @@ def awaited_positions(layout: Layout) -> dict[int, float]:
         for _, guest, back in meetings(layout, carrier.index):
             backs[guest] = max(backs[guest], back)
         hand = layout.hand(carrier.index)
-        if factory.folded and hand is not None and hand.tall:
+        if hand is not None and hand.tall:
             for operation, guest, _ in _delivering(layout, carrier.index):
-                backs[guest] = max(backs[guest], _behind(layout, guest, operation))
+                if len(factory.tours[guest]) < len(factory.tours[carrier.index]):
+                    backs[guest] = max(backs[guest], _behind(layout, guest, operation))
     for robot, hand in enumerate(layout.hands):
         if hand is None or hand.kind == "none":
             continue

@@ -21,6 +21,7 @@ from factory.layout.guidepath import Box, hull
 from factory.layout.hands.apart import BESIDE
 from factory.layout.hands.limbs import limbs, rises_first
 from factory.layout.layout import Layout
+from factory.layout.stops import stops_of
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
 
@@ -155,11 +156,14 @@ def _past(
     x, y = path.middle(layout.goal(operation.index, operation.robots.index(carrier)))
     tower = own[[limb.name == "tower" for limb in limbs(layout, robot)]]
     heading, back = layout.guidepaths[robot].heading, (-path.heading[0], -path.heading[1])
+    _, returns = stops_of(layout.factory, carrier)
     for tour, boxes, step in added:
         swept = _onward(boxes + np.array([x, y, 0.0]), path.heading)
-        if layout.factory.folded:  # it goes back to stations where it was
+        if returns:
             swept = _onward(swept, back)
         if operation.index not in tour:
+            if not returns and any(robot in layout.factory.operations[n].robots for n in tour):
+                continue  # it comes again before that, so it has been at home
             begins = tour[min(1, len(tour) - 1)]
             if far := _back(own, swept, heading, 0.0):
                 yield begins, robot, far

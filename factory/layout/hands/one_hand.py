@@ -108,7 +108,7 @@ class OneHand:
             options = [self._groups(kind, tour, frames, radius) for tour in tours]
             if not all(map(len, options)):
                 continue
-            cost, by, chosen = _level(options, frames[0][1], lifted)
+            cost, by, chosen = _level(options, *frames[0], lifted)
             if cost < lowest and (kind != "behind" or self._below_pads(tours, chosen)):
                 best, lowest = self._hands(kind, tours, frames, by, chosen), cost
             if not lowest:
@@ -255,7 +255,9 @@ def _cost(hand: Hand) -> float:
     return PINNED * (hand.tip == "pin") + min(WAIT * wait, LONG)
 
 
-def _level(options: Sequence[Groups], t: Way, lifted: bool) -> tuple[float, TipName, list[Groups]]:
+def _level(
+    options: Sequence[Groups], u: Way, t: Way, lifted: bool
+) -> tuple[float, TipName, list[Groups]]:
     """Of groups that are at one height for all labels, or at any for a robot that is `lifted`, how
     bad the least bad are together, with which tip, and one for each label; inf where there is no
     such height."""
@@ -271,18 +273,20 @@ def _level(options: Sequence[Groups], t: Way, lifted: bool) -> tuple[float, TipN
                     option.among(cost <= bound + 1e-3)
                     for option, cost, bound in zip(level, costs, low, strict=True)
                 ]
-                best = max(low), by, _together(good, by, t)
+                best = max(low), by, _together(good, by, u, t)
     return best
 
 
-def _together(options: Sequence[Groups], by: TipName, t: Way) -> list[Groups]:
+def _together(options: Sequence[Groups], by: TipName, u: Way, t: Way) -> list[Groups]:
     """For each label one of its groups, the best that there is: such that the carrier stands in one
-    place for all of them if that can be."""
+    place for all of them if that can be, and then of several in the middle of the label."""
     across = [option.across(t) for option in options]
     tried = np.unique(np.round(np.concatenate(across), 4))
     away, ranks, chosen = np.zeros(len(tried)), np.zeros(len(tried)), []
     for option, at in zip(options, across, strict=True):
-        off, rank = np.round(np.abs(at[:, None] - tried) / NEAR), option.rank(by)
+        off, along = np.round(np.abs(at[:, None] - tried) / NEAR), option.across(u)
+        beside = np.abs(along - (along.min() + along.max()) / 2) * (len(options) > 1)
+        rank = option.rank(by, np.round(beside / NEAR))
         chosen.append(np.argmin(off * len(rank) + rank[:, None], axis=0))
         away += np.sqrt(off[chosen[-1], np.arange(len(tried))])
         ranks += rank[chosen[-1]]
