@@ -19,7 +19,6 @@ from factory.export.certificate.writer import certificate
 from factory.foreign_nets.explore import explore
 from factory.layout.bounds import cycle_time_bound
 from factory.layout.durations import Pace, cycle_of
-from factory.layout.hands.adjusting import with_lifts
 from factory.layout.hands.choosing import Hands
 from factory.layout.hands.hand import Hand
 from factory.layout.repeated import repeated
@@ -353,10 +352,9 @@ def test_a_report_links_what_belongs_together() -> None:
 def hands_of(name: str, *branches: tuple[str, int]) -> dict[tuple[object, ...], list[Hand | None]]:
     """The hands that the robots of an example have, by what they take first, however they lie."""
     example = read(f"examples/{name}.pag")
-    factory = in_parallel(judged(example.plain, example.product), branches)
-    product = repeated(example.product, factory)
-    factory = with_lifts(factory, product, example.catalogue) if branches else factory
-    hands = Hands(factory, product)
+    plain = (example.with_branches(branches) if branches else example).plain
+    factory = judged(plain, example.product)
+    hands = Hands(factory, repeated(example.product, factory))
     found: dict[tuple[object, ...], list[Hand | None]] = {}
     for robot, tours in enumerate(hands.tours.of):
         first = factory.operations[factory.robots[robot].operations[0]].written
