@@ -29,7 +29,7 @@ PATH = click.Path(path_type=Path, readable=False)
 
 
 class PagPath(click.Path):
-    """A path whose completions in the shell are PAG files, and folders beside them; where there are
+    """A path whose completions in the shell are PAG files and plans, and folders beside them; where there are
     no PAG files, whatever the shell completes paths to."""
 
     def shell_complete(
@@ -41,7 +41,7 @@ class PagPath(click.Path):
         except OSError:
             names = []
         shown = [os.path.join(folder, n) for n in names if begun or not n.startswith(".")]
-        found = [name for name in shown if name.endswith(".pag")]
+        found = [name for name in shown if name.endswith((".pag", "plan.json"))]
         if not found:
             return super().shell_complete(ctx, param, incomplete)
         folders = [f"{name}/" for name in shown if os.path.isdir(name)]
