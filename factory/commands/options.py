@@ -29,8 +29,8 @@ PATH = click.Path(path_type=Path, readable=False)
 
 
 class PagPath(click.Path):
-    """A path whose completions in the shell are PAG files and plans, and folders beside them; where there are
-    no PAG files, whatever the shell completes paths to."""
+    """A path whose completions in the shell are PAG files and plans, and folders beside them; where
+    there are none of these files, whatever the shell completes paths to."""
 
     def shell_complete(
         self, ctx: click.Context, param: click.Parameter, incomplete: str
