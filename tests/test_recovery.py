@@ -434,7 +434,7 @@ def test_faults_do_not_go_with_distributed(run: Terminal, tmp_path: Path) -> Non
     (tmp_path / "f.toml").write_text("")
     for options in (("--faults", tmp_path / "f.toml"), ("--spares", 1)):
         done = run("run", PAPER, *options, "--distributed", "--json")
-        assert done.status != 0 and done.codes == ["BadFault"]
+        assert done.status != 0 and done.codes == ["BadValue"]
 
 
 # --- the command line -----------------------------------------------------------------------------

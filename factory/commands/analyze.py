@@ -37,14 +37,6 @@ if TYPE_CHECKING:
     from factory.record.log import Log
     from factory.study.analysis import Analysis, Change, Timing
     from factory.study.analysis.measured import RunRecord
-    from factory.timing.failing import Rates
-
-MOST = 0.5
-"""The greatest share of attempts that may fail: what is made is undone faster than that."""
-
-SHARE = click.FloatRange(0.0, MOST)
-
-LIES = click.FloatRange(0.0, 1e6)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,26 +48,6 @@ class AnalyzeOptions:
     seconds: tuple[str, ...]
     faster: tuple[str, ...]
     shorter: tuple[str, ...]
-    redo: float | None = None
-    lose: float | None = None
-    clear: float | None = None
-
-    def failures(self) -> tuple[Rates, float] | None:
-        """The rates at which operations fail, and how long what is lost lies [s], None where no
-        rates are given. Raises InputError."""
-        from factory.simulation.recovery.faults import CLEAR
-        from factory.timing.failing import Rates
-
-        if self.clear is not None and self.lose is None:
-            message = "--clear says how long what is lost lies, and nothing is"
-            raise InputError(Diagnostic("Usage", message, None, "give --lose too, as 0.01"))
-        if self.redo is None and self.lose is None:
-            return None
-        redo, lose = self.redo or 0.0, self.lose or 0.0
-        if redo + lose > MOST:
-            message = f"--redo {redo:g} and --lose {lose:g} are more than {MOST:g} together"
-            raise InputError(Diagnostic("BadValue", message, None, "give smaller shares"))
-        return Rates(redo, lose), CLEAR if self.clear is None else self.clear
 
     def log(self, silent: bool) -> Log | None:
         """The log to compare with. Raises InputError."""
@@ -124,9 +96,6 @@ class AnalyzeOptions:
 @click.option("--second", "seconds", multiple=True, help="What if: another such robot, as r4.")
 @click.option("--faster", multiple=True, help="What if: a robot faster by so many percent, r4=20.")
 @click.option("--shorter", multiple=True, help="What if: its ways shorter by percent, r4=20.")
-@click.option("--redo", type=SHARE, help="What if: this share of attempts is not good, as 0.05.")
-@click.option("--lose", type=SHARE, help="What if: at this share of attempts something is lost.")
-@click.option("--clear", type=LIES, help="What is lost lies for so long [s]; 10 unless given.")
 @click.option("--measured", type=PATH, help="Compare with the LOG of a run, made as that was.")
 @click.option("--run", "on_the_spot", is_flag=True, help="Compare with a run of these units.")
 @click.option("--delays", type=PATH, help="For a net in PNML: a TOML file of place = seconds.")
@@ -214,7 +183,7 @@ def _analyze_pag(
     elif study.on_the_spot:
         record, status = _run(project, timing, asked, out.silent)
     units = len(record.dropoffs) if record else asked.units
-    found = analyse(timing, units, made.wip, change, record, study.failures())
+    found = analyse(timing, units, made.wip, change, record)
     if output is not None:
         write_bytes(output, picture(found, output.suffix))
     if out.as_json:

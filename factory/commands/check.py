@@ -26,16 +26,12 @@ if TYPE_CHECKING:
     from factory.nets.verdict import Witness
     from factory.pipeline import Project
     from factory.study.checking import Checked
-    from factory.study.failures import FailureCost, FailureStudy
 
 SHOWN = 24
 """The most robots that are printed, unless `-v` asks for all."""
 
 PICTURES = "Write a picture of each blocked operation, and of what no hand can hold, in a folder."
 """What `--clashes` does."""
-
-COSTS = "Say what each failure costs, with times estimated from sizes, and how retries are bounded."
-"""What `--failures` does."""
 
 AGAINST = 3
 """The most that is printed against one property, unless `-v` asks for all."""
@@ -51,7 +47,6 @@ POOLED = 8
 @WIP
 @ALLOW
 @click.option("--clashes", type=PATH, help=PICTURES)
-@click.option("--failures", is_flag=True, help=COSTS)
 @RELAY
 @HANDS
 @OUTPUT
@@ -63,7 +58,6 @@ def check(
     against: Path | None,
     wip: int | None,
     clashes: Path | None,
-    failures: bool,
 ) -> int:
     """Parse, compile and prove FILE.pag (or a net in FILE.pnml); or check its certificate."""
     from factory.study.checking import check_net, check_project
@@ -81,9 +75,7 @@ def check(
             or given.deputies
             or (out.as_json and project is not None and _has_places(project))
         )
-        checked = (
-            check_project(project, wip, failures or None, asked) if project else check_net(file)
-        )
+        checked = check_project(project, wip, asked) if project else check_net(file)
     announced(checked.warnings, out)
     if project is not None and not out.silent:
         say_allowed(project)
@@ -102,8 +94,6 @@ def check(
         emit({**checked.as_json(), **found})
     else:
         _describe(checked, out.verbose)
-        if failures and checked.failures:
-            _describe_failures(checked.failures, out.verbose)
         if proved:
             say(f"{against} is a certificate of this net: {_claims(proved)}")
     return 0 if checked.verdict.holds else 1
@@ -198,38 +188,6 @@ def _has_places(project: Project) -> bool:
     """Whether where robots come from is known without boxes, or matters: parts have shapes, or
     robots serve several labels or branches."""
     return is_shaped(project.pag) or bool(project.plan.turns)
-
-
-def _describe_failures(study: FailureStudy, verbose: bool) -> None:
-    """For people: a row for each test of each operation, and the bound on retries."""
-    from factory.lang.writer import write_failure
-    from factory.timing.failing import SCRAPS
-
-    rows = [
-        (
-            one.operation.label,
-            write_failure(one.failure),
-            f"{one.again.later:.2f} s" if one.again else "",
-            *_scrap_words(one.scrap),
-        )
-        for one in study.failures
-    ]
-    columns = ("operation", "failure", "again", "scrap of", "parts", "undone", "scrap")
-    most = len(rows) if verbose else SHOWN
-    table("What each failure costs (estimated)", columns, rows[:most])
-    if len(rows) > most:
-        say(f"... and {len(rows) - most} more failures (-v shows all)")
-    say(
-        f"retries: at most {study.retries} a unit without a scrap, and {study.attempts} attempts on"
-        f" end at one operation, for {SCRAPS} scraps on end stop the run"
-    )
-
-
-def _scrap_words(cost: FailureCost | None) -> tuple[str, str, str, str]:
-    if cost is None:
-        return ("",) * 4
-    undone = f"{cost.undone}" if cost.undone == cost.most else f"{cost.undone} to {cost.most}"
-    return cost.lost, str(cost.parts), undone, f"{cost.later:.2f} s"
 
 
 def _describe_approaches(matings: Matings) -> None:

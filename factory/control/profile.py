@@ -116,22 +116,3 @@ def mode_time(mode: Mode, x0: Array, limits: Limits, world: World = "mujoco") ->
         rested[i] = profile.staged(distance[i], standoff, opens, instant)
         entered[i] = max(rested[i] - profile.landing(mode.eps), 0.0)
     return max(entered if instant else rested) + mode.dwell
-
-
-def places_after(mode: Mode, x0: Array, limits: Limits, time: float) -> Array:
-    """Where the robots (k,) of a mode are so long [s] after they began from rest at `x0` [m], as
-    `mode_time` has their ways, with speeds that they gain at their limits of acceleration."""
-    distance, entered = np.abs(x0 - mode.goals).tolist(), [0.0] * mode.size
-    found = np.array(mode.goals)
-    for i in mode.order:
-        profile = SpeedProfile(float(limits.speed[i]), float(limits.acceleration[i]))
-        gate, way = mode.gate[i], distance[i]
-        opens, standoff = (entered[gate], float(mode.standoff[i])) if gate >= 0 else (0.0, 0.0)
-        rested = profile.staged(way, standoff, opens)
-        entered[i] = max(rested - profile.landing(mode.eps), 0.0)
-        first = max(way - standoff, 0.0)
-        gone, speed = profile.gone(first, min(time, opens))
-        if time > opens:
-            gone += profile.gone(max(way - gone, 0.0), time - opens, speed)[0]
-        found[i] += np.sign(x0[i] - mode.goals[i]) * max(way - gone, 0.0)
-    return found

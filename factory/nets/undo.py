@@ -68,12 +68,6 @@ def marking_after(net: GearNet, fired: Sequence[int]) -> Marking:
     return frozenset(place for place, count in enumerate(tokens_after(net, fired)) if count)
 
 
-def times_undone(before: Sequence[int], after: Sequence[int]) -> dict[int, int]:
-    """How often each transition was undone that was, by its number: n - n'."""
-    pairs = enumerate(zip(before, after, strict=True))
-    return {event: was - now for event, (was, now) in pairs if was != now}
-
-
 def _greatest(
     net: MarkedNet,
     fired: Sequence[int],

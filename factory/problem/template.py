@@ -78,11 +78,6 @@ class Failure:
     position: Position | None = field(default=None, compare=False)
 
     @property
-    def retries(self) -> int:
-        """How often the operation is done again, at most, before the last response."""
-        return sum(response.times for response in self.responses)
-
-    @property
     def last(self) -> Kind:
         """What is done when doing it again has not helped: `scrap` or `stop`."""
         return self.responses[-1].kind

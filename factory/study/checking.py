@@ -17,7 +17,6 @@ from factory.plant.factory import Factory
 from factory.problem.pag import most_allowed
 from factory.problem.shapes import is_plain
 from factory.study.allocation.least import Least, least_robots
-from factory.study.failures import FailureStudy, failure_study
 from factory.support.errors import Diagnostic
 from factory.timing.pool import part_pool
 
@@ -32,9 +31,8 @@ class Checked:
     """A net with its verdict, of a PAG called `name` or read from PNML. `pool`: copies of each part
     that are inside at once; `matings`: how its inputs come together, None where no part has a shape
     of its own; `product`: None where every part is a default box; `no_grips`: what no hand can
-    hold, None where hands are not chosen; `factory`, the `least` robots that can make its product,
-    and what is done about its `failures`, None for a net from elsewhere; `deputies` of each robot,
-    None where not asked for."""
+    hold, None where hands are not chosen; `factory` and the `least` robots that can make its
+    product, None for a net from elsewhere; `deputies` of each robot, None where not asked for."""
 
     name: str
     net: GearNet | MarkedNet
@@ -47,7 +45,6 @@ class Checked:
     no_grips: tuple[NoGrip, ...] | None = None
     factory: Factory | None = None
     least: Least | None = None
-    failures: FailureStudy | None = None
     deputies: tuple[tuple[int, ...], ...] | None = None
 
     def as_json(self) -> dict[str, Any]:
@@ -72,7 +69,6 @@ class Checked:
             **({} if no_grips is None else {"no_grips": no_grips}),
             **self._overlaps(),
             **self._allocation(),
-            **({} if self.failures is None else {"failures": self.failures.as_json()}),
             "warnings": [warning.as_json() for warning in self.warnings],
         }
 
@@ -127,13 +123,10 @@ def _gear_json(gear: Gear, places: Sequence[Place]) -> dict[str, Any]:
     }
 
 
-def check_project(
-    project: Project, wip: int | None = None, costs: bool | None = None, deputies: bool = False
-) -> Checked:
-    """Check a PAG, with at most `wip` units inside at once, find the `costs` of failures if that is
-    said, or the factory is small and live, and look for `deputies`, which asks how boxes come
-    together; where the project is laid out for them, they are those that can take over. Raises
-    InputError."""
+def check_project(project: Project, wip: int | None = None, deputies: bool = False) -> Checked:
+    """Check a PAG, with at most `wip` units inside at once, and look for `deputies`, which asks how
+    boxes come together; where the project is laid out for them, they are those that can take over.
+    Raises InputError."""
     factory = project.factory
     sources = {r.name: r.position for r in factory.robots if r.position}
     verdict = verify(factory.net, sources)
@@ -149,7 +142,6 @@ def check_project(
         project.no_grips if project.settings.hands else None,
         factory,
         least_robots(project.pag, project.templates),
-        failure_study(project, costs if verdict.holds else False),
         _deputies(project, factory) if deputies else None,
     )
 

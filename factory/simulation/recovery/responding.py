@@ -29,7 +29,9 @@ from factory.simulation.recovery.standing import Standing
 from factory.simulation.recovery.wasting import Wasting
 from factory.simulation.simulation import Simulation
 from factory.support.errors import Diagnostic
-from factory.timing.failing import SCRAPS
+
+SCRAPS = 20
+"""So many scraps of one operation on end stop the run: something else is wrong."""
 
 BINNED = 1.0
 """What falls into a bin is gone so long after that [s]."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import inf
 
-from factory.study.analysis.failing import FailingPace, failing_pace
 from factory.study.analysis.flow import Flow, flow
 from factory.study.analysis.measured import Comparison, RunRecord, compare
 from factory.study.analysis.slack import slacks
@@ -20,15 +19,13 @@ from factory.study.analysis.what_if import (
     sensitivities,
     wip_curve,
 )
-from factory.timing.failing import Rates
 
 
 @dataclass(frozen=True)
 class Analysis:
     """The results of the timed net of a laid-out factory.
 
-    `slack[i]`: how much longer operation i may take before it sets the pace [s]; `failing`: the
-    pace with rates of failures, None where none were given.
+    `slack[i]`: how much longer operation i may take before it sets the pace [s].
     """
 
     timing: Timing
@@ -40,7 +37,6 @@ class Analysis:
     scenarios: tuple[Scenario, ...] = field(repr=False)
     curve: WipCurve = field(repr=False)
     measured: Comparison | None = field(repr=False)
-    failing: FailingPace | None = field(default=None, repr=False)
 
     @property
     def bottlenecks(self) -> tuple[str, ...]:
@@ -54,12 +50,10 @@ def analyse(
     wip: int | None = None,
     asked: tuple[str, Change] | None = None,
     record: RunRecord | None = None,
-    failures: tuple[Rates, float] | None = None,
 ) -> Analysis:
     """The analysis of a laid-out factory: of `units` products from the initial marking, with a
-    bound `wip` on copies of each part, with a change that is `asked` about, in words, with the
-    `record` of a run to compare with, and with `failures`: the rates at which operations fail, and
-    how long what is lost lies [s].
+    bound `wip` on copies of each part, with a change that is `asked` about, in words, and with the
+    `record` of a run to compare with.
 
     Raises InputError where `wip` is below 1 or a mode cannot reach its goal.
     """
@@ -79,7 +73,6 @@ def analyse(
         made,
         wip_curve(timing),
         compare(timing, net, found, record) if record else None,
-        failing_pace(timing, net, failures[0], clear=failures[1]) if failures else None,
     )
 
 

@@ -6,7 +6,6 @@ from dataclasses import asdict
 from typing import Any
 
 from factory.study.analysis.analysing import Analysis
-from factory.study.analysis.failing import FailingPace
 from factory.study.analysis.measured import ComparedFigure, Comparison
 
 
@@ -58,31 +57,6 @@ def document(found: Analysis) -> dict[str, Any]:
             for s in found.scenarios
         ],
         "measured": None if found.measured is None else _measured(found, found.measured),
-        **({} if found.failing is None else {"failing": _failing(found, found.failing)}),
-    }
-
-
-def _failing(found: Analysis, failing: FailingPace) -> dict[str, Any]:
-    run, operations = failing.run, found.timing.factory.operations
-    return {
-        "redo": failing.rates.redo,
-        "lose": failing.rates.lose,
-        "clear_s": failing.clear,
-        "units": failing.units,
-        "made": failing.made,
-        "seed": failing.seed,
-        "cycle_time_s": failing.cycle,
-        "loss": failing.loss,
-        "stopped": run.stopped or None,
-        "operations": [
-            {
-                "label": o.label,
-                "redone": run.redone.get(o.index, 0),
-                "scrapped": run.scrapped.get(o.index, 0),
-                "undone": run.undone.get(o.start, 0),
-            }
-            for o in operations
-        ],
     }
 
 

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from factory.study.analysis.analysing import Analysis
-from factory.study.analysis.failing import FailingPace
 from factory.study.analysis.measured import ComparedFigure, Comparison
 from factory.study.analysis.what_if import listed
 
@@ -49,22 +48,6 @@ def summary(found: Analysis) -> Iterator[str]:
     )
     if not flow.settled:
         yield "stocks are those of the last products looked at: the factory still fills then"
-    if found.failing is not None:
-        yield failing_words(found.failing)
-
-
-def failing_words(failing: FailingPace) -> str:
-    """The pace with failures, in a line."""
-    rates, stopped = failing.rates, failing.run.stopped
-    pace = "no cycle time"
-    if failing.cycle is not None and failing.loss is not None:
-        pace = f"cycle time {failing.cycle:.3f} s ({100 * failing.loss:+.1f} %)"
-    lies = f", which lies for {failing.clear:g} s" if failing.clear and rates.lose else ""
-    return (
-        f"{100 * rates.redo:g} % redone and {100 * rates.lose:g} % lost at each operation{lies}: "
-        f"{pace}; {failing.made} of {failing.units} made, {failing.redone} times again, "
-        f"{failing.scrapped} scrapped{f'; stopped at {stopped}' if stopped else ''}"
-    )
 
 
 def critical_words(found: Analysis) -> str:

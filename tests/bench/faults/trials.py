@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 from factory.pipeline import Project, read
-from factory.plant.factory import Factory
-from factory.record.failures import Failing
 from factory.simulation.recovery import Campaign, Sensors, WorldFault, recover
 from factory.simulation.request import RunRequest, WorldName
-from factory.simulation.run import Event, Run
 from factory.simulation.simulation import Simulation
 from factory.study.pool import cores, over_processes
 from tests.fidelity.products import EXAMPLES
@@ -24,8 +20,7 @@ JITTER = 0.3
 
 @dataclass(frozen=True)
 class Trial:
-    """A run of a `product` of the examples, of at most `max_time` [s], and what it is `about`;
-    `tells` which attempts at operations failed."""
+    """A run of a `product` of the examples, of at most `max_time` [s], and what it is `about`."""
 
     product: str
     faults: tuple[WorldFault, ...]
@@ -38,7 +33,6 @@ class Trial:
     noise: float = Sensors().noise
     max_time: float = 300.0
     world: WorldName = "mujoco"
-    tells: bool = False
 
 
 @cache
@@ -63,9 +57,7 @@ def tried(trial: Trial) -> dict[str, Any]:
     recovery = recover(simulation, campaign)
     run = simulation.run(max_time=trial.max_time)
     failures, physics = recovery.report(), run.physics
-    told = {"failed": failed(made.factory, run, failures.found)} if trial.tells else {}
     return {
-        **told,
         "product": trial.product,
         "world": trial.world,
         "about": trial.about,
@@ -90,24 +82,6 @@ def tried(trial: Trial) -> dict[str, Any]:
         "predicted_s": run.predicted_cycle_time_s,
         "dropoffs": run.dropoffs,
     }
-
-
-def failed(
-    factory: Factory, run: Run, found: Sequence[Failing]
-) -> list[tuple[int, int, tuple[str, ...]]]:
-    """The attempts that failed: the operation (index), how many attempts at it were before, and
-    what was lost, () where it was not good."""
-    index = factory.net.threaded.net.transition_index
-    starts: dict[int, list[float]] = {o.start: [] for o in factory.operations}
-    for event in run.events:
-        if isinstance(event, Event) and (number := index[event.transition]) in starts:
-            starts[number].append(event.t)
-    rows = []
-    for one in found:
-        operation = factory.by_label[one.operation]
-        attempt = bisect_right(starts[operation.start], one.t) - 1
-        rows.append((operation.index, attempt, one.scrapped if one.test == "lost" else ()))
-    return rows
 
 
 Kept = Mapping[str, Any] | None
