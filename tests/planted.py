@@ -217,6 +217,11 @@ def off(bit: Any) -> Callable[[Any], None]:
     return act
 
 
+def ghostly(m: Any) -> None:
+    """Contact is found, and has no force."""
+    m.geom_gap[:], m.geom_margin[:] = 1.0, -1.0
+
+
 def weightless(m: Any) -> None:
     """There is no gravity."""
     m.opt.gravity[:] = 0.0
@@ -410,6 +415,7 @@ PLANTS = (
     Plant(
         "a hand is not solid", "engine", hollow("r5/finger", "r5/pad", "r5/column"), ("NotSolid",)
     ),
+    Plant("nothing presses on anything", "engine", ghostly, ("NotSolid",)),
     Plant("a pad is not solid", "engine", hollow("r3/pad"), ("NotSolid",)),
     Plant(
         "a finger is only shown",

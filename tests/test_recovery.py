@@ -31,6 +31,7 @@ from factory.simulation.run import Run, entries_of
 from factory.simulation.simulation import Simulation, compiled
 from factory.support.errors import InputError
 from tests.command_line import PAPER, Terminal
+from tests.examples import with_hands
 from tests.good_runs import assert_good
 from tests.simulation_values import layout_of
 
@@ -156,6 +157,33 @@ def test_a_truck_with_several_faults() -> None:
     run, failures = run_with(*faults, layout=layout_of("truck"), units=1, fuse=True, jitter=0.2)
     assert_recovered(run, failures, {"drop": 1, "bad_part": 1, "bad_joint": 1})
     assert sorted(one.test for one in failures.found) == ["lost", "rejected", "residual"]
+
+
+SHIFTED, TURNED = {"metres": 5e-3}, {"degrees": 15.0}
+
+
+@pytest.mark.parametrize(
+    ("name", "label", "off"),
+    [("stool", "seat", SHIFTED), ("stool", "seat", TURNED), ("shelf", "back", TURNED)],
+)
+def test_no_robot_dies_of_what_lies_askew(name: str, label: str, off: dict[str, float]) -> None:
+    """A seat below the hand that waits for it as a run begins, and a board wider than its housing
+    once it is turned: both go back, and what they touched is counted. What is only shifted touches
+    no robot."""
+    fault = WorldFault("misplaced", label=label, unit=1, **off)
+    layout = with_hands(name)
+    simulation = Simulation(layout, RunRequest("mujoco", 1, recovers=True, shown=False))
+    recovery = recover(simulation, replace(CAMPAIGN, faults=(fault,)))
+    run = simulation.run(max_time=60.0)
+    assert_recovered(run, recovery.report(), {"misplaced": 1})
+    assert [one.test for one in recovery.report().found] == ["misplaced"]
+    world = simulation.physical
+    touched = [world.m.geom(g).name for pair in world.inspection.pressing.touched for g in pair]
+    assert recovery.report().contacts == len(touched) // 2 > 0
+    robots = {robot.name for robot in layout.factory.robots}
+    if off is SHIFTED:
+        assert robots.isdisjoint(name.partition("/")[0] for name in touched)
+    assert not world.m.geom_margin.any() and not world.m.geom_gap.any()
 
 
 @pytest.mark.parametrize("fuse", [False, True])

@@ -74,7 +74,7 @@ def _summary(found: Failures) -> str:
         f"{_count(found.undone, 'transition')} undone",
         f"{found.scrapped} scrapped",
         f"{_count(found.spares, 'spare')} used",
-        f"{_count(found.contacts, 'contact')} with what fell",
+        f"{_count(found.contacts, 'contact')} with what fell or lay askew",
     )
     told = f"{found.missed} missed, {_count(found.false_alarms, 'false alarm')}"
     return f"Faults: {struck or 'none'}; {told}. {', '.join(figures)}."

@@ -25,13 +25,15 @@ FREE = 6
 
 class Pressing:
     """What the pads of robots and feeders are to hold. `fallen`: bodies that lie about, or that a
-    feeder shows askew; `shaken`: those that such a body has touched since, with all that is in the
-    same hands; `touched`: the pairs of geoms of which one was of any of these."""
+    feeder shows askew; `askew`: the latter, which press on nothing; `shaken`: those that what has
+    fallen has touched since, with all that is in the same hands; `touched`: the pairs of geoms of
+    which one was of any of these."""
 
     def __init__(self, m: mujoco.MjModel, model: Model, masks: ContactMasks) -> None:
         factory, layout = model.factory, model.layout
         self._m, self._contents, self._masks = m, factory.contents, masks
         self.fallen: set[int] = set()
+        self.askew: set[int] = set()
         self.shaken: set[int] = set()
         self.touched: set[tuple[int, int]] = set()
         self._holds = {r.name: {held(factory, r.index, at_last=True)} for r in factory.robots}
@@ -57,7 +59,8 @@ class Pressing:
         if bodies.isdisjoint(self.fallen | self.shaken):
             return False
         self.touched.add((one, other))
-        self._shake(bodies)
+        if bodies.isdisjoint(self.askew):
+            self._shake(bodies)
         return True
 
     def knocked(self, one: int, other: int) -> None:

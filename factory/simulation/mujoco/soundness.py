@@ -57,8 +57,8 @@ HARMLESS = int(mujoco.mjtDisableBit.mjDSBL_ISLAND) | int(mujoco.mjtDisableBit.mj
 class Soundness:
     """Compares an engine's model with the factory's, whose parts have `bodies` by label and are in
     the hands that `grips` gives: welds, each with the code of its holder. `mass` (nbody,): what
-    bodies weigh [kg], nan where nothing is asked for; `gone`: bodies that touch nothing any more;
-    `found`: all that was wrong when something first was."""
+    bodies weigh [kg], nan where nothing is asked for; `gone`: bodies that touch or press on nothing
+    any more; `found`: all that was wrong when something first was."""
 
     def __init__(
         self,
@@ -123,7 +123,8 @@ class Soundness:
         m, layout = self._m, self._model.layout
         at = self._stations[~np.isin(m.geom_bodyid[self._stations], [*self.gone])]
         solid = (m.geom_contype[at] > 0) & (m.geom_conaffinity[at] & STATION > 0)
-        loose = [self._name[geom] for geom in at[~solid].tolist()]
+        soft = (m.geom_margin < 0) & ~np.isin(m.geom_bodyid, [*self.gone])
+        loose = [self._name[geom] for geom in [*at[~solid], *np.flatnonzero(soft)]]
         robots = [robot for robot in layout.factory.robots if layout.hands]
         limbed = {f"{r.name}/{limb.name}" for r in robots for limb in limbs(layout, r.index)}
         housed = [names.feeder(line[0].name) for line in lines_of(layout) if line]

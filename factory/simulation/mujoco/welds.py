@@ -66,10 +66,10 @@ class Welds:
         """Put a free body somewhere [m], upright and at rest."""
         self._placed[body] = at
 
-    def turn(self, body: int, quaternion: Array, up: float) -> None:
-        """Turn a free body, so far `up` [m] from where it is."""
+    def turn(self, body: int, quaternion: Array, aside: Array) -> None:
+        """Turn a free body, so far `aside` (3,) [m] from where it is."""
         address = self._m.jnt_qposadr[self._m.body_jntadr[body]]
-        self._d.qpos[address + 2] += up
+        self._d.qpos[address : address + 3] += aside
         self._d.qpos[address + 3 : address + 7] = quaternion
         self._d.xquat[body] = quaternion
         self._sleep.wake([body])

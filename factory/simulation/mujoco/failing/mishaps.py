@@ -14,6 +14,9 @@ from factory.simulation.mujoco.world import MujocoWorld
 from factory.simulation.recovery.faults import WorldFault
 from factory.support.engine import mujoco
 
+FAR = 1.0
+"""Contact of what lies askew is counted to this depth, and presses on nothing [m]."""
+
 SETTLES = 0.5
 """What has slipped is back in its place in the hand so long after it is held right [s]."""
 
@@ -32,7 +35,8 @@ class Mishaps:
     """Those of a world. `slips`: by operation under way (index); `opened`: robots (index) whose
     hands have opened and that do not know; `bad`: bodies that are no good, and whether that is
     hidden from feeders' cameras; `unseen`: bodies that no camera has looked at, and the fault;
-    `gone`: faults that none will look at any more."""
+    `askew`: bodies that lie so in a feeder, whose code is given; `gone`: faults that none will look
+    at any more."""
 
     def __init__(self, world: MujocoWorld, fallen: Fallen) -> None:
         self._world, self._fallen, self._nominal = world, fallen, world.m.eq_data.copy()
@@ -41,12 +45,13 @@ class Mishaps:
         self.opened: set[int] = set()
         self.bad: dict[int, bool] = {}
         self.unseen: dict[int, str] = {}
+        self.askew: dict[int, int] = {}
         self.gone: list[str] = []
 
     @property
     def is_calm(self) -> bool:
         """Whether nothing has slipped or is no good."""
-        slipped = self.slips or self._settling or self.opened
+        slipped = self.slips or self._settling or self.opened or self.askew
         return not (slipped or self.bad or self.unseen or self.gone)
 
     def keep(self, keeper: Keeper) -> None:
@@ -105,11 +110,25 @@ class Mishaps:
         half = np.radians(fault.degrees) / 2
         about_x, turn, pose = np.array([np.cos(half), np.sin(half), 0, 0]), np.zeros(4), np.zeros(4)
         mujoco.mju_mulQuat(turn, self._nominal[weld, 6:10], about_x)
-        mujoco.mju_mulQuat(pose, self._world.d.xquat[m.eq_obj1id[weld]], turn)
-        m.eq_data[weld, 5] += fault.way
+        slider = self._world.d.xquat[m.eq_obj1id[weld]]
+        mujoco.mju_mulQuat(pose, slider, turn)
+        aside = np.zeros(3)
+        mujoco.mju_rotVecQuat(aside, np.array([0, fault.way, 0]), slider)
+        m.eq_data[weld, 4] += fault.way
         m.eq_data[weld, 6:10] = turn
-        parts.welds.turn(body, pose, fault.way)
+        parts.welds.turn(body, pose, aside)
         self._fallen.watch([body])
+        self.askew[body] = int(parts.masks.code[body])
+        self._press(body, False)
+
+    def _press(self, body: int, presses: bool) -> None:
+        """From now on a body presses on what it touches, or only touches it: a housing is as narrow
+        as what hangs straight in it."""
+        m, geoms = self._world.m, self._world.parts.masks.solid[body]
+        m.geom_gap[geoms], m.geom_margin[geoms] = (0.0, 0.0) if presses else (FAR, -FAR)
+        inspection = self._world.inspection
+        for ghosts in (inspection.pressing.askew, inspection.soundness.gone):
+            (ghosts.discard if presses else ghosts.add)(body)
 
     def take_back(self, body: int) -> None:
         """A part is taken back, whether it has been looked at or not."""
@@ -126,5 +145,8 @@ class Mishaps:
         for _, bodies in [one for one in self._settling if one[0] <= world.time]:
             self._fallen.calm(bodies)
         self._settling = [one for one in self._settling if one[0] > world.time]
-        units = world.parts.masks.unit
+        units, code = world.parts.masks.unit, world.parts.masks.code
+        for body in [body for body, feeder in self.askew.items() if code[body] != feeder]:
+            del self.askew[body]
+            self._press(body, True)
         self.bad = {body: hidden for body, hidden in self.bad.items() if units[body] >= 0}
