@@ -34,6 +34,17 @@ p3 = atomic ( box = (0.08, 0.08, 0.04), pos = (0, 0, 0.17) )
 """
 """A hand behind could hold the core of what it lowers, below its rim, and then rises."""
 
+WIDE = """
+root = s1; s1 = mate ( p0, p1, p2, p3, p4, p5 );
+p0 = atomic ( box = (0.02, 0.06, 0.04), pos = (0, 0, 0.02) );
+p1 = atomic ( box = (0.06, 0.02, 0.04), pos = (0.023, -0.023, 0.0605) );
+p2 = atomic ( cylinder = (0.01, 0.04), pos = (-0.0175, -0.013, 0.0605) );
+p3 = atomic ( sphere = 0.015, pos = (0.013, -0.0455, 0.015) );
+p4 = atomic ( box = (0.01, 0.01, 0.03), pos = (0.042, -0.019, 0.096) );
+p5 = atomic ( cylinder = (0.02, 0.04), pos = (-0.0025, 0.018, 0.0605) )
+"""
+"""A pad as wide as its part is high holds it from behind, and reached into the outfeed's tray."""
+
 
 def project_of(text: str, folder: Path) -> Project:
     """The project of a text."""
@@ -56,7 +67,9 @@ def succeeds(project: Project, seed: int, units: int, jitter: float) -> None:
     assert max((p.depth_mm for p in deep), default=0.0) < AT_MOST_MM, deep
 
 
-@pytest.mark.parametrize(("text", "units"), [(CROSSED, 1), (SPOOL, 2)], ids=["crossed", "spool"])
+@pytest.mark.parametrize(
+    ("text", "units"), [(CROSSED, 1), (SPOOL, 2), (WIDE, 1)], ids=["crossed", "spool", "wide"]
+)
 def test_hands_that_met(text: str, units: int, tmp_path: Path) -> None:
     succeeds(project_of(text, tmp_path), 0, units, 0.0)
 

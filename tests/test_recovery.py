@@ -166,7 +166,7 @@ SHIFTED, TURNED = {"metres": 5e-3}, {"degrees": 15.0}
     ("name", "label", "off"),
     [("stool", "seat", SHIFTED), ("stool", "seat", TURNED), ("shelf", "back", TURNED)],
 )
-def test_no_robot_dies_of_what_lies_askew(name: str, label: str, off: dict[str, float]) -> None:
+def test_no_robot_dies_of_what_lies_askew(name: str, label: str, off: dict[str, Any]) -> None:
     """A seat below the hand that waits for it as a run begins, and a board wider than its housing
     once it is turned: both go back, and what they touched is counted. What is only shifted touches
     no robot."""

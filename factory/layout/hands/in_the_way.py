@@ -31,7 +31,7 @@ IN_THE_WAY = {
     "own": "other surfaces of its own are in the way",
     "hands": "hands that hold beside it are in the way",
     "feeder": "there is no room beside its feeder's pad",
-    "tray": "nothing would be left of the outfeed's tray beside it",
+    "tray": "the outfeed's tray is in the way, or nothing would be left of it",
 }
 """What can be in the way of a hand."""
 
@@ -139,8 +139,12 @@ class InTheWay:
             free["own"] &= ~first
         if self.holding.is_fed(robot) and kind == "above":
             free["feeder"] &= self._beside_rod(label, found, *frames[0])
-        if kind == "below" and self.holding.factory.drops(self.holding.last(robot).index):
-            free["tray"] &= self._beside_slot(found, frames[0][0])
+        if self.holding.factory.drops(self.holding.last(robot).index):
+            free["tray"] &= (
+                self._beside_slot(found, frames[0][0])
+                if kind == "below"
+                else self.reach(kind, found, frames[0][0])[0][:, 2] >= self.holding.product.low[2]
+            )
         if kind == "behind" or (kind == "above" and not self.holding.is_fed(robot)):
             first |= True
         for passed in passing:
