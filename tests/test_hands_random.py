@@ -81,6 +81,7 @@ MET = {
     3171: "a lift rises beside what its carrier takes along",
     3287: "what is lowered comes before the carrier's hand",
     2499: "a lift rises through what is brought",
+    261125186: "what waits is beside a hand that reaches over the line",
 }
 """Random products whose hands met, each for a cause of its own."""
 

@@ -8,15 +8,16 @@ written model loses nothing.
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import permutations
 from math import ceil
 
 from factory.compiler.mating.mating import judged
 from factory.geometry.solids import Product
-from factory.layout.certificate import Region
+from factory.layout.certificate import ALWAYS, LOADS, Certificate, Region
 from factory.layout.clearance import certify
-from factory.layout.dimensions import Clearance
+from factory.layout.dimensions import Clearance, up
 from factory.layout.durations import Pace
-from factory.layout.guidepath import Point2
+from factory.layout.guidepath import Point2, hull
 from factory.layout.hands.choosing import Hands
 from factory.layout.hands.leaving import crowded
 from factory.layout.layout import Layout
@@ -42,19 +43,47 @@ def lay_out(
     operation's template asks for what cannot be kept clear."""
     known, c, pace = judged(factory, product), Clearance(clearance), pace or Pace()
     layout = optimised(known, product, c, pace, floor, (), hands)
+    certificate = None
     for _ in range(AGAIN if hands else 0):
         if not (further := crowded(layout)):
+            certificate = certify(layout)
+            further = _parted(layout, certificate)
+        if not further:
             break
         assert hands is not None
         hands.travels |= further
-        layout = optimised(known, product, c, pace, floor, (), hands)
-    return certified(layout, floor)
+        layout, certificate = optimised(known, product, c, pace, floor, (), hands), None
+    return certified(layout, floor, certificate)
 
 
-def certified(layout: Layout, floor: Point2 | None = None) -> Layout:
-    """A layout with its certificate and the floor it takes. Raises RunError (Layout) as `lay_out`
-    does."""
-    certificate = certify(layout)
+def _parted(layout: Layout, certificate: Certificate) -> dict[int, float]:
+    """How far robots are to go at the least, from where they deliver, so that what waits there with
+    its payload is clear of all that passes: of two that are too near, the one that needs less [m].
+    """
+    carried, found = [r for r in certificate.regions if r.kind in LOADS], dict[int, float]()
+    for fault in certificate.faults:
+        pair = [r.index for r in layout.factory.robots if r.name in fault.robots]
+        ways = list[tuple[float, int]]()
+        for robot, other in permutations(pair) if len(pair) == 2 else ():
+            path = layout.guidepaths[robot]
+            own = [r.box for r in carried if r.robot == robot and r.mode == ALWAYS]
+            passing = [r.box for r in carried if r.robot == other]
+            if own and passing:
+                further = path.frame(hull(own))[1] - path.frame(hull(passing))[0]
+                ways.append((further + layout.clearance, robot))
+        further, robot = min((way for way in ways if way[0] > 0), default=(0.0, -1))
+        if further:
+            travel = up(layout.guidepaths[robot].travel + further)
+            found[robot] = max(travel, found.get(robot, 0.0))
+    return found
+
+
+def certified(
+    layout: Layout, floor: Point2 | None = None, certificate: Certificate | None = None
+) -> Layout:
+    """A layout with its certificate, made unless it is given, and the floor it takes. Raises
+    RunError (Layout) as `lay_out` does."""
+    certificate = certificate or certify(layout)
     if not certificate.holds:
         raise RunError(fault.diagnostic() for fault in certificate.faults)
     around = bounds(certificate.regions, layout.clearance)
