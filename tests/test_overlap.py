@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import trimesh
 from manifold3d import Manifold
 
-from factory.geometry.overlap import DrawnSolids, common, swept
+from factory.geometry.overlap import common, drawn, swept
 from factory.geometry.product import product_geometry
 from factory.lang.pag_reader import load_pag
 from factory.pipeline import all_templates
@@ -98,25 +99,27 @@ ball = atomic ( sphere = 0.004, pos = (0, 0, 0.0239) )
 """
 
 
-def solids_of(folder: Path, text: str, mesh: trimesh.Trimesh) -> DrawnSolids:
-    """The solids of a product, with a mesh in the file that the text names."""
+def bodies_of(folder: Path, text: str, mesh: trimesh.Trimesh) -> dict[str, Any]:
+    """The volumes of a product's parts, with a mesh in the file that the text names."""
     (folder / "product.pag").write_text(text)
     (folder / "ring.stl").write_bytes(mesh.export(file_type="stl"))
-    return DrawnSolids(product_geometry(load_pag(folder / "product.pag", all_templates())))
+    product = product_geometry(load_pag(folder / "product.pag", all_templates()))
+    assert all(drawn(solid) is drawn(solid) for solid in product.solids.values())  # made once
+    return {label: drawn(solid) for label, solid in product.solids.items()}
 
 
 def test_parts_of_a_product_overlap_as_they_are_drawn(tmp_path):
-    solids = solids_of(tmp_path, TEXT, trimesh.creation.annulus(5.0, 20.0, 10.0, sections=64))
-    assert all(map(solids.is_drawn, ("ring", "pin", "ball")))
-    assert solids.overlap("ring", "pin").depth == pytest.approx(1e-4, rel=0.1)
-    assert solids.overlap("pin", "ball").depth == pytest.approx(1e-4, rel=0.1)
-    assert solids.overlap("ball", "pin", np.array([0, 0, 0.001])).depth == 0.0
-    assert solids.cut("ring", "pin", np.array([0.1, 0, 0])).depth > 3e-3
-    assert solids.cut("ring", "ball", np.array([0, 0, 0.1])).depth == 0.0  # it passes through
+    mesh = trimesh.creation.annulus(5.0, 20.0, 10.0, sections=64)
+    ring, pin, ball = bodies_of(tmp_path, TEXT, mesh).values()
+    assert common(ring, pin).depth == pytest.approx(1e-4, rel=0.1)
+    assert common(pin, ball).depth == pytest.approx(1e-4, rel=0.1)
+    assert common(ball.translate((0, 0, 0.001)), pin).depth == 0.0
+    assert common(swept(ring, np.array([0.1, 0, 0])), pin, both=False).depth > 3e-3
+    assert common(swept(ring, np.array([0, 0, 0.1])), ball, both=False).depth == 0.0  # through
 
 
 def test_an_open_mesh_has_no_solid(tmp_path):
     box = trimesh.creation.box((10.0, 10.0, 10.0))
     box.update_faces(np.arange(12) > 5)
     text = 'root = ring; ring = atomic ( mesh = "ring.stl", scale = 0.001 )'
-    assert not solids_of(tmp_path, text, box).is_drawn("ring")
+    assert bodies_of(tmp_path, text, box) == {"ring": None}

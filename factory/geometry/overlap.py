@@ -18,12 +18,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from typing import Any
+from weakref import finalize
 
 import numpy as np
 
 from factory.geometry.meshes import Array, Indices, is_closed
 from factory.geometry.pieces import closed_bodies
-from factory.geometry.solids import Product, Solid, rotation
+from factory.geometry.solids import Solid, rotation
 
 ROUND = 5e-6
 """A round body is drawn as a polytope that differs from it by no more than this [m]."""
@@ -61,45 +62,21 @@ APART = Common(0.0, 0.0)
 """Of two solids that have nothing in common."""
 
 
-class DrawnSolids:
-    """The solids of a product's parts as drawn, each made once, and their overlaps."""
-
-    def __init__(self, product: Product) -> None:
-        self._product = product
-        self._bodies: dict[str, Any] = {}
-
-    def is_drawn(self, label: str) -> bool:
-        """Whether the surface of a part bounds a volume. An open mesh bounds none."""
-        return self._body(label) is not None
-
-    def overlap(self, one: str, other: str, shift: Array | None = None) -> Common:
-        """What two parts have in common, the first shifted by `shift` (3,) [m]. Both must be drawn
-        (`is_drawn`)."""
-        body = self._body(one)
-        if shift is not None:
-            body = body.translate(shift)
-        return common(body, self._body(other))
-
-    def shared(self, one: str, other: str) -> float:
-        """The volume [m³] that two parts have in common."""
-        return float((self._body(one) ^ self._body(other)).volume())
-
-    def cut(self, one: str, other: str, shift: Array) -> Common:
-        """What a part has in common with another anywhere on its way from its place to `shift` (3,)
-        [m] from there, its place included. The depth is that in the second part alone: by how
-        much this must be eroded so that the first passes."""
-        body = self._body(one)
-        return common(swept(body, shift), self._body(other), both=False)
-
-    def _body(self, label: str) -> Any:
-        if label not in self._bodies:
-            self._bodies[label] = drawn(self._product.solids[label])
-        return self._bodies[label]
+_DRAWN: dict[int, Any] = {}
+"""The volumes of the solids that there are, by identity."""
 
 
 def drawn(solid: Solid) -> Any:
     """The volume that a part's surface bounds, as a `manifold3d.Manifold` in the frame of the
-    finished product; None for a mesh that bounds none."""
+    finished product, made once; None for a mesh that bounds none."""
+    key = id(solid)
+    if key not in _DRAWN:
+        _DRAWN[key] = _made(solid)
+        finalize(solid, _DRAWN.pop, key, None)
+    return _DRAWN[key]
+
+
+def _made(solid: Solid) -> Any:
     from manifold3d import Manifold
 
     turn = rotation(solid.quaternion)

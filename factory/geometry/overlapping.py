@@ -9,17 +9,13 @@ from weakref import finalize
 
 import numpy as np
 
-from factory.geometry.overlap import DrawnSolids
+from factory.geometry.overlap import common, drawn
 from factory.geometry.solids import Product
 from factory.problem.pag import ROUNDING, AllowedOverlap, most_allowed
 from factory.support.errors import Diagnostic
 
 SILENT = 2e-5
 """What overlaps by no more than this is rounding, or how precisely a drawing was made [m]."""
-
-
-NOTHING = 1e-15
-"""Less in common than this is rounding [m³]."""
 
 EVERYWHERE = 5e-4
 """So deep do parts of a drawing without fits overlap [m]."""
@@ -115,19 +111,16 @@ def within(found: DrawnOverlaps, parts: Collection[str]) -> DrawnOverlaps:
 
 
 def _found(product: Product) -> DrawnOverlaps:
-    solids, bodies = list(product.solids.values()), DrawnSolids(product)
-    drawn = np.array([bodies.is_drawn(solid.label) for solid in solids], bool)
+    labels, bodies = [*product.solids], [drawn(solid) for solid in product.solids.values()]
     pairs = []
     for one, other in _near(product):
-        labels = solids[one].label, solids[other].label
-        if drawn[one] and drawn[other] and bodies.shared(*labels) > NOTHING:
-            depth = bodies.overlap(*labels).depth
+        if bodies[one] is not None and bodies[other] is not None:
+            depth = common(bodies[one], bodies[other]).depth
             if depth > SILENT:
-                pairs.append(Overlapping(*labels, depth))
+                pairs.append(Overlapping(labels[one], labels[other], depth))
     pairs.sort(key=lambda pair: -pair.depth)
-    return DrawnOverlaps(
-        tuple(pairs), tuple(s.label for s, good in zip(solids, drawn, strict=True) if not good)
-    )
+    left = (label for label, body in zip(labels, bodies, strict=True) if body is None)
+    return DrawnOverlaps(tuple(pairs), tuple(left))
 
 
 def _near(product: Product) -> Iterator[tuple[int, int]]:

@@ -32,7 +32,7 @@ PALETTE = (
 """Hue, saturation and value of parts with no colour of their own; later rounds turn the hue."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, weakref_slot=True)
 class Solid:
     """A part as a solid. Arrays are in the frame of the finished product unless said otherwise.
 

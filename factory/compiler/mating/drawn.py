@@ -30,12 +30,11 @@ QUICK, SURELY = 8, 10 * TOLERANCE
 
 
 class DrawnWays:
-    """The parts of a product by number, and how deep they get into each other as drawn. Each body
-    and what it sweeps is made once."""
+    """The parts of a product by number, and how deep they get into each other as drawn. What
+    each sweeps is made once."""
 
     def __init__(self, solids: Sequence[Solid]) -> None:
         self._solids = solids
-        self._bodies: dict[int, Any] = {}
         self._sweeps: dict[tuple[int, int, int], Any] = {}
         self._finished: dict[tuple[int, int], float] = {}
 
@@ -158,9 +157,7 @@ class DrawnWays:
         return float(ahead.min_gap(self._body(standing), most))
 
     def _body(self, part: int) -> Any:
-        if part not in self._bodies:
-            self._bodies[part] = drawn(self._solids[part])
-        return self._bodies[part]
+        return drawn(self._solids[part])
 
     def _swept(self, part: int, axis: int, sign: int) -> Any:
         if (part, axis, sign) not in self._sweeps:
