@@ -181,7 +181,7 @@ def test_programs_export_templates_doctor(run: Terminal, tmp_path: Path) -> None
         assert word in run("export", PAPER, "--format", form).out
         assert word in run("export", PAPER, "--format", form, "--json").json["text"]
         file = tmp_path / f"paper.{form}"
-        assert run("export", PAPER, "--format", form, "-o", file).out == ""
+        assert run("export", PAPER, "--format", form, "-o", file).out == f"{form}: {file}\n"
         assert word in file.read_text("utf-8")
     shown = run("templates", "--json").json
     assert {t["name"] for t in shown["templates"]} >= {
@@ -560,6 +560,17 @@ def test_what_a_log_has_not_is_refused(
     shown = ["--size", "640x360", "--fps", 5, "--camera", "top", "--with", "net", "--title", "A"]
     assert run(*picture, *shown, "--at", 1, "--quiet").status == 0
     assert "--poster is of a film; this is a still" in run(*picture, "--poster", "b.png").err
+
+
+def test_options_of_a_film_are_refused_without_one(run: Terminal, out: Path) -> None:
+    """Each by its name; those that are set beforehand are not."""
+    given = ("--camera", "top", "--size", "640x480", "--poster", out / "a.png")
+    refused = run("run", PAPER, *given, "--json")
+    messages = [error["message"] for error in refused.json["errors"]]
+    assert refused.status == 2 and {*refused.codes} == {"Usage"}
+    assert messages == [
+        f"{x} is of a film, and there is none" for x in ("--size", "--camera", "--poster")
+    ]
 
 
 # --- factory.toml and templates -------------------------------------------------------------------

@@ -496,3 +496,11 @@ def test_roll_pitch_yaw(turn: list[float]) -> None:
 
     made_of = about(2, yaw) @ about(1, pitch) @ about(0, roll)
     assert np.allclose(made_of, rotation(np.array(turn)), atol=1e-9)
+
+
+def test_what_is_written_is_said(run: Terminal, out: Path) -> None:
+    assert run("export", PAPER, "--format", "pnml", "-o", out / "a.pnml").out == (
+        f"pnml: {out / 'a.pnml'}\n"
+    )
+    done = run("export", PAPER, "--format", "stl", "-o", out / "all")
+    assert done.out == f"stl: {out / 'all'}, {len(files_in(out / 'all'))} files\n"

@@ -103,6 +103,8 @@ def export(
         emit({**made_of, **log, **text})
     elif output is None and isinstance(made, str):
         say(made.rstrip("\n"))
+    elif output is not None:
+        say(f"{form}: {output}" + (f", {len(files)} files" if len(files) > 1 else ""))
     return 0
 
 

@@ -25,6 +25,7 @@ from factory.commands.options import (
     RELAY,
     RUN,
     SOURCE,
+    for_a_film,
 )
 from factory.commands.outputs import writable
 from factory.commands.requests import (
@@ -163,9 +164,7 @@ def _film(
     """What films a run as the options ask; None without a film. Raises InputError for what cannot
     be filmed, MissingError where there is no GL."""
     if video is None:
-        if shown.poster is not None:
-            message = "--poster is of a film, and there is none"
-            raise InputError(Diagnostic("Usage", message, None, "give --video OUT.mp4 as well"))
+        for_a_film()
         return None
     if asked.world == "ideal":
         message = "the ideal world has no bodies to film"
