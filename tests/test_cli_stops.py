@@ -204,3 +204,44 @@ def test_the_engine_warns_on_stderr(out: Path) -> None:
     assert done.stdout == ""
     assert done.stderr.startswith("engine: ")
     assert files_in(out) == {}
+
+
+@pytest.mark.parametrize(
+    ("package", "call"),
+    [
+        ("av", "from factory.render.video import _av as called"),
+        ("mujoco.egl", "from factory.support.gl import context\ncalled = lambda: context(8, 8)"),
+    ],
+)
+def test_a_signal_while_a_package_of_pictures_is_imported_is_heard(
+    tmp_path: Path, package: str, call: str
+) -> None:
+    """In a program that uses the library, though the package takes whatever is raised for a library
+    that is missing."""
+    code = f"""
+import signal, sys, types
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
+class Deaf(MetaPathFinder, Loader):
+    def find_spec(self, name, path=None, target=None):
+        return ModuleSpec(name, self) if name == {package!r} else None
+    def create_module(self, spec):
+        return None
+    def exec_module(self, module):
+        module.GLContext = lambda *size: types.SimpleNamespace(make_current=lambda: None)
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except BaseException:
+            pass
+{call}
+sys.meta_path.insert(0, Deaf())
+try:
+    called()
+except KeyboardInterrupt:
+    print("heard")
+"""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "MUJOCO_GL": "egl"}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, cwd=tmp_path
+    )
+    assert done.stdout == "heard\n", done.stderr

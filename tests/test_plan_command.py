@@ -289,3 +289,26 @@ def test_no_pictures_are_made_after_a_signal(
     assert done.status == 0, done.err
     assert "once more: at once" in done.err
     assert not [name for name in files_in(tmp_path / "out") if name.endswith(("png", "mp4"))]
+
+
+HEAVY = """root = all; all = mate ( stem, slab );
+stem = atomic ( box = ( 0.02, 0.01, 0.6 ), pos = ( 0, 0, 0.3 ) );
+slab = atomic ( box = ( 0.6, 0.6, 0.1 ), pos = ( 0, 0, 0.65 ), density = 8000 )
+"""
+
+
+def test_what_is_too_heavy_for_every_hand_is_said_by_plan_and_check(
+    terminal: Terminal, tmp_path: Path
+) -> None:
+    (tmp_path / "all.pag").write_text(HEAVY)
+    words = ("--replan", "--no-look", "-o", tmp_path / "out")
+    done = terminal("plan", tmp_path / "all.pag", *words, "--json")
+    checked = terminal("check", done.json["pag"], "--json")
+    for warnings in (done.json["warnings"], checked.json["warnings"]):
+        grips = [w for w in warnings if w["code"] == "NoGrip"]
+        assert {w["message"] for w in grips} == {
+            "no hand can hold 'slab'",
+            "no hand can hold 'all'",
+        }
+        assert any("not even a pin bears the load" in w["hint"] for w in grips)
+        assert any("times its strength" in w["hint"] for w in grips)

@@ -23,6 +23,7 @@ from factory.render.ink import Pixels
 from factory.support.claim import claimed
 from factory.support.errors import Diagnostic, InputError, MissingError
 from factory.support.files import partial_of, unwritten
+from factory.support.interruption import put_off
 from factory.support.resource import Closing
 
 FPS = 30.0
@@ -178,7 +179,8 @@ def _rewrap(path: Path, rate: Fraction) -> None:
 
 def _av() -> Any:
     try:
-        import av
+        with put_off():
+            import av
     except ImportError as error:
         message = f"films need PyAV: {error}"
         raise MissingError(Diagnostic("NoVideo", message, None, "pip install av")) from error

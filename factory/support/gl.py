@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from factory.support.errors import Diagnostic, MissingError
+from factory.support.interruption import put_off
 
 APT = "apt-get install -y libegl1 libgl1"
 """On Debian, these two packages bring Mesa's EGL and its software renderer."""
@@ -45,7 +46,8 @@ def context(width: int, height: int) -> Any:
     """A current GL context without a window. Call `probe` first; raises anything where GL is
     broken."""
     module = {"egl": "mujoco.egl", "osmesa": "mujoco.osmesa"}.get(prepare(), "mujoco.glfw")
-    made: Any = import_module(module).GLContext
+    with put_off():
+        made: Any = import_module(module).GLContext
     found = made(width, height)
     found.make_current()
     return found
