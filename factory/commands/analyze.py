@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from factory.commands.given import for_a_pag
 from factory.commands.grouped import Grouped
 from factory.commands.logs import cut_off, read_partly
 from factory.commands.options import (
@@ -21,7 +22,6 @@ from factory.commands.options import (
     RUNS,
     SOURCE,
     WIP,
-    for_a_pag,
     gathered,
 )
 from factory.commands.outputs import writable

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 import click
 
 from factory.commands.allowing import ALLOW
+from factory.commands.given import for_a_pag
 from factory.commands.grouped import Grouped
-from factory.commands.options import HANDS, OUTPUT, PATH, RELAY, SOURCE, WIP, for_a_pag
+from factory.commands.options import HANDS, OUTPUT, PATH, RELAY, SOURCE, WIP
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced, say_allowed

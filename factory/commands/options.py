@@ -11,11 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import click
-from click.core import ParameterSource
 from click.shell_completion import CompletionItem
 
 from factory.commands.requests import OutputOptions, PictureOptions, ProjectOptions, RunOptions
-from factory.support.errors import Diagnostic, FactoryError, InputError
+from factory.support.errors import FactoryError
 from factory.support.settings import LEAST, LONGEST, MOST_BRANCHES
 
 if TYPE_CHECKING:
@@ -331,32 +330,3 @@ PICTURE = options(
 )
 OF_A_PICTURE = tuple(field.name for field in fields(PictureOptions))
 """The parameters of PICTURE."""
-
-
-def for_a_pag(file: Path, kind: str, *but: str) -> None:
-    """Refuses the options that mean nothing for a FILE that is no PAG but, say, a log: all that are
-    given on the command line `but` these, and those of OUTPUT. Raises InputError (Usage) with every
-    one."""
-    but = (*but, "file", "as_json", "quiet", "verbose")
-    words, hint = f"is for a PAG; '{file}' is {kind}", "leave it out"
-    _refuse_given(lambda name: name not in but, words, hint)
-
-
-def for_a_film() -> None:
-    """Refuses the options of PICTURE that are given on the command line where nothing is filmed.
-    Raises InputError (Usage) with every one."""
-    words, hint = "is of a film, and there is none", "give --video OUT.mp4 as well"
-    _refuse_given(OF_A_PICTURE.__contains__, words, hint)
-
-
-def _refuse_given(which: Callable[[str], bool], words: str, hint: str) -> None:
-    context = click.get_current_context()
-    given = [
-        max(option.opts, key=len)
-        for option in context.command.params
-        if option.name is not None
-        and which(option.name)
-        and context.get_parameter_source(option.name) is ParameterSource.COMMANDLINE
-    ]
-    if given:
-        raise InputError(Diagnostic("Usage", f"{name} {words}", None, hint) for name in given)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from factory.commands.given import for_a_pag
 from factory.commands.grouped import Grouped
 from factory.commands.logs import cut_off, read_partly
 from factory.commands.options import (
@@ -19,7 +20,6 @@ from factory.commands.options import (
     RELAY,
     RUN,
     SOURCE,
-    for_a_pag,
 )
 from factory.commands.outputs import writable
 from factory.commands.requests import OutputOptions, PictureOptions, ProjectOptions, RunOptions

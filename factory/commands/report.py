@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from factory.commands.given import for_a_pag
 from factory.commands.grouped import Grouped
 from factory.commands.options import (
     DRAW,
@@ -23,7 +24,6 @@ from factory.commands.options import (
     SECONDS,
     SOURCE,
     WIP,
-    for_a_pag,
 )
 from factory.commands.outputs import writable
 from factory.commands.requests import OutputOptions, ProjectOptions, RunOptions

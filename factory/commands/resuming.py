@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from factory.commands.options import for_a_pag
+from factory.commands.given import for_a_pag
 from factory.commands.requests import OutputOptions
 from factory.support.console import emit, say
 from factory.support.progress import Waiting

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from factory.commands.allowing import ALLOW
+from factory.commands.given import for_a_film
 from factory.commands.grouped import Grouped
 from factory.commands.monitor import found_by, say_failures, say_verdict, tell_failures
 from factory.commands.options import (
@@ -25,7 +26,6 @@ from factory.commands.options import (
     RELAY,
     RUN,
     SOURCE,
-    for_a_film,
 )
 from factory.commands.outputs import writable
 from factory.commands.requests import (
