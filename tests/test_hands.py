@@ -23,6 +23,7 @@ from factory.layout.hands.surfaces import Surfaces, hit, retreat, swept
 from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.mjcf.pads import Pads
+from factory.pipeline import read
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.simulation.watched import watched
@@ -220,3 +221,20 @@ def test_robots_do_not_go_back_from_home_to_where_they_would_wait() -> None:
     for _ in range(3):
         assert not made.supervisor.active.ahead
         made.supervisor.step()
+
+
+def test_however_deep_a_product_is_its_hands_are_found(tmp_path: Path) -> None:
+    """Each robot brings what it made to the next: none is looked for inside another."""
+    deep, pitch = 150, 0.06
+    rows: list[str] = []
+    for n in range(deep):
+        joined = f"insert ( p{n}, s{n - 1} )" if n > 1 else "insert ( p1, p0 )"
+        rows += [f"s{n} = {joined}"] if n else []
+        rows.append(f"p{n} = atomic ( box = (0.05, 0.05, 0.02), pos = ({n * pitch}, 0, 0.01) )")
+    file = tmp_path / "deep.pag"
+    file.write_text(f"root = s{deep - 1}; " + "; ".join(rows))
+    project = read(file)
+    hands = Hands(project.plain, project.product)
+    deepest = len(project.plain.robots) - 1
+    u, t = next(hands.holding.frames(deepest))
+    assert hands.hand(deepest, u, t) is not None

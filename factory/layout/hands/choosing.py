@@ -37,6 +37,7 @@ class Hands:
         adjusted = frozenset(tour for r in factory.adjusted for tour in self.tours.of[r])
         self.one_hand = OneHand(self.in_the_way, adjusted)
         self._chosen: dict[tuple[tuple[int, ...], object], tuple[Hand, ...]] = {}
+        self._settled = set[tuple[int, ...]]()
         self._fits: dict[int, frozenset[Fit]] = {}
         self.travels: dict[int, float] = {}
         self._on = {tour: of for of in self.tours.of for tour in of}
@@ -95,6 +96,7 @@ class Hands:
         carries = any(map(self.holding.is_carrier, tours))
         frames = self._sides(tours[0], u) if carries or t is None else ((u, t),)
         if (tours, frames) not in self._chosen:
+            self._settle(tours)
             alike = self.tours.alike(tours)
             unlike = [*dict.fromkeys(alike)]
             which = [unlike.index(tour) for tour in alike]
@@ -104,6 +106,20 @@ class Hands:
                 replace(hands[n], covered=covered) for n in which if hands
             ) or (self._nowhere(held(self.holding.factory, tours[0])),) * len(tours)
         return self._chosen[tours, frames]
+
+    def _settle(self, tours: tuple[int, ...]) -> None:
+        """Choose the hands of all carriers above some tours, the uppermost first: however deep a
+        product is, none is looked for while another is."""
+        above, todo = list[int](), [*tours]
+        while todo:
+            carrier = self.holding.on[todo.pop()]
+            if carrier >= 0 and self._on[carrier] not in self._settled:
+                self._settled.add(self._on[carrier])
+                above.append(carrier)
+                todo += self._on[carrier]
+        for carrier in reversed(above):
+            for u in dict.fromkeys(u for u, _ in self.holding.frames(carrier)):
+                self._of(self._on[carrier], u, None)
 
     def _carrier(self, tour: int, u: Way) -> Hand:
         tours = self._on[tour]

@@ -100,6 +100,12 @@ class Groups:
         rank[np.lexsort(keys)] = np.arange(len(self))
         return rank
 
+    def keys(self, tip: TipName) -> tuple[float, ...]:
+        """What the first group is ordered by where it is as bad as others."""
+        one, other = self.chosen[0].tolist()
+        keys = self.waits[0, 0], self.first[0], one != other, self.used(tip)[0]
+        return tuple(map(float, keys))
+
     def points(self) -> tuple[Point3, ...]:
         """The places of the first group [m]."""
         at = self.places.at[sorted({*self.chosen[0].tolist()})]

@@ -262,18 +262,22 @@ def _level(
     bad the least bad are together, with which tip, and one for each label; inf where there is no
     such height."""
     best: tuple[float, TipName, list[Groups]] = np.inf, "suction", []
+    worst: tuple[float, ...] = (np.inf,)
     tips: tuple[TipName, ...] = "suction", "pin"
     for height in np.unique(np.round(options[0].height, 5)).tolist()[: 1 if lifted else None]:
         level = [o.among((np.abs(o.height - height) <= LEVEL) | lifted) for o in options]
         for by in tips:
             costs = [option.cost(by) for option in level]
             low = [float(cost.min(initial=np.inf)) for cost in costs]
-            if max(low) < best[0]:
+            if max(low) < np.inf and max(low) <= best[0]:
                 good = [
                     option.among(cost <= bound + 1e-3)
                     for option, cost, bound in zip(level, costs, low, strict=True)
                 ]
-                best = max(low), by, _together(good, by, u, t)
+                chosen = _together(good, by, u, t)
+                keys = max(one.keys(by) for one in chosen)
+                if (max(low), *keys) < worst:
+                    best, worst = (max(low), by, chosen), (max(low), *keys)
     return best
 
 
