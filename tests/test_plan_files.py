@@ -145,7 +145,7 @@ LESSONS: list[tuple[str, Any, str]] = [
     ("guidepaths", [{**GUIDEPATH, "reach": 0}], "guidepaths[0] must have a travel from 0 and"),
     ("hands", [{"kind": "glue", "places": []}], "'hands[0].kind' must be one of below, behind,"),
     ("hands", [{"kind": "below", "places": []}], "hands[0] must have places"),
-    ("standby", [[0.5]], "'standby[0][0]' must be a whole number within ±1e+09, not 0.5"),
+    ("standby", [[0.5]], "'standby[0][0]' must be a whole number within ±2^63, not 0.5"),
 ]
 
 

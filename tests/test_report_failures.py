@@ -17,6 +17,7 @@ from factory.show.report.recording import Recording
 from factory.simulation.recovery import Campaign, recover
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
+from factory.support.tables import table_of
 from tests.command_line import PAPER, Terminal
 from tests.failing_runs import FAULTS, failing, paper_layout
 from tests.test_log import block_ends
@@ -94,24 +95,24 @@ def test_from_the_command_line(run: Terminal, tmp_path: Path) -> None:
 def test_what_a_log_keeps_is_read_as_it_was_written(recording: Recording) -> None:
     failures, robots = recording.log.failures, frozenset(recording.log.header["robots"])
     assert failures is not None
-    assert failures_in(json.dumps(failures.as_json()).encode(), robots) == failures
+    assert failures_in(json.dumps(table_of(failures)).encode(), robots) == failures
 
 
 @pytest.mark.parametrize(
     ("key", "value", "words"),
     [
-        ("missed", -1, "'missed' must be a whole number"),
-        ("struck", {"drop": "often"}, "'struck' must be"),
-        ("standing", [{"t": 1.0, "robots": ["r9"]}], "'r9' stood"),
-        ("standing", [[1.0]], "no table"),
-        ("failures", [{"t": -1}], "'t' must be a time"),
-        ("failures", "none", "'failures' must be a list"),
+        ("missed", -1, "counts must be whole numbers from 0"),
+        ("struck", {"drop": "often"}, "'failures.struck.drop' must be a whole number"),
+        ("stood", [[1.0, ["r9"]]], "'r9' stood"),
+        ("stood", [[1.0]], "must be a list of 2"),
+        ("found", [{"t": -1}], "lacks the key 'test'"),
+        ("found", "none", "'failures.found' must be a list"),
     ],
 )
 def test_what_is_no_account_of_failures_is_refused(
     recording: Recording, key: str, value: object, words: str
 ) -> None:
     assert recording.log.failures is not None
-    told = {**recording.log.failures.as_json(), key: value}
+    told = {**table_of(recording.log.failures), key: value}
     with pytest.raises(ValueError, match=words):
         failures_in(json.dumps(told).encode(), frozenset(recording.log.header["robots"]))

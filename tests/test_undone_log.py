@@ -76,7 +76,7 @@ def test_any_other_undo_fails_the_verdict(log: Log, factory: Factory, how: int) 
     assert not verdict_on(replace(log, undone=(*log.undone[:at], *changed)), factory, None).refines
 
 
-def rewritten(path: Path, to: Path, change: Callable[[list[dict[str, Any]]], Any]) -> Path:
+def rewritten(path: Path, to: Path, change: Callable[[list[Any]], Any]) -> Path:
     """The log with other entries in its first block with any."""
     header, blocks = taken_apart(path)
     kind, arrays = next((kind, a) for kind, a in blocks if "undone" in a)
@@ -89,20 +89,23 @@ def rewritten(path: Path, to: Path, change: Callable[[list[dict[str, Any]]], Any
 @pytest.mark.parametrize(
     ("key", "value", "words"),
     [
-        ("t", -1, "'t' must be a time in s"),
-        ("t", float("nan"), "'t' must be a time in s"),
-        ("after", 1.5, "'after' must be a whole number from 0"),
+        ("t", -1, "undone at -1.0 s, before the run"),
+        ("t", float("nan"), "'undone[0][1].t' must be a number"),
+        ("after", 1.5, "'undone[0][0]' must be a whole number"),
         ("after", 10**6, "something is undone after 1000000 firings"),
-        ("operation", None, "'operation' must be a text"),
-        ("asked", "x", "'asked' must be a list of transitions"),
+        ("operation", None, "'undone[0][1].operation' must be a text"),
+        ("asked", "x", "'undone[0][1].asked' must be a list"),
         ("transitions", ["y_s"], "'y_s' is undone, which is no transition"),
-        ("exchanged", 1, "'exchanged' must be true or false"),
+        ("exchanged", 1, "exchanged' must be true or false"),
     ],
 )
 def test_damaged_entries(kept: Path, tmp_path: Path, key: str, value: object, words: str) -> None:
-    bad = rewritten(
-        kept / "run.log", tmp_path / "bad", lambda rows: [{**rows[0], key: value}, *rows[1:]]
-    )
+    def change(rows: list[Any]) -> Any:
+        after, undone = rows[0]
+        row = [value, undone] if key == "after" else [after, {**undone, key: value}]
+        return [row, *rows[1:]]
+
+    bad = rewritten(kept / "run.log", tmp_path / "bad", change)
     with pytest.raises(InputError, match="is damaged") as caught:
         read_log(bad)
     assert words in caught.value.diagnostics[0].message
@@ -171,5 +174,5 @@ def test_what_is_no_news_of_failures_is_refused(kept: Path, tmp_path: Path) -> N
     arrays["failures"] = np.frombuffer(b'{"struck": 3}', "u1")
     path = tmp_path / "bad.log"
     put_together(path, header, [(k, a) for k, a in found if k != b"E"])
-    with pytest.raises(InputError, match="'struck' must be how many faults"):
+    with pytest.raises(InputError, match="struck' must be a table"):
         read_log(path)

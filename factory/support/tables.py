@@ -18,10 +18,10 @@ from factory.support.errors import did_you_mean
 T = TypeVar("T")
 
 LARGE = 10**9
-"""Upper bound on every length [m], time [s] and count in a table."""
+"""Upper bound on every length [m] and time [s] in a table."""
 
 WORDS = {bool: "true or false", str: "a text", NoneType: "null"} | {
-    int: f"a whole number within ±{LARGE:g}",
+    int: "a whole number within ±2^63",
     float: f"a number within ±{LARGE:g}",
 }
 """What values of a simple type are called."""
@@ -65,10 +65,12 @@ def _value(kind: Any, table: Any, place: str) -> Any:
         if not isinstance(table, dict):
             raise _wrong(place, "a table", table)
         return {key: _value(kinds[1], item, f"{place}.{key}") for key, item in table.items()}
-    number = type(table) in (int, float) and abs(table) <= LARGE
-    if kind is float and number:
+    if kind is Any:
+        return table
+    number = type(table) in (int, float)
+    if kind is float and number and abs(table) <= LARGE:
         return float(table)
-    if type(table) is not kind or (kind in (int, float) and not number):
+    if kind is float or type(table) is not kind or (number and abs(table) >= 2**63):
         raise _wrong(place, WORDS[kind], table)
     return table
 

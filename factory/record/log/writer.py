@@ -21,7 +21,6 @@ from factory.pipeline import Project
 from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, block, pack_rows
 from factory.record.log.failed import Told
 from factory.record.log.states import STATES
-from factory.record.log.undone import undone_as_json
 from factory.record.monitor.observation import EngineView
 from factory.record.monitor.subject import subject_of_run
 from factory.record.observed import Observed, Recorder
@@ -56,7 +55,7 @@ class _Ticks:
         self.contacts: list[tuple[int, Any, Any]] = []
         self.fired: list[tuple[int, int, float]] = []
         self.ended: list[int] = []
-        self.undone: list[dict[str, object]] = []
+        self.undone: list[object] = []
         self.marked: bytes | None = None
         self.welds: NDArray[np.intp] | None = None
 
@@ -177,7 +176,7 @@ class LogWriter(Recorder):
         ):
             if isinstance(event, Undone):
                 before = sum(not isinstance(e, Undone) for e in supervisor.events[:number])
-                ticks.undone.append(undone_as_json(event, before))
+                ticks.undone.append(table_of((before, event)))
                 continue
             ticks.fired.append((row, self.numbers[event.transition], event.t))
         self.told.events = len(supervisor.events)
@@ -221,7 +220,7 @@ class LogWriter(Recorder):
         if (figures := self.world.figures()) is not None:
             texts["figures"] = json.dumps(kept_figures(figures))
         if (account := self.world.hooks.account) is not None:
-            texts["failures"] = json.dumps(account.report().as_json())
+            texts["failures"] = json.dumps(table_of(account.report()))
         return {name: _text(text) for name, text in texts.items()}
 
     def _append(self, content: bytes) -> None:
