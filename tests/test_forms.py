@@ -193,6 +193,16 @@ def templates() -> dict[str, Template]:
     return {name: replace(t, instead="") for name, t in TEMPLATES.items()}
 
 
+def test_so_many_robots_come_before_hands_for_all_labels() -> None:
+    """Where each factory with so few robots has labels that no hand can hold, one of them is given
+    with a warning of that (NoGrip); among those with as few, hands come before time."""
+    asked = Aim(robots=18)
+    assert asked.rank(18, 9.0, bare=3) < asked.rank(28, 5.0) < asked.rank(29, 4.0)
+    assert asked.rank(17, 9.0, bare=2) < asked.rank(18, 8.0, bare=3)
+    least = Aim(robots="least")
+    assert least.rank(28, 5.0) < least.rank(18, 9.0, bare=3)
+
+
 @pytest.mark.slow
 def test_forms_leave_no_robot_without_a_hand() -> None:
     project = read(EXAMPLES / "truck.pag")

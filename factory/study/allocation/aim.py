@@ -41,16 +41,17 @@ class Aim:
         """Whether it asks for anything."""
         return self.robots is not None or self.cycle is not None
 
-    def rank(self, robots: int, seconds: float, troubles: int = 0) -> tuple[float, ...]:
-        """What a factory is judged by, the less the better: how many of its operations are worse
-        than as they are written, its robots, its cycle time [s]."""
+    def rank(self, robots: int, seconds: float, bare: int = 0) -> tuple[float, ...]:
+        """What a factory is judged by, the less the better: how many more robots it has than are
+        asked for, how many more labels are `bare` of hands than as they are written, its cycle
+        time [s]; its robots first where as few as found are asked for."""
         seconds = round(seconds, 3)
         if self.robots == LEAST:
-            return troubles, robots, seconds
+            return bare, robots, seconds
         more = max(0, robots - self.robots) if self.robots else 0
         if self.cycle is None:
-            return troubles, more, seconds, robots
-        return troubles, more, max(0.0, seconds - self.cycle), robots, seconds
+            return more, bare, seconds, robots
+        return more, bare, max(0.0, seconds - self.cycle), robots, seconds
 
     def wants(self, robots: int, seconds: float) -> bool:
         """Whether estimates may be those of what is wanted."""

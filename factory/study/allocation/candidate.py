@@ -75,9 +75,17 @@ class Candidate:
         return [factory.operations[n].written for robot in slow for n in robot.operations]
 
     @cached_property
-    def troubles(self) -> int:
-        """How many of its operations are blocked, or have what no hand of a robot for one label can
-        hold."""
+    def blocked(self) -> int:
+        """How many of its operations are blocked."""
         found = self.single.matings
-        blocked = len(found.of_kind("blocked")) if found else 0
-        return blocked + sum(not grip.shared for grip in self.single.no_grips)
+        return len(found.of_kind("blocked")) if found else 0
+
+    @cached_property
+    def bare(self) -> int:
+        """How many labels no hand of a robot for one label can hold."""
+        return sum(not grip.shared for grip in self.single.no_grips)
+
+    @property
+    def troubles(self) -> int:
+        """How many of its operations are blocked, or bring what no such hand can hold."""
+        return self.blocked + self.bare

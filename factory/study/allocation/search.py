@@ -96,8 +96,10 @@ class Search:
 
     def rank(self, one: Candidate) -> tuple[float, ...]:
         """What a candidate is judged by, the less the better; one without a layout is the worst."""
-        troubles = max(0, one.troubles - self.written.troubles)
-        return self.aim.rank(one.robots, one.seconds, troubles) if one.has_layout else (inf,)
+        blocked, bare = one.blocked - self.written.blocked, one.bare - self.written.bare
+        if not one.has_layout:
+            return (inf,)
+        return max(0, blocked), *self.aim.rank(one.robots, one.seconds, max(0, bare))
 
     def look(self, seen: Seen = lambda *_: None) -> None:
         """For forms and lines, as long as there is effort left and something better may be found.
