@@ -335,6 +335,11 @@ def test_what_does_not_go_with_a_plan(run: Terminal, built: Path, tmp_path: Path
         (lambda t: {**t, "ground": {"floor": [1]}}, "BadPlan", "'ground.floor' must be a list of"),
         (lambda t: {**t, "templates": {"mate": "x"}}, "Syntax", "mate:1:2: "),
         (lambda t: {**t, "pag": {**t["pag"], "text": "x"}}, "Syntax", ""),
+        (
+            lambda t: {**t, "pag": {**t["pag"], "file": "a\0b"}},
+            "BadPlan",
+            "'pag': file must be the",
+        ),
         (lambda t: {k: v for k, v in t.items() if k != "pag"}, "BadPlan", "lacks the key 'pag'"),
         (lambda t: {k: v for k, v in t.items() if k != "ground"}, "BadPlan", "no 'ground'"),
     ],

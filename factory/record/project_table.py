@@ -40,6 +40,10 @@ class PagTable:
     text: str
     sha256: str
 
+    def __post_init__(self) -> None:
+        if "\0" in self.file:
+            raise ValueError("file must be the name of a file, without NUL")
+
 
 @dataclass(frozen=True, slots=True)
 class ProjectTable:
