@@ -8,6 +8,8 @@ from math import isfinite
 from types import MappingProxyType
 from typing import Any
 
+from factory.support.tables import value_of
+
 KINDS: Mapping[str, str] = MappingProxyType(
     {
         "drop": "a robot lets fall what it carries",
@@ -109,7 +111,5 @@ class Campaign:
 
 
 def campaign_of(values: Mapping[str, Any]) -> Campaign:
-    """The inverse of `dataclasses.asdict`, from values that came through JSON. Raises ValueError,
-    TypeError or KeyError where they are no campaign."""
-    faults = tuple(WorldFault(**fault) for fault in values["faults"])
-    return Campaign(**{**values, "faults": faults, "sensors": Sensors(**values["sensors"])})
+    """The campaign in a table. Raises ValueError where it is none."""
+    return value_of(Campaign, values, "faults")

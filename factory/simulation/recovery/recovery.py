@@ -4,7 +4,6 @@ what is done."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 
 import numpy as np
 
@@ -26,6 +25,7 @@ from factory.simulation.run import Event
 from factory.simulation.simulation import Simulation
 from factory.simulation.supervisor import Supervisor
 from factory.support.errors import Diagnostic, InputError
+from factory.support.tables import table_of
 
 IN_VAIN = 2.0
 """Nothing more will happen when nothing fires for so many times the longest delay of all."""
@@ -191,7 +191,7 @@ class Recovery:
     @property
     def given(self) -> Mapping[str, object]:
         """The campaign, as values of JSON."""
-        return asdict(self._campaign)
+        return dict(table_of(self._campaign))
 
     @property
     def is_calm(self) -> bool:
