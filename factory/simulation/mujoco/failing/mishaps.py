@@ -10,6 +10,7 @@ import numpy as np
 from factory.plant.factory import Operation
 from factory.simulation.keeping import Keeper
 from factory.simulation.mujoco.failing.fallen import Fallen
+from factory.simulation.mujoco.pressing import PRESSED
 from factory.simulation.mujoco.world import MujocoWorld
 from factory.simulation.recovery.faults import WorldFault
 from factory.support.engine import mujoco
@@ -35,8 +36,8 @@ class Mishaps:
     """Those of a world. `slips`: by operation under way (index); `opened`: robots (index) whose
     hands have opened and that do not know; `bad`: bodies that are no good, and whether that is
     hidden from feeders' cameras; `unseen`: bodies that no camera has looked at, and the fault;
-    `askew`: bodies that lie so in a feeder, whose code is given; `gone`: faults that none will look
-    at any more."""
+    `askew`: bodies that lie so in a feeder, whose code and pad (a geom) are given; `gone`: faults
+    that none will look at any more."""
 
     def __init__(self, world: MujocoWorld, fallen: Fallen) -> None:
         self._world, self._fallen, self._nominal = world, fallen, world.m.eq_data.copy()
@@ -45,7 +46,7 @@ class Mishaps:
         self.opened: set[int] = set()
         self.bad: dict[int, bool] = {}
         self.unseen: dict[int, str] = {}
-        self.askew: dict[int, int] = {}
+        self.askew: dict[int, tuple[int, int]] = {}
         self.gone: list[str] = []
 
     @property
@@ -118,7 +119,8 @@ class Mishaps:
         m.eq_data[weld, 6:10] = turn
         parts.welds.turn(body, pose, aside)
         self._fallen.watch([body])
-        self.askew[body] = int(parts.masks.code[body])
+        pad = int(m.body_geomadr[m.eq_obj1id[weld]])
+        self.askew[body] = int(parts.masks.code[body]), pad
         self._press(body, False)
 
     def _press(self, body: int, presses: bool) -> None:
@@ -129,6 +131,13 @@ class Mishaps:
         inspection = self._world.inspection
         for ghosts in (inspection.pressing.askew, inspection.soundness.gone):
             (ghosts.discard if presses else ghosts.add)(body)
+
+    def _touches(self, body: int, pad: int) -> None:
+        """Count that a body reaches into the pad that holds it: the engine leaves that pair out."""
+        world, touched = self._world, self._world.inspection.pressing.touched
+        for geom in world.parts.masks.solid[body].tolist():
+            if mujoco.mj_geomDistance(world.m, world.d, pad, geom, 0.0, None) < -PRESSED:
+                touched.add((pad, geom))
 
     def take_back(self, body: int) -> None:
         """A part is taken back, whether it has been looked at or not."""
@@ -146,7 +155,10 @@ class Mishaps:
             self._fallen.calm(bodies)
         self._settling = [one for one in self._settling if one[0] > world.time]
         units, code = world.parts.masks.unit, world.parts.masks.code
-        for body in [body for body, feeder in self.askew.items() if code[body] != feeder]:
-            del self.askew[body]
-            self._press(body, True)
+        for body, (feeder, pad) in [*self.askew.items()]:
+            if code[body] == feeder:
+                self._touches(body, pad)
+            else:
+                del self.askew[body]
+                self._press(body, True)
         self.bad = {body: hidden for body, hidden in self.bad.items() if units[body] >= 0}
