@@ -1,10 +1,9 @@
-"""Runs with faults that were killed go on from the last moment in which nothing was wrong: to the
-bit as if nothing had happened."""
+"""Runs with faults that were killed go on: to the bit as if nothing had happened."""
 
 from __future__ import annotations
 
 import sys
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from json import dumps, loads
 from pathlib import Path
 from random import Random
@@ -13,19 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from factory.layout.layout import Layout
-from factory.record.log import Log, LogWriter
-from factory.record.log.blocks import Arrays
-from factory.record.log.kept import KeptRun, kept_run
-from factory.simulation.checkpoint import checkpoint, take_up
-from factory.simulation.recovery import (
-    Campaign,
-    Recovery,
-    Sensors,
-    WorldFault,
-    deputising,
-    recover,
-)
+from factory.record.log import LogWriter
+from factory.simulation.recovery import Campaign, Recovery, Sensors, WorldFault, recover
 from factory.simulation.recovery.faults import KINDS, OF_ROBOT, campaign_of
 from factory.simulation.request import RunRequest, WorldName
 from factory.simulation.simulation import Simulation
@@ -34,7 +22,7 @@ from tests.command_line import PAPER, Terminal, spawn
 from tests.layout_values import paper_layout
 from tests.test_log import block_ends
 from tests.test_log_damage import put_together, taken_apart
-from tests.test_resume import EXAMPLES, killed_and_gone_on, ticks_of
+from tests.test_resume import EXAMPLES, cut, go_on, killed_and_gone_on, ticks_of
 from tests.test_takeovers_mujoco import laid_out
 
 FAULTS = """
@@ -77,41 +65,6 @@ def made(world: WorldName, seed: int) -> tuple[Simulation, Recovery]:
     return simulation, recover(simulation, campaign(seed))
 
 
-@pytest.mark.parametrize(("world", "seed"), [("ideal", 1), ("ideal", 2), ("mujoco", 1)])
-def test_a_run_with_faults_goes_on_the_same(tmp_path: Path, world: WorldName, seed: int) -> None:
-    """From some checkpoints of it: what it notes down at its end is the same, and what failed."""
-    whole, recovery = made(world, seed)
-    kept = kept_of(whole, tmp_path)
-    assert len(recovery.found) > 3 and recovery.report().spares == 1
-    assert 2 < len(kept.checkpoints) < kept.ticks
-    for end, state in Random(seed).sample(kept.checkpoints, 2):
-        check_going_on(*made(world, seed), state, kept.until(end), whole)
-
-
-def kept_of(simulation: Simulation, folder: Path) -> KeptRun:
-    """What is kept of a whole run."""
-    path = folder / "run.log"
-    with LogWriter(path, simulation, checkpoint=lambda: checkpoint(simulation)) as writer:
-        simulation.run([writer.observe])
-    return kept_run(path)
-
-
-def check_going_on(
-    simulation: Simulation, recovery: Recovery, state: Arrays, log: Log, whole: Simulation
-) -> None:
-    """From a checkpoint, with which a log ends, a run comes to the same end as when it was
-    whole."""
-    take_up(simulation, state, log)
-    again = checkpoint(simulation)
-    assert again is not None and again.keys() == state.keys()
-    assert all(again[key].tobytes() == state[key].tobytes() for key in state)
-    run, first = simulation.run(), whole.world.hooks.account
-    assert first is not None
-    assert recovery.report() == first.report() and recovery.exchanges == first.exchanges
-    assert run.replays and simulation.supervisor.events == whole.supervisor.events
-    assert simulation.world.sense()[0].tobytes() == whole.world.sense()[0].tobytes()
-
-
 def with_deputies(world: WorldName, seed: int, *more: WorldFault) -> tuple[Simulation, Recovery]:
     """A run in which r2 takes over for r4, while things are dropped, with more faults."""
     request = RunRequest(world, units=8, seed=seed, jitter=0.3, recovers=True)
@@ -120,64 +73,22 @@ def with_deputies(world: WorldName, seed: int, *more: WorldFault) -> tuple[Simul
     return simulation, recover(simulation, Campaign(faults, seed, clear=2.0, swap=2.0))
 
 
-@pytest.mark.parametrize("world", ["ideal", "mujoco"])
-def test_a_run_goes_on_the_same_after_a_deputy_took_over(tmp_path: Path, world: WorldName) -> None:
-    """From checkpoints of before that and after it: in the net of then. Planted: a record in which
-    another robot takes over, or none may."""
-    whole, recovery = with_deputies(world, 3)
-    kept = kept_of(whole, tmp_path)
-    (change,) = recovery.exchanges
-    logs = [(state, kept.until(end)) for end, state in kept.checkpoints]
-    late = [pair for pair in logs if pair[1].time[-1] > change.t]
-    assert len(late) > 9 and len(late) < len(logs)
-    for state, log in (logs[1], late[0], *Random(3).sample(late, 2)):
-        check_going_on(*with_deputies(world, 3), state, log, whole)
-    state, log = late[0]
-    for robots in (("r4", "r1"), ("r2", "r4"), ("r4",)):
-        wrong = [
-            (n, replace(one, robots=robots) if one.exchanged else one) for n, one in log.undone
-        ]
-        with pytest.raises(ValueError):
-            take_up(with_deputies(world, 3)[0], state, replace(log, undone=tuple(wrong)))
-    alone = Simulation(laid_out(INSERTS), replace(whole.request, recovers=False))
-    with pytest.raises(ValueError, match="does not recover"):
-        take_up(alone, state, log)
-
-
-def test_what_the_crew_that_stays_cannot_carry_back_is_known_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Robots let all that is scrap fall where they are, before the run was cut off and after."""
-
-    def every(alone: Layout) -> frozenset[tuple[int, str]]:
-        labels, robots = alone.factory.by_label, range(len(alone.factory.robots))
-        return frozenset((robot, label) for robot in robots for label in labels)
-
-    monkeypatch.setattr(deputising, "not_carried_back", every)
-    slips = [WorldFault("bad_joint", label="sub1", unit=6)] * 3
-    whole, recovery = with_deputies("mujoco", 3, *slips)
-    kept = kept_of(whole, tmp_path)
-    (change,) = recovery.exchanges
-    end, state = next(one for one in kept.checkpoints if kept.until(one[0]).time[-1] > change.t)
-    later = [one for one in recovery.found if one.t > kept.until(end).time[-1]]
-    assert any(one.test == "residual" and one.scrapped for one in later)
-    check_going_on(*with_deputies("mujoco", 3, *slips), state, kept.until(end), whole)
-
-
-def test_there_is_no_checkpoint_while_something_is_wrong() -> None:
-    """From what has been dropped until all robots are back at work."""
-    simulation = Simulation(paper_layout(), RunRequest("ideal", units=3, recovers=True))
-    recovery = recover(simulation, Campaign((WorldFault("drop", label="part2", unit=1),)))
-    seen = list[tuple[bool, bool]]()
-
-    def look(world: object, supervisor: object) -> None:
-        wrong = bool(recovery.responding.returning.ways or recovery.striking.is_calm is False)
-        seen.append((wrong, checkpoint(simulation) is None))
-
-    simulation.run([look])
-    assert any(wrong for wrong, _ in seen) and not all(wrong for wrong, _ in seen)
-    assert all(none for wrong, none in seen if wrong)
-    assert not seen[-1][1]
+@pytest.mark.parametrize("number", range(4))
+def test_a_run_with_faults_goes_on_the_same(tmp_path: Path, number: int) -> None:
+    """While things are wrong, too: robots stand, are dead, or have been taken over for by others.
+    Its log is the same, with all that failed."""
+    make = (made, with_deputies)[number % 2]
+    world: WorldName = ("ideal", "mujoco")[number // 2]
+    whole, log, (simulation, recovery) = tmp_path / "whole.log", tmp_path / "log", make(world, 3)
+    with LogWriter(whole, simulation) as writer:
+        writer.end(simulation.run([writer.observe]).trouble)
+    assert len(recovery.found) > 1 and bool(recovery.exchanges) == number % 2
+    size = whole.stat().st_size
+    for share in (0.4, 0.5, 0.8) if world == "ideal" else (0.6,):
+        again, other = make(world, 3)
+        assert go_on(again, cut(whole, log, round(share * size))) > 0
+        assert log.read_bytes() == whole.read_bytes()
+        assert other.report() == recovery.report() and other.exchanges == recovery.exchanges
 
 
 KIND = st.sampled_from([kind for kind in KINDS if kind not in OF_ROBOT])
@@ -221,14 +132,6 @@ def test_a_run_that_was_cut_off_is_gone_on_with(
     path.write_bytes(data[: ends[int(share * (len(ends) - 1))] + 9])
     done = run("run", path, "--resume", "--json")
     assert done.status == 0 and len(done.json["failures"]["failures"]) > 3
-    assert ticks_of(path) == ticks_of(whole)
-
-
-def test_what_was_never_calm_begins_anew(whole: Path, tmp_path: Path, run: Terminal) -> None:
-    header, blocks = taken_apart(whole)
-    path = tmp_path / "run.log"
-    put_together(path, header, [(kind, a) for kind, a in blocks if kind not in (b"C", b"E")])
-    assert run("run", path, "--resume", "-q").status == 0
     assert ticks_of(path) == ticks_of(whole)
 
 

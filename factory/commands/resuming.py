@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,23 +17,21 @@ ALLOWED = ("resume", "max_time", "lenient", "monitor")
 """The options of `run` that a run can be gone on with."""
 
 
-def resumed(file: Path, out: OutputOptions) -> Resumed | None:
-    """The run in a log, to be gone on with; where it comes from is said. None for one that has made
-    its units: there is nothing to be done, and that is said."""
+def resumed(file: Path, max_time: float | None, out: OutputOptions) -> Resumed | None:
+    """The run in a log, to be gone on with until `max_time` [s]; how far it came is said. None for
+    one that has made its units: there is nothing to be done, and that is said."""
     from factory.record.ending import CutOff
     from factory.simulation.resuming import resume
 
     for_a_pag(file, "a log", *ALLOWED)
-    with Waiting("making the run in the log again", out.silent):
-        found = resume(file)
+    with Waiting("reading the log, and making its simulation again", out.silent):
+        found = resume(file, max_time)
     if isinstance(found, CutOff):
         if out.as_json:
             emit({"log": str(file), "units": found.units, "products": found.products})
         else:
             say(f"'{file}' has made its units, {found.products} of {found.units}: nothing is left")
         return None
-    for skipped in found.skipped:
-        print(skipped, file=sys.stderr)
     if not out.silent:
-        say(f"'{file}' goes on from where it is {found.came}")
+        say(f"'{file}' is {found.came}; the run is made again until then, and goes on")
     return found

@@ -94,9 +94,10 @@ def run(
     The status is 1 for a run that does not make its units, or does not follow its net, or in which
     bodies do otherwise than the net says: --lenient leaves those out.
 
-    With --resume FILE is a log; its run goes on from its last simulated second, in that log."""
+    With --resume FILE is a log; its run is made again up to where the log ends, which is compared,
+    and goes on from there in that log."""
     if resume:
-        going = resumed(given.file, out)
+        going = resumed(given.file, asked.max_time, out)
         return 0 if going is None else _go_on(going, asked, monitor, out)
     writable(given.file, video, log, shown.poster)
     project = given.project(out.silent)
@@ -117,21 +118,10 @@ def run(
 
 
 def _go_on(going: Resumed, asked: RunOptions, monitor: bool | None, out: OutputOptions) -> int:
-    """Let the run in a log go on to its end; the monitor then judges all of it, from the log. Gives
-    the status."""
-    from factory.record.log import read_log
-    from factory.record.monitor.record import watch_log
-
+    """Let the run in a log go on to its end. Gives the status."""
     made = going.simulation
-    with going.trusted():
-        opened = [going.writer]
-        record = carry_out(made, out.silent, asked.max_time, opened, False, going.path)
-    if account := made.world.hooks.account:
-        record = replace(record, failures=account.report())
-    elif monitor is not False and made.model is not None:
-        with Waiting("judging the whole run", out.silent):
-            record = replace(record, monitor=watch_log(read_log(going.path))[0])
-    status = _told(replace(record, lenient=asked.lenient), made.layout.factory, [], monitor, out)
+    record = _judged(made, asked, out.silent, going.path, [going.recorder], monitor)
+    status = _told(record, made.layout.factory, [], monitor, out)
     if not out.as_json:
         say_files(log=going.path)
     return status
@@ -195,21 +185,32 @@ def run_project(
     seen = log is not None or film is not None
     with Waiting("compiling the model", silent):
         made = Simulation(project.layout, asked.request(project, seen))
-        recovery = None
         if asked.recovers:
             from factory.simulation.recovery import recover
 
-            recovery = recover(made, asked.campaign(project.layout.factory))
+            recover(made, asked.campaign(project.layout.factory))
     recorders: list[Opening] = []
     if log is not None:
         from factory.record.log import LogWriter
-        from factory.simulation.checkpoint import checkpoint
 
-        recorders.append(lambda: LogWriter(log, made, project, checkpoint=lambda: checkpoint(made)))
+        recorders.append(lambda: LogWriter(log, made, project))
     if film is not None:
         recorders.append(lambda: film(made))
+    return _judged(made, asked, silent, log, recorders, monitor)
+
+
+def _judged(
+    made: Simulation,
+    asked: RunOptions,
+    silent: bool,
+    log: Path | None,
+    recorders: Sequence[Opening],
+    monitor: bool | None,
+) -> Run:
+    """A run that is carried out, and judged as the options ask."""
     record = carry_out(made, silent, asked.max_time, recorders, monitor, log)
-    failures = None if recovery is None else recovery.report()
+    account = made.world.hooks.account
+    failures = None if account is None else account.report()
     if failures is not None and log is not None and monitor is not False and made.model is not None:
         from factory.record.log import read_log
         from factory.record.monitor.record import watch_log
@@ -229,26 +230,30 @@ def carry_out(
 ) -> Run:
     """A run with a progress bar. A signal ends it at the end of a tick, so that the recorders'
     files are complete; StoppedError then says how far it came, and how the run in a `log` goes
-    on."""
+    on. Up to the time of which a recorder asks for more it is not shown every tick."""
     from factory.record.ending import CutOff
     from factory.simulation.watched import watched
     from factory.support.interruption import Interruption
 
+    since = 0.0
     try:
         with Interruption() as stop, ExitStack() as stack:
             opened = [stack.enter_context(recorder()) for recorder in recorders]
+            since = max((recorder.since for recorder in opened), default=0.0)
             bar = stack.enter_context(Progress(made.request.units, silent, made.duration))
             seeing, glances = [r.observe for r in opened], [stop.observe, bar.observe]
             if monitor is False:
-                record = made.run(seeing, max_time, glances)
+                record = made.run(seeing, max_time, glances, since)
             else:
-                record = watched(made, seeing, max_time, glances, bool(monitor))
+                record = watched(made, seeing, max_time, glances, bool(monitor), since)
             for recorder in opened:
                 recorder.end(record.trouble)
             return record
     except KeyboardInterrupt as error:
         came = CutOff(made.world.time, made.world.delivered() - made.before, made.request.units)
         message = f"stopped by the user, {came}"
+        if made.world.time < since:
+            message = f"stopped by the user before {since:.2f} s, so '{log}' is as it was"
         hint = f"log: {log}; go on: factory run --resume {quote(str(log))}" if log else ""
         raise StoppedError(Diagnostic("Interrupted", message, None, hint)) from error
 

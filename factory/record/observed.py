@@ -63,7 +63,10 @@ class Observed(Protocol):
 
 
 class Recorder(Closing):
-    """What keeps a run in a file: an observer of it, and a context manager."""
+    """What keeps a run in a file: an observer of it, and a context manager. `since`: until then [s]
+    it need not see every tick."""
+
+    since = 0.0
 
     def observe(self, world: Any, supervisor: Any) -> None:
         """Record the state after a tick."""

@@ -11,7 +11,6 @@ from factory.control.mode import Array, Index
 from factory.control.navigation import Bundle
 from factory.layout.layout import Layout
 from factory.plant.factory import Operation
-from factory.simulation.keeping import Keeper
 from factory.simulation.request import RunRequest
 from factory.simulation.run import PhysicsFigures
 from factory.simulation.world import Hooks, Job
@@ -99,12 +98,6 @@ class IdealWorld:
     @property
     def dropped(self) -> None:
         """Nothing is ever dropped."""
-
-    def keep(self, keeper: Keeper, bundle: Bundle | None, axes: Index) -> None:
-        """Where all axes are."""
-        self.time = keeper.number("time", self.time, 0)
-        self.supplied = keeper.flag("supplied", self.supplied)
-        keeper.array("x", self.x)
 
     def figures(self) -> PhysicsFigures | None:
         """There are no bodies."""

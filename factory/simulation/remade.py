@@ -11,7 +11,6 @@ from typing import Any
 
 from factory.layout.layout import Layout
 from factory.record.log import Log
-from factory.record.log.kept import BROKEN
 from factory.record.log.writer import packed, versions
 from factory.record.monitor.subject import subject_of_run
 from factory.record.project_table import project_of, settings_of
@@ -21,6 +20,12 @@ from factory.simulation.simulation import Simulation
 from factory.support.errors import Diagnostic, FactoryError
 
 TAG = re.compile(r"<[^>]+>")
+
+BROKEN = (
+    *(ValueError, KeyError, IndexError, TypeError, AttributeError),
+    *(OverflowError, RecursionError, AssertionError, MemoryError),
+)
+"""What the header of a log raises that is not what it should be."""
 
 WIDTH = 120
 """So many characters of an element are said."""
@@ -36,7 +41,8 @@ def request_of(header: Mapping[str, Any]) -> RunRequest:
         settings_of(header),
         frozenset(header["start"]),
         header["wip"],
-        fuse=header["fuse"],
+        header["distributed"],
+        header["fuse"],
         recovers="faults" in header,
     )
 

@@ -1,23 +1,19 @@
-"""Going on with a run that was cut off, from its log: the simulation is made again from the header,
-and takes up the last checkpoint. What the log has after that is cut off, and made again."""
+"""Going on with a run that was cut off, from its log: the simulation is made again from the header.
+It comes to where the log ends in the same way, to the last bit, and goes on from there."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from io import FileIO
-from os import SEEK_END
 from pathlib import Path
 
 from factory.pipeline import Project
 from factory.record.ending import CutOff
-from factory.record.log import LogWriter
 from factory.record.log.blocks import bad_log
-from factory.record.log.kept import BROKEN, KeptRun, kept_run
-from factory.record.log.writer import packed, versions
+from factory.record.log.continued import Continued, last_full
+from factory.record.log.reader import Log, read_log
+from factory.record.log.writer import rows_of_a_block, versions
 from factory.record.project_table import check_names, of_its_factory, project_of
-from factory.simulation.checkpoint import checkpoint, take_up
 from factory.simulation.recovery.faults import campaign_of
 from factory.simulation.recovery.recovery import recover
 from factory.simulation.remade import request_of
@@ -25,63 +21,44 @@ from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.claim import claimed_again
 from factory.support.errors import Diagnostic, InputError
-from factory.support.files import AGAIN
+from factory.support.files import AGAIN, RECORD, mapped
 from factory.support.settings import AUTO
 
 IN_ITSELF = ("Stalled", "Dropped", "Unstable", "Failed")
 """What ends a run that would end in the same way if it went on."""
 
-TRIES = 3
-"""So many checkpoints are tried at most, the last one first."""
-
 
 @dataclass(frozen=True)
 class Resumed:
-    """A run that goes on: its `project`, its `simulation` at `time` [s] as it was then, and its
-    claimed log, cut off there; `skipped`: what is wrong with later checkpoints."""
+    """A run that goes on: its `simulation`, which has not begun, and its `log`, claimed as `file`;
+    up to its byte `end`, which is of the time `since` [s], it stays as it is."""
 
     path: Path
-    project: Project = field(repr=False)
     simulation: Simulation = field(repr=False)
+    log: Log = field(repr=False)
     file: FileIO = field(repr=False)
-    skipped: tuple[Diagnostic, ...] = ()
+    end: int
+    since: float
 
     @property
     def came(self) -> CutOff:
         """How far the run has come."""
-        made = self.simulation
-        done = made.world.delivered() - made.before
-        return CutOff(made.world.time, done, made.request.units)
+        log, row = self.log, self.log.row_at(self.since)
+        made = int(log.delivered[row]) if row < len(log) else 0
+        return CutOff(self.since, made, log.header["units"])
 
-    def writer(self) -> LogWriter:
-        """Writes the log on."""
-        made = self.simulation
-        return LogWriter(
-            self.path,
-            made,
-            self.project,
-            checkpoint=lambda: checkpoint(made),
-            going_on=self.file,
-        )
-
-    @contextmanager
-    def trusted(self) -> Iterator[None]:
-        """Raises InputError (BadLog) for errors of a run whose checkpoint was not what it should
-        have been, and was not seen to be."""
-        at = float(self.simulation.world.time)
-        try:
-            yield
-        except BROKEN as error:
-            words = f"went on from {at:.2f} s, where its checkpoint contradicts its run: {error!r}"
-            raise InputError(_bad(self.path, words)) from error
+    def recorder(self) -> Continued:
+        """Compares the simulation with the log, and writes that on."""
+        return Continued(self.simulation, self.log, self.file, self.end, self.since)
 
 
-def resume(path: Path) -> Resumed | CutOff:
-    """The run in a log, to be gone on with; how far it came, where it has made its units. The log
-    is as it was where an error is raised.
+def resume(path: Path, max_time: float | None = None) -> Resumed | CutOff:
+    """The run in a log, to be gone on with until `max_time` [s] at most; how far it came, where it
+    has made its units. The log is as it was where an error is raised.
 
     Raises InputError: BadLog where it is no log, or none to go on from, BadFile where another run
-    writes it; that of its PAG or its meshes where these cannot be read.
+    writes it, Usage where the run has come to `max_time` already; that of its PAG or its meshes
+    where these cannot be read.
     """
     try:
         if not path.is_file():
@@ -90,52 +67,49 @@ def resume(path: Path) -> Resumed | CutOff:
     except OSError as error:
         raise InputError(bad_log(path, f"cannot be written: {error.strerror}")) from error
     try:
-        kept = kept_run(path)
-        if (done := _done(kept)) is not None:
+        log = read_log(path)
+        if (done := _done(path, log)) is not None:
             file.close()
             return done
-        _check(kept)
+        _check(path, log, max_time)
         with of_its_factory():
-            project = project_of(kept.header, path.parent)
-            request = request_of(kept.header)
-        simulation, end, skipped = _going_on(kept, project, request)
-        file.truncate(end)
-        file.seek(0, SEEK_END)
+            project, request = project_of(log.header, path.parent), request_of(log.header)
+        simulation = _made(path, log, project, request)
+        rows = rows_of_a_block(request.settings.tick)
+        end, since = last_full(mapped(path, RECORD), rows)
     except BaseException:
         file.close()
         raise
-    return Resumed(path, project, simulation, file, skipped)
+    return Resumed(path, simulation, log, file, end, since)
 
 
-def _done(kept: KeptRun) -> CutOff | None:
+def _done(path: Path, log: Log) -> CutOff | None:
     """How far a run came that is at its end, None for others. Raises InputError where it ended by
     itself before its units were made."""
-    log = kept.whole
-    if log is None or not log.complete:
+    if not log.complete:
         return None
     cut = log.cut_off
     if cut is None:
         return CutOff(float(log.time[-1]), int(log.delivered[-1]), log.header["units"])
     if cut.code in IN_ITSELF:
         words = f"is of a run that would end again as it did: {cut.told}"
-        raise InputError(_bad(kept.path, words, "mend what ended it, and run it again"))
+        raise InputError(_bad(path, words, "mend what ended it, and run it again"))
     return None
 
 
-def _check(kept: KeptRun) -> None:
-    """Raises InputError (BadLog) where a run cannot be gone on with."""
-    header, now = kept.header, versions()
-    if header["distributed"]:
-        words = "is of a run with --distributed, which has no checkpoints to go on from"
-        raise InputError(_bad(kept.path, words, "leave out --distributed"))
-    lacks = kept.ticks > 1 and not kept.checkpoints and "faults" not in header
-    if lacks:
-        raise InputError(_bad(kept.path, "has no checkpoints to go on from", AGAIN))
+def _check(path: Path, log: Log, max_time: float | None) -> None:
+    """Raises InputError where a run cannot be gone on with."""
+    header, now, last = log.header, versions(), float(log.time[-1]) if len(log) else 0.0
     for package in ("klavins-factory", "mujoco"):
         then, here = header["versions"].get(package, ""), now.get(package, "")
         if then != here:
             words = f"was kept with {package} {then or 'unknown'}, and this is {here}"
-            raise InputError(_bad(kept.path, words, f"install {package} {then}, or {AGAIN}"))
+            raise InputError(_bad(path, words, f"install {package} {then}, or {AGAIN}"))
+    if not log.xml and header["world"] != "ideal":
+        raise InputError(_bad(path, "is cut off in its model, before its run begins"))
+    if max_time is not None and max_time <= last:
+        message = f"'{path}' has come to {last:.2f} s, and --max-time is {max_time:g} s"
+        raise InputError(Diagnostic("Usage", message, None, "give a later time, or leave it out"))
 
 
 def _asked(request: RunRequest, timestep: bool, wip: bool) -> RunRequest:
@@ -144,37 +118,17 @@ def _asked(request: RunRequest, timestep: bool, wip: bool) -> RunRequest:
     return replace(request, settings=settings, wip=None if wip else request.wip)
 
 
-def _going_on(
-    kept: KeptRun, project: Project, request: RunRequest
-) -> tuple[Simulation, int, tuple[Diagnostic, ...]]:
-    """The simulation at the last checkpoint that is good, the byte after that, and what is wrong
-    with later ones; where the run had come to none, at its beginning."""
-    if not kept.checkpoints:
-        return _made(kept, project, request), kept.begin, ()
-    skipped: list[Diagnostic] = []
-    for end, state in kept.checkpoints[: -TRIES - 1 : -1]:
-        simulation = _made(kept, project, request)
-        try:
-            take_up(simulation, state, kept.until(end))
-        except BROKEN as error:
-            words = f"has a bad checkpoint before byte {end}: {error}"
-            skipped.append(_bad(kept.path, words, AGAIN))
-            continue
-        return simulation, end, tuple(skipped)
-    raise InputError(skipped)
-
-
-def _made(kept: KeptRun, project: Project, request: RunRequest) -> Simulation:
+def _made(path: Path, log: Log, project: Project, request: RunRequest) -> Simulation:
     """The simulation at the beginning. Raises InputError where it is not that of the log."""
-    header = kept.header
+    header = log.header
     with of_its_factory():
         made = Simulation(project.layout, request)
         made.asked = _asked(request, **header["chosen"])
         if request.recovers:
             recover(made, campaign_of(header["faults"]))
         check_names(made.layout.factory, header)
-    if {k: a.tobytes() for k, a in (kept.model or {}).items()} != packed(made.model):
-        raise InputError(_bad(kept.path, "is of another model than its PAG gives now", AGAIN))
+    if made.model is not None and (made.model.xml, {**made.model.files}) != (log.xml, log.files):
+        raise InputError(_bad(path, "is of another model than its PAG gives now"))
     return made
 
 

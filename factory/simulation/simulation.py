@@ -185,17 +185,21 @@ class Simulation:
         observers: Sequence[Observer] = (),
         max_time: float | None = None,
         glances: Sequence[Observer] = (),
+        since: float = 0.0,
     ) -> Run:
         """Tick until `units` products have been dropped off, the run stalls, `max_time` [s] passes
         or a robot drops what it holds. Observers are called after every tick; `glances` are, but
-        where there are no observers several ticks may go by between them. Where the engine gives up
+        where there are no observers several ticks may go by between them, and up to the time
+        `since` [s] observers are called no more often. Where the engine gives up
         it begins anew by itself, at time 0: nobody is shown that, and the run has lasted until
         then."""
         patience = PATIENCE * max(self.delays)
         supervisor, world, goal = self.supervisor, self.world, self.before + self.request.units
         begin, watched, trouble = perf_counter(), -world.hooks.ended_time, None
         while trouble is None and (world.dropped or world.delivered() < goal):
-            before, ticks = world.time, 1 if observers else self._unseen(max_time)
+            before, ticks = world.time, self._unseen(max_time)
+            if observers:
+                ticks = self._unseen(since) if before < since else 1
             (supervisor.coast if world.dropped else supervisor.step)(ticks)
             if reason := world.unstable():
                 watched += world.hooks.ended_time

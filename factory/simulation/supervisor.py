@@ -7,7 +7,7 @@ robot costs nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,7 +21,6 @@ from factory.nets.undo import marking_after
 from factory.nets.undone import Undone
 from factory.plant.factory import Factory, Operation
 from factory.simulation.bundles import Bundles
-from factory.simulation.keeping import Keeper, up_to
 from factory.simulation.run import Event
 from factory.simulation.world import World
 
@@ -200,60 +199,6 @@ class Supervisor:
     def awaited(self) -> list[Operation]:
         """The operations all of whose robots wait for them."""
         return [self.factory.operations[event // 2] for event in sorted(self.threads.possible)]
-
-    def go_over(
-        self, past: Iterable[tuple[float, int] | Undone], exchange: Callable[[Undone], None]
-    ) -> None:
-        """Take over what a record says that fired, when [s] and which by number, and what was
-        undone in between; `exchange` takes over an exchange of robots. What is under way, `keep`
-        has to take up."""
-        for entry in past:
-            if not isinstance(entry, Undone):
-                t, event = entry
-                self.threads.fire((event,))
-                self.fired[event] += 1
-                name = self.factory.net.threaded.transitions[event].name
-                self.events.append(Event(t, name))
-            elif entry.exchanged:
-                exchange(entry)
-            else:
-                self.fired[:] = self.without(entry)
-                self._mark(marking_after(self.factory.net, self.fired))
-                self.events.append(entry)
-
-    def without(self, undone: Undone) -> tuple[int, ...]:
-        """How often each transition has fired once that is undone."""
-        number, fired = self.factory.net.threaded.net.transition_index, [*self.fired]
-        for name in undone.transitions:
-            fired[number[name]] -= 1
-        return tuple(fired)
-
-    def keep(self, keeper: Keeper) -> None:
-        """How often each transition has fired, and the modes under way. Raises ValueError where
-        these are not of the run whose record has been gone over."""
-        fired = np.array(self.fired)
-        keeper.array("fired", fired, 0)
-        going = [(number,) for number in self.active.operations]
-        going = keeper.rows("going", going, up_to(len(self.factory.operations)))
-        ahead = [(number,) for number in self.active.ahead]
-        ahead = keeper.rows("ahead", ahead, self.ahead.place.__contains__)
-        clocks = np.zeros(len(going) + len(ahead))
-        if self.active.clocks is not None:
-            clocks[:] = self.active.clocks
-        keeper.array("clocks", clocks, 0)
-        enabled, near = keeper.flag("enabled", self.enabled), keeper.flag("near", self.near)
-        if not keeper.takes_up:
-            return
-        if self.fired != fired.tolist():
-            raise ValueError("its counts of firings are not those of its record")
-        numbers = [number for (number,) in going]
-        if sorted(numbers) != [o.index for o in self.factory.operations if self.marked[o.place]]:
-            raise ValueError("its operations under way are not those of its marking")
-        self.active = Active()
-        self._activate(numbers, [number for (number,) in ahead])
-        if clocks.any():
-            self.active.clocks = clocks
-        self.enabled, self.near = enabled, near
 
     def _startable(self) -> list[int]:
         """Operations X with X_s enabled: waits marked (their goals are everything), the robots in

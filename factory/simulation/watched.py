@@ -16,6 +16,7 @@ def watched(
     max_time: float | None = None,
     glances: Sequence[Observer] = (),
     every_tick: bool = False,
+    since: float = 0.0,
 ) -> Run:
     """`simulation.run`, with a monitor where there are bodies. It looks where operations end, where
     a weld is switched, and at times; with `every_tick` after every tick, and so it does where
@@ -23,12 +24,12 @@ def watched(
     has none: states alone do not tell what was undone, and its log is judged (`monitor.calm`).
     """
     if simulation.model is None or simulation.request.recovers:
-        return simulation.run(observers, max_time, glances)
+        return simulation.run(observers, max_time, glances, since)
     monitor = beside(simulation)
     if every_tick:
-        observers = [monitor.observe, *observers]
+        observers, since = [monitor.observe, *observers], 0.0
     else:
         look = monitor.observe if simulation.request.distributed else monitor.glance
         glances = [look, *glances]
-    run = simulation.run(observers, max_time, glances)
+    run = simulation.run(observers, max_time, glances, since)
     return replace(run, monitor=monitor.report(run.lasting))

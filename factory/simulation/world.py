@@ -11,7 +11,6 @@ from factory.control.mode import Array, Index
 from factory.control.navigation import Bundle
 from factory.plant.factory import Operation
 from factory.record.failures import Account
-from factory.simulation.keeping import Keeper
 from factory.simulation.run import PhysicsFigures
 from factory.support.errors import Diagnostic
 
@@ -133,11 +132,6 @@ class World(Protocol):
     def dropped(self) -> Drop | None:
         """The first that a robot has let fall, None while none has. From then on nothing may
         fire."""
-
-    def keep(self, keeper: Keeper, bundle: Bundle | None, axes: Index) -> None:
-        """All that goes on between two ticks, while the modes of a bundle are active on `axes`, to
-        be noted down or taken up; `dropoffs` apart. Raises ValueError where what is taken up is no
-        state of this world."""
 
     def figures(self) -> PhysicsFigures | None:
         """What only bodies can tell, None where there are none."""

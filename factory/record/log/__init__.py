@@ -24,8 +24,6 @@ appended to.
        undone, bytes                      what was undone, JSON, where anything was
        failures, bytes                    what went wrong so far, JSON as in `run --json` with lists
                                           of what is new, where anything is and the run goes on
-    C  a checkpoint, about every simulated second: the state of the run where the ticks before it
-       end, to be gone on with; see `simulation.checkpoint`. Readers of runs pass it over
     E  the end: the file was closed properly
        figures, bytes (mujoco only)       what its verdict rests on, JSON: see `record.verdict`
        failures, bytes                    what went wrong, JSON as in `run --json`, where the run
@@ -34,7 +32,8 @@ appended to.
                                           ended before its units were made
 
 Every block stands for itself and is written at once, so a file that ends in the middle of one lacks
-at most the last second. While it is written it is locked (`flock`)."""
+at most the last second. Readers pass over blocks of other letters. While it is written it is locked
+(`flock`)."""
 
 from factory.record.log.blocks import MAGIC
 from factory.record.log.reader import Log, Ragged, is_log, read_log

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import platform
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from io import FileIO
 from os import SEEK_CUR
@@ -88,11 +88,10 @@ class LogWriter(Recorder):
     same file meanwhile.
 
     `project`: what the factory was made from, where there is one; `command`: the
-    command line, that of this process unless given; `checkpoint`: what gives the state of the run
-    after a tick, to be gone on with, None where it has none; `going_on`: the log itself, claimed,
-    of a run that is gone on with, at the place to write on. `trouble`: what ended the run early, if
-    something has. Raises InputError where the file cannot be written (BadLog), another run writes
-    it, or there is no more room for it (BadFile)."""
+    command line, that of this process unless given; `going_on`: the log itself, claimed, of a run
+    that has come to where it ends, at the place to write on. `trouble`: what ended the run early,
+    if something has. Raises InputError where the file cannot be written (BadLog), another run
+    writes it, or there is no more room for it (BadFile)."""
 
     def __init__(
         self,
@@ -100,7 +99,6 @@ class LogWriter(Recorder):
         simulation: Observed,
         project: Project | None = None,
         command: Sequence[str] | None = None,
-        checkpoint: Callable[[], Arrays | None] = lambda: None,
         going_on: FileIO | None = None,
     ) -> None:
         self.path, self.world, self.supervisor = Path(path), simulation.world, simulation.supervisor
@@ -108,12 +106,11 @@ class LogWriter(Recorder):
         self.before = int(simulation.before)
         net = simulation.layout.factory.net.threaded
         self.numbers = {t.name: n for n, t in enumerate(net.transitions)}
-        self.most = max(1, round(1.0 / simulation.request.settings.tick))
+        self.most = rows_of_a_block(simulation.request.settings.tick)
         self.ticks, self.told = _Ticks(), Told(len(self.supervisor.events))
         if going_on is not None and self.world.time:
             self.told.goes_on(self.world.hooks.account)
         self.trouble: Diagnostic | None = None
-        self.checkpoint = checkpoint
         self.file = self._begun(simulation, project, command) if going_on is None else going_on
         if going_on is None or not self.world.time:
             self.observe(self.world, self.supervisor)
@@ -151,8 +148,6 @@ class LogWriter(Recorder):
         self._record(world, supervisor)
         if len(self.ticks.time) >= self.most:
             self.flush()
-            if (state := self.checkpoint()) is not None:
-                self._append(block(b"C", state))
 
     def _record(self, world: Any, supervisor: Any) -> None:
         """A row of the log."""
@@ -239,6 +234,12 @@ class LogWriter(Recorder):
             return self.world.x.copy(), self.world.v.copy()
         d = self.view.d
         return d.qpos.copy(), _coarse(d.qvel), _coarse(d.ctrl)
+
+
+def rows_of_a_block(tick: float) -> int:
+    """At least so many rows has a block that the end of its run did not cut short: those of about a
+    simulated second, in ticks of so many [s]."""
+    return max(1, round(1.0 / tick))
 
 
 def _coarse(values: NDArray[np.float64]) -> NDArray[np.float64]:

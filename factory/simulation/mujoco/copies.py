@@ -11,7 +11,6 @@ from factory.mjcf import names
 from factory.mjcf.masks import NOBODY
 from factory.mjcf.model import Model
 from factory.mjcf.parts import parked_at
-from factory.simulation.keeping import Keeper, one_of, up_to
 from factory.simulation.mujoco.welds import Welds
 from factory.support.engine import mujoco
 
@@ -67,26 +66,6 @@ class Copies:
         for (label, old), new in units.items():
             self._number[label, new] = copies[label, old]
             self._welds.masks.enter(label, new, bodies[label, old])
-
-    def keep(self, keeper: Keeper) -> None:
-        """Which copy is in which unit, and which are to spare, in order."""
-        used = [(*part, copy) for part, copy in self._number.items()]
-        free = [(label, copy) for label, spares in self.free.items() for copy in spares]
-        a_label, a_number = one_of(self.body), up_to(np.inf)
-        used = keeper.rows("copies.used", used, a_label, a_number, a_number)
-        free = keeper.rows("copies.free", free, a_label, a_number)
-        if not keeper.takes_up:
-            return
-        every = sorted((label, n) for label, ids in self.body.items() for n in range(len(ids)))
-        found = [(label, copy) for label, _, copy in used] + free
-        if sorted(found) != every or len({(label, unit) for label, unit, _ in used}) < len(used):
-            raise ValueError("its copies of parts are not those of the model")
-        for label, unit in self._number:
-            self._welds.masks.leave(label, unit)
-        self._number = {(label, unit): copy for label, unit, copy in used}
-        self.free = {label: deque(n for of, n in free if of == label) for label in self.body}
-        for label, unit in self._number:
-            self._welds.masks.enter(label, unit, self[label, unit])
 
     def _put_away(self, label: str, copy: int) -> None:
         body = int(self.body[label][copy])

@@ -15,7 +15,6 @@ from factory.control.governor import follow, govern
 from factory.control.mode import REST, ROUNDING, Array, Index
 from factory.control.navigation import Bundle
 from factory.control.profile import landing_speed
-from factory.simulation.keeping import Keeper
 from factory.simulation.mujoco.drives import Drives
 
 AHEAD = 0.0005
@@ -135,22 +134,6 @@ class Follower:
         self._at += ticks
         self.x[self.axes], self.v[self.axes] = course.x[self._at], course.v[self._at]
         self._drives.show(self.axes, course.setpoints[:, self._at * self._substeps])
-
-    def keep(
-        self, keeper: Keeper, name: str, axes: Index, plan: Callable[[Array, Array], Course]
-    ) -> None:
-        """Where its `axes` are on their course: that is planned anew from where it began."""
-        at = keeper.whole(f"{name}.at", -1 if self.course is None else self._at, -1)
-        begin = np.zeros((2, len(axes)))
-        if self.course is not None:
-            begin[:] = self.course.x[0], self.course.v[0]
-        keeper.array(f"{name}.begin", begin)
-        if not keeper.takes_up:
-            return
-        self.course = None if at < 0 else plan(begin[0], begin[1])
-        self.axes, self._at = axes, max(at, 0)
-        if self.left < 0:
-            raise ValueError(f"'{name}.at' is past the end of its course")
 
     def stop(self, axes: Index) -> None:
         """Let axes stand where their references are, and leave the course."""

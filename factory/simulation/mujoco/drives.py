@@ -17,7 +17,6 @@ from __future__ import annotations
 import numpy as np
 
 from factory.control.mode import Array, Index
-from factory.simulation.keeping import Keeper
 from factory.support.engine import mujoco
 
 INPUTS = 3
@@ -89,11 +88,6 @@ class Drives:
         """Let axes stand at x [m]."""
         still = np.stack([x, np.zeros_like(x), self.weight[axes]], axis=-1)
         self.follow(axes, still[:, None])
-
-    def keep(self, keeper: Keeper, name: str) -> None:
-        """What they carry; their buffers are the engine's."""
-        keeper.array(f"{name}.mass", self.mass, 0)
-        keeper.array(f"{name}.weight", self.weight, 0)
 
     def load(self, axes: Index, mass: Array, weight: Array) -> None:
         """From the next setpoints on axes move a mass beside their own [kg], and carry a weight

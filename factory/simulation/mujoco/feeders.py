@@ -20,7 +20,6 @@ from factory.mjcf.masks import feeder_codes
 from factory.mjcf.model import Model
 from factory.mjcf.parts import presented_at
 from factory.plant.factory import Operation
-from factory.simulation.keeping import Keeper, one_of, up_to
 from factory.simulation.mujoco.copies import Copies
 from factory.simulation.mujoco.passing import Passing
 from factory.simulation.mujoco.sliders import NEVER, Sliders
@@ -260,25 +259,6 @@ class Feeders:
         held[[*self.back.parts]] = True
         held[[n for n, s in enumerate(self._stations) if s.label in self.back.awaited]] = True
         return held
-
-    def keep(self, keeper: Keeper) -> None:
-        """What is presented and asked for, and whose turn it is."""
-        self.supply.keep(keeper)
-        self._turns.keep(keeper)
-        self._passing.keep(keeper)
-        a_label, a_unit = one_of(self._number), up_to(np.inf)
-        shown = keeper.rows("feeders.shown", self._shown.items(), a_label, a_unit)
-        asked = [(number,) for number in sorted(self._asked)]
-        asked = keeper.rows("feeders.asked", asked, up_to(len(self._stations)))
-        self.due = keeper.number("feeders.due", self.due, high=NEVER)
-        if self.supply.recovers:
-            late = [(number,) for number in sorted(self.back.late)]
-            late = keeper.rows("feeders.late", late, up_to(len(self._stations)))
-            self.back.late = {number for (number,) in late}
-        self._shown = dict(shown)
-        self._asked = {number for (number,) in asked}
-        if any(part not in self._copies for part in shown):
-            raise ValueError("its feeders show parts that are not there")
 
     def _send(self, numbers: Index, down: bool) -> None:
         self._sliders.send(numbers, down)

@@ -6,7 +6,6 @@ import numpy as np
 
 from factory.control.mode import Array, Index
 from factory.mjcf.model import GRAVITY, ROLLING
-from factory.simulation.keeping import Keeper
 from factory.support.engine import mujoco
 
 
@@ -25,12 +24,6 @@ class Guides:
         """From now on axes bear loads [kg] beside their own weight."""
         self._loads[axes] = loads
         self._rub(axes)
-
-    def keep(self, keeper: Keeper) -> None:
-        """What they bear."""
-        keeper.array("guides.loads", self._loads, 0)
-        if keeper.takes_up:
-            self._rub(np.arange(len(self._loads)))
 
     def rub(self, axes: Index, newtons: float) -> None:
         """From now on axes have another friction when they are empty [N]."""

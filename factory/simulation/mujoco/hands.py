@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import inf
 
 from factory.mjcf import names
 from factory.mjcf.grips import grips_of
 from factory.mjcf.model import Model
-from factory.simulation.keeping import Keeper, is_text, up_to
-from factory.simulation.mujoco.copies import Copies
 from factory.simulation.mujoco.welds import Welds
 from factory.support.engine import mujoco
 
@@ -58,20 +55,6 @@ class Grasps:
         hand = self.of.pop(robot)
         self._welds.loose([self.grip[robot, label] for label in hand.bodies])
         return hand
-
-    def keep(self, keeper: Keeper, copies: Copies) -> None:
-        """What every robot holds."""
-        held = [(r, hand.unit, label) for r, hand in self.of.items() for label in hand.bodies]
-        a_number = up_to(inf)
-        held = keeper.rows("hands", held, a_number, a_number, is_text)
-        if not keeper.takes_up:
-            return
-        self.of.clear()
-        for robot, unit, label in held:
-            hand = self.of.setdefault(robot, Grasp(unit, {}))
-            if (robot, label) not in self.grip or (label, unit) not in copies or hand.unit != unit:
-                raise ValueError("its robots hold what they cannot")
-            hand.bodies[label] = copies[label, unit]
 
     def loads(self) -> dict[int, float]:
         """What each robot that holds something carries [kg]."""

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Container, Iterable
-from math import inf
 
 from factory.control.mode import Index
 from factory.layout.hands.leaving import Leaving, leavings
 from factory.layout.layout import Layout
 from factory.plant.factory import Operation
-from factory.simulation.keeping import Keeper, up_to
 from factory.simulation.mujoco.courses import AHEAD, Follower
 from factory.support.engine import mujoco
 
@@ -58,21 +56,6 @@ class HandsAway:
         for number in over:
             del self._held[number]
         return bool(over)
-
-    def keep(self, keeper: Keeper) -> None:
-        """What holds up which operation."""
-        held = [
-            (number, self._leavings[number].index(one))
-            for number, left in self._held.items()
-            for one in left
-        ]
-        held = keeper.rows("away.held", held, up_to(inf), up_to(inf))
-        found: dict[int, tuple[Leaving, ...]] = {}
-        for number, one in held:
-            if one >= len(self._leavings.get(number, ())):
-                raise ValueError("its operations wait for hands that are not there")
-            found[number] = (*found.get(number, ()), self._leavings[number][one])
-        self._held = found
 
     def _in_the_way(self, awaited: Iterable[Leaving]) -> tuple[Leaving, ...]:
         at = self._d.qpos

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, replace
+from dataclasses import replace
 from math import comb, degrees
-from typing import Any
 
 import numpy as np
 
 from factory.layout.layout import Layout
 from factory.mjcf.model import Model
 from factory.mjcf.weld_frames import residuals
-from factory.simulation.keeping import Keeper, is_size, one_of, up_to
 from factory.simulation.mujoco.onsets import Onsets
 from factory.simulation.mujoco.pressing import Pressing
 from factory.simulation.mujoco.product_error import Misfit, ProductError
@@ -78,21 +76,6 @@ class Inspection:
                 now.add((a, b))
         self.onsets.note(now, float(self._d.time))
 
-    def keep(self, keeper: Keeper) -> None:
-        """The figures, what touches, and what is being joined."""
-        operations = self._model.factory.operations
-        labels = {operation.label for operation in operations}
-        an_operation = up_to(len(operations))
-        joins = keeper.rows("joins", self.joining.items(), an_operation, up_to(np.inf))
-        force = keeper.rows("forces", self.force.items(), one_of(labels), is_size)
-        self.residual = keeper.number("residual", self.residual, 0)
-        error = None if self.error is None else [*astuple(self.error)]
-        error = keeper.value("error", error, lambda v: v is None or _is_misfit(v))
-        self.error = None if error is None else Misfit(*error)
-        self.joining = dict(joins)
-        self.force = dict(force)
-        self.onsets.keep(keeper, self._m.ngeom)
-
     def _joined(self, one: int, other: int) -> str | None:
         """The label of the operation that is joining the parts of two geoms, None for none."""
         a, b = self._m.geom_bodyid[[one, other]].tolist()
@@ -147,10 +130,3 @@ class Inspection:
             grip_strength_robot=None if strength is None else strength.robot,
             grip_strength_label=None if strength is None else strength.label,
         )
-
-
-def _is_misfit(value: Any) -> bool:
-    """Whether a value is two sizes and a label."""
-    if not isinstance(value, list) or len(value) != 3:
-        return False
-    return is_size(value[0]) and is_size(value[1]) and isinstance(value[2], str)

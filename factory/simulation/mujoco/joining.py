@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import astuple
 from types import MappingProxyType
 
 import numpy as np
 
 from factory.mjcf.model import Model
-from factory.simulation.keeping import Keeper, is_size, is_text, one_of, up_to
 from factory.simulation.mujoco.copies import Copies
 from factory.simulation.mujoco.feeders import Feeders
 from factory.simulation.mujoco.fusing import RIGID, SETTLING, Fusion
@@ -33,18 +31,6 @@ class Joining:
         self._feeders, self._welds = feeders, welds
         self.waiting: dict[int, tuple[str, float]] = {}
         self.misfit: dict[int, Misfit] = {}
-
-    def keep(self, keeper: Keeper) -> None:
-        """What waits to become one body, and how far out of place parts were."""
-        waiting = [(robot, *since) for robot, since in self.waiting.items()]
-        a_number, a_label = up_to(np.inf), one_of(self._copies.body)
-        waiting = keeper.rows("joining.waiting", waiting, a_number, a_label, is_size)
-        misfit = [(unit, *astuple(far)) for unit, far in self.misfit.items()]
-        misfit = keeper.rows("joining.misfit", misfit, a_number, is_size, is_size, is_text)
-        self.waiting = {robot: (label, since) for robot, label, since in waiting}
-        self.misfit = {unit: Misfit(*far) for unit, *far in misfit}
-        if not self.waiting.keys() <= self._hands.of.keys():
-            raise ValueError("its robots have joined what they do not hold")
 
     def weigh(self, m: mujoco.MjModel, d: mujoco.MjData) -> None:
         """From now on bodies have the masses that the model has."""

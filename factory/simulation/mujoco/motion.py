@@ -9,7 +9,6 @@ import numpy as np
 from factory.control.mode import Array, Index
 from factory.control.navigation import Bundle
 from factory.mjcf.model import GRAVITY, HEAD_MASS, Model
-from factory.simulation.keeping import Keeper
 from factory.simulation.mujoco.axes import Axes
 from factory.simulation.mujoco.courses import Course, Follower, along, planned
 from factory.simulation.mujoco.drives import Drives
@@ -165,26 +164,6 @@ class Motion:
         outfeed = self.outfeed
         begin = outfeed.goal, x.tobytes(), v.tobytes()
         return self.stepping.course(begin, lambda: outfeed.course(x, v))
-
-    def keep(self, keeper: Keeper, bundle: Bundle | None, active: Index) -> None:
-        """What axes carry, where their references are, and on which courses: those of robots are
-        of the modes of a bundle, on the `active` axes."""
-        self.active = active
-        self.drives.keep(keeper, "axes")
-        self.guides.keep(keeper)
-        self.sleep.keep(keeper)
-        self.outfeed.keep(keeper)
-        self.sliders.keep(keeper)
-        keeper.array("axes.x", self.robots.x)
-        keeper.array("axes.v", self.robots.v)
-
-        def planned(x: Array, v: Array) -> Course:
-            if bundle is None:
-                raise ValueError("it has a course, and no mode is active")
-            return self._course(bundle, x, v)
-
-        self.robots.keep(keeper, "course", active, planned)
-        self.outfeed.follower.keep(keeper, "tray", self.outfeed.axes, self._tray_course)
 
     def send_tray(self, loaded: bool) -> None:
         """The tray goes away with a product, or home without."""

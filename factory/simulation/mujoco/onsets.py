@@ -2,13 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable
-
-from factory.simulation.keeping import Keeper, is_text, maybe_size, up_to
-
-MOST_ONSETS = 10**7
-"""So many onsets of contact are taken up at most."""
 
 
 class Onsets:
@@ -32,15 +26,3 @@ class Onsets:
     def apart(self) -> None:
         """Nothing touches."""
         self._touching = frozenset()
-
-    def keep(self, keeper: Keeper, geoms: int) -> None:
-        """What touches, and all onsets; of so many `geoms`."""
-        a_geom = up_to(geoms)
-        self.begun = keeper.value("contacts.begun", self.begun, maybe_size)
-        touching = keeper.rows("touching", sorted(self._touching), a_geom, a_geom)
-        onsets = [(*pair, count) for pair, count in Counter(self.pairs).items()]
-        onsets = keeper.rows("onsets", onsets, is_text, is_text, up_to(MOST_ONSETS))
-        self._touching = frozenset(touching)
-        if sum(count for _, _, count in onsets) > MOST_ONSETS:
-            raise ValueError(f"'onsets' are more than {MOST_ONSETS}")
-        self.pairs = [(a, b) for a, b, count in onsets for _ in range(count)]

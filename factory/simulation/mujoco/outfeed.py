@@ -9,7 +9,6 @@ from factory.control.mode import Array
 from factory.layout.dimensions import BEHIND, PLAY
 from factory.mjcf.model import GRAVITY, Model
 from factory.mjcf.outfeed import SHUTTER_MASS
-from factory.simulation.keeping import Keeper
 from factory.simulation.mujoco.axes import Axes
 from factory.simulation.mujoco.courses import AHEAD, Course, Follower, Move, planned, towards
 from factory.simulation.mujoco.drives import Drives
@@ -78,13 +77,6 @@ class Outfeed:
             return True
         x, v = self.follower.x[self.axes], self.follower.v[self.axes]
         return bool((x != self.ends).any() or v.any())
-
-    def keep(self, keeper: Keeper) -> None:
-        """Where the tray goes."""
-        away = keeper.flag("outfeed.away", self.goal != 0.0)
-        self.goal = self._far[0] if away else 0.0
-        self.busy = keeper.flag("outfeed.busy", self.busy)
-        self.loading = keeper.flag("outfeed.loading", self.loading)
 
     @property
     def beginning(self) -> tuple[Array, Array]:

@@ -11,7 +11,6 @@ from factory.mjcf.masks import tray_code
 from factory.mjcf.model import Model
 from factory.mjcf.weld_frames import held_at
 from factory.plant.factory import Operation
-from factory.simulation.keeping import Keeper, up_to
 from factory.simulation.mujoco.contacts import ContactMasks
 from factory.simulation.mujoco.copies import Copies, copies_of
 from factory.simulation.mujoco.feeders import Feeders
@@ -141,26 +140,6 @@ class Parts:
     def tray(self) -> int:
         """The code of the tray; that of a robot is its number."""
         return tray_code(self.model.factory)
-
-    def keep(self, keeper: Keeper) -> None:
-        """Where all copies are, and in which hands."""
-        self.copies.keep(keeper)
-        bodies = np.concatenate([*self.copies.body.values()])
-        codes = self.masks.code[bodies]
-        keeper.array("parts.holders", codes, 0, self.tray + len(self.feeders.welds))
-        if keeper.takes_up:
-            self.masks.hold(dict(zip(bodies.tolist(), codes.tolist(), strict=True)))
-        self.feeders.keep(keeper)
-        self.hands.keep(keeper, self.copies)
-        self.strength.keep(keeper)
-        self.joining.keep(keeper)
-        self.welds.keep(keeper)
-        unit = keeper.value("parts.on_tray", self.on_tray, lambda v: v is None or up_to(np.inf)(v))
-        if unit is not None and any(
-            (label, unit) not in self.copies for label in self.labels(unit)
-        ):
-            raise ValueError("its tray carries what is not there")
-        self.on_tray = unit
 
     def grips(self) -> Iterator[tuple[int, int]]:
         """All welds by which holders hold parts, each with the code of its holder."""

@@ -14,7 +14,6 @@ from factory.mjcf import names
 from factory.mjcf.model import Model
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
-from factory.simulation.keeping import Keeper
 from factory.simulation.request import RunRequest
 from factory.support.engine import mujoco
 
@@ -104,10 +103,6 @@ class Passing:
         """Whether a robot's hand, which has nothing to hold, is where the next part comes down: one
         that holds from above comes when that is down."""
         return self._kinds[number] == "above" and not self.is_aside(number)
-
-    def keep(self, keeper: Keeper) -> None:
-        """Which robots have yet to deliver."""
-        keeper.array("passing.holds", self.holds, 0, 1)
 
     def clear(self) -> Truth:
         """Whether each robot (n,) is so far away with its part that the next can come down; or, if

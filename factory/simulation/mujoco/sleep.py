@@ -7,7 +7,6 @@ from collections.abc import Iterable
 import numpy as np
 
 from factory.control.mode import Index
-from factory.simulation.keeping import Keeper
 from factory.support.engine import mujoco
 
 MAY_SLEEP, STAYS_AWAKE = (
@@ -43,11 +42,6 @@ class Sleep:
         self._awake[axes] = False
         self._m.tree_sleep_policy[self._trees[axes]] = MAY_SLEEP
         self._m.tree_sleep_policy[self._trees[self._awake]] = STAYS_AWAKE
-
-    def keep(self, keeper: Keeper) -> None:
-        """Which axes stay awake; what sleeps is in the engine."""
-        keeper.array("sleep.awake", self._awake, 0, 1)
-        keeper.array("sleep.policy", self._m.tree_sleep_policy, 0, STAYS_AWAKE + 10)
 
     def wake(self, bodies: Iterable[int]) -> None:
         """Wake bodies that sleep, and keep those awake that are about to fall asleep."""

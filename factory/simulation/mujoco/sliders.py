@@ -16,7 +16,6 @@ from factory.layout.feeding import outlets_of
 from factory.mjcf import names
 from factory.mjcf.feeders import SLIDER_MASS
 from factory.mjcf.model import GRAVITY, Model, stroke_ticks
-from factory.simulation.keeping import Keeper
 from factory.simulation.mujoco.courses import Course, Move, planned, towards
 from factory.simulation.mujoco.drives import Drives
 from factory.simulation.mujoco.sleep import Sleep
@@ -144,13 +143,6 @@ class Sliders:
             at = np.rint(since).astype(np.intp) + steps
             at = np.clip(at, 0, setpoints.shape[2] - 1)
             self._drives.show(moving, setpoints[self._down[moving], moving, at])
-
-    def keep(self, keeper: Keeper) -> None:
-        """Which are under way, and what they carry."""
-        self._drives.keep(keeper, "sliders")
-        keeper.array("sliders.begun", self._begun)
-        keeper.array("sliders.ends", self.ends, high=NEVER)
-        keeper.array("sliders.down", self._down, 0, 1)
 
     def settle(self) -> None:
         """Sliders that have come to the end of their ways since stand. The engine lets them sleep

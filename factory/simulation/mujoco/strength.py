@@ -8,8 +8,7 @@ of mass bears the moment of the weight, too. All of it is of where the engine's 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import astuple, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,7 +19,6 @@ from factory.layout.hands.tips import TERMS, shares
 from factory.mjcf.grips import grips_of
 from factory.mjcf.model import Model
 from factory.mjcf.weld_frames import ROWS
-from factory.simulation.keeping import Keeper, is_size
 from factory.simulation.world import Drop
 from factory.support.engine import mujoco
 from factory.support.errors import Diagnostic
@@ -104,15 +102,6 @@ class Strength:
         weak = self._holds[found > 1.0].sum(axis=0) > 0
         return [self._grips[grip][1] for grip in grips[weak[grips]].tolist()]
 
-    def keep(self, keeper: Keeper) -> None:
-        """The largest share, and when hands are measured next. A run in which something has been
-        dropped is not gone on with."""
-        most = None if self.most is None else [*astuple(self.most)]
-        most = keeper.value("strength.most", most, lambda v: v is None or _is_use(v))
-        self.most = None if most is None else StrengthUse(*most)
-        self._next = keeper.number("strength.next", self._next, low=-np.inf)
-        self._risen = keeper.number("strength.risen", self._risen)
-
     def _keep(self, found: Array, grips: Index) -> None:
         """Keep the largest share of those that hold something."""
         holding = self._holds[:, grips].sum(axis=1) > 0
@@ -164,16 +153,6 @@ class Strength:
         )
         source = factory.by_label.get(use.label, factory.robots[robot])
         return Drop(now, Diagnostic("Dropped", message, source.position, STRONGER))
-
-
-def _is_use(value: Any) -> bool:
-    """Whether a value is a share, the name of a robot and a label."""
-    return (
-        isinstance(value, list)
-        and len(value) == 3
-        and is_size(value[0])
-        and all(isinstance(name, str) for name in value[1:])
-    )
 
 
 def _told(hand: Hand) -> str:

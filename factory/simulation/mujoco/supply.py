@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from factory.mjcf.model import Model
-from factory.simulation.keeping import Keeper
 from factory.simulation.request import RunRequest
 
 
@@ -30,13 +27,6 @@ class Supply:
     def rounds(self) -> dict[str, int]:
         """How many parts of each label have been taken."""
         return {label: unit // self.period for label, unit in self.next.items()}
-
-    def keep(self, keeper: Keeper) -> None:
-        """Which units come next."""
-        self.released = keeper.whole("supply.released", self.released)
-        rounds = np.array([*self.next.values()])
-        keeper.array("supply.next", rounds, 0)
-        self.next = dict(zip(self.next, rounds.tolist(), strict=True))
 
     def wants(self, label: str) -> bool:
         """Whether some unit has yet to get its part."""

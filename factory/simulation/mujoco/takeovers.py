@@ -6,7 +6,6 @@ import numpy as np
 
 from factory.control.mode import Array, Index
 from factory.mjcf.weld_frames import WeldFrames
-from factory.simulation.keeping import Keeper
 from factory.support.engine import mujoco
 
 
@@ -20,13 +19,6 @@ class Takeovers:
         self.count, self.gap, self.turn, self.off = 0, 0.0, 0.0, 0.0
         self._d, self._frames, self._radii = d, WeldFrames.of(m, d), radii
         self._qpos = m.jnt_qposadr[m.body_jntadr][:, None] + np.arange(7)
-
-    def keep(self, keeper: Keeper) -> None:
-        """What has been measured."""
-        self.count = keeper.whole("taken.count", self.count)
-        self.gap = keeper.number("taken.gap", self.gap, 0)
-        self.turn = keeper.number("taken.turn", self.turn, 0)
-        self.off = keeper.number("taken.off", self.off, 0)
 
     def measure(self, welds: Index, bodies: Index) -> None:
         """Welds close on bodies: where those are now, while `xpos` tells of where the last step

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from factory.control.mode import Truth
-from factory.simulation.keeping import Keeper
 
 
 class Turns:
@@ -45,11 +44,6 @@ class Turns:
         self.now[number] = False
         self.now[then] = True
         return then
-
-    def keep(self, keeper: Keeper) -> None:
-        """Whose turn it is."""
-        keeper.array("turns.now", self.now, 0, 1)
-        keeper.array("turns.vacant", self.vacant, 0, 1)
 
     def any_of(self, chosen: Truth) -> Truth:
         """Whether one of those that share its robot is chosen, for each (n,)."""

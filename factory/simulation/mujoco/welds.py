@@ -9,7 +9,6 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from factory.control.mode import Array
-from factory.simulation.keeping import Keeper, maybe_size
 from factory.simulation.mujoco.contacts import ContactMasks
 from factory.simulation.mujoco.pad_gaps import PadGaps
 from factory.simulation.mujoco.sleep import Sleep
@@ -95,14 +94,6 @@ class Welds:
         self.masks.hold(self._held)
         for gathered in (self._on, self._off, self._gripped, self._held, self._placed):
             gathered.clear()
-
-    def keep(self, keeper: Keeper) -> None:
-        """What was measured of those that have been switched. Nothing is gathered between ticks;
-        which are on, and on what, is in the engine."""
-        self.taken.keep(keeper)
-        largest = self.pads.largest
-        self.pads.largest = keeper.value("pads.gap", largest, maybe_size)
-        self.closed = keeper.number("welds.closed", self.closed, low=-np.inf)
 
     def _put(self) -> None:
         """Put bodies where they belong; `xpos` too, which the engine renews in its next step."""

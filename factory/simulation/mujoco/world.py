@@ -20,8 +20,6 @@ from factory.layout.layout import Layout
 from factory.mjcf.loading import load
 from factory.mjcf.model import Model
 from factory.plant.factory import Operation
-from factory.simulation.keeping import Keeper
-from factory.simulation.mujoco.engine_state import keep_engine
 from factory.simulation.mujoco.fast.neighbours import Neighbours
 from factory.simulation.mujoco.fast.strides import Strides
 from factory.simulation.mujoco.hands_away import HandsAway
@@ -261,16 +259,6 @@ class MujocoWorld:
                 name = mujoco.mjtWarning(kind).name.removeprefix("mjWARN_BAD").lower()
                 return f"the simulation became unstable ({name} is nan or huge)"
         return ""
-
-    def keep(self, keeper: Keeper, bundle: Bundle | None, axes: Index) -> None:
-        """All that goes on, with the modes under way."""
-        keep_engine(keeper, self.m, self.d)
-        self._unseen = keeper.whole("unseen", self._unseen)
-        self.supplied = keeper.flag("supplied", self.supplied)
-        self.parts.keep(keeper)
-        self.motion.keep(keeper, bundle, axes)
-        self._away.keep(keeper)
-        self.inspection.keep(keeper)
 
     def figures(self) -> PhysicsFigures:
         """The figures of the run so far."""

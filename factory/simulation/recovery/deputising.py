@@ -12,7 +12,6 @@ from factory.layout.standby import deputies_in, part_of
 from factory.modes.modes import operation_modes, robot_limits
 from factory.modes.staging import stages_of, with_time
 from factory.nets.undone import Undone
-from factory.nets.verify import proved
 from factory.record.exchange import Exchange
 from factory.simulation.recovery.books import Books
 from factory.simulation.simulation import Simulation
@@ -60,17 +59,6 @@ class Deputising:
     def take_over(self, robot: int, dead: Container[int]) -> Successors | None:
         """What changes as the deputy of a robot takes over; None where it cannot any more."""
         return self._change(robot, self.by_robot.pop(robot), dead)
-
-    def again(self, undone: Undone) -> Successors:
-        """What changed as a record says. Raises ValueError where that is not possible."""
-        number = {robot.name: robot.index for robot in self._books.factory.robots}
-        dead, deputy = (number[name] for name in undone.robots)
-        known = deputies_in(self._simulation.layout).get(dead) == deputy
-        change = self._change(dead, deputy, ()) if known else None
-        if change is None:
-            raise ValueError("{1} is no deputy of {0}".format(*undone.robots))
-        proved(change.takeover.after.net)
-        return change
 
     def _change(self, robot: int, deputy: int, dead: Container[int]) -> Successors | None:
         books, factory = self._books, self._books.factory

@@ -8,7 +8,6 @@ from factory.layout.layout import Layout
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
 from factory.simulation.ideal import IdealWorld
-from factory.simulation.keeping import LARGE, Keeper, one_of, up_to
 from factory.simulation.recovery.books import Books
 from factory.simulation.recovery.faults import WorldFault
 from factory.simulation.simulation import Simulation
@@ -141,16 +140,6 @@ class IdealPlant:
     def closed(self) -> frozenset[int]:
         """Nothing is in the way."""
         return frozenset()
-
-    @property
-    def is_calm(self) -> bool:
-        """Whether robots hold what they should, and feeders show what is good."""
-        return not (self._gone or self._slipped or self._bad)
-
-    def keep(self, keeper: Keeper) -> None:
-        """What feeders show."""
-        labels = one_of({leaf.label for leaf in self._books.factory.leaves})
-        self._shown = dict(keeper.rows("shown", self._shown.items(), labels, up_to(LARGE)))
 
     def clear_out(self, robot: int, layout: Layout) -> None:
         """A dead robot is taken away for good."""

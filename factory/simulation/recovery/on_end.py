@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field
 
-from factory.plant.factory import Factory, Operation
+from factory.plant.factory import Operation
 from factory.problem.template import Kind, Response
-from factory.simulation.keeping import LARGE, Keeper, one_of, up_to
 
 
 @dataclass(slots=True)
@@ -24,11 +23,3 @@ class OnEnd:
         responses = next((f.responses for f in failures if f.test == test), none)
         left = (r for r in responses if r.kind != "again" or tried < r.times)
         return next((response.kind for response in left), "scrap")
-
-    def keep(self, keeper: Keeper, factory: Factory) -> None:
-        """Keep both counts, or take them up."""
-        numbers, names = up_to(len(factory.operations)), one_of({*factory.by_label})
-        count = up_to(LARGE)
-        tried = keeper.rows("failures.tried", self.tried.items(), numbers, count)
-        scrapped = keeper.rows("failures.scrapped", self.scrapped.items(), names, count)
-        self.tried, self.scrapped = Counter(dict(tried)), Counter(dict(scrapped))

@@ -7,7 +7,6 @@ from typing import Protocol
 
 from factory.layout.layout import Layout
 from factory.plant.factory import Operation
-from factory.simulation.keeping import Keeper
 from factory.simulation.recovery.faults import WorldFault
 
 
@@ -116,13 +115,6 @@ class Plant(Protocol):
     @property
     def spilled(self) -> Sequence[str]:
         """The robots, by name, that have let scrap fall where there is no bin for it."""
-
-    @property
-    def is_calm(self) -> bool:
-        """Whether everything is where it should be, as far as it can be."""
-
-    def keep(self, keeper: Keeper) -> None:
-        """What goes on beside the world, while all is calm."""
 
     @property
     def contacts(self) -> int:

@@ -13,7 +13,6 @@ from factory.plant.factory import Factory, Operation
 from factory.problem.template import Failure
 from factory.record.exchange import Exchange
 from factory.record.failures import Failing, Failures, Stood
-from factory.simulation.keeping import Keeper
 from factory.simulation.recovery.books import Books
 from factory.simulation.recovery.counting import summed
 from factory.simulation.recovery.faults import Campaign, WorldFault
@@ -192,30 +191,6 @@ class Recovery:
     def given(self) -> Mapping[str, object]:
         """The campaign, as values of JSON."""
         return dict(table_of(self._campaign))
-
-    @property
-    def is_calm(self) -> bool:
-        """Whether nothing is wrong now: all that `keep` keeps is what was."""
-        busy = self.pending or self.simulation.world.hooks.before_step
-        return not busy and all(one.is_calm for one in self._kept)
-
-    def exchange_again(self, undone: Undone) -> None:
-        """Take over an exchange of robots in the record of this run. Raises ValueError where it can
-        be none of it."""
-        self.responding.exchange_again(undone)
-
-    def keep(self, keeper: Keeper) -> None:
-        """What went wrong so far and what is drawn next, while all is calm, after the simulation.
-        Raises ValueError where what is taken up is no state of this run."""
-        hooks, events = self.simulation.world.hooks, self.books.supervisor.events
-        for one in self._kept:
-            one.keep(keeper)
-        self._seen = keeper.whole("recovery.seen", self._seen, 0, len(events))
-        hooks.busy = keeper.number("recovery.busy", hooks.busy, 0)
-
-    @property
-    def _kept(self) -> tuple[Striking, Responding, Plant]:
-        return self.striking, self.responding, self.plant
 
     def strike(self, fault: WorldFault) -> None:
         """A fault strikes as soon as it can, whatever it says of when."""

@@ -5,7 +5,6 @@ for any more."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import astuple
 from functools import partial
 
 import numpy as np
@@ -18,7 +17,6 @@ from factory.plant.factory import Operation
 from factory.plant.material import joins_of
 from factory.problem.pag import NOPART
 from factory.record.failures import Failing
-from factory.simulation.keeping import Keeper, is_size, is_text, maybe_size, one_of, some_of, up_to
 from factory.simulation.recovery.books import Books
 from factory.simulation.recovery.deputising import Deputising, Successors
 from factory.simulation.recovery.faults import Campaign
@@ -60,36 +58,6 @@ class Responding:
         self._on_end = OnEnd()
         self._wasting = Wasting(not_carried_back(simulation.layout))
         self.deputising = Deputising(simulation, books)
-
-    @property
-    def is_calm(self) -> bool:
-        """Whether all robots are at work, or wait for it."""
-        return not (self.dead or self.returning.ways) and self.standing.is_calm
-
-    def keep(self, keeper: Keeper) -> None:
-        """What failed, and how often on end, while all is calm."""
-        factory, spares = self._books.factory, self._campaign.spares
-        labels, robots = {*factory.by_label}, {"", *(robot.name for robot in factory.robots)}
-        found = [astuple(one) for one in self.found]
-        tests = (
-            is_size,
-            is_text,
-            one_of(labels),
-            one_of(robots),
-            is_text,
-            some_of(labels),
-            maybe_size,
-        )
-        found = keeper.rows("failures", found, *tests, one_of(robots))
-        self.found = [
-            Failing(t, test, label, robot, response, tuple(things), until, deputy)
-            for t, test, label, robot, response, things, until, deputy in found
-        ]
-        self.used_spares = keeper.whole("spares", self.used_spares, 0, spares)
-        self._on_end.keep(keeper, factory)
-        held = up_to(len(factory.robots)), is_text
-        self._wasting.held = dict(keeper.rows("scrap.held", self._wasting.held.items(), *held))
-        self.standing.keep(keeper)
 
     def passed(self, operation: Operation) -> None:
         """An operation has come to its goal and is good."""
@@ -234,12 +202,6 @@ class Responding:
         supervisor.recall(self.standing.axes(going | scrap))
         self._send_back(sorted(going | scrap), over, marking)
         return True
-
-    def exchange_again(self, undone: Undone) -> None:
-        """Take over an exchange of robots in the record of this run."""
-        change, fired = self.deputising.again(undone), self._books.supervisor.without(undone)
-        self._plant.exchange(change.takeover.dead, change.layout)
-        self._exchange(change, fired, undone)
 
     def _exchange(self, change: Successors, fired: tuple[int, ...], undone: Undone) -> None:
         """The net and all that is derived from it are exchanged."""

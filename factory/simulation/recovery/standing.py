@@ -11,7 +11,6 @@ from factory.control.mode import STILL, Limits, Mode
 from factory.control.navigation import Bundle
 from factory.plant.factory import Operation
 from factory.record.failures import Stood
-from factory.simulation.keeping import LARGE, Keeper, is_size, some_of, up_to
 from factory.simulation.simulation import Simulation
 from factory.simulation.supervisor import Supervisor
 
@@ -55,23 +54,6 @@ class Standing:
         every = self._simulation.layout.factory.robots
         names = tuple(every[robot].name for robot in sorted(chosen))
         self.stood.append((self._simulation.world.time, names))
-
-    @property
-    def is_calm(self) -> bool:
-        """Whether no robot stands."""
-        return not self._now
-
-    def keep(self, keeper: Keeper) -> None:
-        """When operations began, and robots went ahead, and which stood, while none does."""
-        factory = self._simulation.layout.factory
-        begun, names = self._begun.items(), {robot.name for robot in factory.robots}
-        self._begun = dict(
-            keeper.rows("standing.begun", begun, up_to(len(factory.operations)), is_size)
-        )
-        went = keeper.rows("standing.went", self._went.items(), up_to(LARGE), is_size)
-        self._went = dict(went)
-        stood = keeper.rows("standing.stood", self.stood, is_size, some_of(names))
-        self.stood = [(t, tuple(robots)) for t, robots in stood]
 
     def limit(self, limits: Limits) -> None:
         """From now on these are the limits of robots that do not stand."""

@@ -8,8 +8,7 @@ import numpy as np
 
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
-from factory.simulation.keeping import LARGE, Keeper, keep_draws, one_of, up_to
-from factory.simulation.recovery.faults import KINDS, Campaign, WorldFault
+from factory.simulation.recovery.faults import Campaign, WorldFault
 from factory.simulation.recovery.plant import Plant
 
 EARLY, LATE = 0.1, 0.9
@@ -72,20 +71,6 @@ class Striking:
             self.starve(label, now + fault.seconds)
         if fault := self._strikes("blackout", unit, now, label):
             self.darken(now + fault.seconds)
-
-    @property
-    def is_calm(self) -> bool:
-        """Whether nothing is about to strike, or lasts."""
-        return not (self._due or self.empty or self.standing) and self.dark == -np.inf
-
-    def keep(self, keeper: Keeper) -> None:
-        """What has struck, and what is drawn next, while all is calm."""
-        keep_draws(keeper, "striking.draws", self._draw)
-        spent = [(number,) for number in sorted(self._spent)]
-        spent = keeper.rows("striking.spent", spent, up_to(len(self._faults)))
-        kinds, count = one_of((*KINDS, "knocked")), up_to(LARGE)
-        self.struck = dict(keeper.rows("striking.struck", self.struck.items(), kinds, count))
-        self._spent = {number for (number,) in spent}
 
     def stand(self, robot: int, until: float) -> None:
         """A robot (index) stands until then [s]."""

@@ -56,11 +56,11 @@ def section(results: dict[str, Any]) -> str:
             f"{kills} kills (`kill -9`) at random times of {len(rows)} runs, each gone on with by"
             f" `factory run --resume`. All made their units, refine the net, touched nothing, and"
             f" the monitor agrees; **{same} of {len(rows)}** logs are, tick by tick, that of a run"
-            " that was never killed. Where things go wrong (`faults.toml`: parts are dropped, come"
-            " bad, askew or late, joints slip, a robot dies), a run goes on from the last moment in"
-            " which nothing was wrong, before a deputy took over or after it.",
+            " that was never killed. In some things go wrong (`faults.toml`: parts are dropped,"
+            " come bad, askew or late, joints slip, a robot dies). *Log ends*: the time up to which"
+            " each resume makes its run again.",
             table(
-                ("factory run", "lasts [s]", "killed", "gone on from [s]", "the same log"),
+                ("factory run", "lasts [s]", "kills", "log ends [s]", "the same log"),
                 [
                     (
                         f"`{row['run']}`",

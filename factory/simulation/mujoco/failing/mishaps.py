@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from factory.plant.factory import Operation
-from factory.simulation.keeping import Keeper
 from factory.simulation.mujoco.failing.fallen import Fallen
 from factory.simulation.mujoco.pressing import PRESSED
 from factory.simulation.mujoco.world import MujocoWorld
@@ -48,19 +47,6 @@ class Mishaps:
         self.unseen: dict[int, str] = {}
         self.askew: dict[int, tuple[int, int]] = {}
         self.gone: list[str] = []
-
-    @property
-    def is_calm(self) -> bool:
-        """Whether nothing has slipped or is no good."""
-        slipped = self.slips or self._settling or self.opened or self.askew
-        return not (slipped or self.bad or self.unseen or self.gone)
-
-    def keep(self, keeper: Keeper) -> None:
-        """How feeders hold what they show, or have shown last."""
-        welds = [*self._world.parts.feeders.welds.values()]
-        held = self._world.m.eq_data[welds]
-        keeper.array("feeders.held", held)
-        self._world.m.eq_data[welds] = held
 
     def open(self, robot: int) -> None:
         """A robot's hand opens."""

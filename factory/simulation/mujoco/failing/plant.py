@@ -10,7 +10,6 @@ from factory.layout.bins import Bin
 from factory.layout.layout import Layout
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
-from factory.simulation.keeping import Keeper, one_of, up_to
 from factory.simulation.mujoco.failing.fallen import Fallen
 from factory.simulation.mujoco.failing.mishaps import Mishaps
 from factory.simulation.mujoco.failing.sensors import Senses
@@ -261,32 +260,6 @@ class MujocoPlant:
     def contacts(self) -> int:
         """Pairs of things that touched of which one had fallen, or lay askew."""
         return len(self._world.inspection.pressing.touched)
-
-    @property
-    def is_calm(self) -> bool:
-        """Whether nothing has fallen or slipped, is askew or taken back."""
-        back, pressing = self._world.parts.feeders.back, self._world.inspection.pressing
-        about = self._fallen.heaps or pressing.fallen or pressing.shaken
-        taken = back.parts or back.fresh or back.awaited
-        return not (about or taken) and self._mishaps.is_calm and self._senses.is_calm
-
-    def keep(self, keeper: Keeper) -> None:
-        """What was scrapped and touched, what feeders' cameras have seen, and noise to come."""
-        world, leaves = self._world, {leaf.label for leaf in self._factory.leaves}
-        back, pressing, a_geom = world.parts.feeders.back, world.inspection.pressing, world.m.ngeom
-        robots = {robot.name for robot in self._factory.robots}
-        self._scrapped = keeper.whole("scrap", self._scrapped, SCRAP)
-        self._fallen.binned = keeper.whole("binned", self._fallen.binned)
-        spilled = [(name,) for name in self.spilled]
-        self.spilled = [name for (name,) in keeper.rows("spilled", spilled, one_of(robots))]
-        good = [(label,) for label in sorted(back.good)]
-        back.good = {label for (label,) in keeper.rows("feeders.good", good, one_of(leaves))}
-        touched = sorted(pressing.touched)
-        touched = keeper.rows("fallen.touched", touched, up_to(a_geom), up_to(a_geom))
-        pressing.touched = {*touched}
-        back.fresh = {}  # of the parts that are shown where a run begins
-        self._mishaps.keep(keeper)
-        self._senses.keep(keeper)
 
     def lift_out(self, robot: int, at: Mapping[int, float]) -> None:
         """A dead robot and what it holds are taken away, and another is put in its place, with its

@@ -7,7 +7,6 @@ import numpy as np
 from factory.control.mode import Array, Index
 from factory.mjcf.weld_frames import WeldFrames
 from factory.plant.factory import Operation
-from factory.simulation.keeping import Keeper, keep_draws
 from factory.simulation.mujoco.world import MujocoWorld
 from factory.simulation.recovery.faults import Campaign
 
@@ -27,15 +26,6 @@ class Senses:
         self._frames, self._seen = WeldFrames.of(world.m, world.d), -1
         self._welds = self._bodies = self._robots = np.empty(0, np.intp)
         self._since: dict[int, float] = {}
-
-    @property
-    def is_calm(self) -> bool:
-        """Whether robots feel all that they hold."""
-        return not self._since
-
-    def keep(self, keeper: Keeper) -> None:
-        """Noise to come."""
-        keep_draws(keeper, "sensors.draws", self._draw)
 
     def unfelt(self) -> frozenset[int]:
         """The robots (index) that do not feel now what they hold: there is no grip, or it is not in

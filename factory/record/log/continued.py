@@ -1,0 +1,124 @@
+"""The log of a run that is made again: compared with it up to where the log ends, then written
+on."""
+
+from __future__ import annotations
+
+from io import FileIO
+from typing import Any
+
+from factory.nets.undone import Entry, Undone
+from factory.record.log.blocks import blocks
+from factory.record.log.reader import Log, header_in
+from factory.record.log.writer import LogWriter
+from factory.record.observed import Observed, Recorder
+from factory.support.errors import Diagnostic, InputError
+from factory.support.files import AGAIN
+
+HINT = (
+    "the log was changed or comes from another machine, or something took part in its run that a "
+    f"log does not keep, such as a push; {AGAIN}"
+)
+
+
+def last_full(data: memoryview, rows: int) -> tuple[int, float]:
+    """The byte after the last block of ticks that the end of its run did not cut short, and the
+    time there [s]; the byte after the model, and 0, where there is none. `rows`: what such a block
+    has at least. Raises ValueError for what is no log."""
+    end, time = header_in(data)[1], 0.0
+    for kind, arrays, after in blocks(data, end):
+        if kind == b"M":
+            end = after
+        count = len(arrays["time"]) if kind == b"T" else 0
+        if count >= rows and count - 1 not in arrays["ended_at"]:
+            end, time = after, float(arrays["time"][-1])
+    return end, time
+
+
+class Continued(Recorder):
+    """Compares a simulation with its `log` up to the time `since` [s]: its events and, in the ticks
+    that have some and at the end, its positions. Then it writes the log on from byte `end`. `file`:
+    the log, claimed; until then it stays as it is.
+
+    `observe` and `end` raise InputError (BadLog) where the simulation is not the run in the log.
+    """
+
+    def __init__(
+        self, simulation: Observed, log: Log, file: FileIO, end: int, since: float
+    ) -> None:
+        self.simulation, self.log, self.file, self.since = simulation, log, file, since
+        self.writer: LogWriter | None = None
+        self._end, self._seen = end, 0
+        if not since:
+            self._write_on()
+
+    def _write_on(self) -> None:
+        self.file.truncate(self._end)
+        self.file.seek(self._end)
+        self.writer = LogWriter(str(self.file.name), self.simulation, going_on=self.file)
+
+    def observe(self, world: Any, supervisor: Any) -> None:
+        """Compare a state, or write it on."""
+        if self.writer is not None:
+            self.writer.observe(world, supervisor)
+            return
+        is_there = world.time >= self.since
+        if len(supervisor.events) > self._seen or is_there:
+            self._compare_events(world.time, supervisor.events)
+            self._compare_state(world)
+        if is_there:
+            self._write_on()
+
+    def _compare_events(self, time: float, events: list[Any]) -> None:
+        logged, begin = self.log.timed_entries, self._seen
+        self._seen = len(events)
+        for number, event in enumerate(events[begin:], start=begin):
+            entry = event if isinstance(event, Undone) else event.transition
+            was = logged[number] if number < len(logged) else None
+            if was != (event.t, entry):
+                raise self._another(event.t, _fired(was), _fired((event.t, entry)))
+        if self._seen < len(logged) and logged[self._seen][0] < time:
+            raise self._another(time, _fired(logged[self._seen]), "no such event")
+
+    def _compare_state(self, world: Any) -> None:
+        log, row = self.log, self.log.row_at(world.time)
+        if row == len(log) or log.time[row] != world.time:
+            raise self._another(world.time, "no state of that time", "one")
+        made, products = world.delivered() - self.simulation.before, int(log.delivered[row])
+        if made != products:
+            raise self._another(world.time, f"{products} products", f"{made}")
+        now = world.x if self.simulation.model is None else world.d.qpos
+        if (other := now != log.qpos[row]).any():
+            at = int(other.argmax())
+            words = f"{log.qpos[row][at]!r} at position {at}", f"{now[at]!r}"
+            raise self._another(world.time, *words)
+
+    def _another(self, time: float, logged: str, again: str) -> InputError:
+        """The error of a run that is not as logged."""
+        words = f"at {time:.3f} s it has {logged}, and the run made again has {again}"
+        message = f"'{self.file.name}' is not what its header makes here: {words}"
+        return InputError(Diagnostic("BadLog", message, None, HINT))
+
+    def end(self, trouble: Diagnostic | None) -> None:
+        """The run is over. Raises InputError where the log has more of it."""
+        if self.writer is None:
+            words = trouble.message if trouble else "its last product"
+            raise self._another(self.since, "more states", f"come to its end: {words}")
+        self.writer.end(trouble)
+
+    def __exit__(self, *raised: object) -> None:
+        if self.writer is None:
+            self.close()
+        else:
+            self.writer.__exit__(*raised)
+
+    def close(self) -> None:
+        """Write what is left, and the end, where the log was written on."""
+        (self.writer or self.file).close()
+
+
+def _fired(entry: tuple[float, Entry] | None) -> str:
+    """An event in words."""
+    if entry is None:
+        return "no more events"
+    time, what = entry
+    return f"'{what if isinstance(what, str) else what.operation + ' undone'}' at {time:.3f} s"
