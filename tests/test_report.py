@@ -271,9 +271,9 @@ def test_hostile_labels_are_text() -> None:
     ("change", "words"),
     [
         (lambda h: h.pop("product"), "'product'"),
-        (lambda h: h.update(start=[0, 99]), "out of range"),
-        (lambda h: h["pag"].update(file=3), "'pag.file' must be a text"),
-        (lambda h: h.update(seed="x"), "'seed' must be a whole number"),
+        (lambda h: h.update(start=[0, 99]), "start must be numbers of places, below 19"),
+        (lambda h: h["pag"].update(file=3), "'header.pag.file' must be a text"),
+        (lambda h: h.update(seed="x"), "'header.seed' must be a whole number"),
     ],
     ids=["product", "start", "file", "seed"],
 )
