@@ -267,16 +267,14 @@ def test_a_forgotten_grip_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_forgotten_holder_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Neighbours of every other holder only."""
-    meets = Neighbours._meets
+    meeting = neighbours._meeting
 
-    def forgetful(self: Neighbours, holder: int) -> np.ndarray:
-        found = meets(self, holder)
-        if holder % 2:
-            found = np.zeros_like(found)
-            found[holder] = True
+    def forgetful(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+        found = meeting(low, high)
+        found[1::2] = np.eye(len(found), dtype=bool)[1::2]
         return found
 
-    monkeypatch.setattr(Neighbours, "_meets", forgetful)
+    monkeypatch.setattr(neighbours, "_meeting", forgetful)
     assert overlooked_in_run("20")
 
 

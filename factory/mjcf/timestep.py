@@ -51,6 +51,10 @@ DIP, DEEPEST = 1.9e-5, 2.5e-4
 each m/s² of the slider, in timesteps of a tick, measured; and it may be so far: a pad then presses
 on it by half as much as it may."""
 
+CRUISES = 0.7
+"""The tray's share of a jump by twice its acceleration: between gaining speed and braking it goes
+at one speed for a while (`layout/outfeed.py`)."""
+
 SURE = 1.25
 """Measured errors are up to so many times the formula's: 630 random runs at 10 ms."""
 
@@ -171,9 +175,7 @@ def _axes(settings: Settings, layout: Layout, jitter: float) -> Iterator[DrivenA
         push, stiff = a + GRAVITY, HOIST_STIFFNESS
         yield DrivenAxis(HOIST_MASS, load, a, push, stiff, 1 - jitter, held=held, room=room)
     fast = settings.outfeed_acceleration
-    reverses = layout.outfeed_way * fast < 1.2 * settings.outfeed**2
     product = masses[factory.products[0]]
-    jump = 1.0 if reverses else 0.7
-    yield DrivenAxis.loaded(TRAY_MASS, product, fast, gain=1.0, jump=jump, room=far)
+    yield DrivenAxis.loaded(TRAY_MASS, product, fast, gain=1.0, jump=CRUISES, room=far)
     shut = settings.shutter_limits[1]
     yield DrivenAxis(HOIST_MASS, 0.0, shut, shut + GRAVITY, HOIST_STIFFNESS, gain=1.0)

@@ -49,7 +49,7 @@ class Hooks:
 
     def admit(self, operation: Operation, unit: int) -> bool:
         """Whether all gates are open for an operation."""
-        return all(gate(operation, unit) for gate in self.gates)
+        return not self.gates or all(gate(operation, unit) for gate in self.gates)
 
     def pass_on(self, operation: Operation, unit: int) -> bool:
         """Whether all judges let an operation end."""

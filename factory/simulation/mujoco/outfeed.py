@@ -7,6 +7,7 @@ import numpy as np
 
 from factory.control.mode import Array
 from factory.layout.dimensions import BEHIND, PLAY
+from factory.layout.outfeed import tray_profile
 from factory.mjcf.model import GRAVITY, Model
 from factory.mjcf.outfeed import SHUTTER_MASS
 from factory.simulation.mujoco.axes import Axes
@@ -40,9 +41,9 @@ class Outfeed:
         self._product = model.masses[model.factory.products[0]]
         self._far = model.layout.outfeed_way, -model.layout.shutter_stroke
         drives.load(self.axes, np.zeros(2), WEIGHT)
-        settings = model.settings
-        tray = settings.outfeed, settings.outfeed_acceleration
-        speed, acceleration = np.array([tray, settings.shutter_limits]).T
+        tray = tray_profile(model.layout, model.settings)
+        limits = (tray.speed, tray.acceleration), model.settings.shutter_limits
+        speed, acceleration = np.array(limits).T
         self._limits = speed, acceleration
 
     def send(self, loaded: bool) -> None:

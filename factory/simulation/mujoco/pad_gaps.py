@@ -5,7 +5,7 @@ All of it is of now: the engine tells of where its last step began.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -34,9 +34,9 @@ class PadGaps:
                 moved = d.qpos[self._frames.along[weld]] @ self._frames.way[weld]
                 self._at_zero[pads] = d.geom_xpos[pads] - moved
 
-    def measure(self, on: Mapping[int, int], off: Iterable[int]) -> None:
-        """Measure welds that are about to be switched `on`, each with its body, while others go
-        `off`."""
+    def measure(self, on: Mapping[int, int]) -> None:
+        """Measure welds that are about to be switched on, each with its body. A holder that lets go
+        of parts for what they have become has taken that before."""
         taken: dict[int, tuple[int, list[int]]] = {}
         for weld, body in on.items():
             holder = int(self._m.eq_obj1id[weld])
@@ -44,11 +44,9 @@ class PadGaps:
                 taken.setdefault(holder, (weld, []))[1].append(body)
         if not taken:
             return
-        active = self._d.eq_active.copy()
-        active[[*off, *on]] = 0
-        busy = np.bincount(self._m.eq_obj1id[active > 0], minlength=self._m.nbody)
+        busy = {*self._m.eq_obj1id[self._d.eq_active > 0].tolist()}
         for holder, (weld, bodies) in taken.items():
-            if not busy[holder]:
+            if holder not in busy:
                 self._pads_of(holder, weld, bodies)
 
     def _pads_of(self, holder: int, weld: int, bodies: Sequence[int]) -> None:

@@ -94,6 +94,11 @@ class Sliders:
         self._begun, self.ends = np.zeros(len(outlets)), np.full(len(outlets), NEVER)
         self._down = np.zeros(len(outlets), np.intp)
 
+    @property
+    def time(self) -> float:
+        """[s]"""
+        return self._drives.time
+
     def _load(self, chosen: Index, loaded: bool) -> None:
         """Sliders carry their loads, or nothing."""
         load = self._loads[chosen] * loaded

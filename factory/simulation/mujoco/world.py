@@ -22,6 +22,7 @@ from factory.mjcf.model import Model
 from factory.plant.factory import Operation
 from factory.simulation.mujoco.fast.neighbours import Neighbours
 from factory.simulation.mujoco.fast.strides import Strides
+from factory.simulation.mujoco.feeders import ROUNDED
 from factory.simulation.mujoco.hands_away import HandsAway
 from factory.simulation.mujoco.inspection import Inspection
 from factory.simulation.mujoco.motion import Motion
@@ -33,9 +34,6 @@ from factory.simulation.request import RunRequest
 from factory.simulation.run import PhysicsFigures
 from factory.simulation.world import Drop, Hooks, Job
 from factory.support.engine import by_name, mujoco
-
-ROUNDED = 0.01
-"""What is due so much of a tick later is due."""
 
 GIVEN_UP = tuple(
     int(getattr(mujoco.mjtWarning, f"mjWARN_{name}"))
@@ -107,8 +105,7 @@ class MujocoWorld:
         if not self.hooks.admit(operation, unit) or self._away.hold_up(operation):
             return False
         if self.parts.feeders.serves(operation.label):
-            now = self.time + ROUNDED * self.model.settings.tick
-            return self.parts.feeders.presents(operation.label, unit, now)
+            return self.parts.feeders.presents(operation.label, unit)
         if not self.model.factory.drops(operation.index):
             return True
         outfeed = self.motion.outfeed
@@ -212,7 +209,7 @@ class MujocoWorld:
         if looks:
             self._look()
         outfeed, unit, feeders = self.motion.outfeed, self.parts.on_tray, self.parts.feeders
-        if feeders.due <= self.time + ROUNDED * self.model.settings.tick:
+        if feeders.due <= feeders.now:
             feeders.due, self.supplied = NEVER, True
         if outfeed.busy and outfeed.rests():
             self.supplied = True

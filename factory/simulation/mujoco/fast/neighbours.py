@@ -10,8 +10,6 @@ time in which nothing does.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 
 from factory.control.mode import Array, Index, Truth
@@ -48,10 +46,10 @@ class Neighbours:
         count = parts.masks.own(trees, parts.tray + len(parts.feeders.welds)) + 1
         self.culls, self._calm = count > FEW, -np.inf
         self._seen = np.ones(count, bool)
-        self._met: dict[int, Truth] = {}
         if self.culls:
             mujoco.mj_kinematics(m, d)
             self._box = _swept(m, d, parts, axes, self._holder, count)
+            self._meets = _meeting(*self._box)
             self._bodies = _of_trees(m, parts.masks.code)
             slides, lengths = _slides(parts, axes)
             self._address, self._ways = axes.qpos[slides], (-ASTRAY, lengths + ASTRAY)
@@ -65,7 +63,7 @@ class Neighbours:
         moves[self._holder[active]] = True
         moves[NOBODY] = False
         self._seen = np.zeros_like(moves)
-        self._include(moves.nonzero()[0].tolist())
+        self._include(moves.nonzero()[0])
 
     @property
     def complete(self) -> bool:
@@ -83,13 +81,12 @@ class Neighbours:
         """Look at holders that have been given something, too."""
         if self._masks.fresh:
             if self.culls:
-                self._include(self._masks.fresh - {NOBODY})
+                self._include(np.array([*self._masks.fresh - {NOBODY}], np.intp))
             self._masks.fresh.clear()
 
-    def _include(self, holders: Iterable[int]) -> None:
+    def _include(self, holders: Index) -> None:
         """Look at holders and all that they can meet, too."""
-        for holder in holders:
-            self._seen |= self._meets(holder)
+        self._seen |= self._meets[holders].any(axis=0)
         self._masks.look(self._seen)
 
     def everything(self) -> None:
@@ -98,16 +95,6 @@ class Neighbours:
         if not self.complete:
             self._seen[:] = True
             self._masks.look(self._seen)
-
-    def _meets(self, holder: int) -> Truth:
-        """The holders whose boxes come near that of one."""
-        found = self._met.get(holder)
-        if found is None:
-            low, high = self._box
-            found = ((low <= high[holder]) & (high >= low[holder])).all(axis=1)
-            found[holder] = True
-            self._met[holder] = found
-        return found
 
 
 def _holders(parts: Parts, axes: Axes) -> Index:
@@ -131,6 +118,13 @@ def _of_trees(m: mujoco.MjModel, code: Index) -> Index:
         moving = bodies[m.body_treeid[bodies] >= 0]
         found[m.body_treeid[moving]] = moving
     return found
+
+
+def _meeting(low: Array, high: Array) -> Truth:
+    """Which boxes (n, n) come near each other, with these corners (n, 2) [m]; each is near itself,
+    empty ones too."""
+    near = np.eye(len(low), dtype=bool)
+    return near | ((low[:, None] <= high) & (high[:, None] >= low)).all(axis=2)
 
 
 def _swept(
