@@ -4,6 +4,7 @@ from what is kept, so that sections can be renewed one by one."""
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import os
 import platform
@@ -17,7 +18,12 @@ from pathlib import Path
 from time import perf_counter
 from types import ModuleType
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
+ROOT = Path(__file__).resolve().parent.parent
+
+DOCS = ROOT / "docs"
+
+PHYSICS = ("factory/layout", "factory/mjcf", "factory/simulation", "mjcf")
+"""The folders on which what is measured depends."""
 
 
 @dataclass(frozen=True)
@@ -47,11 +53,18 @@ class Report:
         parser = argparse.ArgumentParser(prog=f"python -m {self.package}", description=words)
         parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(self.sections))
         parser.add_argument("--quick", action="store_true", help="a taste of each, in seconds")
+        parser.add_argument(
+            "--write", action="store_true", help="measure nothing, write the report anew"
+        )
         return parser
 
-    def chosen(self, parser: argparse.ArgumentParser, names: Sequence[str]) -> Sequence[str]:
+    def chosen(self, parser: argparse.ArgumentParser, given: argparse.Namespace) -> Sequence[str]:
         """The sections that are named, all where none is; ends the program where one is not
-        there."""
+        there. None where the report is to be written alone, which is done."""
+        names: Sequence[str] = given.names
+        if given.write:
+            self.write()
+            return ()
         if unknown := set(names) - set(self.sections):
             there = ", ".join(self.sections)
             parser.error(f"no section {', '.join(sorted(unknown))}; there are {there}")
@@ -79,20 +92,26 @@ class Report:
                 "quick": quick,
                 "seconds": round(perf_counter() - begin, 1),
                 **setting,
+                "physics": before.get("physics", "") if only else setting["physics"],
                 "results": results,
             }
             self.folder.mkdir(parents=True, exist_ok=True)
             file.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n")
 
     def text(self) -> str:
-        """The report on all that is kept."""
-        parts = [self.head]
+        """The report on all that is kept. Its top names the sections whose figures are older than
+        the physics that they describe."""
+        parts, old, now = list[str](), list[str](), physics()
         for name in self.sections:
             file = self.folder / f"{name}.json"
             if file.is_file():
                 kept = json.loads(file.read_text())
-                parts += [self.module(name).section(kept["results"]), _foot(kept)]
-        return "\n\n".join(parts) + "\n"
+                section = self.module(name).section(kept["results"])
+                parts += [section, _foot(kept)]
+                if kept.get("physics") != now:
+                    old.append(section.partition("\n")[0].removeprefix("## "))
+        head = [self.head, *([OLD.format(", ".join(old))] if old else [])]
+        return "\n\n".join([*head, *parts]) + "\n"
 
     def write(self) -> None:
         """Write it."""
@@ -106,9 +125,26 @@ class Report:
             "date": datetime.now(UTC).strftime("%Y-%m-%d"),
             "machine": f"{os.cpu_count()} cores of {_processor()}, {platform.system()}",
             "commit": _commit(),
+            "physics": physics(),
             "load": f"{os.getloadavg()[0]:.1f}",
             "versions": ", ".join([f"Python {platform.python_version()}", *packages]),
         }
+
+
+OLD = (
+    "**Older than the physics that they describe** are the figures of these sections, because"
+    f" {', '.join(PHYSICS[:-1])} or {PHYSICS[-1]} has changed since: {{}}."
+)
+
+
+def physics(root: Path = ROOT) -> str:
+    """A digest of all files of PHYSICS: it needs no history of commits."""
+    found = hashlib.sha256()
+    for folder in PHYSICS:
+        for file in sorted((root / folder).rglob("*")):
+            if file.suffix in (".py", ".xml", ".toml"):
+                found.update(f"{file.relative_to(root).as_posix()}\n".encode() + file.read_bytes())
+    return found.hexdigest()[:16]
 
 
 def _commit() -> str:
@@ -130,7 +166,7 @@ def _processor() -> str:
 
 def _foot(kept: Mapping[str, object]) -> str:
     quick = ", the quick version" if kept["quick"] else ""
-    commit = f" at commit {kept['commit']}" if kept.get("commit") else ""
+    commit = f" at commit {kept['commit']}" if kept.get("commit") else ", at no known commit,"
     load = f", load average {kept['load']}" if kept.get("load") else ""
     return (
         f"*Measured on {kept['date']}{commit} in {kept['seconds']} s{quick}: {kept['versions']};"

@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import json
+import shutil
+import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from tests.bench import floors, large, production, replaying
+from factory.simulation.mujoco import strength
+from factory.simulation.simulation import Simulation
+from tests import reporting
+from tests.bench import floors, large, processes, production, replaying
 from tests.bench.__main__ import REPORT
-from tests.bench.factories import laid_out, robots_at_least
+from tests.bench.factories import laid_out, produce, robots_at_least
 from tests.bench.faults.__main__ import REPORT as FAULTS
+from tests.fidelity.__main__ import REPORT as FIDELITY
 from tests.reporting import Report
 
 KEPT = [(report, file) for report in (REPORT, FAULTS) for file in report.folder.glob("*.json")]
@@ -25,7 +32,7 @@ def test_a_section_is_rendered_from_what_was_kept(report: Report, file: Path) ->
     assert text in report.path.read_text()
 
 
-@pytest.mark.parametrize("report", [REPORT, FAULTS], ids=lambda report: report.path.stem)
+@pytest.mark.parametrize("report", [REPORT, FAULTS, FIDELITY], ids=lambda report: report.path.stem)
 def test_the_report_is_that_of_all_that_was_kept(report: Report) -> None:
     assert report.text() == report.path.read_text()
 
@@ -42,6 +49,55 @@ def test_production_is_measured(timestep: float | None, units: int | None) -> No
     assert found["robots"] == 5 and found["realtime"] > 0
     assert found["from_s"] == 0.0 if units else found["to_s"] - found["from_s"] >= 0.5
     assert units is None or found["made"] == units
+
+
+def test_a_run_that_does_not_succeed_is_no_measurement(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Planted: something touches, and a hand drops what it holds."""
+
+    def touched(simulation: Simulation, units: int) -> None:
+        produce(simulation, units)
+        simulation.physical.inspection.onsets.note({(0, 1)}, 1.0)
+
+    with monkeypatch.context() as planted:
+        planted.setattr(production, "produce", touched)
+        with pytest.raises(SystemExit, match="unintended contact"):
+            production.work(4, fuse=True, units=1)
+    monkeypatch.setattr(strength, "shares", lambda loads: 2.0 + 0.0 * loads[:, 0])
+    with pytest.raises(SystemExit, match="drops"):
+        production.work(4, fuse=True, units=1)
+
+
+def test_a_process_that_fails_ends_the_bench_with_what_it_says() -> None:
+    with pytest.raises(SystemExit, match=r"status 1\nwhy"):
+        processes.run([sys.executable, "-c", "raise SystemExit('why')"])
+
+
+def test_a_report_says_which_sections_are_older_than_the_physics(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Measured now, then a timestep later: the page says so, and is no longer what is kept."""
+    report = replace(REPORT, path=tmp_path / "bench.md", sections=("states", "proving"))
+    for name in report.sections:
+        kept = json.loads((REPORT.folder / f"{name}.json").read_text())
+        report.folder.mkdir(exist_ok=True)
+        now = {"physics": reporting.physics()} if name == "states" else {}
+        (report.folder / f"{name}.json").write_text(json.dumps(kept | now))
+    report.write()
+    text = report.path.read_text()
+    assert "Older than the physics" in text.split("## ")[0] and "From PAG" in text.split("## ")[0]
+    assert "Proofs against" not in text.split("## ")[0]
+    monkeypatch.setattr(reporting, "physics", lambda: "another")
+    assert "Proofs against" in report.text().split("## ")[0] and report.text() != text
+
+
+def test_a_digest_of_the_physics_is_of_all_its_files(tmp_path: Path) -> None:
+    for folder in reporting.PHYSICS:
+        shutil.copytree(reporting.ROOT / folder, tmp_path / folder)
+    assert reporting.physics(tmp_path) == reporting.physics()
+    for changed in ("mjcf/dot.xml", "factory/layout/hands/limbs.py"):
+        before = reporting.physics(tmp_path)
+        (tmp_path / changed).write_text((tmp_path / changed).read_text() + "\n")
+        assert reporting.physics(tmp_path) != before
 
 
 @pytest.mark.parametrize("units", [None, 2])

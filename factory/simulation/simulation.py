@@ -107,6 +107,11 @@ class Simulation:
         self.before = self.world.delivered()
         self.supervisor = (self._distributed if request.distributed else self._central)(stages)
 
+    @cached_property
+    def patience(self) -> float:
+        """A run has stalled when nothing has fired for so long [s]."""
+        return PATIENCE * max(self.delays)
+
     @property
     def silent(self) -> float:
         """How long nothing has fired since the last event, or since time 0 [s]."""
@@ -193,7 +198,6 @@ class Simulation:
         `since` [s] observers are called no more often. Where the engine gives up
         it begins anew by itself, at time 0: nobody is shown that, and the run has lasted until
         then."""
-        patience = PATIENCE * max(self.delays)
         supervisor, world, goal = self.supervisor, self.world, self.before + self.request.units
         begin, watched, trouble = perf_counter(), -world.hooks.ended_time, None
         while trouble is None and (world.dropped or world.delivered() < goal):
@@ -212,13 +216,13 @@ class Simulation:
                 for observe in (*observers, *glances):
                     observe(world, supervisor)
                 watched += perf_counter() - pause
-            trouble = self._ends(patience, max_time)
+            trouble = self.ends(max_time)
         watched += world.hooks.ended_time
         return self._record(perf_counter() - begin - watched, world.time, trouble)
 
-    def _ends(self, patience: float, max_time: float | None) -> Diagnostic | None:
+    def ends(self, max_time: float | None = None) -> Diagnostic | None:
         """What ends the run now, whether or not its products have been dropped off."""
-        world = self.world
+        world, patience = self.world, self.patience
         if world.hooks.trouble is not None:
             return world.hooks.trouble
         if world.dropped is not None:

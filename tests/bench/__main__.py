@@ -39,8 +39,9 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, default=REPORT.path, help="the report")
     given = parser.parse_args()
     report = replace(REPORT, path=given.output)
-    names = report.chosen(parser, given.names)
-    subprocess.run([ROOT / "tools" / "rivals"], check=False)
+    names = report.chosen(parser, given)
+    if names:
+        subprocess.run([ROOT / "tools" / "rivals"], check=False)
     for name in names:
         print(f"{name} ", end="", flush=True)
         report.measure(name, given.quick)

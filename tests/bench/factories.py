@@ -11,8 +11,12 @@ import factory
 from factory.geometry.product import product_geometry
 from factory.layout.layout import Layout
 from factory.layout.request import Ground
+from factory.nets.replay import replay
+from factory.plant.material import joins_of
+from factory.record.verdict import RunVerdict, judged, kept_figures
 from factory.simulation.mujoco.courses import Course
 from factory.simulation.request import RunRequest
+from factory.simulation.run import entries_of
 from factory.simulation.simulation import Simulation
 from factory.support.settings import MOST, Settings
 
@@ -151,10 +155,34 @@ def run_in(simulation: Simulation, steady: Steady) -> float:
 def run_until(simulation: Simulation, time: float) -> None:
     """Tick until this simulated time [s], as a run does that has no observers."""
     while simulation.world.time < time:
-        simulation.supervisor.step(MOST)
+        _step(simulation)
 
 
 def produce(simulation: Simulation, units: int) -> None:
     """Tick until so many units are delivered, as a run does that has no observers."""
     while simulation.world.delivered() < units:
-        simulation.supervisor.step(MOST)
+        _step(simulation)
+
+
+def judge(simulation: Simulation) -> None:
+    """End the program, with what is wrong, where what has been run is no run that succeeds so
+    far."""
+    world = simulation.physical
+    supervisor, factory = simulation.supervisor, simulation.layout.factory
+    entries = entries_of(supervisor.events)
+    refines = replay(factory.net, entries, simulation.start, joins_of(factory), []).refines
+    require(judged(None, refines, kept_figures(world.figures()), None))
+
+
+def require(verdict: RunVerdict) -> None:
+    """End the program, with what is wrong, where a run has not succeeded."""
+    if not verdict.succeeded:
+        raise SystemExit("\n".join(["a run has not succeeded:", *map(str, verdict.gathered)]))
+
+
+def _step(simulation: Simulation) -> None:
+    """Some ticks. Ends the program where the run stalls, or a hand drops what it holds."""
+    simulation.supervisor.step(MOST)
+    trouble = simulation.ends()
+    if trouble is not None:
+        require(judged(trouble, True, None, None))

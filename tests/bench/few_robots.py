@@ -17,6 +17,7 @@ from factory.study.allocation.aim import Aim
 from factory.study.allocation.least import least_robots
 from factory.study.allocation.search import allocated
 from factory.support.settings import Settings
+from tests.bench.factories import require
 from tests.fidelity.products import BRICKS, EXAMPLES
 from tests.tables import table
 
@@ -80,6 +81,7 @@ def _measured(wanted: Wanted) -> dict[str, Any]:
         request = RunRequest("mujoco", wanted.units, seed, jitter, found.settings, fuse=fuse)
         run = Simulation(layout, request).run()
         assert run.physics is not None
+        require(run.verdict)
         runs.append(
             {
                 "cycle_s": run.cycle_time_s,

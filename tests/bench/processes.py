@@ -35,14 +35,14 @@ class Process:
 
 
 def run(command: Sequence[object], **environment: str) -> Process:
-    """Run it, with some more environment. Ends everything if it fails."""
+    """Run it, with some more environment. Ends everything, with what it says, if it fails."""
     words = [str(word) for word in command]
     begin = perf_counter()
-    with tempfile.TemporaryFile("w+") as out:
+    with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as said:
         process = subprocess.Popen(
             words,
             stdout=out,
-            stderr=subprocess.DEVNULL,
+            stderr=said,
             cwd=ROOT,
             env=os.environ | environment,
         )
@@ -50,9 +50,10 @@ def run(command: Sequence[object], **environment: str) -> Process:
         process.returncode = os.waitstatus_to_exitcode(status)
         took = perf_counter() - begin
         out.seek(0)
-        text = out.read()
+        said.seek(0)
+        text, why = out.read(), said.read()
     if process.returncode:
-        raise SystemExit(f"{' '.join(words)} ended with status {process.returncode}")
+        raise SystemExit(f"{' '.join(words)} ended with status {process.returncode}\n{why}")
     return Process(took, usage.ru_maxrss / 1024, text)
 
 

@@ -13,6 +13,7 @@ from tests.bench.factories import (
     PATIENCE,
     Case,
     Steady,
+    judge,
     laid_out,
     produce,
     robots_at_least,
@@ -82,6 +83,7 @@ def measured(simulation: Simulation, go: Callable[[], None]) -> dict[str, Any]:
     start, made, physics, begin = world.time, world.delivered(), world.physics_time, perf_counter()
     go()
     wall, engine = perf_counter() - begin, world.physics_time - physics
+    judge(simulation)
     simulated, timestep = world.time - start, float(world.m.opt.timestep)
     return {
         "robots": len(layout.factory.robots),

@@ -7,7 +7,7 @@ import pstats
 from pathlib import Path
 from typing import Any
 
-from tests.bench.factories import Case, Steady, laid_out, robots_at_least, run_in, run_until
+from tests.bench.factories import Case, Steady, judge, laid_out, robots_at_least, run_in, run_until
 from tests.bench.processes import ROOT, fresh, serve
 from tests.tables import table
 
@@ -22,6 +22,7 @@ def work(robots: int, timestep: float, window: float) -> dict[str, Any]:
     since = run_in(simulation, Steady.of(layout, None))
     profile = cProfile.Profile()
     profile.runcall(run_until, simulation, since + window)
+    judge(simulation)
     stats = pstats.Stats(profile)
     taken: Any = stats.stats  # type: ignore[attr-defined]
     most = sorted(taken.items(), key=lambda item: -item[1][2])[:TOP]

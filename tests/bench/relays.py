@@ -14,7 +14,7 @@ from factory.modes.modes import operation_modes, robot_limits
 from factory.nets.verify import verify
 from factory.support.settings import Settings
 from factory.timing.prediction import operation_delays, predict
-from tests.bench.factories import cube, laid_out
+from tests.bench.factories import cube, laid_out, require
 from tests.tables import table
 
 SIZES = (16, 32, 64, 128, 256, 512, 1024)
@@ -68,6 +68,7 @@ def predicted(layout: Layout, world: Any) -> float:
 def made(layout: Layout, world: Any) -> dict[str, Any]:
     """A run: its cycle time [s], and in MuJoCo how well it went."""
     run = factory.run(layout, world, UNITS, settings=SETTINGS, fuse=world == "mujoco")
+    require(run.verdict)
     found: dict[str, Any] = {"cycle_s": run.cycle_time_s, "refines_net": run.refines_net}
     if run.physics is not None:
         found["contacts"] = run.physics.unintended_contacts

@@ -18,7 +18,7 @@ import numpy as np
 from factory.layout.layout import Layout
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
-from tests.bench.factories import Case, Steady, produce, run_in, run_until
+from tests.bench.factories import Case, Steady, judge, produce, run_in, run_until
 
 DATA = ("ctrl", "history", "qpos", "qvel", "eq_active", "tree_asleep", "xpos", "xmat", "xquat")
 MODEL = (
@@ -112,6 +112,7 @@ def measure_floor(case: Case, layout: Layout, window: float) -> Floor:
     begin = perf_counter()
     _go(timed, case.units, since + window)
     run = perf_counter() - begin
+    judge(timed)
     m, d = recorder.begin
     bare = replay(m, d, recorder.writes)
     assert all(map(same, arrays(m, d), recorder.seen)), "the replay ends in another state"

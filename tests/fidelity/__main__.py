@@ -33,7 +33,7 @@ def main() -> None:
     given = parser.parse_args()
     if given.only and given.names != ["seeds"]:
         parser.error("--only goes with `seeds`")
-    for name in REPORT.chosen(parser, given.names):
+    for name in REPORT.chosen(parser, given):
         print(f"{name} ...", flush=True)
         REPORT.measure(name, given.quick, given.only)
         REPORT.write()

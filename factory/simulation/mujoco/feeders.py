@@ -28,9 +28,6 @@ from factory.simulation.mujoco.turns import Turns
 from factory.simulation.mujoco.welds import Place, Welds
 from factory.support.engine import mujoco
 
-ROUNDED = 0.01
-"""What is due so much of a tick later is due."""
-
 
 @dataclass(frozen=True, slots=True)
 class Station:
@@ -72,7 +69,7 @@ class Feeders:
         self.back = TakenBack()
         self._shown: dict[str, int] = {}
         self._asked: set[int] = set()
-        self.due, self._rounded = NEVER, ROUNDED * model.settings.tick
+        self.due = NEVER
         self._turns = Turns([station.label for station in self._stations])
         self._serve(model.layout, supply.rounds())
 
@@ -113,11 +110,6 @@ class Feeders:
         due = np.flatnonzero(self._turns.now & ~self._passing.holds)
         self._sliders.begin(self._load(due, down=True))
 
-    @property
-    def now(self) -> float:
-        """What is due by then is due [s]."""
-        return self._sliders.time + self._rounded
-
     def presents(self, label: str, unit: int) -> bool:
         """Whether a robot may come for the part for that unit: it is down before the robot can be
         there, and may be let in."""
@@ -129,7 +121,7 @@ class Feeders:
             return False
         ends = float(self._sliders.ends[number])
         enough = ends - self._passing.soonest(number) if ends < NEVER else -NEVER
-        if enough > self.now:
+        if enough > self._sliders.now:
             self.due = min(self.due, enough)
             return False
         return True

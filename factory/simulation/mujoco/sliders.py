@@ -23,6 +23,9 @@ from factory.support.engine import mujoco
 from factory.support.settings import Settings
 from factory.timing.serving import CALM
 
+ROUNDED = 0.01
+"""What is due so much of a tick later is due."""
+
 NEVER = np.inf
 """When a slider that rests comes to the end of its way [s]."""
 
@@ -81,7 +84,7 @@ class Sliders:
         joint = m.body_jntadr[self._body]
         drives = np.array([m.actuator(slider).id for slider in sliders])
         self.trees = m.body_treeid[self._body]
-        self._d, self._step, self._address = d, settings.step, m.jnt_qposadr[joint]
+        self._d, self._address = d, m.jnt_qposadr[joint]
         own = m.body_subtreemass[self._body] + m.dof_armature[m.jnt_dofadr[joint]]
         self._drives, self._sleep = Drives(m, d, drives, own.round(9)), sleep
         self._loads = np.array([model.masses[outlet.label] for outlet in outlets])
@@ -91,13 +94,14 @@ class Sliders:
         ends = high - lengths, high
         ticks = stroke_ticks(model.layout, settings)
         self._strokes = Strokes.of(self._drives, self._loads, ends, ticks, settings)
+        self._soon = ROUNDED * settings.tick
         self._begun, self.ends = np.zeros(len(outlets)), np.full(len(outlets), NEVER)
         self._down = np.zeros(len(outlets), np.intp)
 
     @property
-    def time(self) -> float:
-        """[s]"""
-        return self._drives.time
+    def now(self) -> float:
+        """What is due by then is due [s]."""
+        return self._drives.time + self._soon
 
     def _load(self, chosen: Index, loaded: bool) -> None:
         """Sliders carry their loads, or nothing."""
@@ -143,7 +147,7 @@ class Sliders:
         then."""
         (moving,) = (self.ends < NEVER).nonzero()
         if len(moving):
-            since = (self._drives.time - self._begun[moving]) / self._step
+            since = (self._drives.time - self._begun[moving]) / self._drives.timestep
             setpoints = self._strokes.setpoints
             at = np.rint(since).astype(np.intp) + steps
             at = np.clip(at, 0, setpoints.shape[2] - 1)
@@ -152,7 +156,7 @@ class Sliders:
     def settle(self) -> None:
         """Sliders that have come to the end of their ways since stand. The engine lets them sleep
         by itself: until there they are never slow."""
-        (over,) = (self.ends <= self._drives.time + self._step / 2).nonzero()
+        (over,) = (self.ends <= self._drives.time + self._drives.timestep / 2).nonzero()
         if len(over):
             down = self._down[over] == 1
             self._stand(over[down], True)

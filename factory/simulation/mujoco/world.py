@@ -22,12 +22,11 @@ from factory.mjcf.model import Model
 from factory.plant.factory import Operation
 from factory.simulation.mujoco.fast.neighbours import Neighbours
 from factory.simulation.mujoco.fast.strides import Strides
-from factory.simulation.mujoco.feeders import ROUNDED
 from factory.simulation.mujoco.hands_away import HandsAway
 from factory.simulation.mujoco.inspection import Inspection
 from factory.simulation.mujoco.motion import Motion
 from factory.simulation.mujoco.parts import Parts
-from factory.simulation.mujoco.sliders import NEVER
+from factory.simulation.mujoco.sliders import NEVER, ROUNDED
 from factory.simulation.mujoco.soundness import Soundness
 from factory.simulation.mujoco.stepping import SingleSteps
 from factory.simulation.request import RunRequest
@@ -209,7 +208,7 @@ class MujocoWorld:
         if looks:
             self._look()
         outfeed, unit, feeders = self.motion.outfeed, self.parts.on_tray, self.parts.feeders
-        if feeders.due <= feeders.now:
+        if feeders.due <= self.motion.sliders.now:
             feeders.due, self.supplied = NEVER, True
         if outfeed.busy and outfeed.rests():
             self.supplied = True

@@ -25,7 +25,7 @@ def main() -> None:
     parser = REPORT.parser(__doc__)
     parser.add_argument("--go-on", action="store_true", help="only runs that are not kept yet")
     given = parser.parse_args()
-    for name in REPORT.chosen(parser, given.names):
+    for name in REPORT.chosen(parser, given):
         print(f"{name} ...", flush=True)
         REPORT.measure(name, given.quick, goes_on=given.go_on and name in RUNS)
         REPORT.write()
