@@ -64,7 +64,7 @@ def variants(file: Path) -> Iterator[tuple[str, Factory]]:
                         continue
                     yield f"{name}, {label} = {k}", made
                     yield from takeovers(f"{name}, {label} = {k}", made, catalogue)
-        if pairs := chosen_pairs(deputies(factory, catalogue)):
+        if pairs := chosen_pairs(factory, deputies(factory, catalogue)):
             yield f"{name}, deputies stand by", standing_by(factory, pairs)
         yield from takeovers(name, factory, catalogue)
 

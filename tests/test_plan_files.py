@@ -98,9 +98,9 @@ VARIANTS: dict[str, Callable[[Path], Project]] = {
     "relays": lambda folder: with_text(cube(32), folder, hands=0, relay=True),
     "relays in line": lambda folder: with_text(sawn(1), folder, relay=True),
     "deputies": lambda folder: with_text(BESIDE, folder, deputies=True),
-    "branches with deputies": lambda folder: with_text(
-        BESIDE, folder, hands=0, deputies=True
-    ).with_branches([("sub2", 2)]),
+    "branches with deputies": lambda folder: with_text(BESIDE, folder, deputies=True).with_branches(
+        [("sub2", 2)]
+    ),
 }
 
 

@@ -80,7 +80,7 @@ def test_robots_and_deputies_in_turn_are_live(seed: int, rng: random.Random) -> 
     its tours."""
     _, _, folded = made(seed, rng, 9)
     rows = deputies(folded, catalogue())
-    pairs = chosen_pairs(rows)
+    pairs = chosen_pairs(folded, rows)
     assert {robot for robot, _ in pairs} == {robot for robot, row in enumerate(rows) if row}
     assert all(deputy in rows[robot] for robot, deputy in pairs)
     turns = rounds_of(pairs)

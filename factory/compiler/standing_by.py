@@ -12,16 +12,21 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from factory.compiler.assigning import assigned
+from factory.compiler.folding import delivery
 from factory.plant.factory import Factory
 
 Pair = tuple[int, int]
 """A robot and its deputy (indices)."""
 
 
-def chosen_pairs(deputies: Sequence[Sequence[int]]) -> tuple[Pair, ...]:
-    """One deputy for each robot that has some: where it can be, two that are each other's, so that
-    no robot has to be fit for more than it must."""
+def chosen_pairs(factory: Factory, deputies: Sequence[Sequence[int]]) -> tuple[Pair, ...]:
+    """One deputy for each robot that has some which come to the same carrier, and to which no other
+    delivers: a branch that a twin would take over as a whole does not stand by. Where it can be,
+    two are each other's, so that no robot has to be fit for more than it must."""
     mate: dict[int, int] = {}
+    to = [delivery(factory, robot.index).carrier for robot in factory.robots]
+    rows = [[r for r in row if to[r] == to[robot]] for robot, row in enumerate(deputies)]
+    deputies = [() if robot in to else row for robot, row in enumerate(rows)]
     for robot, row in enumerate(deputies):
         if robot not in mate:
             free = (other for other in row if other not in mate and robot in deputies[other])

@@ -92,7 +92,7 @@ class Ground:
             whole = standing_by(factory, pairs)
             return plain.lay_out(whole, product, settings, None if pairs else hands)
 
-        found = chosen_pairs(deputies(factory, catalogue or load_catalogue()))
+        found = chosen_pairs(factory, deputies(factory, catalogue or load_catalogue()))
         whole, robots = laid_out_for(found, lay_out), range(len(factory.robots))
         known = replace(whole, product=product, standby=whole)
         layout = part_of(known, factory, robots)
