@@ -328,7 +328,7 @@ def test_what_the_crew_that_stays_cannot_carry_back(monkeypatch: pytest.MonkeyPa
             monkeypatch.setattr(deputising, "not_carried_back", every)
         simulation = Simulation(laid_out(INSERTS), RunRequest("mujoco", 3, recovers=True))
         recovery = recover(
-            simulation, Campaign((WorldFault("dead", robot="r4", at=5.0),), swap=4.0)
+            simulation, Campaign((WorldFault("dead", robot="r2", at=5.0),), swap=4.0)
         )
         run = simulation.run(max_time=60.0)
         assert figures(run)[:2] == (0, 3) and len(run.exchanges) == 1
