@@ -571,13 +571,6 @@ PLANTS = (
         OVERLAP % ("allow ( 0.0001 );", "0.04", "0.0397"),
         ("Overlap",),
     ),
-    Plant("a part comes through a wall", "product", CLOSED % "", ("Blocked",)),
-    Plant(
-        "a part comes through more of a wall than is allowed",
-        "product",
-        CLOSED % "allow ( core, front, 0.034 ); allow ( 0.0005 );",
-        ("Blocked",),
-    ),
     Plant(
         "the log says 0 contacts",
         "log",

@@ -85,6 +85,9 @@ def say_verdict(verdict: RunVerdict, verbose: bool = False) -> None:
         say(f"the run FAILED: {lines.pop(0)}")
     for line in lines:
         say(f"  {line}")
+    if verdict.blocked:
+        count = len(verdict.blocked)
+        say(f"parts passed through each other in {count} operation{'s' * (count > 1)} (Blocked)")
 
 
 def found_by(report: Report, cut_off: CutOff | None) -> str:

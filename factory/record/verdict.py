@@ -96,17 +96,22 @@ FAULTS = "faults"
 """The figure that lists what was wrong with the model of a run, code and message of each."""
 
 
+BLOCKED = "Blocked"
+
+
 @dataclass(frozen=True, slots=True)
 class RunVerdict:
     """The verdict on a run: what ended it early, whether its record refines the net, and what is
     wrong with its `bodies`, in the order of time, so many of which came `before` what ended it.
-    `lenient`: the bodies do not count."""
+    `lenient`: the bodies do not count. `blocked`: operations in which parts passed through each
+    other on their way, which is no failure of the run, but of the order of assembly."""
 
     trouble: Diagnostic | None = None
     refines: bool = True
     bodies: tuple[Diagnostic, ...] = ()
     lenient: bool = False
     before: int = 0
+    blocked: tuple[Diagnostic, ...] = ()
 
     @property
     def follows(self) -> bool:
@@ -145,6 +150,7 @@ class RunVerdict:
             "succeeded": self.succeeded,
             "lenient": self.lenient,
             "failures": [failure.as_json() for failure in self.failures],
+            "blocked": [operation.as_json() for operation in self.blocked],
         }
 
 
@@ -162,7 +168,10 @@ def judged(
     dropped = (figures or {}).get(DROPPED)
     ended = inf if dropped is None else dropped
     before = sum(t < ended for t, _ in found)
-    return RunVerdict(trouble, refines, tuple(failure for _, failure in found), lenient, before)
+    faults = [Diagnostic(code, words) for code, words in (figures or {}).get(FAULTS, [])]
+    blocked = tuple(fault for fault in faults if fault.code == BLOCKED)
+    bodies = tuple(failure for _, failure in found)
+    return RunVerdict(trouble, refines, bodies, lenient, before, blocked)
 
 
 def _failures(
@@ -171,7 +180,8 @@ def _failures(
     """What is wrong with the bodies of a run, each with its time [s]: that of the model is before
     all, that of figures without a time and of the product's drawing after all."""
     for code, words in figures.get(FAULTS, []):
-        yield inf if code in ("Overlap", "Blocked") else -inf, Diagnostic(code, words)
+        if code != BLOCKED:
+            yield inf if code == "Overlap" else -inf, Diagnostic(code, words)
     for limit in LIMITS:
         failure = limit.exceeded(figures)
         if failure is not None:
