@@ -60,13 +60,13 @@ class Project:
 
     def with_plan(self, plan: Plan) -> Project:
         """The same product by another plan."""
-        if plan.forms == self.plan.forms:
-            return self._changed({"product", "matings", "compiled"}, plan=plan)
-        return self._changed({"product"}, plan=plan)
+        same = {"matings", "compiled", "approached"} if plan.forms == self.plan.forms else set()
+        return self._changed({"product", *same}, plan=plan)
 
     def with_ground(self, ground: Ground) -> Project:
         """The same factory on another ground."""
-        return self._changed({"product", "matings", "compiled", "plain", "_hands"}, ground=ground)
+        known = {"product", "matings", "compiled", "approached", "planned", "plain", "_hands"}
+        return self._changed(known, ground=ground)
 
     def with_lines(self, lines: Sequence[Sequence[str]]) -> Project:
         """The project in which the robots that bring the labels of a line are one robot. Raises
@@ -176,8 +176,8 @@ class Project:
         from factory.layout.repeated import repeated
 
         product, push = repeated(self.product, factory), self.settings.acceleration
-        lifts = lifts_for(factory, product, self.catalogue, push)
-        return self._shared(replace(plan, lifts=lifts))
+        plan = replace(plan, lifts=lifts_for(factory, product, self.catalogue, push))
+        return self._shared(plan) if plan.lifts else replace(factory, plan=plan)
 
     @cached_property
     def planned(self) -> Factory:
@@ -186,9 +186,15 @@ class Project:
 
     def _shared(self, plan: Plan) -> Factory:
         from factory.compiler.assigning import shared
+
+        return shared(self.approached, plan, self.catalogue)
+
+    @cached_property
+    def approached(self) -> Factory:
+        """`compiled`, with how inputs come together where that is free: in default boxes."""
         from factory.compiler.mating.mating import judged
 
-        return shared(judged(self.compiled, self.product), plan, self.catalogue)
+        return judged(self.compiled, self.product)
 
     @property
     def _single(self) -> Plan:

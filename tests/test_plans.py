@@ -30,7 +30,8 @@ from factory.study.allocation.lines import Shift
 from factory.support.errors import Diagnostic, InputError, RunError
 from factory.support.settings import Settings
 
-FEW, MANY = range(1, 6), range(100, 1100)
+FEW, MANY = (4, 7, 8, 10, 16), range(100, 1100)
+"""Seeds: the few have forms, robots with several tours, and branches that are there twice."""
 
 
 def random_plan(project: Project, rng: random.Random) -> Project:
@@ -48,7 +49,7 @@ def random_plan(project: Project, rng: random.Random) -> Project:
     if rng.random() < 0.7:
         boxes = payload_boxes(base, project.product)
         shift = Shift.of(base, project.catalogue, boxes, Pace.of(project.settings))
-        fillings = [*islice(shift.fillings(1.3), 40)]
+        fillings = [f for f in islice(shift.fillings(1.3), 40) if shift.lines(f)]
         if fillings:
             project = project.with_plan(shift.plan(rng.choice(fillings)))
     labels = [

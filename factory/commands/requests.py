@@ -25,11 +25,7 @@ if TYPE_CHECKING:
 
 
 APART = (
-    (
-        "--deputies",
-        ("--relay", "--cycle"),
-        "no robot can take over for one that relays",
-    ),
+    ("--deputies", ("--relay", "--cycle"), "no robot can take over for one that relays"),
     ("[lines]", ("--robots", "--cycle"), "the search chooses which labels share a robot"),
     (
         "--distributed",
@@ -156,7 +152,8 @@ class ProjectOptions:
             return self._with_few_robots(project, silent)
         if lines := kept.lines():
             project = project.with_lines(lines)
-        return project.with_branches(self.branches()) if self.branches() else project
+        several = self.branches()
+        return project.with_branches(several) if several else project
 
     def branches(self) -> tuple[tuple[str, int], ...]:
         """The labels whose branches are to be there several times, and how often."""
@@ -190,9 +187,10 @@ class ProjectOptions:
         from factory.support.console import warn
         from factory.support.progress import StepBar
 
-        units = prod(k for _, k in self.branches())
+        several = self.branches()
+        units = prod(k for _, k in several)
         effort = self.effort or usual_effort(len(project.pag) * units)
-        aim = Aim(self.robots, self.cycle, effort, self.limit or inf, self.branches())
+        aim = Aim(self.robots, self.cycle, effort, self.limit or inf, several)
         looked_at, warnings = count(1), list[Diagnostic]()
         with StepBar("looking for few robots", silent) as steps:
 

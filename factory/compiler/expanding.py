@@ -83,8 +83,8 @@ def delivered(label: str, plan: Plan) -> str:
     return relay_label(label, number - 1) if number else label
 
 
-def taken_over(label: str) -> str:
-    """The label that is handed over as another; the label itself where none is."""
+def origin_of(label: str) -> str:
+    """The label of which another is a hand-over; the label itself where it is none."""
     origin, _, last = label.rpartition("/")
     return origin if last.startswith(RELAY) else label
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from factory.compiler.expanding import taken_over
+from factory.compiler.expanding import origin_of
 from factory.lang.template_reader import load_templates
 from factory.layout.clearance import certify
 from factory.layout.dimensions import Clearance
@@ -175,7 +175,7 @@ class _Search:
         """Cut no way any more that one of these robots (by name) has a piece of; where they have
         none, no way at all."""
         chosen = (r for r in self.found.factory.robots if r.name in robots)
-        labels = {taken_over(x) for robot in chosen for x in _carried(self.found, robot)}
+        labels = {origin_of(x) for robot in chosen for x in _carried(self.found, robot)}
         shared = labels & set(self.ways)
         self.ways = {k: way for k, way in self.ways.items() if shared and k not in shared}
 
@@ -195,7 +195,7 @@ class _Search:
         times, numbers = robot_times(self.found, self.settings), self.numbers
         for robot in self.found.factory.robots:
             if times[robot.index] > self.cycle + 1e-9:
-                labels = map(taken_over, _carried(self.found, robot))
+                labels = map(origin_of, _carried(self.found, robot))
                 left = [x for x in labels if x in self.ways and numbers[x] < self.ways[x].most]
                 if left:
                     found.add(max(left, key=lambda x: (self.ways[x].longest(numbers[x]), x)))

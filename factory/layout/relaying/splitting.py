@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from factory.compiler.compiler import compile_nodes
-from factory.compiler.expanding import delivered, handed_over, nodes_of, relay_label, taken_over
+from factory.compiler.expanding import delivered, handed_over, nodes_of, origin_of, relay_label
 from factory.layout.dimensions import Clearance
 from factory.layout.layout import Guidepath, Layout
 from factory.layout.relaying.in_line import InLine, hands_in_line
@@ -91,7 +91,7 @@ def _hands(layout: Layout, factory: Factory, cut: Mapping[int, Sequence[Piece]])
         return InLine((), frozenset())
     origins = {piece.robot: robot for robot, pieces in cut.items() for piece in pieces}
     lines = {r: [p.robot for p in reversed(pieces)] for r, pieces in cut.items() if len(pieces) > 1}
-    relays = {o.index for o in factory.making if taken_over(o.label) != o.label}
+    relays = {o.index for o in factory.making if origin_of(o.label) != o.label}
     return hands_in_line(layout, factory, [origins[r.index] for r in factory.robots], lines, relays)
 
 

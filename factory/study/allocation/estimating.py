@@ -10,7 +10,6 @@ from math import inf
 from factory.compiler.expanding import expand
 from factory.compiler.folding import Line
 from factory.compiler.mating.admitting import admitted
-from factory.compiler.mating.mating import judged
 from factory.compiler.parallel import Branches
 from factory.layout.durations import Pace
 from factory.layout.shapes import payload_boxes
@@ -170,7 +169,7 @@ class Estimator:
                 yield Estimate(count, shift.seconds(lines), forms, filling)
 
     def _shift(self, project: Project) -> Shift:
-        factory = judged(project.compiled, project.product)
+        factory = project.approached
         boxes = payload_boxes(factory, project.product)
         return Shift.of(factory, project.catalogue, boxes, self.task.pace)
 

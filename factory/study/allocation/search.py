@@ -14,7 +14,6 @@ from dataclasses import replace
 from math import inf
 
 from factory.compiler.folding import kept_apart, lines_of
-from factory.compiler.mating.mating import judged
 from factory.pipeline import Project
 from factory.problem.plan import THIRD
 from factory.study.allocation.aim import Aim, usual_effort
@@ -96,9 +95,9 @@ class Search:
 
     def rank(self, one: Candidate) -> tuple[float, ...]:
         """What a candidate is judged by, the less the better; one without a layout is the worst."""
-        blocked, bare = one.blocked - self.written.blocked, one.bare - self.written.bare
         if not one.has_layout:
             return (inf,)
+        blocked, bare = one.blocked - self.written.blocked, one.bare - self.written.bare
         return max(0, blocked), *self.aim.rank(one.robots, one.seconds, max(0, bare))
 
     def look(self, seen: Seen = lambda *_: None) -> None:
@@ -115,8 +114,7 @@ class Search:
     def why(self) -> str:
         """What keeps two lines of the best apart, in words; "" where nothing is known to."""
         best = self.best.single
-        compiled = judged(best.compiled, best.product)
-        words = next(kept_apart(compiled, lines_of(best.plan), best.catalogue), "")
+        words = next(kept_apart(best.approached, lines_of(best.plan), best.catalogue), "")
         return f"; {words}" if words else ""
 
     def singles(self) -> Iterator[Candidate]:
