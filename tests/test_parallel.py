@@ -39,7 +39,7 @@ from factory.simulation.simulation import Simulation
 from factory.simulation.watched import watched
 from factory.study.analysis.flow import flow
 from factory.study.analysis.timed import timed_net
-from factory.study.analysis.timing import Timing
+from factory.timing.timing import Timing
 from factory.study.analysis.what_if import wip_curve
 from factory.support.errors import InputError
 from factory.support.settings import Settings

@@ -40,7 +40,7 @@ from factory.study.analysis.analysing import operation_slacks
 from factory.study.analysis.firing import earliest_firings
 from factory.study.analysis.flow import flow
 from factory.study.analysis.timed import timed_net
-from factory.study.analysis.timing import Change
+from factory.timing.timing import Change
 from factory.support.settings import Settings
 from factory.timing.cycle_time import cycle_time
 from factory.timing.prediction import held_up, operation_delays, predict, ways_ahead

@@ -51,16 +51,19 @@ def train_ratio(
             delays[wait] = max(delays[wait], taken - delays[number])
     delays += apart.values()
     found = max_cycle_ratio(with_ways(marked(gears), gears, apart), delays)
-    numbered = {key: len(seconds) + number for number, key in enumerate(apart)}
-    return found, busiest(gears, numbered, found.circuit, delays)
+    owners = {len(seconds) + number: key[:1] for number, key in enumerate(apart)}
+    return found, busiest(gears, owners, found.circuit, delays)
 
 
 def busiest(
-    gears: GearNet, ways: Mapping[Way, int], circuit: Iterable[int], seconds: Sequence[float]
+    gears: GearNet,
+    owners: Mapping[int, tuple[int, ...]],
+    circuit: Iterable[int],
+    seconds: Sequence[float],
 ) -> list[int]:
     """The robots on a circuit, those first that spend most seconds on it. All robots of an
-    operation do. `ways`: their places, beyond those of the gears; others are of no robot."""
-    robots = dict(enumerate(gears.slots)) | {place: key[:1] for key, place in ways.items()}
+    operation do. `owners`: the robots of places beyond those of the gears; others are of none."""
+    robots = dict(enumerate(gears.slots)) | dict(owners)
     spent: dict[int, float] = {}
     for place in circuit:
         for robot in robots.get(place, ()):

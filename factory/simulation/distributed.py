@@ -23,6 +23,7 @@ from factory.plant.factory import Factory, Operation
 from factory.plant.programs import Program, ProgramStep, program_of
 from factory.simulation.bundles import Bundles
 from factory.simulation.cells import Cells, Link
+from factory.simulation.ordering import Orders
 from factory.simulation.run import Event
 from factory.simulation.supervisor import Active
 from factory.simulation.world import Job, World
@@ -78,6 +79,7 @@ class Record:
         for place in factory.net.initial_marking:
             self.marked[place] = 1
         self._under_way: list[int] = []
+        self.fired = [0] * len(self._net.transitions)
 
     @property
     def active(self) -> Active:
@@ -100,6 +102,7 @@ class Record:
             self.marked[place] = 0
         for place in net.postset[transition]:
             self.marked[place] = 1
+        self.fired[transition] += 1
         self.events.append(Event(time, self._net.transitions[transition].name))
 
 
@@ -128,7 +131,7 @@ class DistributedSupervisor:
         self.random = np.random.default_rng([seed, 7])
         programs = [program_of(factory, robot.index) for robot in factory.robots]
         self.processes = self._processes(programs)
-        self.record = Record(factory)
+        self.record, self.orders = Record(factory), Orders()
         self.count = 0
 
     def _processes(self, programs: Sequence[Program]) -> list[Process]:
@@ -211,6 +214,10 @@ class DistributedSupervisor:
             return True
         if not step.is_carrier or not self.world.prepared(*self._job(process, operation)):
             return False
+        if operation.start in self.orders:  # an order place is a cell that two machines share
+            x, _ = self.world.sense()
+            if self.orders.awaited(operation.start, self.record.fired, x):
+                return False
         return bool(self._bundle(operation).in_domain(link.state()[0])[0])
 
     def _run(self, process: Process, step: ProgramStep) -> None:

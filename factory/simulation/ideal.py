@@ -3,13 +3,14 @@ with the robots that carry them, transfers are instantaneous."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
 from factory.control.mode import Array, Index
 from factory.control.navigation import Bundle
 from factory.layout.layout import Layout
+from factory.nets.coordinated import Past
 from factory.plant.factory import Operation
 from factory.simulation.request import RunRequest
 from factory.simulation.run import PhysicsFigures
@@ -53,7 +54,9 @@ class IdealWorld:
                 self.supplied = True
                 self.dropoffs.append(self.time)
 
-    def step(self, bundle: Bundle | None, axes: Index, ticks: int = 1) -> bool:
+    def step(
+        self, bundle: Bundle | None, axes: Index, ticks: int = 1, until: Collection[Past] = ()
+    ) -> bool:
         """ẋ = F_p(x) for one tick. Whether any mode has come to its goal."""
         self._before_step()
         near = False

@@ -12,7 +12,8 @@ from factory.control.mode import Limits, Mode
 from factory.layout.layout import Layout
 from factory.mjcf.timestep import timed
 from factory.modes.modes import operation_modes, robot_limits
-from factory.modes.staging import HeadStart, stages_of, with_time
+from factory.modes.staging import HeadStart, stages_of
+from factory.modes.starting import start_positions
 from factory.nets.history import firings
 from factory.nets.petri import Marking
 from factory.nets.replay import replay
@@ -20,15 +21,17 @@ from factory.plant.material import joins_of
 from factory.simulation.distributed import DistributedSupervisor
 from factory.simulation.ideal import IdealWorld
 from factory.simulation.modelling import modelled
+from factory.simulation.ordering import Orders
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run, busy_times, entries_of
-from factory.simulation.starting import start_positions
 from factory.simulation.supervisor import Supervisor
 from factory.simulation.world import World
 from factory.support.errors import Diagnostic, InputError, RunError
 from factory.support.settings import AUTO, MOST, Settings
 from factory.timing.cycle_time import CycleTime
-from factory.timing.prediction import all_ways, duration, operation_delays, predict
+from factory.timing.prediction import duration
+from factory.timing.timed import timed as timed_net
+from factory.timing.timing import Timing
 
 if TYPE_CHECKING:
     from factory.mjcf.model import Model
@@ -68,7 +71,7 @@ class Simulation:
     request that differs in seed and jitter alone. `counts`: how often each transition has fired
     where it starts; `before`: products that had left by then. `asked`: the request as it was
     given; in `request` the timestep is a number, and `wip` is one where the pool of parts is too
-    large. `ways`: what robots that go ahead while they wait take [s].
+    large. `timing`: how long everything takes.
     """
 
     def __init__(
@@ -83,10 +86,9 @@ class Simulation:
         self.modes = compiled.modes if compiled else operation_modes(layout, settings.eps)
         self.limits, gains = robot_limits(layout, settings, request.seed, request.jitter)
         stages = stages_of(layout, self.modes, settings)
-        ahead = with_time(layout, stages, world, request.wip)
-        self.delays = operation_delays(layout, self.modes, self.limits, settings, world, ahead)
-        told = self.delays, self.limits, settings, world
-        self.ways = all_ways(layout, self.modes, ahead, *told)
+        drawn = request.seed, request.jitter, request.wip, self.modes, self.limits
+        self.timing = Timing(layout, settings, world, *drawn)
+        self.delays = self.timing.delays
         self.counts = firings(net, self.start)
         self.model: Model | None = None
         self.world: World
@@ -106,6 +108,7 @@ class Simulation:
             self.world = MujocoWorld(self.model, request, at, gains, self.counts, loaded)
         self.before = self.world.delivered()
         self.supervisor = (self._distributed if request.distributed else self._central)(stages)
+        self.supervisor.orders = Orders(self.timing.coordinated.net.orders)
 
     @cached_property
     def patience(self) -> float:
@@ -121,15 +124,12 @@ class Simulation:
     @cached_property
     def cycle(self) -> CycleTime:
         """The predicted cycle time, and what allows no less."""
-        request = self.request
-        return predict(
-            self.layout, self.delays, request.settings, request.world, request.wip, self.ways
-        )
+        return timed_net(self.timing, wip=self.request.wip).cycle
 
     @property
     def duration(self) -> float:
         """At most how long the run is expected to take [s]."""
-        return duration(self.layout, self.delays, self.cycle.seconds, self.request.units)
+        return duration(self.timing, self.cycle.seconds, self.request.units)
 
     @property
     def start(self) -> Marking:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Protocol
 
 from factory.control.mode import Array, Index
 from factory.control.navigation import Bundle
+from factory.nets.coordinated import Past
 from factory.plant.factory import Operation
 from factory.record.failures import Account
 from factory.simulation.run import PhysicsFigures
@@ -108,10 +109,12 @@ class World(Protocol):
     def apply(self, started: Sequence[Job], ended: Sequence[Job]) -> None:
         """Operations start and end now."""
 
-    def step(self, bundle: Bundle | None, axes: Index, ticks: int = 1) -> bool:
-        """A tick, or as many as `ticks` where nothing in between asks for the supervisor: the axes
-        of the active modes follow their field, all others stand. Whether any mode may have come to
-        its goal."""
+    def step(
+        self, bundle: Bundle | None, axes: Index, ticks: int = 1, until: Collection[Past] = ()
+    ) -> bool:
+        """A tick, or as many as `ticks` where nothing in between asks for the supervisor, as a pass
+        that it waits `until` does: the axes of the active modes follow their field, all others
+        stand. Whether any mode may have come to its goal."""
 
     def move(self, axes: Index, x: Array, v: Array, a: Array) -> None:
         """From now on `axes` run from x [m] at speed v [m/s] under acceleration a [m/s²]."""

@@ -9,15 +9,15 @@ go, whatever comes next, so the wait ends.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from factory.control.mode import ROUNDING
 from factory.layout.dimensions import up
 from factory.layout.feeding import passing
 from factory.layout.hands.hand import Hand
 from factory.layout.hands.limbs import rises_first
-from factory.layout.hands.meeting import delivered_at, following, guests, meetings
+from factory.layout.hands.meeting import delivered_at, guests, meetings
 from factory.layout.layout import Layout
+from factory.nets.coordinated import Past
 from factory.plant.factory import Operation
 
 SPARE = 0.001
@@ -30,53 +30,42 @@ ON = 0.009
 """A robot whose hand has to be clear goes on by so much: it does not slow down before [m]."""
 
 
-@dataclass(frozen=True, slots=True)
-class Leaving:
-    """A hand is clear when its `axis` is at `least` [m] or beyond."""
-
-    axis: int
-    least: float
-
-
-def leavings(layout: Layout) -> dict[int, tuple[Leaving, ...]]:
+def leavings(layout: Layout) -> dict[int, tuple[Past, ...]]:
     """For each operation (index) the hands that must be clear before it starts: those that have
-    delivered to its carrier in the operation before, where their payload waits for them; before a
-    carrier comes home with a tall hand, those of all that deliver to it; and before a robot goes
-    home whose hand is above what it has let go, its own."""
-    found: dict[int, list[Leaving]] = {}
+    delivered to its carrier, where their payload waits for them; before a carrier comes home with a
+    tall hand, those of all that deliver to it; and before a robot goes home whose hand is above
+    what it has let go, its own."""
+    waits: dict[int, list[Past]] = {}
     for robot in layout.factory.robots:
-        for number, leaving in going_on(layout, robot.index).items():
-            found.setdefault(number, []).extend(leaving)
-        before = list[Leaving]()
-        if rises_first(layout, robot.index):
-            before.append(raised(layout, robot.index))
+        for number, gone in _going_on(layout, robot.index):
+            waits.setdefault(number, []).append(gone)
+        before, tours = list[Past](), layout.factory.tours[robot.index]
         hand = layout.hand(robot.index)
         if hand is not None and hand.tall:
             before += [
-                _gone_behind(layout, guest, operation)
+                _back(layout, guest, operation.index, _behind(layout, guest, operation))
                 for operation, guest, _ in _delivering(layout, robot.index)
             ]
-        for tour in layout.factory.tours[robot.index] if before else ():
-            found.setdefault(tour[0], []).extend(before)
-    return {number: tuple(dict.fromkeys(leaving)) for number, leaving in found.items() if leaving}
+        rises = rises_first(layout, robot.index)
+        for last, tour in zip((*tours[-1:], *tours), tours, strict=False):
+            own = [raised(layout, robot.index, last[-1])] if rises else []
+            if before or own:
+                waits.setdefault(tour[0], []).extend((*own, *before))
+    return {number: tuple(dict.fromkeys(passes)) for number, passes in waits.items()}
 
 
-def going_on(layout: Layout, carrier: int, later: bool = True) -> dict[int, tuple[Leaving, ...]]:
-    """For each operation (index) of a carrier the hands that have delivered to it in the one
-    before, or `later` in any before, and must be clear of what is there or comes there."""
-    found: dict[int, list[Leaving]] = {}
+def _going_on(layout: Layout, carrier: int) -> Iterator[tuple[int, Past]]:
+    """Operations (index) of a carrier, each with a hand that has delivered to it in one before, and
+    must be clear of what is there or comes there."""
     gear = layout.factory.robots[carrier].operations
     for operation, guest, hand in _delivering(layout, carrier):
         step = gear.index(operation.index) + 1
-        for number, back in enumerate(hand.waits if later else hand.waits[:1]):
+        for number, back in enumerate(hand.waits):
             if back:
-                awaited = found.setdefault(gear[(step + number) % len(gear)], [])
-                awaited.append(_gone(layout, guest, back))
-    for number, guest, back in meetings(layout, carrier):
-        delivers = layout.factory.robots[guest].operations[-1]
-        if later or following(layout, carrier, delivers) == number:
-            found.setdefault(number, []).append(_back(layout, guest, back))
-    return {number: tuple(leaving) for number, leaving in found.items()}
+                later = gear[(step + number) % len(gear)]
+                yield later, _gone(layout, guest, operation.index, back)
+    for met in meetings(layout, carrier):
+        yield met.starts, _back(layout, met.robot, met.delivers, met.far)
 
 
 def _delivering(layout: Layout, carrier: int) -> Iterator[tuple[Operation, int, Hand]]:
@@ -96,8 +85,8 @@ def awaited_positions(layout: Layout) -> dict[int, float]:
     found: dict[int, float] = {}
     factory, backs = layout.factory, [0.0] * len(layout.factory.robots)
     for carrier in factory.robots if layout.hands else ():
-        for _, guest, back in meetings(layout, carrier.index):
-            backs[guest] = max(backs[guest], back)
+        for back in meetings(layout, carrier.index):
+            backs[back.robot] = max(backs[back.robot], back.far)
         hand = layout.hand(carrier.index)
         if hand is not None and hand.tall:
             for operation, guest, _ in _delivering(layout, carrier.index):
@@ -110,9 +99,9 @@ def awaited_positions(layout: Layout) -> dict[int, float]:
         if hand.first and not (first.inputs and hand.tall):
             found[robot] = layout.guidepaths[robot].length
             continue
-        back = max(backs[robot], 0.0 if rises_first(layout, robot) else hand.clear)
-        if back:
-            least, end = _back(layout, robot, back).least, _before_next(layout, robot)
+        far = max(backs[robot], 0.0 if rises_first(layout, robot) else hand.clear)
+        if far:
+            least, end = _least(layout, robot, far), _before_next(layout, robot)
             found[robot] = min(least + ON, max(least + NEAR, end))
     return found
 
@@ -145,27 +134,30 @@ def goes_early(layout: Layout) -> list[tuple[int, int]]:
     return [(tour[0], r) for r in awaited for tour in layout.factory.tours[r]]
 
 
-def raised(layout: Layout, robot: int) -> Leaving:
-    """When a robot's lift is up."""
+def raised(layout: Layout, robot: int, after: int) -> Past:
+    """When a robot's lift is up after an operation (index)."""
     axis = len(layout.factory.robots) + list(layout.lifts).index(robot)
-    return Leaving(axis, layout.strokes[robot] - SPARE)
+    return Past(2 * after + 1, axis, layout.strokes[robot] - SPARE)
 
 
-def _gone(layout: Layout, robot: int, back: float) -> Leaving:
+def _gone(layout: Layout, robot: int, after: int, back: float) -> Past:
     """When a robot's hand is clear of what it has to go back from by so much [m], or its lift is
-    up."""
-    return raised(layout, robot) if rises_first(layout, robot) else _back(layout, robot, back)
+    up, after an operation (index)."""
+    if rises_first(layout, robot):
+        return raised(layout, robot, after)
+    return _back(layout, robot, after, back)
 
 
-def _back(layout: Layout, robot: int, back: float) -> Leaving:
-    """When a robot has gone back by so much [m], wherever it has delivered."""
+def _back(layout: Layout, robot: int, after: int, back: float) -> Past:
+    """When a robot has gone back by so much [m], wherever it delivers, after an operation
+    (index)."""
+    return Past(2 * after + 1, robot, _least(layout, robot, back))
+
+
+def _least(layout: Layout, robot: int, back: float) -> float:
+    """Where a robot is that has gone back by so much, wherever it delivers [m]."""
     least = max(delivered_at(layout, robot)) + back + SPARE
-    return Leaving(robot, min(least, layout.guidepaths[robot].length - SPARE))
-
-
-def _gone_behind(layout: Layout, robot: int, operation: Operation) -> Leaving:
-    """When all of a robot's hand has gone back behind what it has delivered to."""
-    return _back(layout, robot, _behind(layout, robot, operation))
+    return min(least, layout.guidepaths[robot].length - SPARE)
 
 
 def _behind(layout: Layout, robot: int, operation: Operation) -> float:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -29,9 +30,19 @@ FAR = 100.0
 """As far as anything comes from [m]."""
 
 
-def meetings(layout: Layout, carrier: int) -> Iterator[tuple[int, int, float]]:
-    """The robots that have to go back after they have delivered to a carrier: an operation (index)
-    that has to wait for that, the robot, and how far it goes [m]."""
+@dataclass(frozen=True, slots=True)
+class Back:
+    """A robot (index) that has delivered in an operation (index) has gone back by `far` [m] before
+    another operation of the same carrier starts (index)."""
+
+    robot: int
+    delivers: int
+    starts: int
+    far: float
+
+
+def meetings(layout: Layout, carrier: int) -> Iterator[Back]:
+    """The robots that have to go back after they have delivered to a carrier, and by how much."""
     axis = 0 if layout.guidepaths[carrier].heading[0] else 1
     coming_here = [
         (
@@ -56,9 +67,10 @@ def meetings(layout: Layout, carrier: int) -> Iterator[tuple[int, int, float]]:
                 if lifted:
                     back = max(back, _back(own, _brought(layout, other, carrier), heading))
                 if back:
-                    yield later.index, robot, back
+                    yield Back(robot, operation.index, later.index, back)
         if lifted and (back := _back(own, _going(layout, carrier, operation), heading)):
-            yield following(layout, carrier, operation.index), robot, back
+            after = following(layout, carrier, operation.index)
+            yield Back(robot, operation.index, after, back)
         yield from _past(layout, carrier, (operation, robot, own), added)
 
 
@@ -147,7 +159,7 @@ def _past(
     carrier: int,
     guest: tuple[Operation, int, Array],
     added: Iterable[tuple[tuple[int, ...], Array, Index]],
-) -> Iterator[tuple[int, int, float]]:
+) -> Iterator[Back]:
     """How far a robot that has delivered to a carrier in an operation, with a hand in some boxes
     there, goes back from what the carrier then takes past it: its tower from what is added on the
     same tour, or all of it, which is up, from all that is there; and from what comes from home on
@@ -166,7 +178,7 @@ def _past(
                 continue  # it comes again before that, so it has been at home
             begins = tour[min(1, len(tour) - 1)]
             if far := _back(own, swept, heading, 0.0):
-                yield begins, robot, far
+                yield Back(robot, operation.index, begins, far)
             continue
         at = tour.index(operation.index)
         if rises_first(layout, robot):
@@ -175,7 +187,8 @@ def _past(
             ways, then = _ways(tower, swept, heading, 0.0) * (step > at), step
         for later in np.unique(then[ways > 0]).tolist():
             begins = tour[later] if later < len(tour) else following(layout, carrier, tour[-1])
-            yield begins, robot, round(float(ways[then == later].max()), 6)
+            far = round(float(ways[then == later].max()), 6)
+            yield Back(robot, operation.index, begins, far)
 
 
 def _added(layout: Layout, carrier: int) -> Iterator[tuple[tuple[int, ...], Array, Index]]:

@@ -15,6 +15,7 @@ from factory.control.governor import follow, govern
 from factory.control.mode import REST, ROUNDING, Array, Index
 from factory.control.navigation import Bundle
 from factory.control.profile import landing_speed
+from factory.nets.coordinated import Past
 from factory.simulation.mujoco.drives import Drives
 
 AHEAD = 0.0005
@@ -113,13 +114,14 @@ class Follower:
         """Whether the course is over, near a goal."""
         return self.course is not None and self.over and self.course.near
 
-    def until(self, axis: int, least: float) -> int:
-        """How many ticks of the course are to come until the reference of an axis is so far [m] or
-        further; all that are left where it never is."""
-        if self.course is None or axis not in self.axes:
+    def until(self, past: Past) -> int:
+        """How many ticks of the course are to come until a reference may be past a point; all that
+        are left where it never is."""
+        if self.course is None or past.axis not in self.axes:
             return self.left
-        slot = int(np.flatnonzero(self.axes == axis)[0])
-        there = self.course.x[self._at :, slot] >= least
+        slot = int(np.flatnonzero(self.axes == past.axis)[0])
+        left = (past.at - self.course.x[self._at :, slot]) * past.direction
+        there = left <= AHEAD
         return int(there.argmax()) if there.any() else self.left
 
     def begin(self, axes: Index, course: Course) -> None:

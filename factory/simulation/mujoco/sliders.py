@@ -21,7 +21,7 @@ from factory.simulation.mujoco.drives import Drives
 from factory.simulation.mujoco.sleep import Sleep
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
-from factory.timing.serving import CALM
+from factory.timing.timing import CALM
 
 ROUNDED = 0.01
 """What is due so much of a tick later is due."""

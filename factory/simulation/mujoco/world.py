@@ -7,7 +7,7 @@ sight.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Container, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from math import ceil
@@ -19,10 +19,10 @@ from factory.control.navigation import Bundle
 from factory.layout.layout import Layout
 from factory.mjcf.loading import load
 from factory.mjcf.model import Model
+from factory.nets.coordinated import Past
 from factory.plant.factory import Operation
 from factory.simulation.mujoco.fast.neighbours import Neighbours
 from factory.simulation.mujoco.fast.strides import Strides
-from factory.simulation.mujoco.hands_away import HandsAway
 from factory.simulation.mujoco.inspection import Inspection
 from factory.simulation.mujoco.motion import Motion
 from factory.simulation.mujoco.parts import Parts
@@ -68,7 +68,7 @@ class MujocoWorld:
         with by_name():
             self.motion = Motion(self.m, self.d, model, start, gains)
             self.parts = Parts(self.m, self.d, model, self.motion, request, counts)
-            self._away, parts = self._hands_away(model.layout), self.parts
+            parts = self.parts
         soundness = Soundness(self.m, self.d, model, parts.masks, parts.copies.body, parts.grips)
         self.inspection = Inspection(self.m, self.d, model, soundness)
         for operation in model.factory.operations:
@@ -101,7 +101,7 @@ class MujocoWorld:
 
     def prepared(self, operation: Operation, unit: int) -> bool:
         """A feeder presents the part of that unit; the outfeed has room for a product."""
-        if not self.hooks.admit(operation, unit) or self._away.hold_up(operation):
+        if not self.hooks.admit(operation, unit):
             return False
         if self.parts.feeders.serves(operation.label):
             return self.parts.feeders.presents(operation.label, unit)
@@ -132,7 +132,9 @@ class MujocoWorld:
         self.parts.hand_over(ended)
         self.supplied = True
 
-    def step(self, bundle: Bundle | None, axes: Index, ticks: int = 1) -> bool:
+    def step(
+        self, bundle: Bundle | None, axes: Index, ticks: int = 1, until: Collection[Past] = ()
+    ) -> bool:
         """Some ticks of the engine, the drives following references that obey F_p under the limits:
         as many as are asked for, but not past the end of a course. Whether any mode may have come
         to its goal: no robot is far ahead of its reference, nor at rest before that is."""
@@ -146,15 +148,12 @@ class MujocoWorld:
             ticks = min(ticks, self.model.settings.stride - self._unseen)
         else:
             motion.plan_robots(bundle)
-        if wait := self._away.soonest(motion.robots):
-            ticks = min(ticks, wait)
+        if until:
+            ticks = min(ticks, max(1, min(map(motion.robots.until, until))))
         left = (self.parts.feeders.due - self.time) / self.model.settings.tick
         if left < ticks:
             ticks = max(1, ceil(left - ROUNDED))
-        passed = motion.step(bundle, ticks)
-        self._settle(passed)
-        if wait and passed == wait:
-            self.supplied |= self._away.gone()
+        self._settle(motion.step(bundle, ticks))
         return motion.robots.near
 
     def move(self, axes: Index, x: Array, v: Array, a: Array) -> None:
@@ -175,19 +174,13 @@ class MujocoWorld:
         self.inspection.soundness.gone.update(gone)
         self.parts.feeders.exchange(robot, layout)
         self.inspection.exchange(layout)
-        self._away = self._hands_away(layout)
 
-    def _hands_away(self, layout: Layout) -> HandsAway:
-        return HandsAway(self.d, layout, self.motion.axes.qpos, self.parts.hands.of)
-
-    def in_the_way(self, under_way: Iterable[int]) -> set[int]:
+    def in_the_way(self, away: Container[int]) -> set[int]:
         """The robots (index) that stand where a part comes late that they wait for, but for those
-        whose hands have gone out of the way of operations (index) that are under way."""
+        one of whose axes is to stay `away`."""
+        lift = self.motion.axes.lift
         robots = self.parts.feeders.in_the_way()
-        if not robots:
-            return robots
-        away = self._away.awaited(under_way)
-        return {r for r in robots if away.isdisjoint({r, self.motion.axes.lift.get(r, r)})}
+        return {r for r in robots if r not in away and lift.get(r, r) not in away}
 
     def settle(self) -> None:
         """A tick's timesteps are over, and the tray's next tick begins."""

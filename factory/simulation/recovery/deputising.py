@@ -10,12 +10,14 @@ from factory.layout.layout import Layout
 from factory.layout.scrapping import not_carried_back
 from factory.layout.standby import deputies_in, part_of
 from factory.modes.modes import operation_modes, robot_limits
-from factory.modes.staging import stages_of, with_time
+from factory.modes.staging import stages_of
 from factory.nets.undone import Undone
 from factory.record.exchange import Exchange
+from factory.simulation.ordering import Orders
 from factory.simulation.recovery.books import Books
 from factory.simulation.simulation import Simulation
-from factory.timing.prediction import all_ways, operation_delays, predict
+from factory.timing.timed import timed
+from factory.timing.timing import Timing
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,19 +78,23 @@ class Deputising:
         that stay."""
         simulation, alone, takeover = self._simulation, change.alone, change.takeover
         request, first = simulation.request, simulation.layout
-        settings, world, stay = request.settings, request.world, change.stay
+        settings, stay = request.settings, change.stay
         lifts = (first.lifts.index(stay[robot]) for robot in alone.lifts)
         axes = [*stay, *(len(first.guidepaths) + lift for lift in lifts)]
         limits = robot_limits(first, settings, request.seed, request.jitter)[0].of(axes)
         modes = operation_modes(alone, settings.eps)
         stages = stages_of(alone, modes, settings)
-        ahead = with_time(alone, stages, world, request.wip)
-        delays = operation_delays(alone, modes, limits, settings, world, ahead)
-        ways = all_ways(alone, modes, ahead, delays, limits, settings, world)
-        predicted = predict(alone, delays, settings, world, request.wip, ways).seconds
-        simulation.modes, simulation.delays, self._books.layout = modes, delays, change.layout
+        drawn = request.seed, request.jitter, request.wip, modes, limits
+        timing = Timing(alone, settings, request.world, *drawn)
+        predicted = timed(timing, wip=request.wip).cycle.seconds
+        simulation.modes, simulation.delays = modes, timing.delays
+        self._books.layout = change.layout
         own = [replace(s, robot=stay[s.robot], axis=axes[s.axis]) for s in stages]
-        self._books.supervisor.exchange(takeover.crew, modes, own, undone, fired)
+        orders = Orders(
+            replace(order, past=replace(order.past, axis=axes[order.past.axis]))
+            for order in timing.coordinated.net.orders
+        )
+        self._books.supervisor.exchange(takeover.crew, modes, own, undone, fired, orders)
         names, net = takeover.names, takeover.after.net
         told = undone.t, *names, fired, net, takeover.crew, predicted
         self.exchanges.append(Exchange(*told))

@@ -120,7 +120,7 @@ class IdealPlant:
     def throw_away(self, robot: int, label: str, seconds: float) -> None:
         """A robot lets scrap fall."""
 
-    def in_the_way(self, under_way: Sequence[int]) -> Set[int]:
+    def in_the_way(self, away: Set[int]) -> Set[int]:
         """No robot is in the way of a part."""
         return frozenset()
 

@@ -78,9 +78,9 @@ class Plant(Protocol):
         """A robot at its B end lets go of a label that is scrap, over its bin, where that is wide
         enough; it lies for so long [s]."""
 
-    def in_the_way(self, under_way: Sequence[int]) -> Set[int]:
-        """The robots that stand where a part comes late that they wait for, but for those that
-        operations under way (index) need to be away."""
+    def in_the_way(self, away: Set[int]) -> Set[int]:
+        """The robots that stand where a part comes late that they wait for, but for those one of
+        whose axes is to stay `away`."""
 
     def takes_back(self, robot: int) -> bool:
         """Whether something goes back up in a robot's feeder, and the robot is out of its way."""

@@ -89,9 +89,10 @@ class Responding:
     def make_way(self) -> None:
         """Robots that wait at their feeders, and are in the way of what comes late there, go out of
         its way."""
-        books = self._books
-        found = self._plant.in_the_way(books.supervisor.active.operations)
-        for robot in found - self.returning.ways.keys() - self.dead.keys():
+        books, supervisor = self._books, self._books.supervisor
+        away = supervisor.orders.axes(2 * number for number in supervisor.active.operations)
+        late = self._plant.in_the_way(away)
+        for robot in late - self.returning.ways.keys() - self.dead.keys():
             if books.step_of(robot) % 2 or books.operation_of(robot).inputs:
                 continue
             books.supervisor.recall(self.standing.axes([robot]))

@@ -56,7 +56,7 @@ class Candidate:
         return sum(len(operation.robots) * delay for operation, delay in pairs)
 
     @cached_property
-    def _timed(self) -> tuple[CycleTime, list[float]]:
+    def _timed(self) -> tuple[CycleTime, tuple[float, ...]]:
         """The pace of its layout, and how long each operation takes [s]."""
         return pace(self.project.layout, self.project.settings)
 

@@ -9,7 +9,6 @@ from factory.study.analysis.flow import Flow, flow
 from factory.study.analysis.measured import Comparison, RunRecord, compare
 from factory.study.analysis.slack import slacks
 from factory.study.analysis.timed import TimedNet, timed_net
-from factory.study.analysis.timing import AS_IT_IS, Change, Timing
 from factory.study.analysis.what_if import (
     Scenario,
     Sensitivity,
@@ -19,6 +18,7 @@ from factory.study.analysis.what_if import (
     sensitivities,
     wip_curve,
 )
+from factory.timing.timing import AS_IT_IS, Change, Timing
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 from factory.plant.factory import Operation
 from factory.study.analysis.firing import Firings, Floats
 from factory.study.analysis.timed import TimedNet, timed_net
-from factory.study.analysis.timing import Timing
+from factory.timing.timing import Timing
 
 APART = 1e-3
 """The pace counts as reached where the mean interval is within this share of it."""

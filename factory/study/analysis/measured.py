@@ -13,7 +13,7 @@ from factory.simulation.run import Event, mean_interval
 from factory.study.analysis.firing import Floats
 from factory.study.analysis.flow import Flow, busy_until, durations, lasting
 from factory.study.analysis.timed import TimedNet
-from factory.study.analysis.timing import Timing
+from factory.timing.timing import Timing
 
 
 @dataclass(frozen=True, slots=True)

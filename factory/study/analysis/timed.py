@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import lcm
 
-from factory.nets.cycle_ratio import CycleRatio, max_cycle_ratio
-from factory.nets.gears import GearNet
-from factory.nets.marked import NONE, MarkedNet, marked
+from factory.nets.cycle_ratio import CycleRatio
+from factory.nets.marked import NONE, MarkedNet
 from factory.nets.petri import PetriNet, Place
-from factory.nets.ways import busiest, with_ways
 from factory.study.analysis.firing import Firings, settled_firings
 from factory.study.analysis.slack import Slack, circuits
-from factory.study.analysis.timing import AS_IT_IS, Change, Timing
-from factory.timing.pool import with_wip
-from factory.timing.serving import longer, serving, turn_ways
-
-SAME = 1e-9
-"""Relative difference up to which times are equal."""
+from factory.timing.timed import FEEDER, OUTFEED, SAME, Timed, timed
+from factory.timing.timing import AS_IT_IS, Change, Timing
 
 LONGEST_PERIOD = 60
 
@@ -49,54 +43,68 @@ class Circuit:
 
 @dataclass(frozen=True)
 class TimedNet:
-    """A net with the time of each place, and those of its circuits that have a name.
+    """A timed net, and those of its circuits that have a name.
 
-    Of a gear net without a bound `wip` these are all its simple circuits: robots' gears, and places
-    that go back over one operation alone. With copies of a robot its gear has so many tokens, and
-    an operation that it does alone, which has one place on the floor, a place of one token back
-    over it: one at a time. The outfeed's place goes back over dropoff. Where robots go ahead while
-    they wait, a gear's slowest circuit goes by those of its `ways` (places by robot and operation)
-    that take longer than the operation. `train`: the gears of a gear train, whose critical circuit
-    may lie in several of them; None for a gear net. `first`: what a place takes for the first time
-    [s], and `ready`: when robots have gone ahead that set out at the beginning, where those are
-    other times. `units`: how many products come in a cycle of the net.
+    In the ideal world the named circuits of a gear net without a bound `wip` are all its simple
+    circuits: robots' gears, and places that go back over one operation alone. With copies of a
+    robot its gear has so many tokens, and an operation that it does alone, which has one place on
+    the floor, a place of one token back over it: one at a time. Where robots go ahead while they
+    wait, a gear's slowest circuit goes by those of its ways that take longer than the operation.
+    `first`: what a place takes for the first time [s], and `ready`: when robots have gone ahead
+    that set out at the beginning, where those are other times.
     """
 
-    net: MarkedNet
-    seconds: tuple[float, ...]
+    timed: Timed
     named: tuple[Circuit, ...] = field(repr=False)
-    bounds: tuple[int, ...] = ()
-    ways: Mapping[tuple[int, int], int] = field(default_factory=dict, repr=False)
     first: Mapping[int, float] = field(default_factory=dict, repr=False)
     ready: Mapping[int, float] = field(default_factory=dict, repr=False)
-    train: GearNet | None = field(default=None, repr=False)
-    units: int = 1
+
+    @property
+    def net(self) -> MarkedNet:
+        """The net."""
+        return self.timed.net
+
+    @property
+    def seconds(self) -> tuple[float, ...]:
+        """The time of each place [s]."""
+        return self.timed.seconds
+
+    @property
+    def ways(self) -> Mapping[tuple[int, int], int]:
+        """The places of robots that go ahead, by robot and operation."""
+        return self.timed.ways
+
+    @property
+    def units(self) -> int:
+        """How many products come in a cycle of the net."""
+        return self.timed.timing.factory.period
 
     @property
     def is_plain(self) -> bool:
         """Whether all simple circuits have a name."""
-        return not self.bounds and self.train is None
+        timing = self.timed.timing
+        return timing.world == "ideal" and not self.timed.bounds and timing.factory.net.is_tree
 
-    @cached_property
+    @property
     def ratio(self) -> CycleRatio:
         """The maximum cycle ratio with its proof."""
-        return max_cycle_ratio(self.net, self.seconds)
+        return self.timed.ratio
 
     @cached_property
     def pace(self) -> float:
         """The cycle time in the long run [s]."""
         if self.is_plain:
             return max(c.pace for c in self.named)
-        return self.ratio.seconds / self.units
+        return self.timed.pace
 
     @cached_property
     def circuits(self) -> tuple[Circuit, ...]:
-        """Those with a name, the tightest through each bound, and in a gear train the critical one,
-        the slowest first."""
-        tightest = circuits(self.ratio, self.bounds) if self.bounds else ()
+        """Those with a name, the tightest through each bound, and the critical one, the slowest
+        first."""
+        bounds = self.timed.bounds
+        tightest = circuits(self.ratio, bounds) if bounds else ()
         found = [self._bounded(slack) for slack in tightest]
-        if self.train is not None:
-            found += self._meeting(self.train, [*self.named, *found])
+        found += self._meeting([*self.named, *found])
         return tuple(sorted((*self.named, *found), key=lambda c: -c.pace))
 
     @cached_property
@@ -106,21 +114,21 @@ class TimedNet:
 
     def _bounded(self, slack: Slack) -> Circuit:
         tokens = sum(self.net.tokens[p] for p in slack.circuit)
-        names = [self.net.net.places[p].name for p in slack.circuit if p in self.bounds]
+        names = [self.net.net.places[p].name for p in slack.circuit if p in self.timed.bounds]
         seconds = sum(self.seconds[p] for p in slack.circuit)
         name = " ".join(names).replace(":", " ")
         return Circuit(name, seconds, tokens, slack.circuit, self.units)
 
-    def _meeting(self, gears: GearNet, known: Sequence[Circuit]) -> list[Circuit]:
-        """The critical circuit of a gear train, where none of those `known` is as slow."""
+    def _meeting(self, known: Sequence[Circuit]) -> list[Circuit]:
+        """The critical circuit, where none of those `known` is as slow."""
         if max(circuit.pace for circuit in known) >= self.pace * (1 - SAME):
             return []
-        places = self.ratio.circuit
-        first, *others = busiest(gears, self.ways, places, self.seconds)
-        names = ", ".join(gears.gears[robot].robot for robot in others)
+        places, robots = self.ratio.circuit, self.timed.timing.factory.robots
+        first, *others = self.timed.busiest
+        names = ", ".join(robots[robot].name for robot in others)
         return [
             Circuit(
-                f"{gears.gears[first].robot} with {names}",
+                f"{robots[first].name} with {names}" if names else robots[first].name,
                 sum(self.seconds[p] for p in places),
                 sum(self.net.tokens[p] for p in places),
                 places,
@@ -150,64 +158,41 @@ def timed_net(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None)
 
     Raises InputError (BadValue) where `wip` is below 1.
     """
-    factory = timing.factory
-    subject = marked(factory.net) if wip is None else with_wip(factory, wip)
-    bounds = tuple(range(len(factory.net.threaded.places), len(subject.tokens)))
-    tokens = list(subject.tokens)
-    for robot, copies in change.copies.items():
-        tokens[factory.net.initial[robot]] += copies - 1
-    went, delays = timing.ways(change), timing.changed(change)
-    if timing.outfeed and factory.folded:
-        went = longer(went, turn_ways(timing.layout, delays, timing.settings))
-    ways = dict(zip(went, range(len(tokens), len(tokens) + len(went)), strict=True))
-    seconds = [*delays]
-    seconds += [*[0.0] * (len(tokens) - len(seconds)), *went.values()]
-    waits = timing.waits(change)
-    for (robot, number), gone in waits.items():
-        gear = factory.net.gears[robot].places
-        seconds[gear[gear.index(number) - 1]] = gone
-    moving = with_ways(replace(subject, tokens=tuple(tokens)), factory.net, ways)
-    tokens, places = list(moving.tokens), list(moving.net.places)
-    back: list[tuple[str, tuple[int, ...], float]] = [
-        (f"station {factory.operations[n].label}", (n,), 0.0) for n in _alone(timing, change)
-    ]
-    held = longer(went, {key: gone + delays[key[1]] for key, gone in waits.items()})
-    for time in serving(timing.layout, delays, timing.settings, held) if timing.outfeed else ():
-        fed = factory.by_label.get(time.bottleneck.partition(" ")[2])
-        served = (fed.index,) if fed else tuple(o.index for o in factory.dropoffs)
-        spent = time.seconds * factory.period - sum(seconds[number] for number in served)
-        back.append((time.bottleneck, served, spent / len(served)))
-    named = _gears(timing, seconds, tokens, ways)
-    for name, served, delay in back:
-        first, circuit = len(places), list[int]()
-        for step, number in enumerate(served):
-            onward = factory.operations[served[(step + 1) % len(served)]]
-            operation = factory.operations[number]
-            circuit += [operation.place, first + step]
-            places.append(Place(name, (operation.end,), (onward.start,), "wait", operation.label))
-            tokens.append(int(step == len(served) - 1))
-            seconds.append(delay)
-        spent = sum(seconds[p] for p in circuit)
-        named.append(Circuit(name, spent, 1, tuple(circuit), factory.period))
-    net = replace(
-        subject,
-        net=PetriNet(subject.net.transitions, tuple(places)),
-        tokens=tuple(tokens),
-        slots=(),
+    made, factory = timed(timing, change, wip), timing.factory
+    places, tokens, seconds = [*made.net.net.places], [*made.net.tokens], [*made.seconds]
+    named = _gears(timing, seconds, tokens, made.ways)
+    for number in _alone(timing, change):
+        operation = factory.operations[number]
+        name, ends = f"station {operation.label}", ((operation.end,), (operation.start,))
+        circuit = operation.place, len(places)
+        places.append(Place(name, *ends, "wait", operation.label))
+        tokens.append(1)
+        seconds.append(0.0)
+        named.append(Circuit(name, seconds[operation.place], 1, circuit, factory.period))
+    named += _machines(timing, made)
+    whole = replace(
+        made,
+        net=MarkedNet(PetriNet(made.net.net.transitions, tuple(places)), tuple(tokens)),
+        seconds=tuple(seconds),
     )
-    ready = {ways[key]: taken for key, taken in timing.first_ways.items()}
-    train = None if factory.net.is_tree else factory.net
-    return TimedNet(
-        net,
-        tuple(seconds),
-        tuple(named),
-        bounds,
-        ways,
-        timing.first,
-        ready,
-        train,
-        factory.period,
-    )
+    ready = {made.ways[key]: taken for key, taken in timing.first_ways.items() if key in made.ways}
+    return TimedNet(whole, tuple(named), timing.first, ready)
+
+
+def _machines(timing: Timing, made: Timed) -> Iterator[Circuit]:
+    """The circuits of the tray, and of the magazines of robots with one tour."""
+    factory, seconds, coordinated = timing.factory, made.seconds, timing.coordinated
+    if not coordinated.away:
+        return
+    trays = [p for o in factory.dropoffs for p in (o.place, coordinated.away[o.index])]
+    cycles = [(OUTFEED, trays)]
+    for number, served in coordinated.served.items():
+        if number == served.before:
+            leaf = factory.operations[number]
+            cycles.append((f"{FEEDER} {leaf.label}", [leaf.place, served.up, served.down]))
+    for name, places in cycles:
+        spent = sum(seconds[p] for p in places)
+        yield Circuit(name, spent, 1, tuple(places), factory.period)
 
 
 def _gears(

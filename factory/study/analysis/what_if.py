@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from factory.study.analysis.timed import SAME, Circuit, TimedNet, timed_net
-from factory.study.analysis.timing import AS_IT_IS, AT_ONCE, Change, Timing
+from factory.study.analysis.timed import Circuit, TimedNet, timed_net
 from factory.timing.pool import part_pool
+from factory.timing.timed import SAME
+from factory.timing.timing import AS_IT_IS, AT_ONCE, Change, Timing
 
 STEP = 0.1
 """Relative change of a speed, an acceleration or a way."""

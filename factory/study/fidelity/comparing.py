@@ -17,7 +17,6 @@ from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from factory.study.analysis.flow import steady_units
-from factory.study.analysis.timing import Timing
 from factory.study.fidelity.causality import (
     causal_record,
     compare,
@@ -31,6 +30,7 @@ from factory.study.pool import over_processes
 from factory.support.engine import mujoco
 from factory.support.errors import Diagnostic, RunError
 from factory.support.settings import Settings
+from factory.timing.timing import Timing
 
 WORST = 10
 """So many pairs of things that are inside each other are listed of a seed."""

@@ -12,7 +12,7 @@ from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Observer, Simulation
 from factory.simulation.watched import watched
 from factory.study.analysis.flow import steady_units
-from factory.study.analysis.timing import Timing
+from factory.timing.timing import Timing
 
 SEED, JITTER = 0, 0.3
 """What the speeds and gains of robots are drawn with."""

@@ -226,10 +226,10 @@ class MujocoPlant:
             self.spilled.append(self._factory.robots[robot].name)
         self.let_go(robot, seconds, into)
 
-    def in_the_way(self, under_way: Sequence[int]) -> Set[int]:
-        """The robots that stand where a part comes late that they wait for, but for those that
-        operations under way (index) need to be away."""
-        return self._world.in_the_way(under_way)
+    def in_the_way(self, away: Set[int]) -> Set[int]:
+        """The robots that stand where a part comes late that they wait for, but for those one of
+        whose axes is to stay `away`."""
+        return self._world.in_the_way(away)
 
     def takes_back(self, robot: int) -> bool:
         """Whether something goes back up in a robot's feeder, and the robot is out of its way."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
@@ -11,14 +11,20 @@ import numpy as np
 
 from factory.control.mode import Array, Limits, Mode
 from factory.control.profile import SpeedProfile, World, mode_time
+from factory.layout.coordinating import HOME, Coordinated, coordinated
+from factory.layout.feeding import feeder_of
+from factory.layout.hands.limbs import rises_first
 from factory.layout.layout import Layout
 from factory.layout.outfeed import away, leaving
 from factory.modes.modes import operation_modes, operation_starts, robot_limits
 from factory.modes.staging import HeadStart, staged, stages_of, with_time
+from factory.modes.starting import start_positions
+from factory.nets.coordinated import Coordination, Past
 from factory.plant.factory import Factory
-from factory.simulation.starting import start_positions
 from factory.support.settings import Settings
-from factory.timing.prediction import gating, one_after_the_other, waits_for_hands, way_time
+
+CALM = 3
+"""So many ticks after its stroke a slider is at rest."""
 
 AT_ONCE = 1e6
 """A factor on a speed that leaves only the acceleration as a bound."""
@@ -42,8 +48,8 @@ AS_IT_IS = Change()
 class Timing:
     """The delays of a layout, by its modes, where each starts, and the robots' limits.
 
-    Speeds are those of `seed` and `jitter`, as in a run. Raises InputError where a mode cannot
-    reach its goal.
+    Speeds are those of `seed` and `jitter`, as in a run, or those `drawn`; `shaped`: the modes,
+    where they have been made already. Raises InputError where a mode cannot reach its goal.
     """
 
     layout: Layout
@@ -51,6 +57,9 @@ class Timing:
     world: World = "mujoco"
     seed: int = 0
     jitter: float = 0.0
+    wip: int | None = None
+    shaped: Sequence[Mode] = field(default=(), repr=False, compare=False)
+    drawn: Limits | None = field(default=None, repr=False, compare=False)
 
     @property
     def factory(self) -> Factory:
@@ -60,18 +69,28 @@ class Timing:
     @cached_property
     def modes(self) -> Sequence[Mode]:
         """The mode of each operation."""
-        return operation_modes(self.layout, self.settings.eps)
+        return self.shaped or operation_modes(self.layout, self.settings.eps)
 
     @cached_property
     def limits(self) -> Limits:
         """The limits of each axis."""
+        if self.drawn is not None:
+            return self.drawn
         return robot_limits(self.layout, self.settings, self.seed, self.jitter)[0]
 
     @cached_property
     def stages(self) -> tuple[HeadStart, ...]:
         """The ways that robots go ahead of operations while they wait, if they are to."""
         found = stages_of(self.layout, self.modes, self.settings)
-        return with_time(self.layout, found, self.world)
+        return with_time(self.layout, found, self.world, self.wip)
+
+    @cached_property
+    def coordinated(self) -> Coordinated:
+        """The coordinated net of the layout; in the ideal world, which has no bodies, the compiled
+        one."""
+        if self.world == "mujoco":
+            return coordinated(self.layout)
+        return Coordinated(Coordination(self.factory.net).built())
 
     @cached_property
     def left(self) -> list[Array]:
@@ -85,28 +104,86 @@ class Timing:
         return staged(self.left, self.stages)
 
     def ways(self, change: Change = AS_IT_IS) -> dict[tuple[int, int], float]:
-        """The time [s] of a robot to go ahead to an operation, by (robot, operation)."""
-        found = one_after_the_other(
+        """The time [s] of a robot to go ahead to an operation, by (robot, operation); and where
+        others wait in that for the robot (`Mode.gate`), until it is over if it begins at once."""
+        ways = _one_after_the_other(
             (stage, self._way(stage, stage.start, change)) for stage in self.stages
         )
-        for stage, begin in self._gating:
-            key = stage.robot, stage.operation
-            found[key] = max(found[key], self._delay(stage.operation, begin, change))
-        return found
+        for stage in self.stages:
+            if stage.axis == stage.robot and stage.slot in self.modes[stage.operation].gate:
+                begin = self.starts[stage.operation].copy()
+                begin[stage.slot] = stage.start
+                key = stage.robot, stage.operation
+                ways[key] = max(ways[key], self._delay(stage.operation, begin, change))
+        return ways
 
-    @cached_property
-    def _gating(self) -> tuple[tuple[HeadStart, Array], ...]:
-        """The ways ahead of robots for which others wait, and where all are before them."""
-        return tuple(gating(self.layout, self.modes, self.stages))
+    def passes(self, change: Change = AS_IT_IS) -> dict[Past, float]:
+        """How long after the transition that it follows each pass of the coordinated net comes
+        [s]: robots set out at once."""
+        delays = self.changed(change)
+        return {past: self._past(past, delays, change) for past in self.coordinated.net.passes}
 
-    def waits(self, change: Change = AS_IT_IS) -> dict[tuple[int, int], float]:
-        """How long a carrier waits at least, for hands that have delivered to it to be gone [s], by
-        (robot, operation to come); nowhere in the ideal world, which has no hands."""
-        if self.world == "ideal":
-            return {}
-        robots = [*range(len(self.factory.robots)), *self.layout.lifts]
-        limits = self._limits(range(len(robots)), robots, change)
-        return waits_for_hands(self.layout, limits)
+    def _past(self, past: Past, delays: Sequence[float], change: Change) -> float:
+        """When an axis comes past a point, from rest."""
+        layout, robot, number = self.layout, self.robot_of(past.axis), past.after // 2
+        profile = self._profile(past.axis, change)
+        if past.axis != robot:
+            return profile.passes(layout.strokes[robot], past.at)
+        begin, factor = layout.legs[number, robot], change.way.get(robot, 1.0)
+        if past.direction < 0:
+            mode, slot = self.modes[number], self.factory.operations[number].robots.index(robot)
+            left = max(0.0, past.at - begin[1]) * factor
+            if mode.gate[slot] >= 0 and left < mode.standoff[slot]:
+                return max(0.0, delays[number] - self.rest - profile.landing(left))
+            way = (begin[0] - begin[1]) * factor
+            return profile.passes(way, way - left)
+        rises = 0.0
+        if rises_first(layout, robot):
+            axis = len(self.factory.robots) + layout.lifts.index(robot)
+            rises = self._profile(axis, change).rest(layout.strokes[robot])
+        way = (layout.guidepaths[robot].length - begin[1]) * factor
+        if past.at < layout.guidepaths[robot].length - HOME:
+            return rises + profile.passes(way, min(way, (past.at - begin[1]) * factor))
+        return rises + profile.rest(way) + self._adjusted(robot, number)
+
+    def _adjusted(self, robot: int, number: int) -> float:
+        """How long the lift of a robot that is at home takes to be set for its next tour [s]."""
+        if robot not in self.factory.adjusted:
+            return 0.0
+        gear = self.factory.robots[robot].operations
+        after = gear[(gear.index(number) + 1) % len(gear)]
+        one, other = (self.layout.level(robot, n).up for n in (number, after))
+        profile = SpeedProfile(self.settings.speed, self.settings.acceleration)
+        return profile.rest(abs(one - other)) + self.settings.settle
+
+    def strokes(self, before: int, leaf: int) -> tuple[float, float]:
+        """How long a slider goes up after the part of one operation, and comes down with that of
+        the next until its robot may set out [s]: a robot comes when the part is down, one whose
+        hand holds from above sets out then, and one whose hand is there first is there."""
+        layout, profile = self.layout, SpeedProfile(*self.settings.feeder_limits)
+        up, down = (
+            profile.rest(feeder_of(layout, self.factory.operations[n].label).stroke)
+            + (CALM + 1) * self.settings.tick
+            for n in (before, leaf)
+        )
+        robot = self.factory.operations[leaf].carrier
+        hand = layout.hand(robot)
+        if hand is None or not (hand.first or hand.kind == "above"):
+            fastest = SpeedProfile(
+                self.settings.speed * (1 + self.jitter), self.settings.acceleration
+            )
+            at = float(self.starts[leaf][self.factory.operations[leaf].robots.index(robot)])
+            down -= fastest.rest(max(0.0, layout.guidepaths[robot].length - at))
+        return up, max(0.0, down)
+
+    def _profile(self, axis: int, change: Change) -> SpeedProfile:
+        limits = self._limits((axis,), (self.robot_of(axis),), change)
+        return SpeedProfile(float(limits.speed[0]), float(limits.acceleration[0]))
+
+    def robot_of(self, axis: int) -> int:
+        """The robot (index) of an axis."""
+        count = len(self.factory.robots)
+        return axis if axis < count else self.layout.lifts[axis - count]
 
     @cached_property
     def first_ways(self) -> Mapping[tuple[int, int], float]:
@@ -117,12 +194,13 @@ class Timing:
             for stage in self.stages
             if self.factory.robots[stage.robot].operations[0] == stage.operation
         )
-        return MappingProxyType(one_after_the_other(ways))
+        return MappingProxyType(_one_after_the_other(ways))
 
     def _way(self, stage: HeadStart, start: float, change: Change) -> float:
         start = stage.goal + (start - stage.goal) * change.way.get(stage.robot, 1.0)
         limits = self._limits((stage.axis,), (stage.robot,), change)
-        return way_time(stage, start, limits, self.settings, self.world)
+        settle = self.settings.settle if self.world == "mujoco" else 0.0
+        return mode_time(stage.mode, np.array([start]), limits, self.world) + settle
 
     def _limits(self, axes: Sequence[int], robots: Sequence[int], change: Change) -> Limits:
         """The limits of axes, which are those of robots, with a change."""
@@ -202,8 +280,7 @@ class Timing:
 
     def _of(self, number: int) -> tuple[int, ...]:
         """The robot of each axis of an operation."""
-        count, lifts = len(self.factory.robots), self.layout.lifts
-        return tuple(a if a < count else lifts[a - count] for a in self.factory.axes[number])
+        return tuple(map(self.robot_of, self.factory.axes[number]))
 
     def _delay(self, number: int, start: Array, change: Change) -> float:
         mode, robots = self.modes[number], self._of(number)
@@ -214,3 +291,14 @@ class Timing:
             factor = np.array(shares + [1.0] * (len(robots) - carriages))
             start = mode.goals + (start - mode.goals) * factor
         return mode_time(mode, start, limits, self.world) + self.rest
+
+
+def _one_after_the_other(
+    ways: Iterable[tuple[HeadStart, float]],
+) -> dict[tuple[int, int], float]:
+    """The times of ways ahead [s] by robot and operation: a robot goes back when its lift is up."""
+    taken: dict[tuple[int, int], float] = {}
+    for stage, seconds in ways:
+        key = stage.robot, stage.operation
+        taken[key] = taken.get(key, 0.0) + seconds
+    return taken

@@ -1,0 +1,147 @@
+"""The coordinated net of a layout: its compiled net with ways past points, hands that wait for each
+other, magazines and the tray (`nets/coordinated.py`).
+
+An order between two operations is that in which one unit is made alone. So a sequence in which each
+transition fires once stays possible, and no circuit is free of tokens.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import groupby
+
+from factory.layout.feeding import passing
+from factory.layout.hands.leaving import leavings
+from factory.layout.layout import Layout
+from factory.nets.coordinated import CoordinatedNet, Coordination, Past
+from factory.plant.factory import Operation
+
+HOME = 1e-3
+"""A robot is at home within this [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Served:
+    """How a magazine serves the part of an operation (index): the place in which its slider goes up
+    after the part `before`, by the operation (index) that takes that, and the place in which it
+    comes down with this one."""
+
+    before: int
+    up: int
+    down: int
+
+
+@dataclass(frozen=True)
+class Coordinated:
+    """The coordinated net of a layout. `served`: by the operation (index) that takes a part;
+    `away`: the place in which the tray is away after a dropoff, by its operation (index)."""
+
+    net: CoordinatedNet
+    served: Mapping[int, Served] = field(default_factory=dict, repr=False)
+    away: Mapping[int, int] = field(default_factory=dict, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class _Feeding:
+    """Two parts that a magazine shows one after the other, by the operations in which they are
+    taken; whether a run begins with the second one; and the pass of the robot that has to be out of
+    the way in between, None where it is as soon as it has delivered."""
+
+    before: Operation
+    leaf: Operation
+    begins: bool
+    past: Past | None
+
+
+def coordinated(layout: Layout) -> Coordinated:
+    """The coordinated net of a layout with bodies."""
+    factory, build = layout.factory, Coordination(layout.factory.net)
+    position = {number: place for place, number in enumerate(factory.order)}
+    waits, feedings = leavings(layout).items(), [*_feedings(layout)]
+    passes = dict.fromkeys(feeding.past for feeding in feedings if feeding.past is not None)
+    passes |= dict.fromkeys(past for _, many in waits for past in many)
+    by_way = sorted(passes, key=lambda past: _way_of(layout, past))
+    for (after, robot, _), along in groupby(by_way, key=lambda past: _way_of(layout, past)[:3]):
+        _chain(layout, build, (factory.operations[after // 2], robot), [*along])
+    for start, many in waits:
+        operation = factory.operations[start]
+        for past in many:
+            before = factory.operations[past.after // 2]
+            tokens = int(position[before.index] >= position[start])
+            name = f"order:{before.label}:{_axis(layout, past)}:{operation.label}"
+            build.order(name, past, operation.start, tokens)
+    served = {one.leaf.index: _served(layout, build, one) for one in feedings}
+    away = {}
+    for step, dropoff in enumerate(factory.dropoffs):
+        then = factory.dropoffs[(step + 1) % factory.period]
+        name, ends = f"tray:{dropoff.label}", (dropoff.end, then.start)
+        away[dropoff.index] = build.place(name, *ends, int(then.turn == 0), "tray")
+    return Coordinated(build.built(), served, away)
+
+
+def _way_of(layout: Layout, past: Past) -> tuple[int, int, bool, float]:
+    """The transition that a pass follows, its robot, and in which order the robot comes past
+    points: its lift first, where that has to be up before it goes home."""
+    count = len(layout.factory.robots)
+    robot = past.axis if past.axis < count else layout.lifts[past.axis - count]
+    return past.after, robot, past.axis < count, past.at * past.direction
+
+
+def _axis(layout: Layout, past: Past) -> str:
+    """Whose axis it is."""
+    robot = layout.factory.robots[_way_of(layout, past)[1]]
+    return robot.name if past.axis == robot.index else f"{robot.name} up"
+
+
+def _chain(
+    layout: Layout, build: Coordination, who: tuple[Operation, int], passes: list[Past]
+) -> None:
+    """The passes of a robot that follow one transition of an operation: in that, or after its end
+    until the start of the robot's next, or its end where that leads beyond them all."""
+    factory, (operation, robot) = layout.factory, who
+    names = {p: f"past:{_axis(layout, p)}:{p.at:.3f}:{operation.label}" for p in passes}
+    if passes[0].after == operation.start:
+        build.chain(names, operation.end, operation.place)
+        return
+    gear = factory.robots[robot].operations
+    step = (gear.index(operation.index) + 1) % len(gear)
+    then, wait = factory.operations[gear[step]], factory.net.gears[robot].places[2 * step]
+    goals = {
+        axis: layout.goal(then.index, slot) for slot, axis in enumerate(factory.axes[then.index])
+    }
+    beyond = all(past.axis in goals and past.holds(goals[past.axis]) for past in passes)
+    build.chain(names, then.end if beyond else then.start, wait)
+
+
+def _feedings(layout: Layout) -> Iterator[_Feeding]:
+    """What magazines show, one part after the other. A robot whose hand is there first is at home
+    before a part comes down; any other is past the point where all that it holds is clear."""
+    factory = layout.factory
+    for robot, tours in enumerate(factory.tours):
+        hand, length = layout.hand(robot), layout.guidepaths[robot].length
+        fed = [n for n, tour in enumerate(tours) if not factory.operations[tour[0]].inputs]
+        for step, turn in enumerate(fed):
+            before, leaf = tours[fed[step - 1]], factory.operations[tours[turn][0]]
+            if hand is not None and hand.first:
+                last = factory.operations[tours[turn - 1][-1]]
+                past: Past | None = Past(last.end, robot, length - HOME)
+            else:
+                clear = length - passing(layout, leaf)
+                legs = (2 * n for n in before if layout.legs[n, robot][1] <= clear)
+                past = next((Past(start, robot, clear, -1) for start in legs), None)
+            yield _Feeding(factory.operations[before[0]], leaf, not step, past)
+
+
+def _served(layout: Layout, build: Coordination, feeding: _Feeding) -> Served:
+    """The gear of a magazine from one part to the next."""
+    before, leaf, past = feeding.before, feeding.leaf, feeding.past
+    tour = layout.factory.tour_of(leaf.carrier, before.index)
+    down = build.transition(f"down:{leaf.label}")
+    up = build.place(f"magazine up:{leaf.label}", before.end, down, 0, "magazine")
+    clear = layout.factory.operations[tour[-1]].end if past is None else build.events[past]
+    build.place(f"clear:{leaf.label}", clear, down)
+    shown = build.place(
+        f"magazine down:{leaf.label}", down, leaf.start, int(feeding.begins), "magazine"
+    )
+    return Served(before.index, up, shown)

@@ -1,0 +1,119 @@
+"""Coordinated nets: a compiled net, with what else waits in a laid-out factory.
+
+Beside the places of the compiled net there are *passes*, transitions that an axis fires in motion
+as it goes past a point; *order places*, by which a machine waits for one of those of another; and
+the gears of machines without a program, the magazines and the tray. All of them only restrict the
+compiled net: without them every run of the coordinated net is one of the compiled net (refinement),
+so what is proved of operations holds. It is a marked graph, so it is live, and its orders can never
+deadlock, iff no circuit is free of tokens (Commoner et al. 1971).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from factory.nets.gears import GearNet
+from factory.nets.marked import MarkedNet, marked, stuck_circuit, token_free
+from factory.nets.petri import PetriNet, Place, Transition
+
+
+@dataclass(frozen=True, slots=True)
+class Past:
+    """A pass: an `axis` has come as far as `at` [m], or further in its `direction` (+1 or -1),
+    since the transition `after` has fired."""
+
+    after: int
+    axis: int
+    at: float
+    direction: int = 1
+
+    def holds(self, x: float) -> bool:
+        """Whether the axis at `x` [m] is past."""
+        return (x - self.at) * self.direction >= 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """An order place [past; start]: the transition `start` has fired at most `tokens` times more
+    often than the pass. That comes before the transition `end` of its robot, which has fired at
+    most `held` times more often than what the pass follows."""
+
+    past: Past
+    start: int
+    tokens: int
+    end: int
+    held: int
+
+
+@dataclass(frozen=True)
+class CoordinatedNet:
+    """A marked graph whose first places and transitions are those of the compiled net. `passes`:
+    the place that each pass ends, and the pass where that begins, None for the transition that it
+    follows; `beside`: places that have as many tokens as one of the compiled net, which they are
+    beside; `orders`: those that a supervisor keeps."""
+
+    net: MarkedNet
+    passes: Mapping[Past, tuple[int, Past | None]] = field(repr=False)
+    beside: Mapping[int, int] = field(repr=False)
+    orders: tuple[Order, ...] = field(repr=False)
+
+    @property
+    def deadlock(self) -> tuple[int, ...]:
+        """The places of a circuit without token, () where the net is live. Linear."""
+        stuck = token_free(self.net).stuck
+        return stuck_circuit(self.net, stuck) if stuck else ()
+
+
+class Coordination:
+    """Builds a coordinated net upon a compiled one."""
+
+    def __init__(self, net: GearNet) -> None:
+        compiled = marked(net)
+        self.transitions, self.places = [*compiled.net.transitions], [*compiled.net.places]
+        self.tokens = [*compiled.tokens]
+        self.passes: dict[Past, tuple[int, Past | None]] = {}
+        self.events: dict[Past, int] = {}
+        self.beside: dict[int, int] = {}
+        self._ends: dict[Past, tuple[int, int]] = {}
+        self.orders: list[Order] = []
+
+    def transition(self, name: str) -> int:
+        """A transition more."""
+        self.transitions.append(Transition(name))
+        return len(self.transitions) - 1
+
+    def place(
+        self, name: str, before: int, after: int, tokens: int = 0, mode: str = "order"
+    ) -> int:
+        """A place [before; after] more; its name ends with the label that it is about."""
+        label = name.rpartition(":")[2]
+        self.places.append(Place(name, (before,), (after,), mode, label, 0))
+        self.tokens.append(tokens)
+        return len(self.places) - 1
+
+    def chain(self, passes: Mapping[Past, str], end: int, beside: int) -> None:
+        """Passes that come one after the other, with their names, between the transition that all
+        of them follow and the transition `end`, with as many tokens as a place that they are
+        `beside`."""
+        before: Past | None = None
+        for past, name in passes.items():
+            start = past.after if before is None else self.events[before]
+            event = self.events[past] = self.transition(name)
+            self.passes[past] = self.place(name, start, event, mode="past"), before
+            self._ends[past] = end, self.tokens[beside]
+            before = past
+        if before is not None:
+            name, tokens = f"{passes[before]} on", self.tokens[beside]
+            self.beside[self.place(name, self.events[before], end, tokens, "past")] = beside
+
+    def order(self, name: str, past: Past, start: int, tokens: int) -> None:
+        """An order place, from a pass to a transition of the compiled net."""
+        self.place(name, self.events[past], start, tokens)
+        self.orders.append(Order(past, start, tokens, *self._ends[past]))
+
+    def built(self) -> CoordinatedNet:
+        """The net."""
+        net = PetriNet(tuple(self.transitions), tuple(self.places))
+        marks = MarkedNet(net, tuple(self.tokens))
+        return CoordinatedNet(marks, self.passes, self.beside, tuple(self.orders))

@@ -1,0 +1,129 @@
+"""The timed net of a layout: its coordinated net with the time that a token stays in each place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+from factory.nets.cycle_ratio import CycleRatio, max_cycle_ratio
+from factory.nets.marked import MarkedNet
+from factory.nets.ways import Way, busiest, with_ways
+from factory.timing.cycle_time import CycleTime, cycle_time
+from factory.timing.pool import with_wip
+from factory.timing.timing import AS_IT_IS, Change, Timing
+
+SAME = 1e-9
+"""Relative difference up to which times are equal."""
+
+OUTFEED, FEEDER = "outfeed", "feeder"
+"""What machines are called that are no robots, as a bottleneck."""
+
+
+@dataclass(frozen=True)
+class Timed:
+    """A net with the `seconds` that a token stays in each place. `ways`: the places of robots that
+    go ahead while they wait, by robot and operation; `bounds`: those that bound what is inside;
+    `owners`: the robots that are in a place beyond those of the compiled net; `units`: how many
+    products are made in a cycle of the net."""
+
+    timing: Timing
+    net: MarkedNet
+    seconds: tuple[float, ...]
+    ways: Mapping[Way, int] = field(default_factory=dict, repr=False)
+    bounds: tuple[int, ...] = ()
+    owners: Mapping[int, tuple[int, ...]] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def ratio(self) -> CycleRatio:
+        """The maximum cycle ratio with its proof."""
+        return max_cycle_ratio(self.net, self.seconds)
+
+    @property
+    def pace(self) -> float:
+        """The cycle time in the long run [s]."""
+        return self.ratio.seconds / self.timing.factory.period
+
+    @cached_property
+    def busiest(self) -> list[int]:
+        """The robots on the critical circuit, those first that spend most seconds on it."""
+        gears = self.timing.factory.net
+        return busiest(gears, self.owners, self.ratio.circuit, self.seconds)
+
+    @cached_property
+    def bottleneck(self) -> str:
+        """What allows no less: a bound on what is inside, a feeder, the outfeed, or a robot."""
+        places = [(number, self.net.net.places[number]) for number in self.ratio.circuit]
+        for number, place in places:
+            if number in self.bounds:
+                return place.name.replace(":", " ")
+        modes = {place.mode: place.label for _, place in places}
+        if "tray" in modes:
+            return OUTFEED
+        if "magazine" in modes:
+            return f"{FEEDER} {modes['magazine']}"
+        return self.timing.factory.robots[self.busiest[0]].name
+
+    @property
+    def cycle(self) -> CycleTime:
+        """The cycle time and its bottleneck: a robot where its gear alone allows no less."""
+        gears = cycle_time(self.timing.factory, self.seconds[: self._compiled], self._taken)
+        if gears.seconds >= self.pace * (1 - SAME):
+            return gears
+        return CycleTime(self.pace, self.bottleneck)
+
+    @property
+    def _compiled(self) -> int:
+        return len(self.timing.factory.net.threaded.places)
+
+    @property
+    def _taken(self) -> dict[Way, float]:
+        return {way: self.seconds[place] for way, place in self.ways.items()}
+
+
+def timed(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None) -> Timed:
+    """The timed net of a layout with a change of its robots and a bound on copies of each part.
+
+    Raises InputError (BadValue) where `wip` is below 1.
+    """
+    factory, coordinated = timing.factory, timing.coordinated
+    net, count = _copied(timing, change), len(factory.net.threaded.places)
+    delays = timing.changed(change)
+    seconds = [*delays, *[0.0] * (len(net.tokens) - len(delays))]
+    owners: dict[int, tuple[int, ...]] = {}
+    dates = timing.passes(change)
+    for past, (place, before) in coordinated.net.passes.items():
+        seconds[place] = max(0.0, dates[past] - (dates[before] if before else 0.0))
+        owners[place] = (timing.robot_of(past.axis),)
+    for number, served in coordinated.served.items():
+        seconds[served.up], seconds[served.down] = timing.strokes(served.before, number)
+    for place in coordinated.away.values():
+        seconds[place] = timing.outfeed
+    bounds: tuple[int, ...] = ()
+    if wip is not None:
+        bounded = with_wip(factory, min(wip, len(factory.robots)))
+        more, tokens = bounded.net.places[count:], bounded.tokens[count:]
+        bounds = tuple(range(len(seconds), len(seconds) + len(more)))
+        places = replace(net.net, places=(*net.net.places, *more))
+        net = MarkedNet(places, (*net.tokens, *tokens))
+        seconds += [0.0] * len(more)
+    went = timing.ways(change)
+    for robot, number in [way for way in went if len(factory.net.gears[way[0]].places) == 2]:
+        # a way around a gear of one operation would lead back to where it begins
+        wait = factory.net.gears[robot].places[0]
+        seconds[wait] = max(seconds[wait], went.pop((robot, number)) - seconds[number])
+    ways = dict(zip(went, range(len(seconds), len(seconds) + len(went)), strict=True))
+    owners |= {place: (robot,) for (robot, _), place in ways.items()}
+    net = with_ways(net, factory.net, went)
+    return Timed(timing, net, (*seconds, *went.values()), ways, bounds, owners)
+
+
+def _copied(timing: Timing, change: Change) -> MarkedNet:
+    """The coordinated net, in which the gear of a robot with copies has so many tokens."""
+    coordinated, factory = timing.coordinated.net, timing.factory
+    tokens = list(coordinated.net.tokens)
+    for robot, copies in change.copies.items():
+        tokens[factory.net.initial[robot]] += copies - 1
+    for place, beside in coordinated.beside.items():
+        tokens[place] = tokens[beside]
+    return replace(coordinated.net, tokens=tuple(tokens))
