@@ -36,7 +36,7 @@ from factory.study.analysis.timed import timed_net
 from factory.study.analysis.what_if import scenarios, wip_curve
 from factory.support.settings import Settings
 from factory.timing.pool import part_pool
-from factory.timing.prediction import operation_delays, predict
+from factory.timing.timed import timed
 from tests.command_line import PAPER, ROOT, Terminal
 from tests.layout_values import paper_layout, random_layout
 from tests.net_values import net_from
@@ -170,12 +170,9 @@ def layouts() -> list[Layout]:
 def test_the_pace_is_the_predicted_one(world: str) -> None:
     for layout in layouts():
         timing = Timing(layout, Settings(), world, 3, 0.3)  # type: ignore[arg-type]
-        limits = robot_limits(layout, timing.settings, 3, 0.3)[0]
-        delays = operation_delays(layout, timing.modes, limits, timing.settings, timing.world)
-        assert list(timing.delays) == delays
         for wip in (None, 1, 2):
             net = timed_net(timing, wip=wip)
-            predicted = predict(layout, delays, timing.settings, timing.world, wip)
+            predicted = timed(timing, wip=wip).cycle
             assert net.pace == pytest.approx(predicted.seconds)
             assert max_cycle_ratio(net.net, net.seconds).seconds == pytest.approx(net.pace)
 

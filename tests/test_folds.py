@@ -46,10 +46,10 @@ from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.study.analysis.analysing import operation_slacks
 from factory.study.analysis.timed import timed_net
-from factory.timing.timing import Timing
 from factory.support.errors import InputError, RunError
 from factory.support.settings import Settings
 from factory.timing.cycle_time import CycleTime, cycle_time
+from factory.timing.timing import Timing
 from tests.command_line import Terminal
 from tests.fold_values import (
     fold_layout,

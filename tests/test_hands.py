@@ -159,7 +159,7 @@ def test_layouts_with_hands_are_certified() -> None:
 
 def test_those_that_wait_for_a_hand_wait_for_one_that_leaves() -> None:
     layout = with_hands("truck")
-    waited = {leaving.axis for many in leavings(layout).values() for leaving in many}
+    waited = {past.axis for many in leavings(layout).values() for past in many}
     assert waited
     for axis in waited:
         assert axis < len(layout.guidepaths) + len(layout.lifts)

@@ -26,11 +26,10 @@ from factory.layout.outline import Choice, Outline
 from factory.layout.request import Ground
 from factory.layout.shapes import Shape
 from factory.layout.skyline import Skyline
-from factory.modes.modes import operation_modes, robot_limits
 from factory.pipeline import read
 from factory.support.errors import RunError
 from factory.support.settings import Settings
-from factory.timing.prediction import operation_delays
+from factory.timing.timing import Timing
 from tests.command_line import ROOT, Terminal
 
 PACE = Pace.of(Settings())
@@ -62,9 +61,7 @@ def test_between_the_bound_and_the_first_layout(
 def test_times_are_those_of_the_modes(size: int, seed: int, shape: str, style: str) -> None:
     """Scalar times against those predicted from the modes of the operations."""
     layout = random_layout(size, seed, shape, style)
-    given = Settings()
-    modes, (limits, _) = operation_modes(layout, given.eps), robot_limits(layout, given)
-    predicted = operation_delays(layout, modes, limits, given, "mujoco")
+    predicted = Timing(layout, replace(Settings(), stage=False)).delays
     assert operation_times(layout, PACE) == pytest.approx(predicted, abs=1e-6)
 
 

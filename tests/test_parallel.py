@@ -39,12 +39,12 @@ from factory.simulation.simulation import Simulation
 from factory.simulation.watched import watched
 from factory.study.analysis.flow import flow
 from factory.study.analysis.timed import timed_net
-from factory.timing.timing import Timing
 from factory.study.analysis.what_if import wip_curve
 from factory.support.errors import InputError
 from factory.support.settings import Settings
 from factory.timing.cycle_time import cycle_time
 from factory.timing.pool import part_pool
+from factory.timing.timing import Timing
 from tests.command_line import Terminal
 from tests.fold_values import plain, random_fold, simulated_cycle, swapped, table_of
 from tests.pag_values import paper

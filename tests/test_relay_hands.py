@@ -26,13 +26,12 @@ from factory.layout.relaying import relayed
 from factory.layout.relaying.relaying import Room as RoomForLanes
 from factory.layout.relaying.splitting import split
 from factory.layout.relaying.ways import ways
-from factory.modes.modes import operation_modes, robot_limits
 from factory.nets.verify import verify
 from factory.pipeline import read
 from factory.plant.factory import Operation
 from factory.problem.robot_types import load_catalogue
 from factory.support.settings import Settings
-from factory.timing.prediction import operation_delays, predict
+from factory.timing.prediction import pace
 from tests.bench.factories import cube
 from tests.command_line import ROOT, Terminal
 from tests.test_hands import AT_MOST_MM, GRIP_MM, looked_at
@@ -135,11 +134,8 @@ def test_a_slower_cycle_takes_fewer_relays() -> None:
 def test_no_more_relays_than_the_outfeed_has_use_for() -> None:
     """A second relay would make the gears faster, but the outfeed takes as long as they do."""
     layout = with_relays(6)
-    limits, _ = robot_limits(layout, SETTINGS, 0, 0.0)
-    modes = operation_modes(layout, SETTINGS.eps)
-    delays = operation_delays(layout, modes, limits, SETTINGS, "mujoco")
     assert len(hand_overs(layout)) == 1
-    found = predict(layout, delays, SETTINGS, "mujoco")
+    found, _ = pace(layout, SETTINGS)
     assert found.bottleneck == "outfeed"
     assert found.seconds == pytest.approx(max(gear_times(layout, Pace.of(SETTINGS))), rel=0.01)
 

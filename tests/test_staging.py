@@ -16,6 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from factory.control.mode import Mode
+from factory.control.profile import mode_time
 from factory.layout.bounds import cycle_time_bound
 from factory.layout.clearance import certify
 from factory.layout.dimensions import Clearance
@@ -24,8 +25,8 @@ from factory.layout.hands.limbs import rises_first
 from factory.layout.layout import Layout
 from factory.layout.optimising import first_feasible, optimised
 from factory.modes import staging
-from factory.modes.modes import operation_modes, robot_limits
-from factory.modes.staging import stages, stages_of
+from factory.modes.modes import operation_modes
+from factory.modes.staging import stages
 from factory.nets.cycle_ratio import max_cycle_ratio
 from factory.nets.marked import MarkedNet
 from factory.nets.petri import PetriNet, Place, Transition
@@ -40,10 +41,10 @@ from factory.study.analysis.analysing import operation_slacks
 from factory.study.analysis.firing import earliest_firings
 from factory.study.analysis.flow import flow
 from factory.study.analysis.timed import timed_net
-from factory.timing.timing import Change
 from factory.support.settings import Settings
 from factory.timing.cycle_time import cycle_time
-from factory.timing.prediction import held_up, operation_delays, predict, ways_ahead
+from factory.timing.timed import timed
+from factory.timing.timing import Change
 from tests.command_line import PAPER, ROOT, Terminal
 from tests.examples import without_hands
 from tests.layout_values import STYLES, random_layout
@@ -118,10 +119,7 @@ def test_the_slowest_gear_sets_the_pace(
     net = timed_net(timing, wip=wip)
     assert net.pace == pytest.approx(max_cycle_ratio(net.net, net.seconds).seconds)
     assert net.pace <= timed_net(Timing(layout, STILL, world, seed, 0.3), wip=wip).pace + 1e-9
-    told = layout, timing.modes, timing.limits, STAGED, world
-    delays = operation_delays(*told, timing.stages)
-    ways = ways_ahead(timing.stages, timing.limits, STAGED, world)
-    assert predict(layout, delays, STAGED, world, wip, ways).seconds == pytest.approx(net.pace)
+    assert timed(timing, wip=wip).cycle.seconds == pytest.approx(net.pace)
     shares = flow(timing, net, 6).shares
     for robot, share in zip(layout.factory.robots, shares, strict=True):
         waits = net.pace - net.named[robot.index].seconds
@@ -146,10 +144,11 @@ def test_a_carrier_that_is_waited_for_takes_as_long_as_all_of_its_operation() ->
     layout = laid_out(ROOT / "examples" / "stool.pag")
     simulation = Simulation(layout, RunRequest("ideal", units=7))
     settings, world = simulation.request.settings, simulation.request.world
-    ahead = stages_of(layout, simulation.modes, settings)
-    told = layout, simulation.modes, simulation.limits, settings, world, ahead
-    whole, alone = held_up(*told), ways_ahead(ahead, simulation.limits, settings, world)
-    longer = {key for key, seconds in whole.items() if seconds > alone[key] + 0.1}
+    timing, longer = simulation.timing, set[tuple[int, int]]()
+    for stage in timing.stages:
+        way = mode_time(stage.mode, np.array([stage.start]), timing.limits.of((stage.axis,)), world)
+        key = stage.robot, stage.operation
+        longer |= {key} if timing.ways()[key] > way + 0.1 else set()
     run = simulation.run()
     assert run.bottleneck in {layout.factory.robots[robot].name for robot, _ in longer}
     assert run.predicted_cycle_time_s == pytest.approx(run.cycle_time_s, rel=0.01)
@@ -182,11 +181,8 @@ def test_the_layout_is_made_for_that_pace(size: int, seed: int, shape: str, styl
     layout = random_layout(size, seed, shape, style)
     net = timed_net(Timing(layout, STAGED, "ideal"))
     still, staged = Pace.of(STILL), Pace.of(STAGED)
-    modes, (limits, _) = operation_modes(layout, STAGED.eps), robot_limits(layout, STAGED)
-    told = layout, modes, limits, STAGED, "mujoco"
-    ahead = stages(layout, modes)
-    delays = operation_delays(*told, ahead)
-    ways = ways_ahead(ahead, limits, STAGED, "mujoco")
+    timing = Timing(layout, STAGED)
+    delays, ways = timing.delays, timing.ways()
     assert operation_times(layout, staged) == pytest.approx(delays, abs=1e-6)
     cycle = max(gear_times(layout, staged))
     assert cycle == pytest.approx(cycle_time(layout.factory, delays, ways).seconds, abs=1e-6)
@@ -299,7 +295,7 @@ def test_it_does_not_change_a_run_without_it(paper: Layout) -> None:
         e.transition
         for e in Simulation(paper, RunRequest("mujoco", units=2, settings=STILL)).run().events[:6]
     ]
-    assert made.supervisor.active.ahead == () and made.ways == {}
+    assert made.supervisor.active.ahead == () and made.timing.ways() == {}
 
 
 # --- robots on their way --------------------------------------------------------------------------

@@ -11,7 +11,6 @@ import pytest
 from factory.control.mode import Array, Truth
 from factory.control.navigation import Bundle
 from factory.simulation.mujoco.feeders import Feeders
-from factory.simulation.mujoco.hands_away import HandsAway
 from factory.simulation.mujoco.world import MujocoWorld
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
@@ -56,14 +55,13 @@ def test_nothing_is_asked_while_nothing_changes(
 ) -> None:
     """But when something has fired, the outfeed's tray has gone or come home, a part that is waited
     for comes down or is about to be there, or a hand that is waited for has gone."""
-    changed, tend, gone = list[str](), Feeders.tend, HandsAway.gone
+    changed, tend = list[str](), Feeders.tend
 
     def told(what: str, change: bool) -> bool:
         changed.extend([what] * change)
         return change
 
     monkeypatch.setattr(Feeders, "tend", lambda self: told("part", tend(self)))
-    monkeypatch.setattr(HandsAway, "gone", lambda self: told("hand", gone(self)))
     simulation = Simulation(layout_of(name), RunRequest(units=6, **given))
     supervisor, world = simulation.supervisor, simulation.world
     asked, ticks = set(), 0
@@ -76,6 +74,7 @@ def test_nothing_is_asked_while_nothing_changes(
     while world.delivered() < 4:
         due = _due(world)
         supervisor.step()
+        told("hand", bool(supervisor.held) and supervisor.enabled)
         ticks += 1
         told("there", due <= world.time + 1e-6)
         assert world.time < LONG

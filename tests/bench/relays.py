@@ -10,10 +10,10 @@ import factory
 from factory.layout.durations import Pace, gear_times
 from factory.layout.layout import Layout
 from factory.layout.relaying import relayed
-from factory.modes.modes import operation_modes, robot_limits
 from factory.nets.verify import verify
 from factory.support.settings import Settings
-from factory.timing.prediction import operation_delays, predict
+from factory.timing.timed import timed
+from factory.timing.timing import Timing
 from tests.bench.factories import cube, laid_out, require
 from tests.tables import table
 
@@ -59,10 +59,7 @@ def measure(quick: bool = False) -> dict[str, Any]:
 
 def predicted(layout: Layout, world: Any) -> float:
     """The cycle time [s] that the net, and in MuJoCo the outfeed, allow."""
-    limits, _ = robot_limits(layout, SETTINGS, 0, 0.0)
-    modes = operation_modes(layout, SETTINGS.eps)
-    delays = operation_delays(layout, modes, limits, SETTINGS, world)
-    return predict(layout, delays, SETTINGS, world).seconds
+    return timed(Timing(layout, SETTINGS, world)).cycle.seconds
 
 
 def made(layout: Layout, world: Any) -> dict[str, Any]:
