@@ -104,13 +104,14 @@ class Timing:
         return staged(self.left, self.stages)
 
     def ways(self, change: Change = AS_IT_IS) -> dict[tuple[int, int], float]:
-        """The time [s] of a robot to go ahead to an operation, by (robot, operation); and where
-        others wait in that for the robot (`Mode.gate`), until it is over if it begins at once."""
+        """The least time [s] from the end of a robot's operation to that of the one that it goes
+        ahead to, by (robot, operation to come): of its way; and of all of that operation if it
+        begins at once, unless the robot's lift has to be up before."""
         ways = _one_after_the_other(
             (stage, self._way(stage, stage.start, change)) for stage in self.stages
         )
         for stage in self.stages:
-            if stage.axis == stage.robot and stage.slot in self.modes[stage.operation].gate:
+            if stage.axis == stage.robot and not rises_first(self.layout, stage.robot):
                 begin = self.starts[stage.operation].copy()
                 begin[stage.slot] = stage.start
                 key = stage.robot, stage.operation
