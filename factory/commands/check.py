@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -76,7 +76,7 @@ def check(
             or given.deputies
             or (out.as_json and project is not None and _has_places(project))
         )
-        checked = check_project(project, wip, asked) if project else check_net(file)
+        checked = check_project(project, wip, asked, out.verbose) if project else check_net(file)
     announced(checked.warnings, out)
     if project is not None and not out.silent:
         say_allowed(project)
@@ -167,6 +167,8 @@ def _describe(checked: Checked, verbose: bool) -> None:
         if not verbose and len(alike) > AGAINST:
             name = alike[0].property.replace("_", " ")
             say(f"  not {name}: and {len(alike) - AGAINST} more (-v shows all)")
+    if "coordinated" in document:
+        _describe_coordinated(document["coordinated"])
     if checked.pool:
         most = sorted(checked.pool.items(), key=lambda item: -item[1])[:POOLED]
         listed = ", ".join(f"{label} {count}" for label, count in most)
@@ -175,6 +177,19 @@ def _describe(checked: Checked, verbose: bool) -> None:
         _describe_approaches(checked.matings)
     if "deputies" in document:
         _describe_deputies(document["deputies"])
+
+
+def _describe_coordinated(net: Mapping[str, Any]) -> None:
+    """For people: the net that runs, with its order places."""
+    rows = [
+        (order["place"].removeprefix("order:"), str(order["tokens"])) for order in net["orders"]
+    ]
+    say(
+        f"coordinated with hands, magazines and the tray: {net['places']} places,"
+        f" {net['transitions']} transitions, live: {'yes' if net['live'] else 'NO'}"
+    )
+    if rows:
+        table("", ("order place", "tokens"), rows)
 
 
 def _by_property(faults: Sequence[Witness]) -> list[list[Witness]]:

@@ -13,6 +13,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 from factory.export.subject import Subject
 from factory.export.swimlanes import Swimlanes, swimlanes
+from factory.layout.coordinating import coordinated
 from factory.layout.layout import Point2
 from factory.nets.gears import Gear, GearNet
 from factory.nets.marked import MarkedNet, marked
@@ -41,11 +42,16 @@ _ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 
 
 def export(subject: Subject) -> str:
-    """The net as PNML; with `failures`, failures that are the same in every marking are transitions
+    """The net as PNML; `coordinated` with hands, magazines and the tray, as it runs; with
+    `failures`, failures that are the same in every marking are transitions
     of it. Raises InputError (Usage)."""
-    wanted = ["net", "failures"] if isinstance(subject.source, Project) else ["net"]
-    if subject.choose(wanted, "choices") == "net":
+    of_a_project = ["net", "failures", "coordinated"]
+    wanted = of_a_project if isinstance(subject.source, Project) else ["net"]
+    chosen = subject.choose(wanted, "choices")
+    if chosen == "net":
         return write_pnml(subject.net)
+    if chosen == "coordinated":
+        return write_pnml(coordinated(subject.project.layout).net.net)
     factory = subject.project.factory
     return write_pnml(factory.net, tuple(failing_transitions(factory)))
 

@@ -32,6 +32,7 @@ from factory.layout.certificate import (
     Shared,
     fault,
 )
+from factory.layout.coordinating import coordinated
 from factory.layout.crossings import embedding_faults, near
 from factory.layout.dimensions import (
     ARM_LOW,
@@ -47,6 +48,7 @@ from factory.layout.feeding import passing
 from factory.layout.guidepath import Box
 from factory.layout.layout import Layout
 from factory.layout.sweeps import Pile, piles, regions
+from factory.nets.verdict import listing
 from factory.plant.approaches import MARGIN
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
@@ -70,6 +72,7 @@ def certify(layout: Layout) -> Certificate:
         *islice(_standoffs(layout, found), MOST),
         *islice(_raised(layout, found), MOST),
         *islice(_back_at_feeders(layout, found), MOST),
+        *_deadlock(layout),
     ]
     top = max(region.z[1] for region in swept)
     return Certificate(
@@ -262,6 +265,17 @@ def _back_at_feeders(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Faul
                 here = Region(robot, PAYLOADS, PAYLOAD_BODY, pile.box, pile.z, brought)
                 yield fault(layout.factory, message, here, lacking=before)
             past = past or before <= TOLERANCE
+
+
+def _deadlock(layout: Layout) -> Iterator[Fault]:
+    """A circuit of the coordinated net that carries no token: what is on it never moves."""
+    coordination = coordinated(layout).net
+    if circuit := coordination.deadlock:
+        net, operations = coordination.net, layout.factory.operations
+        labels = {place.label for place in map(net.net.places.__getitem__, circuit)}
+        robots = sorted({o.carrier for o in operations if o.label in labels})
+        names = listing(net.net.places[place].name for place in circuit)
+        yield fault(layout.factory, f"these wait for each other for ever: {names}", *robots)
 
 
 def _way(layout: Layout, found: Mapping[str, Pile], operation: Operation, slot: int) -> Region:

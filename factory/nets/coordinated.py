@@ -64,6 +64,18 @@ class CoordinatedNet:
         stuck = token_free(self.net).stuck
         return stuck_circuit(self.net, stuck) if stuck else ()
 
+    def as_json(self) -> dict[str, object]:
+        """The net as `check --json` tells of it: its size, whether it is live, and the order places
+        with their tokens."""
+        places = zip(self.net.net.places, self.net.tokens, strict=True)
+        return {
+            "places": len(self.net.tokens),
+            "transitions": len(self.net.net.transitions),
+            "passes": len(self.passes),
+            "live": not self.deadlock,
+            "orders": [{"place": p.name, "tokens": n} for p, n in places if p.mode == "order"],
+        }
+
 
 class Coordination:
     """Builds a coordinated net upon a compiled one."""

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from factory.layout.coordinating import coordinated
+from factory.nets.coordinated import CoordinatedNet
 from factory.nets.gears import Gear, GearNet
 from factory.nets.marked import MarkedNet, marked
 from factory.nets.petri import Place
@@ -32,7 +34,8 @@ class Checked:
     that are inside at once; `matings`: how its inputs come together, None where no part has a shape
     of its own; `product`: None where every part is a default box; `no_grips`: what no hand can
     hold, None where hands are not chosen; `factory` and the `least` robots that can make its
-    product, None for a net from elsewhere; `deputies` of each robot, None where not asked for."""
+    product, None for a net from elsewhere; `deputies` of each robot and the net that is
+    `coordinated` with hands, magazines and the tray, None where not asked for."""
 
     name: str
     net: GearNet | MarkedNet
@@ -46,6 +49,7 @@ class Checked:
     factory: Factory | None = None
     least: Least | None = None
     deputies: tuple[tuple[int, ...], ...] | None = None
+    coordinated: CoordinatedNet | None = None
 
     def as_json(self) -> dict[str, Any]:
         """The keys of `check --json`."""
@@ -69,6 +73,7 @@ class Checked:
             **({} if no_grips is None else {"no_grips": no_grips}),
             **self._overlaps(),
             **self._allocation(),
+            **({"coordinated": self.coordinated.as_json()} if self.coordinated else {}),
             "warnings": [warning.as_json() for warning in self.warnings],
         }
 
@@ -123,10 +128,12 @@ def _gear_json(gear: Gear, places: Sequence[Place]) -> dict[str, Any]:
     }
 
 
-def check_project(project: Project, wip: int | None = None, deputies: bool = False) -> Checked:
+def check_project(
+    project: Project, wip: int | None = None, deputies: bool = False, laid_out: bool = False
+) -> Checked:
     """Check a PAG, with at most `wip` units inside at once, and look for `deputies`, which asks how
     boxes come together; where the project is laid out for them, they are those that can take over.
-    Raises InputError."""
+    `laid_out`: its coordinated net too, which asks for a layout. Raises InputError."""
     factory = project.factory
     sources = {r.name: r.position for r in factory.robots if r.position}
     verdict = verify(factory.net, sources)
@@ -143,6 +150,7 @@ def check_project(project: Project, wip: int | None = None, deputies: bool = Fal
         factory,
         least_robots(project.pag, project.templates),
         _deputies(project, factory) if deputies else None,
+        coordinated(project.layout).net if laid_out else None,
     )
 
 
