@@ -74,7 +74,7 @@ def test_nothing_is_asked_while_nothing_changes(
     while world.delivered() < 4:
         due = _due(world)
         supervisor.step()
-        told("hand", bool(supervisor.held) and supervisor.enabled)
+        told("hand", bool(supervisor.ordering.held) and supervisor.enabled)
         ticks += 1
         told("there", due <= world.time + 1e-6)
         assert world.time < LONG

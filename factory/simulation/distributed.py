@@ -23,7 +23,7 @@ from factory.plant.factory import Factory, Operation
 from factory.plant.programs import Program, ProgramStep, program_of
 from factory.simulation.bundles import Bundles
 from factory.simulation.cells import Cells, Link
-from factory.simulation.ordering import Orders
+from factory.simulation.ordering import Ordering
 from factory.simulation.run import Event
 from factory.simulation.supervisor import Active
 from factory.simulation.world import Job, World
@@ -131,7 +131,7 @@ class DistributedSupervisor:
         self.random = np.random.default_rng([seed, 7])
         programs = [program_of(factory, robot.index) for robot in factory.robots]
         self.processes = self._processes(programs)
-        self.record, self.orders = Record(factory), Orders()
+        self.record, self.ordering = Record(factory), Ordering()
         self.count = 0
 
     def _processes(self, programs: Sequence[Program]) -> list[Process]:
@@ -214,10 +214,8 @@ class DistributedSupervisor:
             return True
         if not step.is_carrier or not self.world.prepared(*self._job(process, operation)):
             return False
-        if operation.start in self.orders:  # an order place is a cell that two machines share
-            x, _ = self.world.sense()
-            if self.orders.awaited(operation.start, self.record.fired, x):
-                return False
+        if self.ordering.hold_up(operation.start, self.record.fired, lambda: self.world.sense()[0]):
+            return False  # an order place is a cell that two machines share
         return bool(self._bundle(operation).in_domain(link.state()[0])[0])
 
     def _run(self, process: Process, step: ProgramStep) -> None:

@@ -7,34 +7,42 @@ the axis is: so it is after an undo too, and where a run begins in any marking.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from factory.control.mode import Array
 from factory.nets.coordinated import Order, Past
 
 
-class Orders:
-    """The order places of a coordinated net, by the transition that waits."""
+class Ordering:
+    """The order places of a coordinated net, by the transition that waits. `held`: the passes that
+    transitions have been found to wait for."""
 
     def __init__(self, orders: Iterable[Order] = ()) -> None:
+        self.held = set[Past]()
         self._by_start: dict[int, list[Order]] = {}
         for order in orders:
             self._by_start.setdefault(order.start, []).append(order)
 
-    def awaited(self, start: int, fired: Sequence[int], x: Array) -> list[Past]:
-        """The passes that a transition still waits for, where transitions have `fired` so often and
-        axes are at `x` [m]."""
-        return [
+    def hold_up(self, start: int, fired: Sequence[int], sense: Callable[[], Array]) -> bool:
+        """Whether a transition still waits for a pass, where transitions have `fired` so often and
+        axes are where `sense` says [m]; which is held then."""
+        if start not in self._by_start:
+            return False
+        x = sense()
+        awaited = [
             order.past
-            for order in self._by_start.get(start, ())
+            for order in self._by_start[start]
             if fired[order.past.after] + order.tokens == fired[start] + 1
             and fired[order.end] < fired[order.past.after] + order.held
             and not order.past.holds(float(x[order.past.axis]))
         ]
+        self.held.update(awaited)
+        return bool(awaited)
+
+    def goes_on(self, x: Array) -> bool:
+        """Whether a pass that is held has come, with axes at `x` [m]."""
+        return any(past.holds(float(x[past.axis])) for past in self.held)
 
     def axes(self, starts: Iterable[int]) -> set[int]:
         """The axes that transitions wait for."""
         return {order.past.axis for start in starts for order in self._by_start.get(start, ())}
-
-    def __contains__(self, start: int) -> bool:
-        return start in self._by_start

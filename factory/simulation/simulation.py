@@ -21,7 +21,7 @@ from factory.plant.material import joins_of
 from factory.simulation.distributed import DistributedSupervisor
 from factory.simulation.ideal import IdealWorld
 from factory.simulation.modelling import modelled
-from factory.simulation.ordering import Orders
+from factory.simulation.ordering import Ordering
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run, busy_times, entries_of
 from factory.simulation.supervisor import Supervisor
@@ -108,7 +108,7 @@ class Simulation:
             self.world = MujocoWorld(self.model, request, at, gains, self.counts, loaded)
         self.before = self.world.delivered()
         self.supervisor = (self._distributed if request.distributed else self._central)(stages)
-        self.supervisor.orders = Orders(self.timing.coordinated.net.orders)
+        self.supervisor.ordering = Ordering(self.timing.coordinated.net.orders)
 
     @cached_property
     def patience(self) -> float:

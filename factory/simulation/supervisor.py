@@ -15,14 +15,13 @@ import numpy as np
 from factory.control.mode import STILL, Array, Index, Limits, Mode
 from factory.control.navigation import Bundle
 from factory.modes.staging import HeadStart
-from factory.nets.coordinated import Past
 from factory.nets.petri import Marking
 from factory.nets.threads import Threads
 from factory.nets.undo import marking_after
 from factory.nets.undone import Undone
 from factory.plant.factory import Factory, Operation
 from factory.simulation.bundles import Bundles
-from factory.simulation.ordering import Orders
+from factory.simulation.ordering import Ordering
 from factory.simulation.run import Event
 from factory.simulation.world import World
 
@@ -83,8 +82,8 @@ class Supervisor:
     `threads` is (m, f_m): every firing moves robots by the redistribution functions and asserts
     that the marking stays legal. `counts`: how often each transition has fired where the run
     starts. `stages`: what robots do while they wait, where that is not to stand; nothing of it is
-    in the net. `orders`: the order places of the coordinated net; `held`: the passes that awaited
-    operations wait for. `enabled`: some operation may start that could not in the last tick.
+    in the net. `ordering`: the order places of the coordinated net. `enabled`: some operation may
+    start that could not in the last tick.
     """
 
     def __init__(
@@ -99,7 +98,7 @@ class Supervisor:
         stages: Sequence[HeadStart],
     ) -> None:
         self.factory, self.world, self.tick = factory, world, tick
-        self.orders, self.held = Orders(), set[Past]()
+        self.ordering = Ordering()
         axes_of = [*factory.axes, *((stage.axis,) for stage in stages)]
         self.bundles = Bundles([*modes, *(stage.mode for stage in stages)], axes_of, limits)
         self._mark(start)
@@ -142,10 +141,9 @@ class Supervisor:
             )
         if self._prepared():
             ticks = 1
-        self.near = self.world.step(self.active.bundle, self.active.axes, ticks, self.held)
-        if self.held:
-            x, _ = self.world.sense()
-            self.enabled |= any(past.holds(float(x[past.axis])) for past in self.held)
+        self.near = self.world.step(self.active.bundle, self.active.axes, ticks, self.ordering.held)
+        if self.ordering.held:
+            self.enabled |= self.ordering.goes_on(self._sensed())
 
     def undo(
         self, undone: Undone, fired: Sequence[int], marking: Marking, free: Container[int]
@@ -167,12 +165,12 @@ class Supervisor:
         stages: Sequence[HeadStart],
         undone: Undone,
         fired: Sequence[int],
-        orders: Orders,
+        ordering: Ordering,
     ) -> None:
         """Go on in another factory that has the same operations, robots by number and axes, from
         the counts `fired`: what is under way goes on, robots that wait go ahead anew."""
         axes_of = [*factory.axes, *((stage.axis,) for stage in stages)]
-        self.factory, self.orders = factory, orders
+        self.factory, self.ordering = factory, ordering
         self.bundles = Bundles([*modes, *(stage.mode for stage in stages)], axes_of, self.limits)
         self._activate(self.active.operations, ())
         self.ahead, marking = Ahead(factory, stages), marking_after(factory.net, fired)
@@ -224,23 +222,20 @@ class Supervisor:
         asked again where there was none and nothing has changed."""
         if not (self.enabled or self.world.supplied):
             return ()
-        self.held.clear()
+        self.ordering.held.clear()
         prepared, fired, unit = self.world.prepared, self.fired, self.factory.unit
+        hold_up = self.ordering.hold_up
         ready = tuple(
             o.index
             for o in self.awaited()
-            if self._in_order(o.start) and prepared(o, unit(o, fired[o.start]))
+            if not hold_up(o.start, fired, self._sensed) and prepared(o, unit(o, fired[o.start]))
         )
         self.enabled, self.world.supplied = bool(ready), False
         return ready
 
-    def _in_order(self, start: int) -> bool:
-        """Whether all passes that a transition waits for have come."""
-        if start not in self.orders:
-            return True
-        awaited = self.orders.awaited(start, self.fired, self.world.sense()[0])
-        self.held.update(awaited)
-        return not awaited
+    def _sensed(self) -> Array:
+        """Where all axes are [m]."""
+        return self.world.sense()[0]
 
     def _finished(self) -> list[int]:
         """Operations X with X_e enabled: robots in the goal ball, at rest, and the clock run out;

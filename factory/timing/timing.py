@@ -106,7 +106,8 @@ class Timing:
     def ways(self, change: Change = AS_IT_IS) -> dict[tuple[int, int], float]:
         """The least time [s] from the end of a robot's operation to that of the one that it goes
         ahead to, by (robot, operation to come): of its way; and of all of that operation if it
-        begins at once, unless the robot's lift has to be up before."""
+        begins at once, unless the robot's lift has to be up before. The robot sets out in the tick
+        in which the one before ends; others that wait for it see it a tick later."""
         ways = _one_after_the_other(
             (stage, self._way(stage, stage.start, change)) for stage in self.stages
         )
@@ -115,7 +116,10 @@ class Timing:
                 begin = self.starts[stage.operation].copy()
                 begin[stage.slot] = stage.start
                 key = stage.robot, stage.operation
-                ways[key] = max(ways[key], self._delay(stage.operation, begin, change))
+                at_once = self._delay(stage.operation, begin, change)
+                if stage.slot not in self.modes[stage.operation].gate:
+                    at_once -= self.settings.tick
+                ways[key] = max(ways[key], at_once)
         return ways
 
     def passes(self, change: Change = AS_IT_IS) -> dict[Past, float]:

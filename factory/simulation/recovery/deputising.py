@@ -13,7 +13,7 @@ from factory.modes.modes import operation_modes, robot_limits
 from factory.modes.staging import stages_of
 from factory.nets.undone import Undone
 from factory.record.exchange import Exchange
-from factory.simulation.ordering import Orders
+from factory.simulation.ordering import Ordering
 from factory.simulation.recovery.books import Books
 from factory.simulation.simulation import Simulation
 from factory.timing.timed import timed
@@ -90,11 +90,11 @@ class Deputising:
         simulation.modes, simulation.delays = modes, timing.delays
         self._books.layout = change.layout
         own = [replace(s, robot=stay[s.robot], axis=axes[s.axis]) for s in stages]
-        orders = Orders(
+        ordering = Ordering(
             replace(order, past=replace(order.past, axis=axes[order.past.axis]))
             for order in timing.coordinated.net.orders
         )
-        self._books.supervisor.exchange(takeover.crew, modes, own, undone, fired, orders)
+        self._books.supervisor.exchange(takeover.crew, modes, own, undone, fired, ordering)
         names, net = takeover.names, takeover.after.net
         told = undone.t, *names, fired, net, takeover.crew, predicted
         self.exchanges.append(Exchange(*told))

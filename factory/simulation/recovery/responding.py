@@ -90,7 +90,7 @@ class Responding:
         """Robots that wait at their feeders, and are in the way of what comes late there, go out of
         its way."""
         books, supervisor = self._books, self._books.supervisor
-        away = supervisor.orders.axes(2 * number for number in supervisor.active.operations)
+        away = supervisor.ordering.axes(2 * number for number in supervisor.active.operations)
         late = self._plant.in_the_way(away)
         for robot in late - self.returning.ways.keys() - self.dead.keys():
             if books.step_of(robot) % 2 or books.operation_of(robot).inputs:
