@@ -27,7 +27,7 @@ from factory.plant.approaches import Overlap
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
 
-BESIDE = 0.005
+BESIDE = 0.001
 """What is to be lowered stays this far short of its meeting point until the others stand [m]."""
 
 
