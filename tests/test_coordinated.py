@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from command_line import Terminal
 from fold_values import dates
 from random_products import random_product
 
-from command_line import Terminal
 from examples import with_hands
 from factory.layout.clearance import certify
 from factory.layout.coordinating import coordinated
