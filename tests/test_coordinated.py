@@ -169,7 +169,7 @@ def test_machines_without_a_program_are_in_it() -> None:
     layout = with_hands("stool")
     made = coordinated(layout)
     modes = {place.mode for place in made.net.net.net.places}
-    assert modes >= {"past", "order", "magazine", "tray"}
+    assert modes >= {"hand", "way", "order", "magazine", "tray"}
     assert made.served.keys() == {leaf.index for leaf in layout.factory.leaves}
     assert made.away.keys() == {dropoff.index for dropoff in layout.factory.dropoffs}
 

@@ -40,6 +40,8 @@ from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
+from factory.timing.timed import timed
+from factory.timing.timing import Timing
 from tests.bench.faults.takeovers import PAPER as INSERTS
 from tests.bench.faults.takeovers import interval_after
 from tests.command_line import ROOT, Terminal
@@ -109,13 +111,12 @@ def test_parts_of_two_heights(dead: str) -> None:
 def test_each_axis_keeps_its_limits(monkeypatch: pytest.MonkeyPatch) -> None:
     """Robots differ, and their lifts with them; those that stay have limits of their own."""
     seen = list[tuple[Layout, Limits]]()
-    delays = deputising.operation_delays
 
-    def look(layout: Layout, modes: Any, limits: Limits, *more: Any) -> Any:
-        seen.append((layout, limits))
-        return delays(layout, modes, limits, *more)
+    def look(timing: Timing, **given: Any) -> Any:
+        seen.append((timing.layout, timing.limits))
+        return timed(timing, **given)
 
-    monkeypatch.setattr(deputising, "operation_delays", look)
+    monkeypatch.setattr(deputising, "timed", look)
     simulation, _ = simulated(STEPS, "r2", 5.0, jitter=0.3)
     before = speeds(simulation.layout, simulation.limits)
     simulation.run(max_time=60.0)

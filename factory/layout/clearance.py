@@ -272,8 +272,8 @@ def _deadlock(layout: Layout) -> Iterator[Fault]:
     coordination = coordinated(layout).net
     if circuit := coordination.deadlock:
         net, operations = coordination.net, layout.factory.operations
-        labels = {place.label for place in map(net.net.places.__getitem__, circuit)}
-        robots = sorted({o.carrier for o in operations if o.label in labels})
+        events = (net.right[place] // 2 for place in circuit)
+        robots = sorted({operations[n].carrier for n in events if n < len(operations)})
         names = listing(net.net.places[place].name for place in circuit)
         yield fault(layout.factory, f"these wait for each other for ever: {names}", *robots)
 

@@ -76,7 +76,7 @@ def coordinated(layout: Layout) -> Coordinated:
     for step, dropoff in enumerate(factory.dropoffs):
         then = factory.dropoffs[(step + 1) % factory.period]
         name, ends = f"tray:{dropoff.label}", (dropoff.end, then.start)
-        away[dropoff.index] = build.place(name, *ends, int(then.turn == 0), "tray")
+        away[dropoff.index] = build.place(name, ends, int(then.turn == 0), "tray", dropoff.label)
     return Coordinated(build.built(), served, away)
 
 
@@ -101,9 +101,12 @@ def _chain(
     until the start of the robot's next, or its end where that leads beyond them all."""
     factory, (operation, robot) = layout.factory, who
     names = {p: f"past:{_axis(layout, p)}:{p.at:.3f}:{operation.label}" for p in passes}
+    name = factory.robots[robot].name
     if passes[0].after == operation.start:
-        build.chain(names, operation.end, operation.place)
+        said = "way", f"of {name} from its feeder"
+        build.chain(names, said, operation.end, operation.place)
         return
+    said = "hand", f"of {name} over {operation.label}"
     gear = factory.robots[robot].operations
     step = (gear.index(operation.index) + 1) % len(gear)
     then, wait = factory.operations[gear[step]], factory.net.gears[robot].places[2 * step]
@@ -111,7 +114,7 @@ def _chain(
         axis: layout.goal(then.index, slot) for slot, axis in enumerate(factory.axes[then.index])
     }
     beyond = all(past.axis in goals and past.holds(goals[past.axis]) for past in passes)
-    build.chain(names, then.end if beyond else then.start, wait)
+    build.chain(names, said, then.end if beyond else then.start, wait)
 
 
 def _feedings(layout: Layout) -> Iterator[_Feeding]:
@@ -138,10 +141,13 @@ def _served(layout: Layout, build: Coordination, feeding: _Feeding) -> Served:
     before, leaf, past = feeding.before, feeding.leaf, feeding.past
     tour = layout.factory.tour_of(leaf.carrier, before.index)
     down = build.transition(f"down:{leaf.label}")
-    up = build.place(f"magazine up:{leaf.label}", before.end, down, 0, "magazine")
-    clear = layout.factory.operations[tour[-1]].end if past is None else build.events[past]
-    build.place(f"clear:{leaf.label}", clear, down)
-    shown = build.place(
-        f"magazine down:{leaf.label}", down, leaf.start, int(feeding.begins), "magazine"
+    label, clear = leaf.label, layout.factory.operations[tour[-1]].end
+    up = build.place(f"magazine up:{label}", (before.end, down), 0, "magazine", label)
+    way = build.events[past] if past is not None else clear, down
+    build.place(f"clear:{label}", way, 0, "order", f"clear:{label}")
+    shown = down, leaf.start
+    return Served(
+        before.index,
+        up,
+        build.place(f"magazine down:{label}", shown, int(feeding.begins), "magazine", label),
     )
-    return Served(before.index, up, shown)

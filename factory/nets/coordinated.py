@@ -95,33 +95,33 @@ class Coordination:
         self.transitions.append(Transition(name))
         return len(self.transitions) - 1
 
-    def place(
-        self, name: str, before: int, after: int, tokens: int = 0, mode: str = "order"
-    ) -> int:
-        """A place [before; after] more; its name ends with the label that it is about."""
-        label = name.rpartition(":")[2]
+    def place(self, name: str, ends: tuple[int, int], tokens: int, mode: str, label: str) -> int:
+        """A place [before; after] more."""
+        before, after = ends
         self.places.append(Place(name, (before,), (after,), mode, label, 0))
         self.tokens.append(tokens)
         return len(self.places) - 1
 
-    def chain(self, passes: Mapping[Past, str], end: int, beside: int) -> None:
+    def chain(
+        self, passes: Mapping[Past, str], said: tuple[str, str], end: int, beside: int
+    ) -> None:
         """Passes that come one after the other, with their names, between the transition that all
         of them follow and the transition `end`, with as many tokens as a place that they are
-        `beside`."""
+        `beside`; `said`: the mode and the label of their places."""
         before: Past | None = None
         for past, name in passes.items():
             start = past.after if before is None else self.events[before]
             event = self.events[past] = self.transition(name)
-            self.passes[past] = self.place(name, start, event, mode="past"), before
+            self.passes[past] = self.place(name, (start, event), 0, *said), before
             self._ends[past] = end, self.tokens[beside]
             before = past
         if before is not None:
-            name, tokens = f"{passes[before]} on", self.tokens[beside]
-            self.beside[self.place(name, self.events[before], end, tokens, "past")] = beside
+            name, ends = f"{passes[before]} on", (self.events[before], end)
+            self.beside[self.place(name, ends, self.tokens[beside], *said)] = beside
 
     def order(self, name: str, past: Past, start: int, tokens: int) -> None:
         """An order place, from a pass to a transition of the compiled net."""
-        self.place(name, self.events[past], start, tokens)
+        self.place(name, (self.events[past], start), tokens, "order", name)
         self.orders.append(Order(past, start, tokens, *self._ends[past]))
 
     def built(self) -> CoordinatedNet:

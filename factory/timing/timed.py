@@ -23,15 +23,15 @@ OUTFEED, FEEDER = "outfeed", "feeder"
 @dataclass(frozen=True)
 class Timed:
     """A net with the `seconds` that a token stays in each place. `ways`: the places of robots that
-    go ahead while they wait, by robot and operation; `bounds`: those that bound what is inside;
-    `owners`: the robots that are in a place beyond those of the compiled net; `units`: how many
-    products are made in a cycle of the net."""
+    go ahead while they wait, by robot and operation; `bounds`: those of a bound `wip` on what is
+    inside; `owners`: the robots that are in a place beyond those of the compiled net."""
 
     timing: Timing
     net: MarkedNet
     seconds: tuple[float, ...]
     ways: Mapping[Way, int] = field(default_factory=dict, repr=False)
     bounds: tuple[int, ...] = ()
+    wip: int | None = None
     owners: Mapping[int, tuple[int, ...]] = field(default_factory=dict, repr=False)
 
     @cached_property
@@ -50,14 +50,24 @@ class Timed:
         gears = self.timing.factory.net
         return busiest(gears, self.owners, self.ratio.circuit, self.seconds)
 
+    @property
+    def waited_for(self) -> list[int]:
+        """The robots in places of their own on the critical circuit: for their hands, ways or turns
+        another waits."""
+        gears = self.timing.factory.net
+        alone = (
+            self.owners.get(p) or (p < len(gears.slots) and gears.slots[p]) or ()
+            for p in self.ratio.circuit
+        )
+        return [*dict.fromkeys(robots[0] for robots in alone if len(robots) == 1)]
+
     @cached_property
     def bottleneck(self) -> str:
         """What allows no less: a bound on what is inside, a feeder, the outfeed, or a robot."""
-        places = [(number, self.net.net.places[number]) for number in self.ratio.circuit]
-        for number, place in places:
-            if number in self.bounds:
-                return place.name.replace(":", " ")
-        modes = {place.mode: place.label for _, place in places}
+        if not set(self.bounds).isdisjoint(self.ratio.circuit):
+            return f"wip {self.wip}"
+        places = map(self.net.net.places.__getitem__, self.ratio.circuit)
+        modes = {place.mode: place.label for place in places}
         if "tray" in modes:
             return OUTFEED
         if "magazine" in modes:
@@ -115,7 +125,7 @@ def timed(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None) -> 
     ways = dict(zip(went, range(len(seconds), len(seconds) + len(went)), strict=True))
     owners |= {place: (robot,) for (robot, _), place in ways.items()}
     net = with_ways(net, factory.net, went)
-    return Timed(timing, net, (*seconds, *went.values()), ways, bounds, owners)
+    return Timed(timing, net, (*seconds, *went.values()), ways, bounds, wip, owners)
 
 
 def _copied(timing: Timing, change: Change) -> MarkedNet:

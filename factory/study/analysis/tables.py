@@ -53,8 +53,11 @@ def summary(found: Analysis) -> Iterator[str]:
 def critical_words(found: Analysis) -> str:
     """The first critical circuit: its places that take time, with their times."""
     circuit, net = found.net.critical[0], found.net
-    timed = [(net.net.net.places[p], net.seconds[p]) for p in circuit.places if net.seconds[p]]
-    names = [f"{place.mode} {place.label}".strip() + f" {seconds:.3f}" for place, seconds in timed]
+    spent = dict[str, float]()
+    for place, seconds in ((net.net.net.places[p], net.seconds[p]) for p in circuit.places):
+        name = f"{place.mode} {place.label}".strip()
+        spent[name] = spent.get(name, 0.0) + seconds
+    names = [f"{name} {seconds:.3f}" for name, seconds in spent.items() if seconds]
     tokens = f", {circuit.products} products a turn" if circuit.products > 1 else ""
     return f"{circuit.name}: {' · '.join(names)} = {circuit.seconds:.3f} s{tokens}"
 

@@ -124,8 +124,8 @@ class TimedNet:
         if max(circuit.pace for circuit in known) >= self.pace * (1 - SAME):
             return []
         places, robots = self.ratio.circuit, self.timed.timing.factory.robots
-        first, *others = self.timed.busiest
-        names = ", ".join(robots[robot].name for robot in others)
+        first = self.timed.busiest[0]
+        names = ", ".join(robots[robot].name for robot in self.timed.waited_for if robot != first)
         return [
             Circuit(
                 f"{robots[first].name} with {names}" if names else robots[first].name,
