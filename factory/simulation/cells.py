@@ -25,6 +25,7 @@ class Cells:
 
     def __init__(self, factory: Factory, labels: Sequence[str]) -> None:
         self._cells = [Cell(label) for label in labels]
+        self._operations = factory.operations
         self._length = [len(robot.operations) for robot in factory.robots]
         self._place = {
             (robot.index, number): place
@@ -38,6 +39,18 @@ class Cells:
     def turn(self, robot: int, operation: Operation, unit: int) -> int:
         """How many operations a robot has finished when it comes to this one for that unit."""
         return unit * self._length[robot] + self._place[robot, operation.index]
+
+    def fired(self, transition: int) -> int:
+        """How often an operation has been ended by its carrier, or entered by its first robot."""
+        operation = self._operations[transition // 2]
+        if transition == operation.end:
+            return self._past(operation.carrier, self[operation.carrier].turn, operation)
+        return max(self._past(r, self[r].entered, operation) for r in operation.robots)
+
+    def _past(self, robot: int, turn: int, operation: Operation) -> int:
+        """How often a robot that has come so far has come past an operation."""
+        length = self._length[robot]
+        return (turn - self._place[robot, operation.index] + length - 1) // length
 
 
 class Link:

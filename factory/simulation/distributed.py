@@ -79,7 +79,6 @@ class Record:
         for place in factory.net.initial_marking:
             self.marked[place] = 1
         self._under_way: list[int] = []
-        self.fired = [0] * len(self._net.transitions)
 
     @property
     def active(self) -> Active:
@@ -102,7 +101,6 @@ class Record:
             self.marked[place] = 0
         for place in net.postset[transition]:
             self.marked[place] = 1
-        self.fired[transition] += 1
         self.events.append(Event(time, self._net.transitions[transition].name))
 
 
@@ -130,6 +128,7 @@ class DistributedSupervisor:
         self.bundles = Bundles([*modes, *(stage.mode for stage in stages)], axes_of, limits)
         self.random = np.random.default_rng([seed, 7])
         programs = [program_of(factory, robot.index) for robot in factory.robots]
+        self.cells = Cells(factory, [program.steps[0].label for program in programs])
         self.processes = self._processes(programs)
         self.record, self.ordering = Record(factory), Ordering()
         self.count = 0
@@ -137,14 +136,16 @@ class DistributedSupervisor:
     def _processes(self, programs: Sequence[Program]) -> list[Process]:
         low, high = (max(1, round(period / self.timestep)) for period in PERIODS)
         periods = self.random.integers(low, high + 1, size=len(programs))
-        cells = Cells(self.factory, [program.steps[0].label for program in programs])
         x = self.world.sense()[0]
         lifts = {robot: len(programs) + n for n, robot in enumerate(self.factory.strokes)}
         found = []
         for p, n in zip(programs, periods, strict=True):
             axes = np.array([p.robot, *([lifts[p.robot]] if p.robot in lifts else [])])
             phase = int(self.random.integers(n))
-            link, still = Link(p.robot, cells, self.world, self.factory.axes), np.zeros(len(axes))
+            link, still = (
+                Link(p.robot, self.cells, self.world, self.factory.axes),
+                np.zeros(len(axes)),
+            )
             link.at(p.steps[0].operation, 0)
             found.append(Process(p, link, int(n), phase, axes, np.array(x[axes]), still))
         return found
@@ -214,7 +215,7 @@ class DistributedSupervisor:
             return True
         if not step.is_carrier or not self.world.prepared(*self._job(process, operation)):
             return False
-        if self.ordering.hold_up(operation.start, self.record.fired, lambda: self.world.sense()[0]):
+        if self.ordering.hold_up(operation.start, self.cells.fired, lambda: self.world.sense()[0]):
             return False  # an order place is a cell that two machines share
         return bool(self._bundle(operation).in_domain(link.state()[0])[0])
 

@@ -7,7 +7,7 @@ the axis is: so it is after an undo too, and where a run begins in any marking.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 
 from factory.control.mode import Array
 from factory.nets.coordinated import Order, Past
@@ -23,8 +23,8 @@ class Ordering:
         for order in orders:
             self._by_start.setdefault(order.start, []).append(order)
 
-    def hold_up(self, start: int, fired: Sequence[int], sense: Callable[[], Array]) -> bool:
-        """Whether a transition still waits for a pass, where transitions have `fired` so often and
+    def hold_up(self, start: int, fired: Callable[[int], int], sense: Callable[[], Array]) -> bool:
+        """Whether a transition still waits for a pass, where `fired` says how often others have and
         axes are where `sense` says [m]; which is held then."""
         if start not in self._by_start:
             return False
@@ -32,8 +32,8 @@ class Ordering:
         awaited = [
             order.past
             for order in self._by_start[start]
-            if fired[order.past.after] + order.tokens == fired[start] + 1
-            and fired[order.end] < fired[order.past.after] + order.held
+            if fired(order.past.after) + order.tokens == fired(start) + 1
+            and fired(order.end) < fired(order.past.after) + order.held
             and not order.past.holds(float(x[order.past.axis]))
         ]
         self.held.update(awaited)

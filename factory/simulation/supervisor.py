@@ -228,7 +228,8 @@ class Supervisor:
         ready = tuple(
             o.index
             for o in self.awaited()
-            if not hold_up(o.start, fired, self._sensed) and prepared(o, unit(o, fired[o.start]))
+            if not hold_up(o.start, fired.__getitem__, self._sensed)
+            and prepared(o, unit(o, fired[o.start]))
         )
         self.enabled, self.world.supplied = bool(ready), False
         return ready

@@ -55,10 +55,8 @@ class Timed:
         """The robots in places of their own on the critical circuit: for their hands, ways or turns
         another waits."""
         gears = self.timing.factory.net
-        alone = (
-            self.owners.get(p) or (p < len(gears.slots) and gears.slots[p]) or ()
-            for p in self.ratio.circuit
-        )
+        owners = dict(enumerate(gears.slots)) | dict(self.owners)
+        alone = (owners.get(place, ()) for place in self.ratio.circuit)
         return [*dict.fromkeys(robots[0] for robots in alone if len(robots) == 1)]
 
     @cached_property
