@@ -163,7 +163,7 @@ def log_format() -> str:
             definition(docstring(log)),
             heading(2, "Blocks"),
             definition(docstring(blocks)),
-            "`factory export LOG --format csv`, `parquet`, `mcap` or `usd` makes other files of "
+            "`factory export LOG --format csv`, `mcap` or `usd` makes other files of "
             "it; `factory.record.log.read_log` reads it in Python.",
         ]
     )

@@ -15,7 +15,7 @@ EXTRAS: Mapping[str, tuple[tuple[str, ...], str]] = MappingProxyType(
         "decompose": (("coacd",), "meshes that are not convex collide as convex pieces"),
         "plots": (("matplotlib",), "plots of `fidelity` and `sweep`"),
         "live": (("websockets",), "`view`, in the browser"),
-        "export": (("ezdxf", "foxglove-sdk", "pyarrow"), "DXF, MCAP and Parquet"),
+        "export": (("ezdxf", "foxglove-sdk"), "DXF and MCAP"),
         "usd": (("usd-core",), "USD"),
         "yaml": (("pyyaml",), "`import` of trees in YAML"),
         "step": (("cascadio",), "`plan` of STEP files"),
