@@ -31,6 +31,7 @@ IS_AWAKE = int(mujoco.mjtSleepState.mjS_AWAKE)
 @pytest.fixture(autouse=True)
 def _in_small_factories_too(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(neighbours, "FEW", 0)
+    monkeypatch.setattr(neighbours, "MANY", 1.0)
 
 
 def solid_bodies(m: mujoco.MjModel) -> np.ndarray:
@@ -219,7 +220,7 @@ def test_what_leaves_its_way_is_noticed(steps: int) -> None:
 
 
 def within_boxes(simulation: Simulation) -> bool:
-    """Whether all that holders have is within the boxes that are foreseen for them."""
+    """Whether all that holders have is within the boxes that they are to sweep."""
     world = simulation.physical
     m, d, stepping_ = world.m, world.d, world.motion.stepping
     assert isinstance(stepping_, Strides)
@@ -227,7 +228,7 @@ def within_boxes(simulation: Simulation) -> bool:
     code, bodies = world.parts.masks.code, solid_bodies(m)
     bodies = bodies[code[bodies] != NOBODY]
     low, high = boxes(m, d, bodies).transpose(1, 0, 2)
-    least, most = (corners[code[bodies]] for corners in stepping_._neighbours._box)
+    least, most = (corners.T[code[bodies]] for corners in stepping_._neighbours.boxes())
     return bool((least <= low[:, :2]).all() and (high[:, :2] <= most).all())
 
 
@@ -267,23 +268,22 @@ def test_a_forgotten_grip_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_forgotten_holder_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Neighbours of every other holder only."""
-    meeting = neighbours._meeting
+    met = neighbours._met
 
-    def forgetful(low: np.ndarray, high: np.ndarray) -> np.ndarray:
-        found = meeting(low, high)
-        found[1::2] = np.eye(len(found), dtype=bool)[1::2]
+    def forgetful(holders: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+        found = met(holders[::2], low, high)
+        found[holders] = True
         return found
 
-    monkeypatch.setattr(neighbours, "_meeting", forgetful)
+    monkeypatch.setattr(neighbours, "_met", forgetful)
     assert overlooked_in_run("20")
 
 
 def test_boxes_that_are_too_small_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Boxes of where holders are, not of where they go."""
-    monkeypatch.setattr(
-        neighbours, "_slides", lambda parts, axes: (np.arange(axes.tray), np.zeros(axes.tray))
-    )
+    """Boxes of where holders were when the run began, not of where they go."""
     simulation = ready("20")
+    monkeypatch.setattr(neighbours.Ways, "go", lambda self, axes, x: None)
+    monkeypatch.setattr(neighbours.Ways, "stand", lambda self, d: None)
     monkeypatch.setattr(Neighbours, "astray", lambda _: False)
     assert overlooked_in(simulation, lambda: simulation.supervisor.step(MOST), 4.0)
 
@@ -302,7 +302,10 @@ def test_what_is_given_something_is_looked_at(
 ) -> None:
     """From the next step on; planted fault: it is not noticed."""
     if not noticed:
-        monkeypatch.setattr(Neighbours, "notice", lambda self: None)
+        look = Neighbours.look
+        monkeypatch.setattr(
+            Neighbours, "look", lambda self: (self._masks.fresh.clear(), look(self))
+        )
     simulation = ready("20", units=9)
     world = simulation.physical
     m, d, parts = world.m, world.d, world.parts

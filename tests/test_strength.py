@@ -118,7 +118,7 @@ def test_a_hand_at_rest_bears_the_weight_of_what_it_holds(name: str) -> None:
         grips = used._grip[world.d.efc_id[: world.d.ne : 6]]
         terms = used._gauges[grips] @ world.d.efc_force[: world.d.ne].reshape(-1, 6, 1)
         for number, robot in enumerate(used._robots.tolist()):
-            mine, hand = used._holds[number, grips] > 0, layout.hands[robot]
+            mine, hand = used._hand[grips] == number, layout.hands[robot]
             bodies = {used._grips[grip][0][1] for grip in grips[mine].tolist()}
             parts = [solids[p] for body in bodies for p in world.model.carried.parts(body)]
             if not parts or hand is None:

@@ -22,6 +22,8 @@ from tests.bench.factories import Case, Steady, judge, produce, run_in, run_unti
 
 DATA = ("ctrl", "history", "qpos", "qvel", "eq_active", "tree_asleep", "xpos", "xmat", "xquat")
 MODEL = (
+    "actuator_delay",
+    "actuator_history",
     "tree_sleep_policy",
     "dof_frictionloss",
     "eq_obj2id",

@@ -2,7 +2,8 @@
 
 Each actuator reads its setpoint from a buffer with a delay (`mjModel.actuator_delay`), so samples
 that are written before a call of the engine are read in its steps. The last sample is held. A step
-in which something falls asleep reads its sample once more, so one sample is kept to spare.
+in which something falls asleep reads its sample once more, so one sample is kept to spare. A drive
+that stands has no delay and keeps no samples: it reads `ctrl`.
 
 A buffer in `mjData.history` is one number for users, the index of the newest sample, the samples'
 times, and their values. The value at a time is that of the last sample before it, so the times are
@@ -36,9 +37,9 @@ class Drives:
         self.control = m.actuator_ctrladr[actuators]
         self.timestep = float(m.opt.timestep)
         self._d, self._actuators = d, actuators
-        samples = int(m.actuator_history[actuators[0], 0])
+        self._delay, self._samples = m.actuator_delay, m.actuator_history[:, 0]
+        samples = int(self._samples[actuators[0]])
         self.most = samples - 2
-        m.actuator_delay[actuators] = self.most * self.timestep
         size = 2 + (1 + INPUTS) * samples
         at = m.actuator_historyadr[actuators]
         first, self._row = int(at.min()), (at - at.min()) // size
@@ -73,8 +74,10 @@ class Drives:
     def follow(self, axes: Index, setpoints: Array) -> None:
         """Let axes follow setpoints (n, samples, 3), one a timestep from now on; the last is
         held."""
-        samples = setpoints.shape[1]
+        samples, actuators = setpoints.shape[1], self._actuators[axes]
         rows, head = self._row[axes], self._head.copy()
+        self._delay[actuators] = self.most * self.timestep
+        self._samples[actuators] = len(head) - 1
         head[1:] += self.time + samples * self.timestep
         self._buffers[rows, 1 : 1 + len(head)] = head
         self._buffers[rows, -INPUTS * samples :] = setpoints.reshape(len(axes), -1)
@@ -86,8 +89,11 @@ class Drives:
 
     def stand(self, axes: Index, x: Array) -> None:
         """Let axes stand at x [m]."""
-        still = np.stack([x, np.zeros_like(x), self.weight[axes]], axis=-1)
-        self.follow(axes, still[:, None])
+        actuators = self._actuators[axes]
+        self._delay[actuators] = self._samples[actuators] = 0
+        setpoint = self._d.ctrl.reshape(-1, INPUTS)
+        setpoint[actuators, 0], setpoint[actuators, 1] = x, 0.0
+        setpoint[actuators, 2] = self.weight[axes]
 
     def load(self, axes: Index, mass: Array, weight: Array) -> None:
         """From the next setpoints on axes move a mass beside their own [kg], and carry a weight

@@ -127,7 +127,7 @@ class Motion:
         """The tray's next course begins where one is over. Come to its goal, it stands."""
         outfeed, follower = self.outfeed, self.outfeed.follower
         if outfeed.moves and not follower.left:
-            follower.begin(outfeed.axes, self._tray_course(*outfeed.beginning))
+            self._begin(follower, outfeed.axes, self._tray_course(*outfeed.beginning))
             follower.show(0)
         elif not outfeed.moves and follower.course is not None:
             follower.stop(outfeed.axes)
@@ -143,7 +143,11 @@ class Motion:
     def _plan(self, bundle: Bundle) -> None:
         """The next stride of the active modes. The load of each robot is that of its operation."""
         axes, robots = self.active, self.robots
-        robots.begin(axes, self._course(bundle, robots.x[axes], robots.v[axes]))
+        self._begin(robots, axes, self._course(bundle, robots.x[axes], robots.v[axes]))
+
+    def _begin(self, follower: Follower, axes: Index, course: Course) -> None:
+        follower.begin(axes, course)
+        self.stepping.follow(axes, course)
 
     def _course(self, bundle: Bundle, x: Array, v: Array) -> Course:
         """A stride of the active modes from x [m] and v [m/s]."""

@@ -27,6 +27,9 @@ class Stepping(Protocol):
     def turn(self, active: Index) -> None:
         """These axes move from now on, and no others."""
 
+    def follow(self, axes: Index, course: Course) -> None:
+        """Axes follow a course from now on."""
+
     def advance(self, steps: int) -> None:
         """Some timesteps; what touches in any of them is inspected."""
 
@@ -52,6 +55,9 @@ class SingleSteps:
 
     def turn(self, active: Index) -> None:
         """All bodies are looked at, whatever moves."""
+
+    def follow(self, axes: Index, course: Course) -> None:
+        """All bodies are looked at, wherever it leads."""
 
     def advance(self, steps: int) -> None:
         """Some timesteps; hooks are called before each."""

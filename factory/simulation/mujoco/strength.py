@@ -75,9 +75,9 @@ class Strength:
         self._grip = np.full(m.neq, len(self._grips))
         self._grip[[weld for _, weld in self._grips]] = np.arange(len(self._grips))
         self._gauges = self._of_grips()
-        self._holds = np.zeros((len(self._hands), len(self._grips) + 1))
-        for number, ((robot, _), _) in enumerate(self._grips):
-            self._holds[self._robots == robot, number] = 1.0
+        number = {robot: n for n, robot in enumerate(self._hands)}
+        robots = [number[robot] for (robot, _), _ in self._grips]
+        self._hand = np.array([*robots, len(self._hands)], np.intp)
         self._next, self._risen = -np.inf, float(d.time)
 
     def look(self) -> list[int]:
@@ -90,7 +90,9 @@ class Strength:
         grips = self._grip[d.efc_id[: d.ne : ROWS]]
         # of all constraints only welds count: what else touches a body is a load
         terms = self._gauges[grips] @ d.efc_force[: d.ne].reshape(-1, ROWS, 1)
-        found = shares(self._holds[:, grips] @ terms[:, :, 0])
+        loads = np.zeros((len(self._hands) + 1, TERMS))
+        np.add.at(loads, self._hand[grips], terms[:, :, 0])
+        found = shares(loads[:-1])
         share = float(found.max())
         if self.most is None or share > self.most.share:
             self._keep(found, grips)
@@ -99,14 +101,14 @@ class Strength:
         worst = int(found.argmax())
         if self.dropped is None:
             self.dropped = self._drop(worst, self._use(worst, share, grips))
-        weak = self._holds[found > 1.0].sum(axis=0) > 0
-        return [self._grips[grip][1] for grip in grips[weak[grips]].tolist()]
+        weak = np.append(found > 1.0, False)[self._hand[grips]]
+        return [self._grips[grip][1] for grip in grips[weak].tolist()]
 
     def _keep(self, found: Array, grips: Index) -> None:
         """Keep the largest share of those that hold something."""
-        holding = self._holds[:, grips].sum(axis=1) > 0
-        if holding.any():
-            worst = int(np.where(holding, found, -np.inf).argmax())
+        holding = np.unique(self._hand[grips[grips < len(self._grips)]])
+        if len(holding):
+            worst = int(holding[found[holding].argmax()])
             if self.most is None or found[worst] > RISE * self.most.share:
                 self._risen = float(self._d.time)
             self.most = self._use(worst, max(0.0, float(found[worst])), grips)
@@ -136,7 +138,7 @@ class Strength:
         """What the n-th hand holds, and which share of its strength that uses."""
         factory, carried = self._model.factory, self._model.carried
         robot = factory.robots[int(self._robots[number])]
-        held = grips[self._holds[number, grips] > 0].tolist()
+        held = grips[self._hand[grips] == number].tolist()
         bodies = [self._grips[grip][0][1] for grip in held]
         parts = {part for body in bodies for part in carried.parts(body)}
         made = (factory.operations[operation].label for operation in robot.operations)

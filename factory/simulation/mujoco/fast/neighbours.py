@@ -1,11 +1,11 @@
 """Which holders can meet at all, and what the engine's broad phase looks at for that.
 
 The engine boxes every body that can collide in every step. Most of a factory rests, far from what
-moves. A holder (a robot, a feeder, the tray) sweeps one box with all that it ever holds, seen from
-above; those whose boxes are apart never meet. So the broad phase looks at what is awake and its
+moves. While a holder (a robot, a feeder, the tray) follows a course, it sweeps one box with all
+that it ever holds, seen from above; one that stands has the box of where it is. Those whose boxes
+are apart do not meet before the next course. So the broad phase looks at what is awake and its
 neighbours. No pair that could touch is left out: a run is the same to the last bit. Where anything
-touches, is pushed or leaves its way, everything is looked at, until other modes begin after some
-time in which nothing does.
+touches, is pushed or leaves its way, everything is looked at for a while.
 """
 
 from __future__ import annotations
@@ -33,37 +33,73 @@ CALM = 0.1
 FEW = 120
 """Where there are fewer holders all bodies are looked at: choosing takes as long as it saves."""
 
+MANY = 0.25
+"""Where a greater share of all holders moves all bodies are looked at, for the same reason."""
+
+
+class Ways:
+    """The axes along which holders go: carriages, then the outfeed's tray. `low` and `high` (n,):
+    the ends of the way that each goes until it is told another [m]; `along` (n, 2): where that
+    leads, seen from above."""
+
+    def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, axes: Axes, robots: int) -> None:
+        slides = np.array([*range(robots), axes.tray])
+        self._number = np.full(len(axes), -1)
+        self._number[slides] = np.arange(len(slides))
+        self.slides, self._address = slides, axes.qpos[slides]
+        self.along = d.xaxis[m.body_jntadr[axes.body[slides]], :2].copy()
+        self.stand(d)
+
+    def stand(self, d: mujoco.MjData) -> None:
+        """All stand where they are."""
+        self.low, self.high = d.qpos[self._address], d.qpos[self._address]
+
+    def go(self, axes: Index, x: Array) -> None:
+        """Some axes of a factory go from where they are by positions (ticks, n) [m]."""
+        number = self._number[axes]
+        if (number < 0).any():
+            number, x = number[number >= 0], x[:, number >= 0]
+        self.low[number] = np.minimum(self.low[number], x.min(axis=0))
+        self.high[number] = np.maximum(self.high[number], x.max(axis=0))
+
+    def left(self, d: mujoco.MjData) -> bool:
+        """Whether any is off its way."""
+        x = d.qpos[self._address]
+        return bool(((x < self.low - ASTRAY) | (x > self.high + ASTRAY)).any())
+
 
 class Neighbours:
     """The holders of a model's parts, by their codes, where the run begins; `culls`: some may be
     left out."""
 
     def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, parts: Parts, axes: Axes) -> None:
-        self._d, self._masks, self._holder = d, parts.masks, _holders(parts, axes)
+        shutter = parts.tray + len(parts.feeders.welds) + 1
+        self._d, self._masks, self._holder = d, parts.masks, _holders(parts, axes, shutter)
         trees = (
             dict(zip(axes.tree.tolist(), self._holder.tolist(), strict=True)) | parts.feeders.trees
         )
-        count = parts.masks.own(trees, parts.tray + len(parts.feeders.welds)) + 1
+        count = parts.masks.own(trees, shutter) + 1
         self.culls, self._calm = count > FEW, -np.inf
-        self._seen = np.ones(count, bool)
+        self._active: Index | None = None
+        self._seen, self._moved = np.ones(count, bool), False
         if self.culls:
             mujoco.mj_kinematics(m, d)
-            self._box = _swept(m, d, parts, axes, self._holder, count)
-            self._meets = _meeting(*self._box)
+            self._ways = Ways(m, d, axes, len(parts.model.factory.robots))
+            self._box = _boxes(m, d, parts, count)
+            self._began = self._ways.low
             self._bodies = _of_trees(m, parts.masks.code)
-            slides, lengths = _slides(parts, axes)
-            self._address, self._ways = axes.qpos[slides], (-ASTRAY, lengths + ASTRAY)
 
     def turn(self, active: Index) -> None:
-        """These axes move from now on; what is awake may move, too."""
-        if not self.culls or self._d.time < self._calm:
-            return
-        moves = np.zeros_like(self._seen)
-        moves[self._masks.code[self._bodies[self._d.tree_asleep < 0]]] = True
-        moves[self._holder[active]] = True
-        moves[NOBODY] = False
-        self._seen = np.zeros_like(moves)
-        self._include(moves.nonzero()[0])
+        """These axes move from now on, all others stand; what is awake may move, too."""
+        if self.culls:
+            self._ways.stand(self._d)
+            self._active, self._moved = active, True
+
+    def follow(self, axes: Index, x: Array) -> None:
+        """Axes go by positions (ticks, n) [m] from now on."""
+        if self.culls:
+            self._ways.go(axes, x)
+            self._moved = True
 
     @property
     def complete(self) -> bool:
@@ -72,43 +108,51 @@ class Neighbours:
 
     def astray(self) -> bool:
         """Whether a holder is off its way, and something is left out that it may meet there."""
-        if self.complete:
-            return False
-        x, (low, high) = self._d.qpos[self._address], self._ways
-        return bool(((x < low) | (x > high)).any())
+        return not self.complete and self._ways.left(self._d)
 
-    def notice(self) -> None:
-        """Look at holders that have been given something, too."""
-        if self._masks.fresh:
-            if self.culls:
-                self._include(np.array([*self._masks.fresh - {NOBODY}], np.intp))
-            self._masks.fresh.clear()
-
-    def _include(self, holders: Index) -> None:
-        """Look at holders and all that they can meet, too."""
-        self._seen |= self._meets[holders].any(axis=0)
+    def look(self) -> None:
+        """Look at what moves, at what has been given something, and at all that these can meet
+        until they are told another way."""
+        fresh = {*self._masks.fresh} - {NOBODY}
+        self._masks.fresh.clear()
+        if self._active is None or not (self._moved or fresh) or self._d.time < self._calm:
+            return
+        moves = np.zeros_like(self._seen)
+        moves[self._masks.code[self._bodies[self._d.tree_asleep < 0]]] = True
+        moves[self._holder[self._active]] = True
+        moves[[*fresh]] = True
+        moves[NOBODY] = self._moved = False
+        (moving,) = moves.nonzero()
+        if len(moving) > MANY * len(moves):
+            self._seen = np.ones_like(moves)
+        else:
+            self._seen = _met(moving, *self.boxes())
         self._masks.look(self._seen)
 
+    def boxes(self) -> tuple[Array, Array]:
+        """The corners (2, holders) of the box that each holder sweeps until it is told another way,
+        with all that it ever holds [m]."""
+        ways, robots = self._ways, self._holder[self._ways.slides]
+        low, high = (corners.copy() for corners in self._box)
+        ends = np.stack([ways.low, ways.high]) - self._began
+        swept = ends[:, None] * ways.along.T
+        low[:, robots] += swept.min(axis=0)
+        high[:, robots] += swept.max(axis=0)
+        return low, high
+
     def everything(self) -> None:
-        """Look at everything for a while, and until other modes begin."""
-        self._calm = self._d.time + CALM
+        """Look at everything for a while."""
+        self._calm, self._moved = self._d.time + CALM, True
         if not self.complete:
             self._seen[:] = True
             self._masks.look(self._seen)
 
 
-def _holders(parts: Parts, axes: Axes) -> Index:
-    """The code of the holder that each axis (axes,) is of."""
+def _holders(parts: Parts, axes: Axes, shutter: int) -> Index:
+    """The code of the holder that each axis (axes,) is of; the shutter holds nothing."""
     robots = len(parts.model.factory.robots)
     lifts = (robot + 1 for robot in axes.lift)
-    return np.array([*range(1, robots + 1), *lifts, parts.tray, parts.tray])
-
-
-def _slides(parts: Parts, axes: Axes) -> tuple[Index, Array]:
-    """The axes along which holders go, and the lengths of their ways [m]."""
-    layout = parts.model.layout
-    lengths = [path.length for path in layout.guidepaths]
-    return np.r_[: len(lengths), axes.tray], np.array([*lengths, layout.outfeed_way])
+    return np.array([*range(1, robots + 1), *lifts, parts.tray, shutter])
 
 
 def _of_trees(m: mujoco.MjModel, code: Index) -> Index:
@@ -120,18 +164,21 @@ def _of_trees(m: mujoco.MjModel, code: Index) -> Index:
     return found
 
 
-def _meeting(low: Array, high: Array) -> Truth:
-    """Which boxes (n, n) come near each other, with these corners (n, 2) [m]; each is near itself,
-    empty ones too."""
-    near = np.eye(len(low), dtype=bool)
-    return near | ((low[:, None] <= high) & (high[:, None] >= low)).all(axis=2)
+def _met(holders: Index, low: Array, high: Array) -> Truth:
+    """Which boxes (n,), with these corners (2, n) [m], come near those of some holders; each is
+    near itself, empty ones too."""
+    near = low[0, holders, None] <= high[0]
+    near &= high[0, holders, None] >= low[0]
+    near &= low[1, holders, None] <= high[1]
+    near &= high[1, holders, None] >= low[1]
+    met = near.any(axis=0)
+    met[holders] = True
+    return np.asarray(met)
 
 
-def _swept(
-    m: mujoco.MjModel, d: mujoco.MjData, parts: Parts, axes: Axes, holder: Index, count: int
-) -> tuple[Array, Array]:
-    """The corners (count, 2) [m] of the box that each holder sweeps, with all that it ever holds,
-    from one end of its way to the other."""
+def _boxes(m: mujoco.MjModel, d: mujoco.MjData, parts: Parts, count: int) -> tuple[Array, Array]:
+    """The corners (2, count) [m] of the box of each holder where it is now, with all that it ever
+    holds."""
     masks = parts.masks
     low, high = boxes(m, d, masks)
     bodies = np.flatnonzero(masks.code != NOBODY)
@@ -143,12 +190,7 @@ def _swept(
     least, most = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
     np.minimum.at(least, code, place + low[which])
     np.maximum.at(most, code, place + high[which])
-    slides, lengths = _slides(parts, axes)
-    at, way = d.qpos[axes.qpos[slides]], d.xaxis[m.body_jntadr[axes.body[slides]], :2]
-    ends = np.array([-at, lengths - at])[:, :, None] * way
-    least[holder[slides]] += ends.min(axis=0)
-    most[holder[slides]] += ends.max(axis=0)
-    return least - MARGIN, most + MARGIN
+    return least.T - MARGIN, most.T + MARGIN
 
 
 def boxes(m: mujoco.MjModel, d: mujoco.MjData, masks: ContactMasks) -> tuple[Array, Array]:

@@ -48,10 +48,14 @@ class Strides(SingleSteps):
         """The broad phase looks at what moves and what that can meet."""
         self._neighbours.turn(active)
 
+    def follow(self, axes: Index, course: Course) -> None:
+        """What that can meet is what is near its way."""
+        self._neighbours.follow(axes, course.x)
+
     def advance(self, steps: int) -> None:
         """Some timesteps: at once, and one by one where anything touches or leaves its way."""
         d = self.d
-        self._neighbours.notice()
+        self._neighbours.look()
         if d.ncon or self.hooks.before_step or self._neighbours.astray():
             self._neighbours.everything()
         if d.ncon or self.hooks.before_step or steps == 1:
