@@ -21,6 +21,10 @@ from factory.simulation.mujoco.drives import Drives
 AHEAD = 0.0005
 """No robot is further ahead of its reference than this [m]."""
 
+FASTER = 0.8
+"""No robot is slower than this share of its reference, half a timestep ago: the engine's speeds lag
+its positions by so much."""
+
 Move = tuple[Array, Array, Array, bool]
 """A tick of n axes: the positions [m] and speeds [m/s] it leads to, its accelerations [m/s²], and
 whether some axis may be at its goal then."""
@@ -64,14 +68,15 @@ def planned(
     return Course(x, v, setpoints, near)
 
 
-def along(bundle: Bundle, tick: float) -> Callable[[Array, Array], Move]:
-    """A tick [s] of the modes of a bundle: the field F_p under the limits of its robots."""
+def along(bundle: Bundle, tick: float, timestep: float) -> Callable[[Array, Array], Move]:
+    """A tick [s] of the modes of a bundle, of timesteps [s]: the field F_p under the limits of its
+    robots."""
 
     def go(x: Array, v: Array) -> Move:
         x1, v1, a = follow(bundle, x, v, tick)
-        slow = np.abs(v1)
-        v1[slow < ROUNDING] = 0.0
-        return x1, v1, a, bool(bundle.near_goal(x1, AHEAD, slow < REST))
+        v1[np.abs(v1) < ROUNDING] = 0.0
+        slow = FASTER * np.abs(v1 - timestep / 2 * a) < REST
+        return x1, v1, a, bool(bundle.near_goal(x1, AHEAD, slow))
 
     return go
 

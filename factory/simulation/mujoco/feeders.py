@@ -155,9 +155,13 @@ class Feeders:
         self._sliders.settle()
         if self.back.parts:
             self._take_back()
+        if not np.count_nonzero(self._turns.vacant):
+            return False
         busy = self._turns.any_of((self._sliders.ends < NEVER) | self._held_back())
-        free = self._turns.vacant & ~busy & self._passing.clear()
-        free[self._obstructed()] = False
+        free = self._turns.vacant & ~busy
+        if np.count_nonzero(free):
+            free &= self._passing.clear()
+            free[self._obstructed()] = False
         if not np.count_nonzero(free):
             return False
         loaded = self._load(free.nonzero()[0])
@@ -258,7 +262,8 @@ class Feeders:
         """Whether each (n,) is to show nothing yet."""
         held = np.zeros(len(self._stations), bool)
         held[[*self.back.parts]] = True
-        held[[n for n, s in enumerate(self._stations) if s.label in self.back.awaited]] = True
+        if self.back.awaited:
+            held[[n for n, s in enumerate(self._stations) if s.label in self.back.awaited]] = True
         return held
 
     def _send(self, numbers: Index, down: bool) -> None:

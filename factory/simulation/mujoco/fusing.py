@@ -7,10 +7,9 @@ other, which the welds that join them have brought to rest before.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from factory.geometry.meshes import Array
 from factory.support.engine import mujoco
@@ -23,6 +22,21 @@ RIGID = 1e-6
 first [m]."""
 
 
+def _turning() -> Array:
+    """What the products (16,) of a unit quaternion's components add to the nine of the identity to
+    give those of its rotation matrix."""
+    found = np.zeros((4, 4, 3, 3))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        for other in (j, k):
+            found[1 + other, 1 + other, i, i] = -2.0
+        found[1 + i, 1 + j, i, j] = found[1 + i, 1 + j, j, i] = 2.0
+        found[0, 1 + k, i, j], found[0, 1 + k, j, i] = -2.0, 2.0
+    return found.reshape(16, 9)
+
+
+_TURN = _turning()
+
+
 class Fusion:
     """Of free bodies whose origins are their centres of mass.
 
@@ -32,6 +46,7 @@ class Fusion:
 
     def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, places: Array, radii: Array) -> None:
         self._d, self._mass, self._places, self._radii = d, m.body_mass.copy(), places, radii
+        self._tree = m.body_treeid
         self._qpos = m.jnt_qposadr[m.body_jntadr][:, None] + np.arange(7)
         self._dof = m.jnt_dofadr[m.body_jntadr][:, None] + np.arange(6)
         axes = rotations(m.body_iquat)
@@ -52,6 +67,10 @@ class Fusion:
         apart += np.sqrt((tilt * tilt).sum(axis=1)) * self._radii[bodies]
         starts = np.cumsum(sizes, dtype=np.intp) - sizes
         return np.asarray(np.maximum.reduceat(apart, starts))
+
+    def sleeps(self, bodies: Mapping[str, int]) -> bool:
+        """Whether bodies that one holder has sleep: all do, or none."""
+        return bool(self._d.tree_asleep[self._tree[next(iter(bodies.values()))]] >= 0)
 
     def turns(self, bodies: Sequence[int]) -> float:
         """How far at most any of some bodies is turned against the first [rad]."""
@@ -79,8 +98,12 @@ class Fusion:
 
 
 def rotations(quaternions: Array) -> Array:
-    """Rotation matrices (n, 3, 3) of unit quaternions (n, 4)."""
-    return np.asarray(Rotation.from_quat(quaternions, scalar_first=True).as_matrix())
+    """Rotation matrices (n, 3, 3) of unit quaternions (n, 4); many times faster than SciPy's for
+    few."""
+    q = np.asarray(quaternions)
+    products = q[:, :, None] * q[:, None, :]
+    turns = np.eye(3).ravel() + products.reshape(-1, 16) @ _TURN
+    return np.asarray(turns.reshape(-1, 3, 3))
 
 
 def angles(turns: Array) -> Array:

@@ -31,6 +31,7 @@ class Joining:
         self._feeders, self._welds = feeders, welds
         self.waiting: dict[int, tuple[str, float]] = {}
         self.misfit: dict[int, Misfit] = {}
+        self._asleep: set[int] = set()
 
     def weigh(self, m: mujoco.MjModel, d: mujoco.MjData) -> None:
         """From now on bodies have the masses that the model has."""
@@ -46,8 +47,12 @@ class Joining:
             self.waiting[robot] = label, now
 
     def settle(self, now: float) -> None:
-        """Let one body take the place of those that a robot has joined, once they have settled."""
+        """Let one body take the place of those that a robot has joined, once they have settled.
+        What has been looked at asleep is not looked at again before it wakes."""
         late = [robot for robot, (_, since) in self.waiting.items() if now - since > SETTLING]
+        asleep = {r for r in late if self.fusion.sleeps(self._hands.of[r].bodies)}
+        late = [robot for robot in late if robot not in asleep or robot not in self._asleep]
+        self._asleep = asleep
         if late:
             apart = dict(zip(late, self._misfits(late), strict=True))
             self.fuse([robot for robot in late if apart[robot] < RIGID], apart)

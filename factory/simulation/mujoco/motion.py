@@ -159,7 +159,7 @@ class Motion:
                 self.active,
                 (x, v),
                 (settings.stride, settings.steps),
-                along(bundle, settings.tick),
+                along(bundle, settings.tick, settings.step),
             ),
         )
 

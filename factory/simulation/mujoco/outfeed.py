@@ -36,6 +36,7 @@ class Outfeed:
         self.follower, self.goal = follower, 0.0
         self.busy = self.loading = False
         self.axes = np.array([axes.tray, axes.tray + 1])
+        self._slots = slice(axes.tray, axes.tray + 2)
         self._d, self._drives, self._settings = d, drives, model.settings
         self._address = axes.qpos[self.axes], axes.dof[self.axes]
         self._product = model.masses[model.factory.products[0]]
@@ -58,9 +59,9 @@ class Outfeed:
         return np.array([self._product if self.goal else 0.0, 0.0])
 
     @property
-    def ends(self) -> Array:
-        """Where tray and shutter go (2,) [m]: the shed is shut while a product is in it."""
-        return np.array([self.goal, self._far[1] if self.goal else 0.0])
+    def ends(self) -> list[float]:
+        """Where tray and shutter go [m]: the shed is shut while a product is in it."""
+        return [self.goal, self._far[1] if self.goal else 0.0]
 
     def rests(self) -> bool:
         """Whether tray and shutter rest where they go."""
@@ -68,7 +69,7 @@ class Outfeed:
         slow = NEAR / self._settings.tick
         return all(
             abs(at - end) < NEAR and abs(speed) < slow
-            for at, end, speed in zip(x.tolist(), self.ends.tolist(), v.tolist(), strict=True)
+            for at, end, speed in zip(x.tolist(), self.ends, v.tolist(), strict=True)
         )
 
     @property
@@ -76,8 +77,8 @@ class Outfeed:
         """Whether a reference has yet to come to rest at its end, or it is busy."""
         if self.busy:
             return True
-        x, v = self.follower.x[self.axes], self.follower.v[self.axes]
-        return bool((x != self.ends).any() or v.any())
+        x, v = (each[self._slots].tolist() for each in (self.follower.x, self.follower.v))
+        return x != self.ends or v != [0.0, 0.0]
 
     @property
     def beginning(self) -> tuple[Array, Array]:
@@ -91,7 +92,7 @@ class Outfeed:
 
     def _go(self, x: Array, v: Array) -> Move:
         """A tick: the shutter begins to come down when the product is past it."""
-        ends = self.ends
+        ends = np.array(self.ends)
         goals = ends if x[0] >= self._far[0] - BEHIND + PLAY else np.array([self.goal, 0.0])
         x1, v1, a = towards(goals, x, v, self._limits, self._settings.tick)
         return x1, v1, a, bool((np.abs(x1 - ends) < CLOSE).all())

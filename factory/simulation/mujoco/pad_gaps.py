@@ -5,7 +5,7 @@ All of it is of now: the engine tells of where its last step began.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 
 import numpy as np
 
@@ -25,6 +25,7 @@ class PadGaps:
 
     def __init__(self, m: mujoco.MjModel, d: mujoco.MjData) -> None:
         self.largest: float | None = None
+        self._put = set[int]()
         self._m, self._d = m, d
         self._frames = WeldFrames.of(m, d)
         self._pads = Pads(m)
@@ -34,11 +35,15 @@ class PadGaps:
                 moved = d.qpos[self._frames.along[weld]] @ self._frames.way[weld]
                 self._at_zero[pads] = d.geom_xpos[pads] - moved
 
-    def measure(self, on: Mapping[int, int]) -> None:
-        """Measure welds that are about to be switched on, each with its body. A holder that lets go
-        of parts for what they have become has taken that before."""
+    def measure(self, on: Mapping[int, int], gripped: Container[int]) -> None:
+        """Measure welds that are about to be switched on, each with its body: those that are
+        `gripped` every time, others once, since bodies are put where these hold them. A holder that
+        lets go of parts for what they have become has taken that before."""
         taken: dict[int, tuple[int, list[int]]] = {}
         for weld, body in on.items():
+            if weld in self._put and weld not in gripped:
+                continue
+            self._put.add(weld)
             holder = int(self._m.eq_obj1id[weld])
             if holder in self._pads.of and body in self._pads.solid:
                 taken.setdefault(holder, (weld, []))[1].append(body)

@@ -243,8 +243,11 @@ class MujocoWorld:
 
     def unstable(self) -> str:
         """What made the engine give up, "" while it has not."""
+        warned = self.d.warning.number
+        if not warned.any():
+            return ""
         for kind in GIVEN_UP:
-            if self.d.warning[kind].number:
+            if warned[kind]:
                 name = mujoco.mjtWarning(kind).name.removeprefix("mjWARN_BAD").lower()
                 return f"the simulation became unstable ({name} is nan or huge)"
         return ""
