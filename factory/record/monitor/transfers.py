@@ -96,10 +96,15 @@ class Transfers:
         """The copies that have taken the place of others: each with what held those, and them. A
         copy that was parked comes before one that is used anew at once."""
         found = []
+        having: dict[str, dict[Holder, None]] = {}
+        for holder, copies in gone.items():
+            for part in (part for copy in copies for part in self.inside[copy]):
+                having.setdefault(part, {})[holder] = None
         fresh = [s for s in switches if self.at[s.copy] and (PARK, -1) not in self._holders(s)]
         for switch in sorted(fresh, key=lambda s: self.at[s.copy] != (PARK, -1)):
             parts = self.inside[switch.copy]
-            for holder, copies in gone.items():
+            for holder in having.get(next(iter(parts)), ()):
+                copies = gone[holder]
                 inside = [c for c in copies if self.inside[c] < parts]
                 if sum(len(self.inside[c]) for c in inside) == len(parts):
                     found.append((switch.copy, holder, inside))

@@ -110,6 +110,10 @@ class Feeders:
         due = np.flatnonzero(self._turns.now & ~self._passing.holds)
         self._sliders.begin(self._load(due, down=True))
 
+    def lacks(self, label: str) -> bool:
+        """Whether a robot has asked for a part that has not come yet."""
+        return self._number.get(label) in self._asked
+
     def presents(self, label: str, unit: int) -> bool:
         """Whether a robot may come for the part for that unit: it is down before the robot can be
         there, and may be let in."""
@@ -202,6 +206,7 @@ class Feeders:
     def undone(self, units: Mapping[str, int], rounds: Mapping[str, int], scrap: int) -> None:
         """The next part of each label is for another unit, after so many rounds; what it is no
         longer the turn of is taken back."""
+        self._asked.clear()
         self._turns.recount(rounds)
         for label, unit in units.items():
             number, is_shown = self._number[label], label in self._shown

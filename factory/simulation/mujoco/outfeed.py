@@ -78,7 +78,7 @@ class Outfeed:
         if self.busy:
             return True
         x, v = (each[self._slots].tolist() for each in (self.follower.x, self.follower.v))
-        return x != self.ends or v != [0.0, 0.0]
+        return bool(x != self.ends or v != [0.0, 0.0])
 
     @property
     def beginning(self) -> tuple[Array, Array]:

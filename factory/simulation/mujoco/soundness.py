@@ -79,6 +79,7 @@ class Soundness:
         self.mass = np.array([WEIGHTS.get(name.rpartition("/")[2], np.nan) for name in called])
         for label, ids in bodies.items():
             self.mass[ids] = model.carried.mass[label]
+        self._shape: Array = np.empty(0)
         solid = masks.solid
         owner = np.repeat([*solid], [len(geoms) for geoms in solid.values()])
         self._geoms = np.stack([np.concatenate([*solid.values()]), owner])
@@ -169,7 +170,10 @@ class Soundness:
     def _misshapen(self) -> Iterator[Diagnostic]:
         """Parts whose geoms are elsewhere in their bodies than in the product, or of another
         size."""
-        wrong = []
+        m, wrong = self._m, list[str]()
+        shape = np.hstack([m.geom_pos, m.geom_quat, m.geom_size])
+        if np.array_equal(shape, self._shape):
+            return
         for label, ids in self._of.items():
             solid = self.masks.solid
             first, *others = [solid[body] for body in ids.tolist()]
@@ -180,6 +184,8 @@ class Soundness:
                 grown = np.abs(self._m.geom_size[geoms] - size).max(axis=1) > SHIFTED
                 wrong += [self._name[g] for g in geoms[off | (tilt > TILTED) | grown].tolist()]
         yield from _each("Shape", "{} is not where its part is, or not as large", wrong)
+        if not wrong:
+            self._shape = shape
 
     def _nominal(self, label: str, body: int, geoms: Index) -> tuple[Array, Array, Array]:
         """Where the geoms of a body are in it (n, 3), how they are turned (n, 3, 3), and their

@@ -101,10 +101,13 @@ class MujocoWorld:
 
     def prepared(self, operation: Operation, unit: int) -> bool:
         """A feeder presents the part of that unit; the outfeed has room for a product."""
+        feeders = self.parts.feeders
+        if feeders.lacks(operation.label):
+            return False
         if not self.hooks.admit(operation, unit):
             return False
-        if self.parts.feeders.serves(operation.label):
-            return self.parts.feeders.presents(operation.label, unit)
+        if feeders.serves(operation.label):
+            return feeders.presents(operation.label, unit)
         if not self.model.factory.drops(operation.index):
             return True
         outfeed = self.motion.outfeed
