@@ -5,7 +5,7 @@ All of it is of now: the engine tells of where its last step began.
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -25,33 +25,26 @@ class PadGaps:
 
     def __init__(self, m: mujoco.MjModel, d: mujoco.MjData) -> None:
         self.largest: float | None = None
-        self._put = set[int]()
         self._m, self._d = m, d
         self._frames = WeldFrames.of(m, d)
         self._pads = Pads(m)
         self._at_zero, self._turned = d.geom_xpos.copy(), rotations(m.geom_quat)
-        for holder, weld in zip(*np.unique(m.eq_obj1id, return_index=True), strict=True):
-            if (pads := self._pads.of.get(int(holder))) is not None:
-                moved = d.qpos[self._frames.along[weld]] @ self._frames.way[weld]
-                self._at_zero[pads] = d.geom_xpos[pads] - moved
+        self._welds = {h: np.flatnonzero(m.eq_obj1id == h) for h in self._pads.of}
+        for holder, welds in self._welds.items():
+            pads, weld = self._pads.of[holder], welds[0]
+            moved = d.qpos[self._frames.along[weld]] @ self._frames.way[weld]
+            self._at_zero[pads] = d.geom_xpos[pads] - moved
 
-    def measure(self, on: Mapping[int, int], gripped: Container[int]) -> None:
-        """Measure welds that are about to be switched on, each with its body: those that are
-        `gripped` every time, others once, since bodies are put where these hold them. A holder that
-        lets go of parts for what they have become has taken that before."""
+    def measure(self, on: Mapping[int, int]) -> None:
+        """Measure welds that are about to be switched on, each with its body. A holder that lets go
+        of parts for what they have become has taken that before."""
         taken: dict[int, tuple[int, list[int]]] = {}
         for weld, body in on.items():
-            if weld in self._put and weld not in gripped:
-                continue
-            self._put.add(weld)
             holder = int(self._m.eq_obj1id[weld])
             if holder in self._pads.of and body in self._pads.solid:
                 taken.setdefault(holder, (weld, []))[1].append(body)
-        if not taken:
-            return
-        busy = {*self._m.eq_obj1id[self._d.eq_active > 0].tolist()}
         for holder, (weld, bodies) in taken.items():
-            if holder not in busy:
+            if not self._d.eq_active[self._welds[holder]].any():
                 self._pads_of(holder, weld, bodies)
 
     def _pads_of(self, holder: int, weld: int, bodies: Sequence[int]) -> None:

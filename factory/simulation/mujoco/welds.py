@@ -78,7 +78,7 @@ class Welds:
         if not (self._on or self._off or self._held or self._placed):
             return
         self._put()
-        self.pads.measure(self._on, self._gripped)
+        self.pads.measure(self._on)
         if self._gripped:
             welds, bodies = np.array([*self._gripped.items()]).T
             self.taken.measure(welds, bodies)
