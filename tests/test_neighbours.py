@@ -282,8 +282,8 @@ def test_a_forgotten_holder_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_boxes_that_are_too_small_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Boxes of where holders were when the run began, not of where they go."""
     simulation = ready("20")
-    monkeypatch.setattr(neighbours.Ways, "go", lambda self, axes, x: None)
-    monkeypatch.setattr(neighbours.Ways, "stand", lambda self, d: None)
+    monkeypatch.setattr(neighbours.Extents, "go", lambda self, axes, x: None)
+    monkeypatch.setattr(neighbours.Extents, "stand", lambda self, d: None)
     monkeypatch.setattr(Neighbours, "astray", lambda _: False)
     assert overlooked_in(simulation, lambda: simulation.supervisor.step(MOST), 4.0)
 

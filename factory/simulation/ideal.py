@@ -3,7 +3,7 @@ with the robots that carry them, transfers are instantaneous."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Container, Mapping, Sequence
 
 import numpy as np
 
@@ -20,6 +20,8 @@ from factory.simulation.world import Hooks, Job
 class IdealWorld:
     """A DotFactory. Asserts that no configuration in Δ occurs: no two robots coupled by a mode
     touch."""
+
+    lacking: Container[str] = ()
 
     def __init__(
         self, layout: Layout, request: RunRequest, start: Array, counts: Mapping[int, int]

@@ -224,11 +224,12 @@ class Supervisor:
             return ()
         self.ordering.held.clear()
         prepared, fired, unit = self.world.prepared, self.fired, self.factory.unit
-        hold_up = self.ordering.hold_up
+        hold_up, lacking = self.ordering.hold_up, self.world.lacking
         ready = tuple(
             o.index
             for o in self.awaited()
-            if not hold_up(o.start, fired.__getitem__, self._sensed)
+            if o.label not in lacking
+            and not hold_up(o.start, fired.__getitem__, self._sensed)
             and prepared(o, unit(o, fired[o.start]))
         )
         self.enabled, self.world.supplied = bool(ready), False

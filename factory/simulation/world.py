@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Container, Sequence
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Protocol
@@ -85,6 +85,10 @@ class World(Protocol):
     @property
     def time(self) -> float:
         """[s]"""
+
+    @property
+    def lacking(self) -> Container[str]:
+        """The labels of operations that cannot become prepared before this changes."""
 
     @property
     def hooks(self) -> Hooks:

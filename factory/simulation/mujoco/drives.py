@@ -37,8 +37,8 @@ class Drives:
         self.control = m.actuator_ctrladr[actuators]
         self.timestep = float(m.opt.timestep)
         self._d, self._actuators = d, actuators
-        self._delay, self._samples = m.actuator_delay, m.actuator_history[:, 0]
-        samples = int(self._samples[actuators[0]])
+        self._history = m.actuator_delay, m.actuator_history[:, 0]
+        samples = int(m.actuator_history[actuators[0], 0])
         self.most = samples - 2
         size = 2 + (1 + INPUTS) * samples
         at = m.actuator_historyadr[actuators]
@@ -76,8 +76,8 @@ class Drives:
         held."""
         samples, actuators = setpoints.shape[1], self._actuators[axes]
         rows, head = self._row[axes], self._head.copy()
-        self._delay[actuators] = self.most * self.timestep
-        self._samples[actuators] = len(head) - 1
+        delay, kept = self._history
+        delay[actuators], kept[actuators] = self.most * self.timestep, len(head) - 1
         head[1:] += self.time + samples * self.timestep
         self._buffers[rows, 1 : 1 + len(head)] = head
         self._buffers[rows, -INPUTS * samples :] = setpoints.reshape(len(axes), -1)
@@ -89,8 +89,8 @@ class Drives:
 
     def stand(self, axes: Index, x: Array) -> None:
         """Let axes stand at x [m]."""
-        actuators = self._actuators[axes]
-        self._delay[actuators] = self._samples[actuators] = 0
+        actuators, (delay, kept) = self._actuators[axes], self._history
+        delay[actuators] = kept[actuators] = 0
         setpoint = self._d.ctrl.reshape(-1, INPUTS)
         setpoint[actuators, 0], setpoint[actuators, 1] = x, 0.0
         setpoint[actuators, 2] = self.weight[axes]

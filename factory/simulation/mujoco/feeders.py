@@ -47,8 +47,8 @@ class Feeders:
     """The feeders of a factory, by their outlets (n,). `counts`: how often each transition has
     fired where the run starts.
 
-    `due`: when a part that a robot has asked for too early comes soon enough [s]. `back`: what is
-    taken back.
+    `lacking`: the labels of parts that robots have asked for, and that have not come. `due`: when a
+    part that a robot has asked for too early comes soon enough [s]. `back`: what is taken back.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class Feeders:
         self._stations = [_station(m, outlet, codes[outlet.robot]) for outlet in outlets]
         self.back = TakenBack()
         self._shown: dict[str, int] = {}
-        self._asked: set[int] = set()
+        self.lacking = set[str]()
         self.due = NEVER
         self._turns = Turns([station.label for station in self._stations])
         self._serve(model.layout, supply.rounds())
@@ -110,10 +110,6 @@ class Feeders:
         due = np.flatnonzero(self._turns.now & ~self._passing.holds)
         self._sliders.begin(self._load(due, down=True))
 
-    def lacks(self, label: str) -> bool:
-        """Whether a robot has asked for a part that has not come yet."""
-        return self._number.get(label) in self._asked
-
     def presents(self, label: str, unit: int) -> bool:
         """Whether a robot may come for the part for that unit: it is down before the robot can be
         there, and may be let in."""
@@ -121,7 +117,7 @@ class Feeders:
             return False
         number = self._number[label]
         if self._shown.get(label) != unit:
-            self._asked.add(number)
+            self.lacking.add(label)
             return False
         ends = float(self._sliders.ends[number])
         enough = ends - self._passing.soonest(number) if ends < NEVER else -NEVER
@@ -171,8 +167,8 @@ class Feeders:
         loaded = self._load(free.nonzero()[0])
         self._welds.write()
         self._send(loaded, down=True)
-        come = self._asked & {*loaded.tolist()}
-        self._asked -= come
+        come = self.lacking & {self._stations[number].label for number in loaded.tolist()}
+        self.lacking -= come
         return bool(come)
 
     def at_rest(self) -> Iterator[tuple[Station, int, int]]:
@@ -206,7 +202,7 @@ class Feeders:
     def undone(self, units: Mapping[str, int], rounds: Mapping[str, int], scrap: int) -> None:
         """The next part of each label is for another unit, after so many rounds; what it is no
         longer the turn of is taken back."""
-        self._asked.clear()
+        self.lacking.clear()
         self._turns.recount(rounds)
         for label, unit in units.items():
             number, is_shown = self._number[label], label in self._shown
@@ -222,7 +218,7 @@ class Feeders:
         """A robot (index) is gone, and others take parts as in a layout. What is shown `elsewhere`
         has been taken back, and `undone` will say whose turn it is."""
         self._passing.gone(robot)
-        self._asked.clear()
+        self.lacking.clear()
         self._serve(layout, self.supply.rounds())
 
     def elsewhere(self, layout: Layout) -> list[str]:

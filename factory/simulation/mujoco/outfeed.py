@@ -36,7 +36,6 @@ class Outfeed:
         self.follower, self.goal = follower, 0.0
         self.busy = self.loading = False
         self.axes = np.array([axes.tray, axes.tray + 1])
-        self._slots = slice(axes.tray, axes.tray + 2)
         self._d, self._drives, self._settings = d, drives, model.settings
         self._address = axes.qpos[self.axes], axes.dof[self.axes]
         self._product = model.masses[model.factory.products[0]]
@@ -77,7 +76,7 @@ class Outfeed:
         """Whether a reference has yet to come to rest at its end, or it is busy."""
         if self.busy:
             return True
-        x, v = (each[self._slots].tolist() for each in (self.follower.x, self.follower.v))
+        x, v = (each[self.axes].tolist() for each in (self.follower.x, self.follower.v))
         return bool(x != self.ends or v != [0.0, 0.0])
 
     @property

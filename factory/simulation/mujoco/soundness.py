@@ -73,9 +73,6 @@ class Soundness:
         self.masks, self.gone, self.found = masks, set[int](), tuple[Diagnostic, ...]()
         self._name = [m.geom(geom).name for geom in range(m.ngeom)]
         called = [m.body(body).name for body in range(m.nbody)]
-        robots = np.array([names.kind(name) == "robot" for name in called])[m.geom_bodyid]
-        stands = [names.kind(n) in STANDS and not n.endswith(ROD) for n in self._name]
-        self._stations = np.flatnonzero(robots & (m.geom_group == 0) | stands)
         self.mass = np.array([WEIGHTS.get(name.rpartition("/")[2], np.nan) for name in called])
         for label, ids in bodies.items():
             self.mass[ids] = model.carried.mass[label]
@@ -122,7 +119,8 @@ class Soundness:
     def _loose(self) -> Iterator[Diagnostic]:
         """What does not collide, and should."""
         m, layout = self._m, self._model.layout
-        at = self._stations[~np.isin(m.geom_bodyid[self._stations], [*self.gone])]
+        stations = self._stations()
+        at = stations[~np.isin(m.geom_bodyid[stations], [*self.gone])]
         solid = (m.geom_contype[at] > 0) & (m.geom_conaffinity[at] & STATION > 0)
         soft = (m.geom_margin < 0) & ~np.isin(m.geom_bodyid, [*self.gone])
         loose = [self._name[geom] for geom in [*at[~solid], *np.flatnonzero(soft)]]
@@ -133,9 +131,16 @@ class Soundness:
         wanted |= {f"{feeder}/{kind}" for feeder in housed for kind in HOUSING}
         sliders = [n for n in map(self._body, range(m.nbody)) if n.endswith("/slider")]
         wanted |= {names.pad(n.removeprefix("feeder/").removesuffix("/slider")) for n in sliders}
-        loose += sorted(wanted.difference(self._name[geom] for geom in self._stations.tolist()))
+        loose += sorted(wanted.difference(self._name[geom] for geom in stations.tolist()))
         yield from _each("NotSolid", "{} is not solid", [*loose, *self._unmasked()])
         yield from _each("NotSolid", "{} do not collide", self._left_out())
+
+    def _stations(self) -> Index:
+        """The geoms of robots and of what stands, which collide with everything."""
+        m, bodies = self._m, range(self._m.nbody)
+        robots = np.array([names.kind(self._body(body)) == "robot" for body in bodies])
+        stands = [names.kind(n) in STANDS and not n.endswith(ROD) for n in self._name]
+        return np.flatnonzero(robots[m.geom_bodyid] & (m.geom_group == 0) | stands)
 
     def _unmasked(self) -> Iterator[str]:
         """The geoms of held parts whose masks are not those of what their holder holds."""

@@ -99,15 +99,17 @@ class MujocoWorld:
         """Measured positions [m] and speeds [m/s] of all carriages, then of all lifts."""
         return self.hooks.sensed(*self.motion.axes.measured(self.d))
 
+    @property
+    def lacking(self) -> set[str]:
+        """The labels of parts that have been asked for, and have not come."""
+        return self.parts.feeders.lacking
+
     def prepared(self, operation: Operation, unit: int) -> bool:
         """A feeder presents the part of that unit; the outfeed has room for a product."""
-        feeders = self.parts.feeders
-        if feeders.lacks(operation.label):
-            return False
         if not self.hooks.admit(operation, unit):
             return False
-        if feeders.serves(operation.label):
-            return feeders.presents(operation.label, unit)
+        if self.parts.feeders.serves(operation.label):
+            return self.parts.feeders.presents(operation.label, unit)
         if not self.model.factory.drops(operation.index):
             return True
         outfeed = self.motion.outfeed

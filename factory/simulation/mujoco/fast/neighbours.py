@@ -37,7 +37,7 @@ MANY = 0.25
 """Where a greater share of all holders moves all bodies are looked at, for the same reason."""
 
 
-class Ways:
+class Extents:
     """The axes along which holders go: carriages, then the outfeed's tray. `low` and `high` (n,):
     the ends of the way that each goes until it is told another [m]; `along` (n, 2): where that
     leads, seen from above."""
@@ -84,7 +84,7 @@ class Neighbours:
         self._seen, self._moved = np.ones(count, bool), False
         if self.culls:
             mujoco.mj_kinematics(m, d)
-            self._ways = Ways(m, d, axes, len(parts.model.factory.robots))
+            self._ways = Extents(m, d, axes, len(parts.model.factory.robots))
             self._box = _boxes(m, d, parts, count)
             self._began = self._ways.low
             self._bodies = _of_trees(m, parts.masks.code)
