@@ -16,9 +16,9 @@ from factory.layout.feeding import feeder_of
 from factory.layout.hands.choosing import Hands
 from factory.layout.hands.hand import AIR, Hand
 from factory.layout.hands.limbs import limbs
+from factory.layout.hanging import Hanging
 from factory.layout.layout import Layout
 from factory.mjcf import hanging
-from factory.mjcf.hanging import Hanging
 from factory.pipeline import Project, read
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run

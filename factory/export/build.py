@@ -10,6 +10,7 @@ from factory.export.certificate.writer import certificate
 from factory.export.dot import write_dot
 from factory.export.floor_sheet import write_svg
 from factory.export.pnml import write_pnml
+from factory.export.ways import ways
 from factory.layout.certificate import Certificate
 from factory.layout.clearance import certify
 from factory.mjcf.binary import beside, kept, key_of, packed, seal_of, sealed
@@ -71,6 +72,7 @@ def build(project: Project, verdict: Verdict, request: BuildRequest) -> Built:
         own_names(mjcf.parent, (files.keys() | binary.keys()) - {request.mjcf}, read)
     if output is not None:
         texts = _documents(project, clearance, verdict)
+        texts["ways.json"] = _json(ways(model))
         documents = {output / f"{project.name}.{end}": t.encode() for end, t in texts.items()}
         documents |= plan_files(project, output)
         own_names(output, documents, read)

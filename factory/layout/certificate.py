@@ -126,14 +126,50 @@ class Shared:
 
 
 @dataclass(frozen=True, slots=True)
+class Excluded:
+    """Two machines that would come near in two places of the coordinated net, by which `bodies` of
+    theirs, and the places of a `circuit` through both that carries one token: so they are never
+    in both at once."""
+
+    machines: tuple[str, str]
+    places: tuple[str, str]
+    bodies: tuple[str, str]
+    circuit: tuple[str, ...]
+
+    def as_json(self) -> dict[str, object]:
+        """The pair as the certificate's document lists it."""
+        return {
+            "machines": list(self.machines),
+            "places": list(self.places),
+            "bodies": list(self.bodies),
+            "circuit": list(self.circuit),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Precedence:
+    """An order place by `name` that keeps machines apart: `start` has fired at most `tokens` times
+    more often than `before`, transitions of the coordinated net by their indices. Whether a run
+    keeps it (`kept`): what a magazine has to do before comes long before."""
+
+    name: str
+    before: int
+    start: int
+    tokens: int
+    kept: bool = True
+
+
+@dataclass(frozen=True, slots=True)
 class Certificate:
     """That no two robots which are not coupled by a mode can touch, nor their payloads.
 
     Uncoupled regions of different robots in one layer are at least `clearance` [m] apart in plan;
     end stops are beyond the regions by less than half of that. `layers` gives each layer's z range
     and `gaps` the vertical distance to the one below [m]; where a coupled region is nearer to
-    another robot's, `shared` names the junction. It holds if there is no fault; at most
-    `clearance.MOST` faults are listed.
+    another robot's, `shared` names the junction. Machines that come near are `excluded`, some by
+    `orders`, places that the net needs for that, and robots (index) that go back by themselves to
+    an arc length [m], `backs`. It holds if there is no fault; at most `clearance.MOST` faults are
+    listed.
     """
 
     clearance: float
@@ -145,11 +181,19 @@ class Certificate:
     shared: tuple[Shared, ...] = field(repr=False)
     faults: tuple[Fault, ...] = ()
     pairs: int = 0
+    excluded: tuple[Excluded, ...] = field(default=(), repr=False)
+    orders: tuple[Precedence, ...] = field(default=(), repr=False)
+    backs: tuple[tuple[int, float], ...] = field(default=(), repr=False)
 
     @property
     def holds(self) -> bool:
         """Whether the layout is clear."""
         return not self.faults
+
+    def is_of(self, factory: Factory) -> bool:
+        """Whether it is of a factory with these operations and robots."""
+        names = tuple(robot.name for robot in factory.robots)
+        return (names, tuple(o.label for o in factory.operations)) == (self.robots, self.operations)
 
     def as_json(self) -> dict[str, object]:
         """The certificate as a document that another program can check."""
@@ -165,6 +209,8 @@ class Certificate:
             "vertical_gaps_m": {name: round(gap, 6) for name, gap in self.gaps},
             "regions": [self._region(region) for region in self.regions],
             "shared": [shared.as_json() for shared in self.shared],
+            "excluded": [excluded.as_json() for excluded in self.excluded],
+            "orders": [{"place": o.name, "tokens": o.tokens, "kept": o.kept} for o in self.orders],
             "faults": [fault.as_json() for fault in self.faults],
         }
 
@@ -176,6 +222,7 @@ class Certificate:
             "clearance_m": self.clearance,
             "regions": len(self.regions),
             "shared": len(self.shared),
+            "excluded": len(self.excluded),
         }
 
     def _region(self, region: Region) -> dict[str, object]:

@@ -32,7 +32,7 @@ from factory.layout.certificate import (
     Shared,
     fault,
 )
-from factory.layout.coordinating import coordinated
+from factory.layout.coordinating import Coordinated, coordinated
 from factory.layout.crossings import embedding_faults, near
 from factory.layout.dimensions import (
     ARM_LOW,
@@ -44,6 +44,7 @@ from factory.layout.dimensions import (
     PAYLOAD,
     PAYLOADS,
 )
+from factory.layout.exclusions import Exclusions, exclusions
 from factory.layout.feeding import passing
 from factory.layout.guidepath import Box
 from factory.layout.layout import Layout
@@ -63,7 +64,7 @@ MOST = 100
 def certify(layout: Layout) -> Certificate:
     """The clearance certificate of a layout. Never raises; see `Certificate.holds`."""
     factory = layout.factory
-    found = piles(factory, layout.product)
+    found, coordination = piles(factory, layout.product), coordinated(layout, ())
     swept = regions(layout, found)
     search = ClearanceSearch(layout, swept)
     faults = [
@@ -72,8 +73,9 @@ def certify(layout: Layout) -> Certificate:
         *islice(_standoffs(layout, found), MOST),
         *islice(_raised(layout, found), MOST),
         *islice(_back_at_feeders(layout, found), MOST),
-        *_deadlock(layout),
+        *_deadlock(layout, coordination),
     ]
+    kept = Exclusions() if faults else exclusions(layout, coordination)
     top = max(region.z[1] for region in swept)
     return Certificate(
         layout.clearance,
@@ -89,8 +91,11 @@ def certify(layout: Layout) -> Certificate:
         tuple(operation.label for operation in factory.operations),
         tuple(swept),
         tuple(search.shared.values()),
-        tuple(faults[:MOST]),
+        (*faults[:MOST], *kept.faults[:MOST]),
         search.pairs,
+        kept.excluded,
+        kept.orders,
+        kept.backs,
     )
 
 
@@ -267,11 +272,10 @@ def _back_at_feeders(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Faul
             past = past or before <= TOLERANCE
 
 
-def _deadlock(layout: Layout) -> Iterator[Fault]:
+def _deadlock(layout: Layout, coordination: Coordinated) -> Iterator[Fault]:
     """A circuit of the coordinated net that carries no token: what is on it never moves."""
-    coordination = coordinated(layout).net
-    if circuit := coordination.deadlock:
-        net, operations = coordination.net, layout.factory.operations
+    if circuit := coordination.net.deadlock:
+        net, operations = coordination.net.net, layout.factory.operations
         events = (net.right[place] // 2 for place in circuit)
         robots = sorted({operations[n].carrier for n in events if n < len(operations)})
         names = listing(net.net.places[place].name for place in circuit)

@@ -7,10 +7,11 @@ transition fires once stays possible, and no circuit is free of tokens.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 
+from factory.layout.certificate import Precedence
 from factory.layout.feeding import passing
 from factory.layout.hands.leaving import leavings
 from factory.layout.layout import Layout
@@ -24,11 +25,12 @@ HOME = 1e-3
 @dataclass(frozen=True, slots=True)
 class Served:
     """How a magazine serves the part of an operation (index): the place in which its slider goes up
-    after the part `before`, by the operation (index) that takes that, and the place in which it
-    comes down with this one."""
+    after the part `before`, by the operation (index) that takes that, the one in which it is on
+    `top`, and the place in which it comes down with this one."""
 
     before: int
     up: int
+    top: int
     down: int
 
 
@@ -54,8 +56,9 @@ class _Feeding:
     past: Past | None
 
 
-def coordinated(layout: Layout) -> Coordinated:
-    """The coordinated net of a layout with bodies."""
+def coordinated(layout: Layout, orders: Sequence[Precedence] | None = None) -> Coordinated:
+    """The coordinated net of a layout with bodies, and the order places that keep its machines
+    apart: those of its certificate unless others are given."""
     factory, build = layout.factory, Coordination(layout.factory.net)
     position = {number: place for place, number in enumerate(factory.order)}
     waits, feedings = leavings(layout).items(), [*_feedings(layout)]
@@ -77,6 +80,11 @@ def coordinated(layout: Layout) -> Coordinated:
         then = factory.dropoffs[(step + 1) % factory.period]
         name, ends = f"tray:{dropoff.label}", (dropoff.end, then.start)
         away[dropoff.index] = build.place(name, ends, int(then.turn == 0), "tray", dropoff.label)
+    certificate = layout.certificate
+    if orders is None and certificate is not None and certificate.is_of(factory):
+        orders = [order for order in certificate.orders if order.kept]
+    for order in orders or ():
+        build.precede(order.name, order.before, order.start, order.tokens)
     return Coordinated(build.built(), served, away)
 
 
@@ -141,13 +149,16 @@ def _served(layout: Layout, build: Coordination, feeding: _Feeding) -> Served:
     before, leaf, past = feeding.before, feeding.leaf, feeding.past
     tour = layout.factory.tour_of(leaf.carrier, before.index)
     down = build.transition(f"down:{leaf.label}")
+    above = build.transition(f"up:{before.label}")
     label, clear = leaf.label, layout.factory.operations[tour[-1]].end
-    up = build.place(f"magazine up:{label}", (before.end, down), 0, "magazine", label)
+    up = build.place(f"magazine up:{label}", (before.end, above), 0, "magazine", label)
+    top = build.place(f"magazine top:{label}", (above, down), 0, "magazine", label)
     way = build.events[past] if past is not None else clear, down
     build.place(f"clear:{label}", way, 0, "order", f"clear:{label}")
     shown = down, leaf.start
     return Served(
         before.index,
         up,
+        top,
         build.place(f"magazine down:{label}", shown, int(feeding.begins), "magazine", label),
     )

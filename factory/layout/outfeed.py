@@ -1,13 +1,16 @@
-"""How long the outfeed takes: its tray takes a product into the shed, waits until that is shut, and
-comes back."""
+"""The outfeed: how long its tray takes, which brings a product into the shed, waits until that is
+shut, and comes back; and the slot in it."""
 
 from __future__ import annotations
 
 from math import sqrt
 
 from factory.control.profile import SpeedProfile
-from factory.layout.dimensions import BEHIND, PLAY
+from factory.layout.dimensions import BEHIND, PLAY, SLOT, Clearance
+from factory.layout.guidepath import Box, Point2
+from factory.layout.hands.limbs import limbs
 from factory.layout.layout import Layout
+from factory.layout.standing import dip
 from factory.support.settings import Settings
 
 CRUISE = 1.2
@@ -40,3 +43,45 @@ def away(layout: Layout, settings: Settings) -> float:
 
 def _shutter(layout: Layout, settings: Settings) -> float:
     return SpeedProfile(*settings.shutter_limits).rest(layout.shutter_stroke)
+
+
+def slot_of(layout: Layout) -> tuple[float, float, float] | None:
+    """The slot through which the output robot's hand comes up to the product, about the product's
+    middle: how far it reaches, as far as the robot can be pushed, and its sides [m]; None where the
+    hand is not below."""
+    path, hand = layout.guidepaths[0], layout.hand(0)
+    upright = [limb for limb in limbs(layout, 0) if limb.name.endswith(("column", "pad"))]
+    if hand is None or hand.kind != "below":
+        return None
+    ends = max(limb.high[0] for limb in upright) - path.reach + SLOT
+    ends += Clearance(layout.clearance).stop
+    low = min(limb.low[1] for limb in upright) + path.offset - SLOT
+    return ends, low, max(limb.high[1] for limb in upright) + path.offset + SLOT
+
+
+def dip_of(layout: Layout, slot: tuple[float, float, float] | None) -> float:
+    """How far the product dips into the tray's slot [m]."""
+    if slot is None:
+        return 0.0
+    (_, xhi, ylo, yhi), (end, low, high) = layout.payloads[layout.factory.products[0]], slot
+    x, y = layout.product.middle[:2].tolist()
+    beside = (1, y + low, -1, low - ylo), (1, y + high, 1, yhi - high), (0, x + end, 1, xhi - end)
+    plates = [(axis, at, way) for axis, at, way, room in beside if room > SLOT]
+    return dip(layout.product, plates)
+
+
+def slotted(plate: Box, slot: tuple[float, float, float] | None) -> list[tuple[Point2, Point2]]:
+    """The rectangles, middles and half sizes, that make up a plate with a slot from its rear."""
+    xlo, xhi, ylo, yhi = plate
+    boxes = [plate]
+    if slot is not None:
+        end, low, high = slot
+        boxes = [
+            (xlo, xhi, ylo, low),
+            (xlo, xhi, high, yhi),
+            (end, xhi, max(low, ylo), min(high, yhi)),
+        ]
+        boxes = [box for box in boxes if min(box[1] - box[0], box[3] - box[2]) > SLOT] or [plate]
+    return [
+        (((x0 + x1) / 2, (y0 + y1) / 2), ((x1 - x0) / 2, (y1 - y0) / 2)) for x0, x1, y0, y1 in boxes
+    ]

@@ -12,10 +12,10 @@ from factory.geometry.suction import PadPlace
 from factory.layout.dimensions import BOOM, BOOM_HEIGHT, PAD, POST, WALL
 from factory.layout.feeding import lines_of, outlets_of
 from factory.layout.guidepath import Feeder
+from factory.layout.hanging import Hanging
 from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.mjcf.elements import add, add_shown, add_station
-from factory.mjcf.hanging import Hanging
 from factory.mjcf.masks import feeder_codes, masks_of
 from factory.mjcf.robots import MOTOR, Drive, add_inertia, heading_quaternion
 from factory.mjcf.stops import Stops, lift_stops

@@ -20,13 +20,13 @@ from xml.sax.saxutils import quoteattr
 from factory.control.profile import SpeedProfile
 from factory.layout.bins import Bin
 from factory.layout.feeding import outlets_of
+from factory.layout.hanging import Hanging
 from factory.layout.layout import Layout
 from factory.layout.standby import Repertoire
 from factory.mjcf import names
 from factory.mjcf.bins import add_bins
 from factory.mjcf.elements import add, fill
 from factory.mjcf.feeders import SLIDER_MASS, add_feeders
-from factory.mjcf.hanging import Hanging
 from factory.mjcf.insets import Insets, insets_of
 from factory.mjcf.outfeed import SHUTTER_MASS, TRAY_MASS, add_outfeed
 from factory.mjcf.parts import add_meshes, add_parts, add_wholes

@@ -9,16 +9,14 @@ from __future__ import annotations
 
 from xml.etree.ElementTree import Element
 
-from factory.layout.dimensions import BELT_GAP, FINGER_TOP, PAYLOAD, PLAY, SLOT, TRAY, WALL
-from factory.layout.guidepath import Box
-from factory.layout.hands.limbs import limbs
+from factory.layout.dimensions import BELT_GAP, FINGER_TOP, PAYLOAD, PLAY, TRAY, WALL
 from factory.layout.layout import Layout, Point2
-from factory.layout.standing import dip
+from factory.layout.outfeed import dip_of, slot_of, slotted
 from factory.mjcf import names
 from factory.mjcf.elements import add, add_station
 from factory.mjcf.masks import masks_of, tray_code
 from factory.mjcf.robots import MOTOR, Drive, add_inertia
-from factory.mjcf.stops import robot_room, shutter_stops, tray_stops
+from factory.mjcf.stops import shutter_stops, tray_stops
 
 TRAY_MASS = 4.0
 """Mass of the empty tray [kg]."""
@@ -67,9 +65,9 @@ def _add_tray(world: Element, actuator: Element, layout: Layout, drive: Drive) -
     add_inertia(joint, drive)
     tray_stops(layout).limit(joint)
     contype, conaffinity = masks_of(tray_code(layout.factory))
-    plate, slot = (xlo, xhi, ylo, yhi), _slot(layout)
-    low, high = PAYLOAD - BELT_GAP - TRAY + 1e-4, PAYLOAD - BELT_GAP - 1e-4 + _dip(layout, slot)
-    for number, (at, half) in enumerate(_slotted(plate, slot), 1):
+    plate, slot = (xlo, xhi, ylo, yhi), slot_of(layout)
+    low, high = PAYLOAD - BELT_GAP - TRAY + 1e-4, PAYLOAD - BELT_GAP - 1e-4 + dip_of(layout, slot)
+    for number, (at, half) in enumerate(slotted(plate, slot), 1):
         add(
             body,
             "geom",
@@ -126,11 +124,11 @@ def _add_table(world: Element, layout: Layout) -> None:
     length, width = back - mouth - WALL, high - low
     along, across = mouth + length / 2 - x, (low + high) / 2 - y
     end = mouth + length + WALL / 2 - x
-    a, slot = layout.guidepaths[0].a, _slot(layout)
+    a, slot = layout.guidepaths[0].a, slot_of(layout)
     if slot is not None:
         slot = slot[0] + a[0] - x, slot[1] + a[1] - y, slot[2] + a[1] - y
     belt = -half[0], min(half[0], mouth + length - x - SLIT), -half[1], half[1]
-    for number, (at, rest) in enumerate(_slotted(belt, slot), 1):
+    for number, (at, rest) in enumerate(slotted(belt, slot), 1):
         name = "outfeed/belt" + (f"/{number}" if number > 1 else "")
         place = {"pos": (*at, BELT - thick / 2), "size": (*_plate(*rest), thick / 2)}
         add_station(body, name, **place, material="belt")
@@ -150,48 +148,6 @@ def _add_table(world: Element, layout: Layout) -> None:
         foot = a[0] + front + 2 * leg - x, side * (half[1] - leg), (BELT - thick) / 2
         size = leg, leg, (BELT - thick) / 2
         add_station(body, f"outfeed/leg{side}", pos=foot, size=size, material="frame")
-
-
-def _slot(layout: Layout) -> tuple[float, float, float] | None:
-    """The slot through which the output robot's hand comes up to the product, about the product's
-    middle: how far it reaches, as far as the robot can be pushed, and its sides [m]; None where the
-    hand is not below."""
-    path, hand = layout.guidepaths[0], layout.hand(0)
-    upright = [limb for limb in limbs(layout, 0) if limb.name.endswith(("column", "pad"))]
-    if hand is None or hand.kind != "below":
-        return None
-    ends = max(limb.high[0] for limb in upright) - path.reach + SLOT
-    ends += robot_room(layout.clearance).stop
-    low = min(limb.low[1] for limb in upright) + path.offset - SLOT
-    return ends, low, max(limb.high[1] for limb in upright) + path.offset + SLOT
-
-
-def _dip(layout: Layout, slot: tuple[float, float, float] | None) -> float:
-    """How far the product dips into the tray's slot [m]."""
-    if slot is None:
-        return 0.0
-    (_, xhi, ylo, yhi), (end, low, high) = layout.payloads[layout.factory.products[0]], slot
-    x, y = layout.product.middle[:2].tolist()
-    beside = (1, y + low, -1, low - ylo), (1, y + high, 1, yhi - high), (0, x + end, 1, xhi - end)
-    plates = [(axis, at, way) for axis, at, way, room in beside if room > SLOT]
-    return dip(layout.product, plates)
-
-
-def _slotted(plate: Box, slot: tuple[float, float, float] | None) -> list[tuple[Point2, Point2]]:
-    """The rectangles, middles and half sizes, that make up a plate with a slot from its rear."""
-    xlo, xhi, ylo, yhi = plate
-    boxes = [plate]
-    if slot is not None:
-        end, low, high = slot
-        boxes = [
-            (xlo, xhi, ylo, low),
-            (xlo, xhi, high, yhi),
-            (end, xhi, max(low, ylo), min(high, yhi)),
-        ]
-        boxes = [box for box in boxes if min(box[1] - box[0], box[3] - box[2]) > SLOT] or [plate]
-    return [
-        (((x0 + x1) / 2, (y0 + y1) / 2), ((x1 - x0) / 2, (y1 - y0) / 2)) for x0, x1, y0, y1 in boxes
-    ]
 
 
 def _plate(x: float, y: float) -> Point2:

@@ -9,9 +9,9 @@ from xml.etree.ElementTree import Element
 from factory.geometry.meshes import Array, Mesh
 from factory.geometry.solids import Product, Solid
 from factory.layout.dimensions import PAYLOAD
+from factory.layout.hanging import Hanging
 from factory.layout.layout import Layout, Point2
 from factory.mjcf.elements import add, exact, numbers
-from factory.mjcf.hanging import Hanging
 from factory.mjcf.insets import Insets
 from factory.mjcf.mesh_files import inset_file, inset_name, mesh_file, piece_files
 from factory.mjcf.names import part, piece

@@ -6,11 +6,11 @@ from collections.abc import Iterable, Mapping
 from xml.etree.ElementTree import Element
 
 from factory.layout.feeding import outlets_of
+from factory.layout.hanging import Hanging
 from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.mjcf.elements import add, numbers
 from factory.mjcf.grips import grips_of, turned
-from factory.mjcf.hanging import Hanging
 from factory.mjcf.parts import parked_at, place_in
 from factory.mjcf.robots import heading_quaternion
 from factory.plant.fused_bodies import FusedBodies, Inside

@@ -35,15 +35,17 @@ class Past:
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """An order place [past; start]: the transition `start` has fired at most `tokens` times more
-    often than the pass. That comes before the transition `end` of its robot, which has fired at
-    most `held` times more often than what the pass follows."""
+    """An order place: the transition `start` has fired at most `tokens` times more often than
+    `before`, a transition of the compiled net, or than the pass `past` that follows it. That comes
+    before the transition `end` of its robot, which has fired at most `held` times more often than
+    what the pass follows."""
 
-    past: Past
+    before: int
     start: int
     tokens: int
-    end: int
-    held: int
+    past: Past | None = None
+    end: int = -1
+    held: int = 0
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,7 @@ class Coordination:
     def __init__(self, net: GearNet) -> None:
         compiled = marked(net)
         self.transitions, self.places = [*compiled.net.transitions], [*compiled.net.places]
-        self.tokens = [*compiled.tokens]
+        self.tokens, self._compiled = [*compiled.tokens], len(compiled.net.transitions)
         self.passes: dict[Past, tuple[int, Past | None]] = {}
         self.events: dict[Past, int] = {}
         self.beside: dict[int, int] = {}
@@ -122,7 +124,18 @@ class Coordination:
     def order(self, name: str, past: Past, start: int, tokens: int) -> None:
         """An order place, from a pass to a transition of the compiled net."""
         self.place(name, (self.events[past], start), tokens, "order", name)
-        self.orders.append(Order(past, start, tokens, *self._ends[past]))
+        self.orders.append(Order(past.after, start, tokens, past, *self._ends[past]))
+
+    def precede(self, name: str, before: int, start: int, tokens: int) -> None:
+        """An order place between two transitions of the net. A supervisor keeps it where the first
+        is of the compiled net or a pass, and the second the start of an operation."""
+        past = next((past for past, event in self.events.items() if event == before), None)
+        if past is not None:
+            self.order(name, past, start, tokens)
+            return
+        self.place(name, (before, start), tokens, "order", name)
+        if before < self._compiled and start < self._compiled and start % 2 == 0:
+            self.orders.append(Order(before, start, tokens))
 
     def built(self) -> CoordinatedNet:
         """The net."""

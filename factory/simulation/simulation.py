@@ -109,6 +109,8 @@ class Simulation:
         self.before = self.world.delivered()
         self.supervisor = (self._distributed if request.distributed else self._central)(stages)
         self.supervisor.ordering = Ordering(self.timing.coordinated.net.orders)
+        if self.start != net.initial_marking:
+            self.supervisor.ordering.keep_passes()
 
     @cached_property
     def patience(self) -> float:

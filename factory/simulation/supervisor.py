@@ -152,6 +152,7 @@ class Supervisor:
         are over, as are the stages of axes that are `free`."""
         active = self.active
         self.fired[:] = fired
+        self.ordering.keep_passes()
         self.events.append(undone)
         self._mark(marking)
         self.enabled = True
@@ -222,7 +223,7 @@ class Supervisor:
         asked again where there was none and nothing has changed."""
         if not (self.enabled or self.world.supplied):
             return ()
-        self.ordering.held.clear()
+        self.ordering.ask_anew()
         prepared, fired, unit = self.world.prepared, self.fired, self.factory.unit
         hold_up, lacking = self.ordering.hold_up, self.world.lacking
         ready = tuple(
@@ -276,6 +277,7 @@ class Supervisor:
         ends = [(o, unit(o, fired[o.end])) for o in (operations[n] for n in ended)]
         events = (*(o.start for o, _ in starts), *(o.end for o, _ in ends))
         self.enabled |= self.threads.fire(events)
+        self.enabled |= not self.ordering.lacking.isdisjoint(events)
         transitions = self.factory.net.threaded.transitions
         for event in events:
             fired[event] += 1

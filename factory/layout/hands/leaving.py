@@ -81,7 +81,8 @@ def awaited_positions(layout: Layout) -> dict[int, float]:
     """Where robots go as soon as they have let go, since what they have delivered waits for that:
     clear of it; and home those whose hands have to be there before what they take, unless others
     could be where a tall hand comes to. Where robots have several tours, one may have nothing more
-    to bring while its carrier comes home for another: it goes clear of that."""
+    to bring while its carrier comes home for another: it goes clear of that. And further, where the
+    layout's certificate asks for that."""
     found: dict[int, float] = {}
     factory, backs = layout.factory, [0.0] * len(layout.factory.robots)
     for carrier in factory.robots if layout.hands else ():
@@ -101,9 +102,16 @@ def awaited_positions(layout: Layout) -> dict[int, float]:
             continue
         far = max(backs[robot], 0.0 if rises_first(layout, robot) else hand.clear)
         if far:
-            least, end = _least(layout, robot, far), _before_next(layout, robot)
-            found[robot] = min(least + ON, max(least + NEAR, end))
+            found[robot] = gone_by(layout, robot, _least(layout, robot, far))
+    if layout.certificate is not None and layout.certificate.is_of(factory):
+        for robot, at in layout.certificate.backs:
+            found[robot] = max(at, found.get(robot, 0.0))
     return found
+
+
+def gone_by(layout: Layout, robot: int, least: float) -> float:
+    """Where a robot goes so that it comes past a point: on a little, if it can [m]."""
+    return min(least + ON, max(least + NEAR, _before_next(layout, robot)))
 
 
 def crowded(layout: Layout) -> dict[int, float]:

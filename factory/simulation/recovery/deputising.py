@@ -93,6 +93,7 @@ class Deputising:
         ordering = Ordering(
             replace(order, past=replace(order.past, axis=axes[order.past.axis]))
             for order in timing.coordinated.net.orders
+            if order.past is not None
         )
         self._books.supervisor.exchange(takeover.crew, modes, own, undone, fired, ordering)
         names, net = takeover.names, takeover.after.net

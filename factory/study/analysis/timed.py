@@ -189,7 +189,9 @@ def _machines(timing: Timing, made: Timed) -> Iterator[Circuit]:
     for number, served in coordinated.served.items():
         if number == served.before:
             leaf = factory.operations[number]
-            cycles.append((f"{FEEDER} {leaf.label}", [leaf.place, served.up, served.down]))
+            cycles.append(
+                (f"{FEEDER} {leaf.label}", [leaf.place, served.up, served.top, served.down])
+            )
     for name, places in cycles:
         spent = sum(seconds[p] for p in places)
         yield Circuit(name, spent, 1, tuple(places), factory.period)

@@ -1,0 +1,82 @@
+"""The ways of a factory's machines, so that another program can check that they never meet.
+
+For each machine and each place of the coordinated net in which it is: which bodies of the MJCF it
+has, over which spans its joints go, and by which welds it holds what it holds. The pairs that come
+near, and their circuits, are in the clearance certificate. Standing machines have no ways.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from factory.layout.coordinating import coordinated
+from factory.layout.feeding import outlets_of
+from factory.layout.hands.leaving import awaited_positions
+from factory.layout.hanging import Hanging
+from factory.layout.machines import presences
+from factory.layout.presence import Presence, Span
+from factory.mjcf import names
+from factory.mjcf.model import Model
+
+Json = dict[str, object]
+
+
+def ways(model: Model) -> Json:
+    """The places of a model's coordinated net, each from one transition to another with its
+    tokens, and the ways of its machines [m]."""
+    layout = model.layout
+    coordination = coordinated(layout, layout.certificate.orders if layout.certificate else ())
+    net, written = coordination.net.net, _Writer(model)
+    events = net.net.transitions
+    found = [*presences(layout, coordination, awaited_positions(layout))]
+    return {
+        "places": [
+            {"place": place.name, "before": events[a].name, "after": events[b].name, "tokens": n}
+            for place, a, b, n in zip(net.net.places, net.left, net.right, net.tokens, strict=True)
+        ],
+        "ways": [
+            {"places": [net.net.places[p].name for p in one.places], **written.way(one)}
+            for one in found
+            if one.places
+        ],
+    }
+
+
+class _Writer:
+    """Writes where machines are, by the names of a model."""
+
+    def __init__(self, model: Model) -> None:
+        self._model, self._hanging = model, Hanging.of(model.layout)
+        self._outlets = {(o.label, o.robot): o.name for o in outlets_of(model.layout)}
+
+    def way(self, one: Presence) -> Json:
+        """One of them."""
+        name, held = one.machine, self._model.carried.carried.get(one.label, ())
+        robot = self._model.factory.robots[one.robot].name
+        if name == robot:
+            bodies, joints = [names.carriage(robot)], [names.slide(robot)]
+            if one.robot in self._model.factory.strokes:
+                bodies, joints = [*bodies, names.head(robot)], [*joints, names.lift(robot)]
+            return _way(one, bodies, joints, [names.grip(robot, label) for label in held], 0.0)
+        if name == "tray":
+            bodies, joints = [names.OUTFEED_TRAY], [names.OUTFEED_SLIDE]
+            return _way(one, bodies, joints, [names.hold(label) for label in held], 0.0)
+        outlet = self._outlets[one.label, one.robot]
+        slider = names.slider(self._hanging.slider[outlet])
+        hangs = [names.feed(outlet)] * (len(one.bodies.names) > 1)
+        return _way(one, [slider], [slider], hangs, self._hanging.raised[outlet])
+
+
+def _way(
+    one: Presence, bodies: Sequence[str], joints: Sequence[str], welds: Sequence[str], more: float
+) -> Json:
+    def span(ends: Span) -> list[float]:
+        return [round(min(ends) + more, 6), round(max(ends) + more, 6)]
+
+    return {
+        "machine": one.machine,
+        "bodies": bodies,
+        "joints": joints,
+        "welds": welds,
+        "spans": [[span(ends) for ends in sweep[: len(joints)]] for sweep in one.sweeps],
+    }

@@ -1,0 +1,230 @@
+"""Where the solid bodies of machines are while places of a net are marked, and which come near.
+
+A machine is whatever has axes and moves: a robot, the sliders of a magazine, the outfeed's tray;
+what stands is there in every marking. MachineBodies are swept as boxes over the intervals of their
+machine's axes. Two presences of different machines are *near* where bodies of both come closer than
+drives and grips need, and both are not one and the same mode, whose field keeps its robots apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+import shapely
+
+from factory.compiler.mating.depth import Polytope, exact, polytope
+from factory.control.mode import Index, Truth
+from factory.geometry.meshes import Array
+from factory.layout.crossings import near as near_boxes
+from factory.layout.dimensions import PAYLOADS
+
+ACROSS = 5e-5
+"""Bodies of machines that work together come no nearer than this: a robot's pad is 0.2 mm off what
+it holds, a feeder's 0.1 mm [m]."""
+
+ALONG = 5e-5
+"""A robot is no further than this from where its reference is, along its guidepath [m]: 0.06 mm is
+the most that is measured (docs/fidelity.md)."""
+
+ROUNDING = 1e-6
+"""Lengths that differ by less are the same [m]."""
+
+ANY = -1
+"""The layer of a body that stands in all layers."""
+
+UP = np.array([0.0, 0.0, 1.0])
+
+Span = tuple[float, float]
+"""From where to where an axis goes, in either order [m]."""
+
+
+STILL: tuple[Span, Span] = (0.0, 0.0), (0.0, 0.0)
+"""The spans of a machine that stays where its bodies are told."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class MachineBodies:
+    """Convex bodies of a machine in the world, its axes at 0: their `names`, `boxes` (n, 2, 3) and
+    `corners` (k, 3) as seen from `origins` (n, 3) [m], the `layers` in which they are (n,), and
+    which of them `rise` with its second axis (n,). Its first axis moves all of them along the
+    vector `way` (3,)."""
+
+    names: tuple[str, ...]
+    boxes: Array
+    corners: tuple[Array, ...]
+    origins: Array
+    layers: Index
+    rise: Truth
+    way: Array
+
+    def swept(self, first: Span, second: Span) -> Array:
+        """The boxes (n, 2, 3) of all that they take as the axes go over two spans [m]."""
+        swept = self.boxes + np.sort(self.along(first), axis=0)
+        swept[self.rise, :, 2] += np.sort(second)
+        return np.asarray(swept)
+
+    def along(self, first: Span) -> Array:
+        """How far bodies move as the first axis goes from one end of a span to the other (2, 3)
+        [m], and as far beyond as it may be off: a slider, which stands out of its way, is not."""
+        off = ALONG * (1.0 - abs(self.way[2]))
+        return np.outer([min(first) - off, max(first) + off], self.way)
+
+    def moved(self, by: Array) -> MachineBodies:
+        """The same, elsewhere."""
+        return replace(self, boxes=self.boxes + by, origins=self.origins + by)
+
+    def going(self, way: Array) -> MachineBodies:
+        """The same of a machine whose first axis moves them along another vector (3,)."""
+        return replace(self, way=way)
+
+    def __add__(self, other: MachineBodies) -> MachineBodies:
+        """Those of both, which move alike."""
+        return MachineBodies(
+            self.names + other.names,
+            np.concatenate([self.boxes, other.boxes]),
+            self.corners + other.corners,
+            np.concatenate([self.origins, other.origins]),
+            np.concatenate([self.layers, other.layers]),
+            np.concatenate([self.rise, other.rise]),
+            self.way,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Presence:
+    """A `machine`, by name, while all of some `places` (indices) of a net are marked, none for what
+    stands: its `bodies` and what it holds, as its axes go over pairs of spans, one after another.
+    `robot` (index): itself, or the one that it serves; `partners`: numbers that it shares with the
+    machines that it works together with; whether it `bears` on what it hands over; `label`: what it
+    holds, or shows next, "" for nothing."""
+
+    robot: int
+    machine: str
+    places: tuple[int, ...]
+    bodies: MachineBodies = field(repr=False)
+    sweeps: tuple[tuple[Span, Span], ...] = (STILL,)
+    partners: frozenset[int] = field(default=frozenset(), repr=False)
+    bears: bool = False
+    label: str = ""
+
+    @cached_property
+    def boxes(self) -> Array:
+        """What each body sweeps in each pair of spans, as boxes (m n, 2, 3) [m]."""
+        return np.concatenate([self.bodies.swept(*spans) for spans in self.sweeps])
+
+    @cached_property
+    def layers(self) -> Index:
+        """In which layer each of them is (m n,)."""
+        return np.tile(self.bodies.layers, len(self.sweeps))
+
+    @cached_property
+    def hull(self) -> Array:
+        """The box (2, 3) of all of them [m]."""
+        return np.array([self.boxes[:, 0].min(axis=0), self.boxes[:, 1].max(axis=0)])
+
+    def name(self, number: int) -> str:
+        """The body that sweeps one of the boxes."""
+        return self.bodies.names[number % len(self.bodies.names)]
+
+    def solid(self, number: int) -> Polytope:
+        """What is really in one of the boxes."""
+        sweep, body = divmod(number, len(self.bodies.names))
+        first, second = self.sweeps[sweep]
+        rise = UP * bool(self.bodies.rise[body])
+        along = self.bodies.along(first)
+        ends = [end + rise * z for end in along for z in {*second}]
+        corners = self.bodies.corners[body] + self.bodies.origins[body]
+        return polytope(np.concatenate([corners + end for end in ends]))
+
+
+@dataclass(frozen=True, slots=True)
+class Near:
+    """Two presences that come near, which `bodies` of theirs come nearest, and by how much nearer
+    than they may (`lacking`) [m]."""
+
+    one: Presence
+    other: Presence
+    bodies: tuple[str, str]
+    lacking: float
+
+
+def near(presences: Sequence[Presence], clearance: float) -> Iterator[Near]:
+    """The pairs of presences of different machines without a common place that come near: nearer
+    than ACROSS, or than the clearance [m] where bodies are in one layer and their machines do not
+    work together. Near linear."""
+    hulls = np.array([presence.hull for presence in presences]).reshape(-1, 2, 3)
+    machine = np.unique([presence.machine for presence in presences], return_inverse=True)[1]
+    low, high = hulls[:, 0] - clearance / 2, hulls[:, 1] + clearance / 2
+    for first, second in near_boxes(shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])):
+        meets = (low[first] < high[second]).all(axis=1) & (low[second] < high[first]).all(axis=1)
+        meets &= machine[first] != machine[second]
+        for i, j in zip(first[meets].tolist(), second[meets].tolist(), strict=True):
+            one, other = presences[i], presences[j]
+            if not {*one.places}.isdisjoint(other.places):
+                continue
+            if (nearest := _nearest(one, other, clearance)) is not None:
+                yield nearest
+
+
+def _nearest(one: Presence, other: Presence, clearance: float) -> Near | None:
+    """Two presences with the bodies whose boxes come nearest for what they need, if any do."""
+    pairs = _pairs(one, other, clearance)
+    lacking, i, j = max(pairs, default=(0.0, 0, 0))
+    return Near(one, other, (one.name(i), other.name(j)), lacking) if pairs else None
+
+
+def nearer(found: Near, clearance: float) -> Near | None:
+    """The same of the bodies themselves, which may be apart where their boxes are not."""
+    one, other = found.one, found.other
+    for lacking, i, j in sorted(_pairs(one, other, clearance), reverse=True):
+        need = lacking - _overlap(one.boxes[i], other.boxes[j])
+        deep = exact(one.solid(i), other.solid(j)).bounds.min()
+        if min(lacking, need + deep) > ROUNDING:
+            return Near(one, other, (one.name(i), other.name(j)), min(lacking, need + deep))
+    return None
+
+
+def _pairs(one: Presence, other: Presence, clearance: float) -> list[tuple[float, int, int]]:
+    """The pairs of boxes of two presences that come near, and by how much nearer than they may."""
+    across = 0.0 if one.bears or other.bears else ACROSS
+    apart = across if one.partners & other.partners else clearance - 2 * (ALONG + ROUNDING)
+    here = _within(one.boxes, other.hull, apart)
+    there = _within(other.boxes, one.hull, apart)
+    a, b = one.boxes[here][:, None], other.boxes[there][None]
+    layer, beside = one.layers[here][:, None], other.layers[there][None]
+    alike = (layer == beside) | (layer == ANY) | (beside == ANY)
+    lacking = np.where(alike, apart, across) + _overlap(a, b)
+    pairs = zip(*np.nonzero(lacking > ROUNDING), strict=True)
+    return [(float(lacking[i, j]), int(here[i]), int(there[j])) for i, j in pairs]
+
+
+def _overlap(one: Array, other: Array) -> Array:
+    """How deep boxes (..., 2, 3) overlap; negative by how far they are apart (...) [m]."""
+    low = np.maximum(one[..., 0, :], other[..., 0, :])
+    return np.asarray((np.minimum(one[..., 1, :], other[..., 1, :]) - low).min(axis=-1))
+
+
+def _within(boxes: Array, hull: Array, apart: float) -> Index:
+    """Which boxes (n, 2, 3) come nearer than so much to a box (2, 3)."""
+    meets = (boxes[:, 0] < hull[1] + apart) & (boxes[:, 1] > hull[0] - apart)
+    return np.flatnonzero(meets.all(axis=1))
+
+
+def corners_of(boxes: Array) -> tuple[Array, ...]:
+    """The corners (8, 3) of boxes (n, 2, 3)."""
+    return tuple(np.array([*product(*box.T)]) for box in boxes)
+
+
+def boxed(
+    names: tuple[str, ...], boxes: Array, way: Array, corners: tuple[Array, ...] = ()
+) -> MachineBodies:
+    """Bodies of boxes among the payloads, or with other corners inside these."""
+    count = len(boxes)
+    shapes, layers = corners or corners_of(boxes), np.full(count, PAYLOADS)
+    return MachineBodies(
+        names, boxes, shapes, np.zeros((count, 3)), layers, np.zeros(count, bool), way
+    )
