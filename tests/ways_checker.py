@@ -39,8 +39,9 @@ def check(m: mujoco.MjModel, ways: Json, clearance: Json) -> list[str]:
         bodies = _near(mine, its)
         both = ((p, q) for p in one["places"] for q in other["places"])
         if bodies and apart.isdisjoint(both):
-            named = (f"{b} in {' and '.join(w['places'])}" for b, w in zip(bodies, (one, other)))
-            wrong.append(f"{' and '.join(named)} come near, and no circuit excludes that")
+            sides = zip(bodies, (one, other), strict=True)
+            named = " and ".join(f"{body} in {' and '.join(w['places'])}" for body, w in sides)
+            wrong.append(f"{named} come near, and no circuit excludes that")
     return wrong
 
 

@@ -181,10 +181,10 @@ def nearer(found: Near, clearance: float) -> Near | None:
     """The same of the bodies themselves, which may be apart where their boxes are not."""
     one, other = found.one, found.other
     for lacking, i, j in sorted(_pairs(one, other, clearance), reverse=True):
-        need = lacking - _overlap(one.boxes[i], other.boxes[j])
-        deep = exact(one.solid(i), other.solid(j)).bounds.min()
-        if min(lacking, need + deep) > ROUNDING:
-            return Near(one, other, (one.name(i), other.name(j)), min(lacking, need + deep))
+        need = lacking - float(_overlap(one.boxes[i], other.boxes[j]))
+        deep = float(exact(one.solid(i), other.solid(j)).bounds.min())
+        if (lacks := min(lacking, need + deep)) > ROUNDING:
+            return Near(one, other, (one.name(i), other.name(j)), lacks)
     return None
 
 
