@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
+from factory.layout import clearance
 from factory.layout.dimensions import FINGER_TOP, PAYLOAD
+from factory.layout.exclusions import Exclusions
 from factory.layout.feeding import feeder_of
 from factory.layout.hands import leaving
 from factory.layout.hands.apart import LEVEL, HandsApart
@@ -25,6 +27,7 @@ from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.simulation.watched import watched
 from factory.study.fidelity.hidden import HiddenPenetrations
+from factory.support.errors import RunError
 
 AT_MOST_MM = 0.1
 
@@ -141,7 +144,11 @@ def test_hands_from_either_side_wait_for_each_other(distributed: bool, tmp_path:
 
 
 def test_if_they_did_not_they_would_meet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The certificate says so; a layout that is not asked for one shows it."""
     monkeypatch.setattr(leaving, "meetings", lambda *_: ())
+    with pytest.raises(RunError, match="beam of r6, .* and cross of r7, .* both at once"):
+        laid_out(BOX, tmp_path)
+    monkeypatch.setattr(clearance, "exclusions", lambda *_: Exclusions())
     run = watched(Simulation(laid_out(BOX, tmp_path), RunRequest(units=1)), (), 60.0)
     codes = {failure.code for failure in run.verdict.failures}
     assert "Contact" in codes and codes & {"Dropped", "Stalled"}
