@@ -146,7 +146,7 @@ def test_hands_from_either_side_wait_for_each_other(distributed: bool, tmp_path:
 def test_if_they_did_not_they_would_meet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The certificate says so; a layout that is not asked for one shows it."""
     monkeypatch.setattr(leaving, "meetings", lambda *_: ())
-    with pytest.raises(RunError, match="beam of r6, .* and cross of r7, .* both at once"):
+    with pytest.raises(RunError, match=r"beam of r6, .* and cross of r7, .* both at once"):
         laid_out(BOX, tmp_path)
     monkeypatch.setattr(clearance, "exclusions", lambda *_: Exclusions())
     run = watched(Simulation(laid_out(BOX, tmp_path), RunRequest(units=1)), (), 60.0)
