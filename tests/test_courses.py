@@ -14,6 +14,7 @@ from factory.control.mode import ROUNDING
 from factory.control.navigation import Bundle
 from factory.simulation import bundles
 from factory.simulation.disturbance.interventions import Interventions
+from factory.simulation.mujoco import courses, motion
 from factory.simulation.mujoco.courses import Course, Follower, planned
 from factory.simulation.mujoco.fast import strides
 from factory.simulation.mujoco.fast.strides import Strides
@@ -162,6 +163,32 @@ def test_a_course_ends_where_it_is_near() -> None:
     assert (cut.ticks, cut.near) == (2, False) and (whole.ticks, whole.near) == (4, True)
     assert cut.setpoints.shape == (1, 11, 3) and whole.setpoints.shape == (1, 21, 3)
     assert whole.x[:, 0] == pytest.approx([0.0, 0.01, 0.02, 0.03, 0.04])
+
+
+@pytest.mark.parametrize("lags", [True, False])
+def test_robots_are_slow_where_a_course_is_over_near_their_goal(
+    lags: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nearly always something ends then. Planted fault: speeds that lag nothing; robots are still
+    too fast then, and asked again a tick later."""
+    if not lags:
+        monkeypatch.setattr(
+            motion, "along", lambda bundle, tick, _: courses.along(bundle, tick, 0.0)
+        )
+    simulation = ready("20", settings=Settings(timestep=0.01, substeps=1), jitter=0.0)
+    supervisor, found = simulation.supervisor, list[bool]()
+    finished = supervisor._finished
+
+    def finishing() -> list[int]:
+        over = finished()
+        if supervisor.near and supervisor.active.bundle is not None:
+            found.append(bool(over))
+        return over
+
+    monkeypatch.setattr(supervisor, "_finished", finishing)
+    while not simulation.physical.delivered():
+        supervisor.step(MOST)
+    assert len(found) > 15 and (np.mean(found) > 0.8) == lags
 
 
 def test_a_follower_keeps_its_own_references() -> None:

@@ -191,6 +191,18 @@ def test_what_comes_to_rest_stands_there() -> None:
         mujoco.mj_step(m, d)
 
 
+def test_what_stands_keeps_no_samples() -> None:
+    """Which the engine would write and read in every step; what sets out again does."""
+    _, drives, m, _ = still()
+    axes, samples = np.array([1]), drives.most + 2
+    actuator = drives._actuators[axes]
+    drives.stand(axes, np.array([0.1]))
+    assert not m.actuator_history[actuator, 0].any() and not m.actuator_delay[actuator].any()
+    drives.follow(axes, np.full((1, 4, 3), 2.0))
+    assert m.actuator_history[actuator, 0] == samples
+    assert m.actuator_delay[actuator] == drives.most * drives.timestep
+
+
 def test_samples_are_of_each_leg_and_end_at_rest() -> None:
     """Positions on parabolas, speeds half a step late, forces for mass and weight; one that rests
     after them carries its weight alone."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +21,7 @@ from factory.simulation.mujoco.fusing import SETTLING, Fusion, rotations
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
-from factory.support.settings import Settings
+from factory.support.settings import MOST, Settings
 from tests.command_line import PAPER, Terminal
 from tests.pag_texts import laid_out
 from tests.simulation_values import layout_of, ready
@@ -362,3 +362,27 @@ def test_a_fusion_that_loses_momentum_shows() -> None:
     before = momentum(m, d, [1, 2])
     nowhere(m, d).fuse([1, 2], whole)
     assert not np.allclose(momentum(m, d, [whole]), before, atol=1e-3)
+
+
+@pytest.mark.parametrize("knows", [True, False])
+def test_what_sleeps_is_asked_once_whether_it_has_settled(
+    knows: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Until it wakes nothing of it changes. Planted fault: nobody knows that it sleeps."""
+    if not knows:
+        monkeypatch.setattr(Fusion, "sleeps", lambda *_: False)
+    simulation = ready("20", fuse=True, settings=Settings(timestep=0.01, substeps=1), units=4)
+    world, asked = simulation.physical, dict[tuple[int, ...], list[float]]()
+    misfits = Fusion.misfits
+
+    def counting(self: Fusion, groups: Sequence[Sequence[int]]) -> np.ndarray:
+        for group in groups:
+            tree = world.m.body_treeid[group[0]]
+            if world.d.tree_asleep[tree] >= 0:
+                asked.setdefault(tuple(group), []).append(world.time)
+        return misfits(self, groups)
+
+    monkeypatch.setattr(Fusion, "misfits", counting)
+    while world.delivered() < 2:
+        simulation.supervisor.step(MOST)
+    assert (max(map(len, asked.values())) <= 4) == knows

@@ -33,8 +33,9 @@ CALM = 0.1
 FEW = 120
 """Where there are fewer holders all bodies are looked at: choosing takes as long as it saves."""
 
-MANY = 0.25
-"""Where a greater share of all holders moves all bodies are looked at, for the same reason."""
+MANY = 200_000
+"""Where more pairs of a holder that moves and any other are to be compared all bodies are looked
+at, for the same reason."""
 
 
 class Extents:
@@ -123,7 +124,7 @@ class Neighbours:
         moves[[*fresh]] = True
         moves[NOBODY] = self._moved = False
         (moving,) = moves.nonzero()
-        if len(moving) > MANY * len(moves):
+        if len(moving) * len(moves) > MANY:
             self._seen = np.ones_like(moves)
         else:
             self._seen = _met(moving, *self.boxes())
