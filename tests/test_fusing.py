@@ -344,6 +344,24 @@ def test_what_has_not_settled_is_not_one_body_yet(monkeypatch: pytest.MonkeyPatc
     assert error is not None and 0.0 < error < 0.002
 
 
+INTERLOCKED = """root = s2; s2 = mate(s1, c); s1 = mate(a, b);
+a = atomic(box = (0.02, 0.02, 0.02), pos = (0.0, 0.0, 0.01));
+b = atomic(box = (0.02, 0.02, 0.02), pos = (0.02, 0.0, 0.01));
+c = atomic(box = (0.02, 0.02, 0.02), pos = (0.03, 0.01, 0.01));"""
+
+
+def test_what_has_not_settled_is_left_out_of_contact_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`b` and `c` have 10 mm in common. They do not touch on the way, whether `b` is one body with
+    `a` by then or not."""
+    layout = laid_out(INTERLOCKED)
+    for settles in (True, False):
+        if not settles:
+            monkeypatch.setattr("factory.simulation.mujoco.joining.SETTLING", np.inf)
+        run = Simulation(layout, RunRequest(units=2, fuse=True)).run()
+        assert run.products == 2 and run.physics and run.physics.excluded == (("b", "c"),)
+        assert run.physics.unintended_contacts == 0 and run.physics.mating_force_max_n == 0
+
+
 def test_a_misfit_is_part_of_the_error(monkeypatch: pytest.MonkeyPatch) -> None:
     """Planted: parts are 3 mm out of place when they become one body."""
     misfits = Fusion.misfits

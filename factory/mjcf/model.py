@@ -98,7 +98,7 @@ class Model:
     `carried`: what bodies there are, `copies`: how many of each; `masses`: of each label carried
     [kg]; `drives`: of each robot; `insets`: what is taken from the shapes that collide; `wip`: the
     most units inside at once that they are enough for, None where more never are; `apart`: the
-    pairs of parts that are `excluded`, each part with the body that brings it to the other; `bins`:
+    pairs of parts that are `excluded`, each part with a body that may bring it to the other; `bins`:
     those for scrap; `overlaps`: what is said of parts that overlap in the finished product.
     """
 
@@ -197,7 +197,7 @@ def build_model(
     fill(section["option"], timestep=settings.step)
     add_paints(section["asset"])
     insets = insets_of(layout, settings.overlap)
-    apart = tuple(bodies.meeting(factory, pair) for pair in insets.excluded)
+    apart = tuple(m for pair in insets.excluded for m in bodies.meeting(factory, pair))
     files = add_meshes(section["asset"], product, insets)
     add_scene(world, section["statistic"], layout)
     hoists = _hoists(layout, masses, settings)

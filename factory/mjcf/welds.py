@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from xml.etree.ElementTree import Element
 
@@ -60,12 +61,14 @@ def _park(equality: Element, layout: Layout, label: str, copies: int, used: int)
 def add_exclusions(
     contact: Element, apart: Iterable[tuple[Inside, Inside]], copies: Mapping[str, int]
 ) -> None:
-    """The pairs of parts between which there is no contact, each with the body that brings it, a
+    """The pairs of parts between which there is no contact, each with a body that may bring it, a
     slot for each unit that can be inside: a run aims them at the copies of one unit."""
+    slots = defaultdict[tuple[str, str], int](int)
     for (one, part), (other, partner) in apart:
         for n in range(1, min(copies[one], copies[other]) + 1):
             pair = names.solid(one, n, part), names.solid(other, n, partner)
-            name = names.exclusion(part, partner, n)
+            slots[part, partner] += 1
+            name = names.exclusion(part, partner, slots[part, partner])
             add(contact, "exclude", name=name, body1=pair[0], body2=pair[1])
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import product as product_of
 from types import MappingProxyType
 
 import numpy as np
@@ -75,12 +76,22 @@ class FusedBodies:
                     found.update(dict.fromkeys(self.carried[label]))
         return tuple(found)
 
-    def meeting(self, factory: Factory, pair: tuple[str, str]) -> tuple[Inside, Inside]:
-        """Two parts, each with the body that it belongs to just before the operation that joins
-        them."""
-        one, other = pair
-        bodies = _meeting(factory, self.carried, one, other) if self.wholes else pair
-        return (bodies[0], one), (bodies[1], other)
+    def meeting(self, factory: Factory, pair: tuple[str, str]) -> list[tuple[Inside, Inside]]:
+        """Two parts, each with a body that it may belong to as the operation begins that joins
+        them: the body that its input becomes, or one of those that have not yet become it."""
+        if not self.wholes:
+            return [((pair[0], pair[0]), (pair[1], pair[1]))]
+        ways = [_way(factory, part) for part in pair]
+        common = {*ways[0]} & {*ways[1]}
+        bodies = [
+            dict.fromkeys(
+                (self.carried[factory.operations[number].label][0], part)
+                for number in way
+                if number not in common
+            )
+            for way, part in zip(ways, pair, strict=True)
+        ]
+        return [*product_of(*([*inside][-2:] for inside in bodies))]
 
 
 def bodies_of(factory: Factory, product: Product, fuse: bool = False) -> FusedBodies:
@@ -142,20 +153,10 @@ def fused_copies(bodies: FusedBodies, factory: Factory, units: int | None) -> di
     return {label: min(number, most) for label, number in copies.items()}
 
 
-def _meeting(
-    factory: Factory, carried: Mapping[str, tuple[str, ...]], one: str, other: str
-) -> tuple[str, str]:
-    """The bodies that two parts belong to just before the operation that joins them."""
-    below = {}
-    number = factory.by_label[one].index
+def _way(factory: Factory, part: str) -> list[int]:
+    """The operations (index) that a part goes through, its own first."""
+    way, number = list[int](), factory.by_label[part].index
     while number >= 0:
-        above = factory.parents[number]
-        below[above] = number
-        number = above
-    number = factory.by_label[other].index
-    while factory.parents[number] not in below:
+        way.append(number)
         number = factory.parents[number]
-    first = below[factory.parents[number]]
-    labels = (factory.operations[n].label for n in (first, number))
-    a, b = (carried[label][0] for label in labels)
-    return a, b
+    return way
