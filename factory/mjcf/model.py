@@ -98,8 +98,8 @@ class Model:
     `carried`: what bodies there are, `copies`: how many of each; `masses`: of each label carried
     [kg]; `drives`: of each robot; `insets`: what is taken from the shapes that collide; `wip`: the
     most units inside at once that they are enough for, None where more never are; `apart`: the
-    pairs of parts that are `excluded`, each part with a body that may bring it to the other; `bins`:
-    those for scrap; `overlaps`: what is said of parts that overlap in the finished product.
+    pairs of parts that are `excluded`, each part with a body that may bring it to the other;
+    `bins`: those for scrap; `overlaps`: what is said of parts that overlap in the finished product.
     """
 
     layout: Layout

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from itertools import product as product_of
+from itertools import product as pairs
 from types import MappingProxyType
 
 import numpy as np
@@ -91,7 +91,8 @@ class FusedBodies:
             )
             for way, part in zip(ways, pair, strict=True)
         ]
-        return [*product_of(*([*inside][-2:] for inside in bodies))]
+        one, other = ([*inside][-2:] for inside in bodies)
+        return [*pairs(one, other)]
 
 
 def bodies_of(factory: Factory, product: Product, fuse: bool = False) -> FusedBodies:
