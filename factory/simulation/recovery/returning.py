@@ -100,9 +100,11 @@ class Returning:
         return [robot for robot, way in self.ways.items() if way.since < before]
 
     def home(self, robot: int) -> list[Goal]:
-        """The way of a robot to the B end of its guidepath, its lift first."""
+        """The way of a robot to the B end of its guidepath: its lift first, but for one that is set
+        for what the robot holds, which goes back as high as it came."""
         lift, layout = self._lift(robot), self._layout
-        rise = [] if lift is None else [(lift, _highest(layout, robot))]
+        rises = lift is not None and robot not in layout.factory.adjusted
+        rise = [(lift, _highest(layout, robot))] if rises else []
         return [*rise, (robot, layout.guidepaths[robot].length)]
 
     def aside(self, robot: int, leaf: Operation) -> list[Goal]:
