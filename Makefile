@@ -30,7 +30,7 @@ demo: setup
 	@echo "see renders/paper.mp4 and renders/paper.png"
 
 test: setup
-	$(PY) -m pytest -q -n 2 --dist worksteal -m "not slow" $(ARGS)
+	TEST_DAY=$$(date +%y%m%d) $(PY) -m pytest -q -n 2 --dist worksteal -m "not slow" $(ARGS)
 
 test-all: setup oracles
 	$(PY) -m pytest -q -n 2 --dist worksteal $(ARGS)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -81,6 +82,7 @@ MET = {
     3171: "a lift rises beside what its carrier takes along",
     3287: "what is lowered comes before the carrier's hand",
     2499: "a lift rises through what is brought",
+    2611261150: "what a lift raises its hand from is higher than that beside it",
     261125186: "what waits is beside a hand that reaches over the line",
 }
 """Random products whose hands met, each for a cause of its own."""
@@ -98,7 +100,20 @@ MET_LATER = {
     "seed", [*MET, *(pytest.param(seed, marks=pytest.mark.slow) for seed in MET_LATER)]
 )
 def test_random_products_whose_hands_met(seed: int, tmp_path: Path) -> None:
-    succeeds(project_of(random_product(seed), tmp_path), seed, 1 + seed % 2, 0.3 * (seed == 3287))
+    succeeds(project_of(random_product(seed), tmp_path), seed, 2, 0.3 * (seed == 3287))
+
+
+DAY = int(os.environ.get("TEST_DAY", "261126"))
+"""Year, month and day whose seeds are drawn; `make test` says today's."""
+
+
+@pytest.mark.parametrize("seed", [1000 * DAY + number for number in range(20)])
+def test_the_default_path(seed: int, tmp_path: Path) -> None:
+    """What `factory run` makes of any product that can be joined: production without a fault."""
+    text = random_blocks(seed) if seed % 4 == 0 else random_product(seed)
+    request = RunRequest(units=5, seed=seed, jitter=0.3)
+    run = watched(Simulation(project_of(text, tmp_path).layout, request))
+    assert run.succeeded, run.verdict.failures
 
 
 @pytest.mark.slow

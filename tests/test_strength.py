@@ -18,7 +18,7 @@ from factory.layout.embedding import lay_out
 from factory.layout.hands import gauges
 from factory.layout.hands.gauges import gauge, middle
 from factory.layout.hands.holding import Holding, held
-from factory.layout.hands.places import GRAVITY, centre_of
+from factory.layout.hands.places import GRAVITY, PUSH, SURGE, centre_of
 from factory.layout.hands.tips import Tip, TipName, shares, tip
 from factory.layout.layout import Layout
 from factory.layout.request import Ground
@@ -39,8 +39,6 @@ from tests.command_line import ROOT, Terminal
 from tests.live_sessions import Stopped
 
 EXAMPLES = ROOT / "examples"
-AGREES = 1.05
-"""At most so many times what was predicted is measured."""
 
 
 @cache
@@ -183,8 +181,24 @@ def test_hands_bear_what_was_predicted(name: str, monkeypatch: pytest.MonkeyPatc
     assert figures.grip_strength_robot == f"r{max(most, key=most.__getitem__) + 1}"
     for robot, hand in hands.items():
         assert hand is not None
-        assert most[robot] <= AGREES * hand.share + 1e-3, robot
-        assert most[robot] >= 0.5 * hand.share, robot
+        assert most[robot] <= hand.share + 1e-3, robot
+        assert most[robot] >= 0.45 * hand.share, robot
+
+
+@pytest.mark.parametrize("name", ["paper", "stool"])
+def test_robots_accelerate_no_more_than_their_hands_are_chosen_for(name: str) -> None:
+    """Drives fall behind their references, and make up for it."""
+    simulation = ready(name)
+    world, most = simulation.physical, 0.0
+    robots = world.motion.axes.dof[: len(simulation.layout.factory.robots)]
+
+    def look() -> None:
+        nonlocal most
+        most = max(most, float(np.abs(world.d.qacc[robots]).max()))
+
+    world.hooks.before_step.append(look)
+    assert simulation.run().products == 2
+    assert 1.01 * PUSH < most < SURGE * PUSH
 
 
 def test_without_hands_there_is_nothing_to_measure() -> None:

@@ -41,7 +41,6 @@ PLAY = 1e-6
 ROD = 0.008
 """Radius of the pad by which a feeder holds a part, at most [m]."""
 
-
 DIP, PUSHED = 0.02, 0.01
 """A product dips so deep into the slot of the outfeed's tray at the most, which begins so far ahead
 of the hand [m]."""
@@ -131,6 +130,7 @@ class InTheWay:
         for u, t in frames:
             free["hands"] &= self.apart.own_side(robot, kind, found, u, t)
             free["hands"] &= ~_any(self.apart.carriers_hand(robot, kind, found, u, t), found)
+            free["joined"] &= ~_any(self._raised(robot, kind, found, u, t), found)
         free["hands"] &= self.apart.over_fingers(kind, found)
         headings = dict.fromkeys((u, (abs(x), abs(y))) for u, (x, y) in frames)
         passing = [self._passing(robot, label, kind, found, u, t) for u, t in headings]
@@ -177,7 +177,10 @@ class InTheWay:
         self, robot: int, kind: Kind, found: Places, u: Way, t: Way
     ) -> Iterator[tuple[str, Swept]]:
         """What may not be in the way of a hand at each place, and why it is there."""
-        for ways in self._leaving(robot, kind, found, u):
+        for ways in (
+            *self._leaving(robot, kind, found, u),
+            *self._raised(robot, kind, found, u, t),
+        ):
             yield "joined", ways
         for ways in self.apart.carriers_hand(robot, kind, found, u, t):
             yield "hands", ways
@@ -205,7 +208,7 @@ class InTheWay:
         """Whether something low of the product is over what is left of the tray: on a side of the
         slot through which a hand comes, or ahead of that."""
         along, ahead = (0, u[0]) if u[0] else (1, u[1])
-        boxes = self.holding.boxes(self._at_last(0))
+        boxes = self.holding.boxes(held(self.holding.factory, 0, at_last=True))
         boxes = boxes[boxes[:, 0, 2] < self.holding.product.low[2] + DIP]
         half, at = halves(found.radius) + SLOT + BESIDE, found.at[:, 1 - along]
         sides = boxes[:, 0, 1 - along].min() < at - half, boxes[:, 1, 1 - along].max() > at + half
@@ -218,9 +221,9 @@ class InTheWay:
         """
         last, (low, high) = self.holding.last(robot), self.reach(kind, found, u)
         if self.holding.factory.drops(last.index):
-            gone, whole = swept(low, high, back(u)), self._at_last(robot)
             if kind != "behind":
-                yield (*gone, self.holding.boxes(whole))
+                whole = held(self.holding.factory, robot, at_last=True)
+                yield (*swept(low, high, back(u)), self.holding.boxes(whole))
             return
         for boxes in self._from_above(last, robot, (u,)):
             yield (*swept(low, high, back(u)), boxes)
@@ -236,6 +239,16 @@ class InTheWay:
         for other, guest in zip(last.before, last.robots, strict=True):
             if other != NOPART and (guest != robot or lifted):
                 yield (*gone, self.holding.boxes(other))
+
+    def _raised(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Iterator[Swept]:
+        """The same of a hand above whose lift is up: it goes home over what it has delivered to,
+        which may go on along t meanwhile, or either way where its carrier turns."""
+        if kind == "above" and self.holding.factory.lowers(robot):
+            low, high = self.reach(kind, found, u)
+            low[:, 2] += self.holding.factory.strokes[robot]
+            boxes = self.holding.boxes(self.holding.last(robot).label)
+            for side in (back(t), t)[: 1 + (self.holding.on[robot] in self.holding.turning)]:
+                yield (*swept(low, high, back(u), side), boxes)
 
     def _going_on(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Array:
         """How far a hand has to go back (n, k) [m], as its lift rises, until each of the next k
@@ -269,10 +282,6 @@ class InTheWay:
             of = np.repeat(np.arange(len(found)), [len(boxes) for boxes in found])
             self._onward[last.index] = Onward(np.concatenate(found), of, len(found))
         return self._onward[last.index]
-
-    def _at_last(self, robot: int) -> str:
-        """What a robot has in the end."""
-        return held(self.holding.factory, robot, at_last=True)
 
     def coming(
         self, robot: int, label: str, kind: Kind, found: Places, u: Way, t: Way
@@ -316,8 +325,7 @@ class InTheWay:
         if kind != "below":
             low, high = swept(low, high, back(u))
         for operation in self.holding.made(robot):
-            sides = [(u[1], u[0]), (-u[1], -u[0])]
-            for boxes in self._from_above(operation, robot, sides):
+            for boxes in self._from_above(operation, robot, [(u[1], u[0]), (-u[1], -u[0])]):
                 yield low, high, boxes
 
     def _from_above(

@@ -42,6 +42,10 @@ GRAVITY, PUSH = 9.81, 2.0
 """What a payload's mass is pulled and pushed by [m/s²]: its weight, and robots' acceleration where
 nothing else is asked for."""
 
+SURGE = 1.08
+"""A robot's acceleration is up to so many times that of its reference: its drive falls behind as
+that begins, and makes up for it. Measured: 1.02 to 1.075 in 54 random factories, jitter 0.3."""
+
 PUSHES = np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])
 """Where to it is pushed."""
 
@@ -106,7 +110,7 @@ class Loads:
     def about(self, at: Array) -> tuple[Array, Array]:
         """Force (3, 1, m) [N] and moment (3, n, m) [Nm] about places `at` (n, 3) of each load, at
         rest and as it is accelerated to any side."""
-        pulls = np.array([0.0, 0.0, -GRAVITY]) + self.push * PUSHES
+        pulls = np.array([0.0, 0.0, -GRAVITY]) + SURGE * self.push * PUSHES
         fx, fy, fz = force = pulls.T[:, None] * self.mass[:, None]
         x, y, z = (self.centre - at[:, None]).T.swapaxes(1, 2)[..., None]
         moment = np.stack([y * fz - z * fy, z * fx - x * fz, x * fy - y * fx])
