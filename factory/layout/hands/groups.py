@@ -15,7 +15,7 @@ from factory.layout.hands.hand import Point3
 from factory.layout.hands.places import Places
 from factory.layout.hands.tips import STRONG, TipName
 
-ENOUGH = 0.8
+ENOUGH = 0.85
 """A hand holds well if no more than this share of its strength is used."""
 
 APART = 0.03

@@ -15,19 +15,19 @@ APART = 2e-4
 
 def reach(product: Product, kind: Kind, at: Array, radius: Array, u: Way) -> tuple[Array, Array]:
     """The boxes (n, 3) [m] of pad and column, of pad and stem, or of pad and bar of hands that head
-    along u, with pads of some radii (n,) at places (n, 3); a play around them, and before their
-    faces half the air: something may hang lower beside the place, as under a ball."""
+    along u, with pads of some radii (n,) at places (n, 3); a play around them. Over a pad
+    half its air is play: what is held sags, and may hang lower than where the pad is."""
     half = halves(radius)[:, None] if kind == "behind" else radius[:, None]
     low, high = at - half - APART, at + half + APART
     if kind == "below":
         low[:, 2], high[:, 2] = product.low[2] - 1.0, at[:, 2] - AIR / 2
     elif kind == "above":
-        low[:, 2], high[:, 2] = at[:, 2] + AIR / 2, product.high[2] + 10.0
+        low[:, 2], high[:, 2] = at[:, 2] + AIR, product.high[2] + 10.0
     else:
         low[:, 2] = np.minimum(low[:, 2], at[:, 2] - BEAM / 2)
         high[:, 2] = np.maximum(high[:, 2], at[:, 2] + BEAM / 2)
         axis, ahead = (0, u[0]) if u[0] else (1, u[1])
-        (high if ahead > 0 else low)[:, axis] = at[:, axis] - ahead * AIR / 2
+        (high if ahead > 0 else low)[:, axis] = at[:, axis] - ahead * AIR
     return low, high
 
 
