@@ -47,6 +47,16 @@ p5 = atomic ( cylinder = (0.02, 0.04), pos = (-0.0025, 0.018, 0.0605) )
 """A pad as wide as its part is high holds it from behind, and reached into the outfeed's tray."""
 
 
+BALL = """
+root = s3; s1 = mate ( p1, p0 ); s2 = mate ( s1, p2 ); s3 = mate ( s2, p3 );
+p0 = atomic ( sphere = 0.00225, pos = ( 0, 0, 0.00225 ), density = 2700 );
+p1 = atomic ( box = (0.0015, 0.003, 0.0045), pos = (-0.00225, -0.0039, 0.00225), density = 2700 );
+p2 = atomic ( box = (0.006, 0.006, 0.015), pos = (0.00045, 0.0003, 0.01215), density = 2700 );
+p3 = atomic ( box = (0.0015, 0.0015, 0.009), pos = (-0.00165, -0.0063, 0.0045), density = 2700 )
+"""
+"""The carrier's pad, beside the lowest point of a ball that is brought, passes below that."""
+
+
 def project_of(text: str, folder: Path) -> Project:
     """The project of a text."""
     file = folder / "product.pag"
@@ -69,7 +79,9 @@ def succeeds(project: Project, seed: int, units: int, jitter: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "units"), [(CROSSED, 1), (SPOOL, 2), (WIDE, 1)], ids=["crossed", "spool", "wide"]
+    ("text", "units"),
+    [(CROSSED, 1), (SPOOL, 2), (WIDE, 1), (BALL, 2)],
+    ids=["crossed", "spool", "wide", "ball"],
 )
 def test_hands_that_met(text: str, units: int, tmp_path: Path) -> None:
     succeeds(project_of(text, tmp_path), 0, units, 0.0)

@@ -215,6 +215,20 @@ def folded() -> Layout:
     return allocated(read(PAPER), Aim(3)).layout
 
 
+def test_scrap_goes_back_as_high_as_it_came(tmp_path: Path) -> None:
+    """One robot brings `low`, which is tall, after `high`, which is lost then. Its lift is
+    set for `high` only after it has thrown `low` away, past the magazine that both have."""
+    file = tmp_path / "shelf.pag"
+    file.write_text("""root = s2; s1 = insert ( post, high ); s2 = insert ( s1, low );
+post = atomic ( box = ( 0.06, 0.04, 0.12 ), pos = ( 0, 0, 0.06 ) );
+high = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( 0, 0.03, 0.1 ) );
+low = atomic ( box = ( 0.02, 0.02, 0.08 ), pos = ( 0, 0.03, 0.04 ) )""")
+    layout = read(file).with_lines([("high", "low")]).layout
+    assert layout.factory.adjusted
+    run, failures = run_with(WorldFault("drop", label="s1", unit=1), layout=layout, units=1)
+    assert_recovered(run, failures, {"drop": 1})
+
+
 @pytest.mark.parametrize(("world", "seed"), [("mujoco", 1), *(("ideal", n) for n in range(4))])
 def test_faults_at_rates(world: Any, seed: int) -> None:
     """All kinds at once, drawn; the same draw gives the same run."""

@@ -103,8 +103,8 @@ class Returning:
         """The way of a robot to the B end of its guidepath: its lift first, but for one that is set
         for what the robot holds, which goes back as high as it came."""
         lift, layout = self._lift(robot), self._layout
-        rises = lift is not None and robot not in layout.factory.adjusted
-        rise = [(lift, _highest(layout, robot))] if rises else []
+        stays = robot in layout.factory.adjusted
+        rise = [] if lift is None or stays else [(lift, _highest(layout, robot))]
         return [*rise, (robot, layout.guidepaths[robot].length)]
 
     def aside(self, robot: int, leaf: Operation) -> list[Goal]:
