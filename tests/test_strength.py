@@ -272,7 +272,7 @@ def test_a_tip_of_a_tenth_of_its_pull(monkeypatch: pytest.MonkeyPatch, more: Any
 
 
 @pytest.mark.parametrize(
-    ("name", "robot", "label"), [("lamp", "r3", "shade"), ("stool", "r4", "legs")]
+    ("name", "robot", "label"), [("lamp", "r3", "shade"), ("stool", "r4", "legs/2")]
 )
 def test_a_payload_twice_as_heavy(name: str, robot: str, label: str) -> None:
     dropped(watched(disturb(ready(name), Mass(2.0))), robot, label)
