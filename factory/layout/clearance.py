@@ -45,7 +45,6 @@ from factory.layout.dimensions import (
     PAYLOADS,
 )
 from factory.layout.exclusions import Exclusions, exclusions
-from factory.layout.feeding import passing
 from factory.layout.guidepath import Box
 from factory.layout.layout import Layout
 from factory.layout.sweeps import Pile, piles, regions
@@ -72,7 +71,6 @@ def certify(layout: Layout) -> Certificate:
         *islice(search.faults(), MOST),
         *islice(_standoffs(layout, found), MOST),
         *islice(_raised(layout, found), MOST),
-        *islice(_back_at_feeders(layout, found), MOST),
         *_deadlock(layout, coordination),
     ]
     kept = Exclusions() if faults else exclusions(layout, coordination)
@@ -246,30 +244,6 @@ def _raised(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
                 )
                 here = Region(guest, PAYLOADS, PAYLOAD_BODY, found[label].box, found[label].z)
                 yield fault(layout.factory, message, here, lacking=MARGIN - over)
-
-
-def _back_at_feeders(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
-    """A robot that has gone so far that the next part comes down does not come back with what it
-    holds: it would meet that part."""
-    operations = layout.factory.operations
-    for leaf in layout.factory.leaves:
-        robot = leaf.carrier
-        tour, way = layout.factory.tour_of(robot, leaf.index), passing(layout, leaf)
-        gone = dict(zip(layout.factory.robots[robot].operations, layout.stops(robot), strict=True))
-        past = False
-        for number in tour:
-            before = way - (layout.guidepaths[robot].length - gone[number])
-            if past and before > TOLERANCE:
-                name, label = layout.factory.robots[robot].name, operations[number].label
-                message = (
-                    f"{name} comes back to its feeder for '{label}', {before * 1000:.1f} mm nearer"
-                    " than it has to be when the next part comes down"
-                )
-                brought = operations[number].before[operations[number].robots.index(robot)]
-                pile = found[brought]
-                here = Region(robot, PAYLOADS, PAYLOAD_BODY, pile.box, pile.z, brought)
-                yield fault(layout.factory, message, here, lacking=before)
-            past = past or before <= TOLERANCE
 
 
 def _deadlock(layout: Layout, coordination: Coordinated) -> Iterator[Fault]:
