@@ -11,6 +11,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 
+from factory.layout import hanging
 from factory.layout.clearance import certify
 from factory.layout.feeding import feeder_of
 from factory.layout.hands.choosing import Hands
@@ -18,7 +19,6 @@ from factory.layout.hands.hand import AIR, Hand
 from factory.layout.hands.limbs import limbs
 from factory.layout.hanging import Hanging
 from factory.layout.layout import Layout
-from factory.mjcf import hanging
 from factory.pipeline import Project, read
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
