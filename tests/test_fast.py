@@ -357,20 +357,15 @@ def test_a_call_lasts_until_something_asks_for_the_supervisor(name: str) -> None
         before, tray = tray, world.motion.outfeed.moves
         stride_is_over = not world.motion.robots.left
         for_a_reason = stride_is_over or supervisor.near or before or tray
-        for_a_reason |= world.supplied or _may_be_gone(world)
+        held, at = supervisor.ordering.held, world.motion.robots.x
+        may_be_past = [(past.at - at[past.axis]) * past.direction <= AHEAD for past in held]
+        for_a_reason |= world.supplied or supervisor.enabled or any(may_be_past)
 
 
-def _may_be_gone(world: MujocoWorld) -> bool:
-    """Whether all hands that some operation waits for may be gone, as far as references say."""
-    at = world.motion.robots.x
-    held = world._away._held.values()
-    return any(all(at[one.axis] >= one.least - AHEAD for one in awaited) for awaited in held)
-
-
-def test_a_hand_that_goes_unseen_is_seen_late(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Planted fault: courses go on where a hand that is waited for may have gone."""
+def test_a_pass_that_comes_unseen_is_seen_late(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Planted fault: courses go on where what is waited for may have come past."""
     singly = kept("chest", 1)
-    monkeypatch.setattr(Follower, "until", lambda self, axis, least: self.left)
+    monkeypatch.setattr(Follower, "until", lambda self, past: self.left)
     assert not traced(ready("chest"), MOST).agrees(singly)
 
 
@@ -411,9 +406,9 @@ def test_the_run_of_a_shell_takes_many_ticks_a_call(
 ) -> None:
     calls, step = list[int](), MujocoWorld.step
 
-    def counted(self: MujocoWorld, bundle: Any, axes: Any, ticks: int = 1) -> bool:
+    def counted(self: MujocoWorld, bundle: Any, axes: Any, ticks: int, until: Any) -> bool:
         calls.append(ticks)
-        return step(self, bundle, axes, ticks)
+        return step(self, bundle, axes, ticks, until)
 
     monkeypatch.setattr(MujocoWorld, "step", counted)
     run("run", PAPER, *more)

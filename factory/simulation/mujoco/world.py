@@ -142,7 +142,8 @@ class MujocoWorld:
     ) -> bool:
         """Some ticks of the engine, the drives following references that obey F_p under the limits:
         as many as are asked for, but not past the end of a course. Whether any mode may have come
-        to its goal: no robot is far ahead of its reference, nor at rest before that is."""
+        to its goal: no robot is far ahead of its reference, nor at rest before that is. One that
+        something touches may be: passes are looked for in every tick then."""
         motion = self.motion
         if axes is not motion.active:
             motion.turn(axes)
@@ -154,7 +155,7 @@ class MujocoWorld:
         else:
             motion.plan_robots(bundle)
         if until:
-            ticks = min(ticks, max(1, min(map(motion.robots.until, until))))
+            ticks = 1 if self.d.ncon else min(ticks, max(1, min(map(motion.robots.until, until))))
         left = (self.parts.feeders.due - self.time) / self.model.settings.tick
         if left < ticks:
             ticks = max(1, ceil(left - ROUNDED))
