@@ -17,8 +17,10 @@ from random_products import random_product
 from ways_checker import check
 
 from factory.export.ways import ways
+from factory.layout.certificate import Precedence
 from factory.layout.clearance import certify
 from factory.layout.coordinating import coordinated
+from factory.layout.exclusions import further
 from factory.layout.hands.leaving import awaited_positions
 from factory.layout.layout import Layout
 from factory.layout.machines import presences
@@ -172,14 +174,19 @@ def meet(one: Presence, other: Presence) -> bool:
 
 
 def test_robots_go_back_by_themselves_for_what_waits_for_that() -> None:
-    """A hand above rises by less than what its carrier takes past it is tall."""
-    layout = laid_out(39097)
+    """A hand that rises stays over its station, and may not have to come back in the last unit."""
+    layout = laid_out(39014)
+    net = coordinated(layout).net
+    past = next(p for p in net.passes if p.after % 2 and p.axis < len(layout.guidepaths))
+    name = net.net.net.transitions[net.net.right[net.passes[past][0]]].name
+    waits = [Precedence("order", name, "s1_s", 0)]
+    back = further(layout, net, waits, {})
+    assert [*back] == [past.axis] and past.at < back[past.axis]
+    assert not further(layout, net, waits, back)
     assert layout.certificate is not None
-    names = [layout.factory.robots[robot].name for robot, _ in layout.certificate.backs]
-    assert names == ["r9"]
-    assert "order:past:r9:0.299:s12:s13" in [order.name for order in layout.certificate.orders]
-    bare = replace(layout, certificate=None)
-    assert 8 in awaited_positions(layout) and 8 not in awaited_positions(bare)
+    own = awaited_positions(layout)[past.axis]
+    told = replace(layout.certificate, backs=((past.axis, own + 0.01),))
+    assert awaited_positions(replace(layout, certificate=told))[past.axis] == own + 0.01
 
 
 def test_what_no_order_keeps_apart_is_a_fault() -> None:

@@ -149,12 +149,12 @@ class Excluded:
 @dataclass(frozen=True, slots=True)
 class Precedence:
     """An order place by `name` that keeps machines apart: `start` has fired at most `tokens` times
-    more often than `before`, transitions of the coordinated net by their indices. Whether a run
+    more often than `before`, transitions of the coordinated net by their names. Whether a run
     keeps it (`kept`): what a magazine has to do before comes long before."""
 
     name: str
-    before: int
-    start: int
+    before: str
+    start: str
     tokens: int
     kept: bool = True
 

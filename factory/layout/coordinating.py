@@ -84,7 +84,7 @@ def coordinated(layout: Layout, orders: Sequence[Precedence] | None = None) -> C
     if orders is None and certificate is not None and certificate.is_of(factory):
         orders = [order for order in certificate.orders if order.kept]
     for order in orders or ():
-        build.precede(order.name, order.before, order.start, order.tokens)
+        build.precede(order.name, (order.before, order.start), order.tokens)
     return Coordinated(build.built(), served, away)
 
 

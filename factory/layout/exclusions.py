@@ -45,21 +45,22 @@ def exclusions(layout: Layout, coordinated: Coordinated) -> Exclusions:
     awaited, backs = awaited_positions(layout), dict[int, float]()
     for _ in range(ROUNDS):
         kept = _ordered(layout, coordinated, awaited | backs)
-        further = _further(layout, coordinated.net, kept.orders, awaited | backs)
-        if not further:
+        more = further(layout, coordinated.net, kept.orders, awaited | backs)
+        if not more:
             break
-        backs |= further
+        backs |= more
     return replace(kept, backs=tuple(backs.items()))
 
 
-def _further(
+def further(
     layout: Layout,
     net: CoordinatedNet,
     orders: Iterable[Precedence],
     awaited: Mapping[int, float],
 ) -> dict[int, float]:
     """Where robots have to go back to by themselves for passes that something waits for [m]."""
-    passes = {net.net.right[place]: past for past, (place, _) in net.passes.items()}
+    events, right = net.net.net.transitions, net.net.right
+    passes = {events[right[place]].name: past for past, (place, _) in net.passes.items()}
     waited = (passes[order.before] for order in orders if order.before in passes)
     found = dict[int, float]()
     for past in waited:
@@ -85,14 +86,20 @@ def _ordered(layout: Layout, coordinated: Coordinated, awaited: Mapping[int, flo
         asked = (p for p in needed.values() if (p.one.bears or p.other.bears) == by_magazine)
         apart = (_orderable(net, sequence, pair) for pair in asked)
         wanted = [both for both in apart if both is not None]
-        before, kept = kept, ordered(kept, sequence, wanted, starts).net
-        for place in range(len(before.tokens), len(kept.tokens)):
-            ends = kept.left[place], kept.right[place], kept.tokens[place]
-            orders.append(Precedence(kept.net.places[place].name, *ends, not by_magazine))
+        count, kept = len(kept.tokens), ordered(kept, sequence, wanted, starts).net
+        orders += (
+            _precedence(kept, place, not by_magazine) for place in range(count, len(kept.tokens))
+        )
     circuits |= _circuits(kept, needed)
     excluded = tuple(_excluded(kept, pairs[n], circuit) for n, circuit in circuits.items())
     faults = (_fault(layout, net, pair) for n, pair in needed.items() if n not in circuits)
     return Exclusions(excluded, tuple(orders), (), tuple(faults))
+
+
+def _precedence(net: MarkedNet, place: int, kept: bool) -> Precedence:
+    """An order place of a net, by names."""
+    before, start = (net.net.transitions[side[place]].name for side in (net.left, net.right))
+    return Precedence(net.net.places[place].name, before, start, net.tokens[place], kept)
 
 
 def _circuits(net: MarkedNet, pairs: Mapping[int, Near]) -> dict[int, Circuit]:
@@ -182,4 +189,4 @@ def _named(net: MarkedNet, presence: Presence) -> str:
     return f"in {' and '.join(names)}" if names else "which stands"
 
 
-__all__ = ["Exclusions", "exclusions", "one_unit"]
+__all__ = ["Exclusions", "exclusions", "further", "one_unit"]

@@ -126,9 +126,14 @@ class Coordination:
         self.place(name, (self.events[past], start), tokens, "order", name)
         self.orders.append(Order(past.after, start, tokens, past, *self._ends[past]))
 
-    def precede(self, name: str, before: int, start: int, tokens: int) -> None:
-        """An order place between two transitions of the net. A supervisor keeps it where the first
-        is of the compiled net or a pass, and the second the start of an operation."""
+    def precede(self, name: str, ends: tuple[str, str], tokens: int) -> None:
+        """An order place between two transitions of the net, by their names; none where one is not
+        of the net. A supervisor keeps it where the first is of the compiled net or a pass, and the
+        second the start of an operation."""
+        numbers = {event.name: number for number, event in enumerate(self.transitions)}
+        if not numbers.keys() >= {*ends}:
+            return
+        before, start = (numbers[end] for end in ends)
         past = next((past for past, event in self.events.items() if event == before), None)
         if past is not None:
             self.order(name, past, start, tokens)
