@@ -13,11 +13,11 @@ import factory
 from factory.geometry.product import product_geometry
 from factory.layout.clearance import certify
 from factory.layout.embedding import lay_out
+from factory.layout.exclusions import awaited_positions, coordinated
 from factory.layout.hands.bores import bores
 from factory.layout.hands.choosing import Hands
 from factory.layout.hands.hand import AIR
 from factory.layout.hands.holding import held
-from factory.layout.hands.leaving import awaited_positions, leavings
 from factory.layout.hands.limbs import limbs
 from factory.layout.hands.surfaces import Surfaces, hit, retreat, swept
 from factory.layout.layout import Layout
@@ -159,7 +159,8 @@ def test_layouts_with_hands_are_certified() -> None:
 
 def test_those_that_wait_for_a_hand_wait_for_one_that_leaves() -> None:
     layout = with_hands("truck")
-    waited = {past.axis for many in leavings(layout).values() for past in many}
+    orders = coordinated(layout).net.orders
+    waited = {order.past.axis for order in orders if order.past is not None}
     assert waited
     for axis in waited:
         assert axis < len(layout.guidepaths) + len(layout.lifts)

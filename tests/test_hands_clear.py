@@ -10,10 +10,10 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from factory.layout import clearance
+from factory.layout import exclusions as excluding
 from factory.layout.dimensions import FINGER_TOP, PAYLOAD
 from factory.layout.exclusions import Exclusions
 from factory.layout.feeding import feeder_of
-from factory.layout.hands import leaving
 from factory.layout.hands.apart import LEVEL, HandsApart
 from factory.layout.hands.hand import BEAM, Hand
 from factory.layout.hands.holding import Holding
@@ -145,7 +145,7 @@ def test_hands_from_either_side_wait_for_each_other(distributed: bool, tmp_path:
 
 def test_if_they_did_not_they_would_meet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The certificate says so; a layout that is not asked for one shows it."""
-    monkeypatch.setattr(leaving, "meetings", lambda *_: ())
+    monkeypatch.setattr(excluding, "_cuts", lambda *_: [])
     with pytest.raises(RunError, match=r"beam of r6, .* and cross of r7, .* both at once"):
         laid_out(BOX, tmp_path)
     monkeypatch.setattr(clearance, "exclusions", lambda *_: Exclusions())

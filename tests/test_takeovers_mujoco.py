@@ -20,8 +20,8 @@ from factory.export import Subject, exporters
 from factory.export.motion import motion_of
 from factory.layout import standby
 from factory.layout.bins import bins_of
+from factory.layout.exclusions import goes_early
 from factory.layout.feeding import feeder_of, lines_of, outlets_of
-from factory.layout.hands.leaving import goes_early
 from factory.layout.layout import Layout
 from factory.layout.request import Ground
 from factory.layout.standby import Repertoire, deputies_in, part_of

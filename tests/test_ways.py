@@ -17,11 +17,8 @@ from random_products import random_product
 from ways_checker import check
 
 from factory.export.ways import ways
-from factory.layout.certificate import Precedence
 from factory.layout.clearance import certify
-from factory.layout.coordinating import coordinated
-from factory.layout.exclusions import further
-from factory.layout.hands.leaving import awaited_positions
+from factory.layout.exclusions import awaited_positions, coordinated
 from factory.layout.layout import Layout
 from factory.layout.machines import presences
 from factory.layout.presence import Presence
@@ -174,19 +171,14 @@ def meet(one: Presence, other: Presence) -> bool:
 
 
 def test_robots_go_back_by_themselves_for_what_waits_for_that() -> None:
-    """A hand that rises stays over its station, and may not have to come back in the last unit."""
-    layout = laid_out(39014)
-    net = coordinated(layout).net
-    past = next(p for p in net.passes if p.after % 2 and p.axis < len(layout.guidepaths))
-    name = net.net.net.transitions[net.net.right[net.passes[past][0]]].name
-    waits = [Precedence("order", name, "s1_s", 0)]
-    back = further(layout, net, waits, {})
-    assert [*back] == [past.axis] and past.at < back[past.axis]
-    assert not further(layout, net, waits, back)
-    assert layout.certificate is not None
-    own = awaited_positions(layout)[past.axis]
-    told = replace(layout.certificate, backs=((past.axis, own + 0.01),))
-    assert awaited_positions(replace(layout, certificate=told))[past.axis] == own + 0.01
+    """To where their certificate says; the same is found where there is none."""
+    layout = laid_out(39097)
+    back = awaited_positions(layout)
+    assert back and layout.certificate is not None
+    assert awaited_positions(replace(layout, certificate=None)) == back
+    robot = next(iter(back))
+    told = replace(layout.certificate, backs=((robot, back[robot] + 0.01),))
+    assert awaited_positions(replace(layout, certificate=told)) == {robot: back[robot] + 0.01}
 
 
 def test_what_no_order_keeps_apart_is_a_fault() -> None:

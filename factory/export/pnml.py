@@ -13,7 +13,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 from factory.export.subject import Subject
 from factory.export.swimlanes import Swimlanes, swimlanes
-from factory.layout.coordinating import coordinated
+from factory.layout.exclusions import coordinated
 from factory.layout.layout import Point2
 from factory.nets.gears import Gear, GearNet
 from factory.nets.marked import MarkedNet, marked

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from factory.layout.coordinating import coordinated
+from factory.layout.exclusions import awaited_positions, coordinated
 from factory.layout.feeding import outlets_of
-from factory.layout.hands.leaving import awaited_positions
 from factory.layout.hanging import Hanging
 from factory.layout.machines import presences
 from factory.layout.presence import Presence, Span
@@ -25,7 +24,7 @@ def ways(model: Model) -> Json:
     """The places of a model's coordinated net, each from one transition to another with its
     tokens, and the ways of its machines [m]."""
     layout = model.layout
-    coordination = coordinated(layout, layout.certificate.orders if layout.certificate else ())
+    coordination = coordinated(layout)
     net, written = coordination.net.net, _Writer(model)
     events = net.net.transitions
     found = [*presences(layout, coordination, awaited_positions(layout))]

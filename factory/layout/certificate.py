@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from factory.layout.dimensions import Clearance
 from factory.layout.guidepath import Box, Point2
+from factory.nets.coordinated import Past
 from factory.plant.factory import Factory
 from factory.support.errors import Diagnostic, Position
 
@@ -167,9 +168,9 @@ class Certificate:
     end stops are beyond the regions by less than half of that. `layers` gives each layer's z range
     and `gaps` the vertical distance to the one below [m]; where a coupled region is nearer to
     another robot's, `shared` names the junction. Machines that come near are `excluded`, some by
-    `orders`, places that the net needs for that, and robots (index) that go back by themselves to
-    an arc length [m], `backs`. It holds if there is no fault; at most `clearance.MOST` faults are
-    listed.
+    `orders` and `passes` that the net needs for that, and robots (index) that go back by themselves
+    to an arc length [m], `backs`. It holds if there is no fault; at most `clearance.MOST` faults
+    are listed.
     """
 
     clearance: float
@@ -183,6 +184,7 @@ class Certificate:
     pairs: int = 0
     excluded: tuple[Excluded, ...] = field(default=(), repr=False)
     orders: tuple[Precedence, ...] = field(default=(), repr=False)
+    passes: tuple[Past, ...] = field(default=(), repr=False)
     backs: tuple[tuple[int, float], ...] = field(default=(), repr=False)
 
     @property

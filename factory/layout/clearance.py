@@ -32,7 +32,6 @@ from factory.layout.certificate import (
     Shared,
     fault,
 )
-from factory.layout.coordinating import Coordinated, coordinated
 from factory.layout.crossings import embedding_faults, near
 from factory.layout.dimensions import (
     ARM_LOW,
@@ -48,7 +47,6 @@ from factory.layout.exclusions import Exclusions, exclusions
 from factory.layout.guidepath import Box
 from factory.layout.layout import Layout
 from factory.layout.sweeps import Pile, piles, regions
-from factory.nets.verdict import listing
 from factory.plant.approaches import MARGIN
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
@@ -63,7 +61,7 @@ MOST = 100
 def certify(layout: Layout) -> Certificate:
     """The clearance certificate of a layout. Never raises; see `Certificate.holds`."""
     factory = layout.factory
-    found, coordination = piles(factory, layout.product), coordinated(layout, ())
+    found = piles(factory, layout.product)
     swept = regions(layout, found)
     search = ClearanceSearch(layout, swept)
     faults = [
@@ -71,9 +69,8 @@ def certify(layout: Layout) -> Certificate:
         *islice(search.faults(), MOST),
         *islice(_standoffs(layout, found), MOST),
         *islice(_raised(layout, found), MOST),
-        *_deadlock(layout, coordination),
     ]
-    kept = Exclusions() if faults else exclusions(layout, coordination)
+    apart = Exclusions() if faults else exclusions(layout)
     top = max(region.z[1] for region in swept)
     return Certificate(
         layout.clearance,
@@ -89,11 +86,12 @@ def certify(layout: Layout) -> Certificate:
         tuple(operation.label for operation in factory.operations),
         tuple(swept),
         tuple(search.shared.values()),
-        (*faults[:MOST], *kept.faults[:MOST]),
+        (*faults[:MOST], *apart.faults[:MOST]),
         search.pairs,
-        kept.excluded,
-        kept.orders,
-        kept.backs,
+        apart.excluded,
+        apart.orders,
+        apart.passes,
+        apart.backs,
     )
 
 
@@ -244,16 +242,6 @@ def _raised(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
                 )
                 here = Region(guest, PAYLOADS, PAYLOAD_BODY, found[label].box, found[label].z)
                 yield fault(layout.factory, message, here, lacking=MARGIN - over)
-
-
-def _deadlock(layout: Layout, coordination: Coordinated) -> Iterator[Fault]:
-    """A circuit of the coordinated net that carries no token: what is on it never moves."""
-    if circuit := coordination.net.deadlock:
-        net, operations = coordination.net.net, layout.factory.operations
-        events = (net.right[place] // 2 for place in circuit)
-        robots = sorted({operations[n].carrier for n in events if n < len(operations)})
-        names = listing(net.net.places[place].name for place in circuit)
-        yield fault(layout.factory, f"these wait for each other for ever: {names}", *robots)
 
 
 def _way(layout: Layout, found: Mapping[str, Pile], operation: Operation, slot: int) -> Region:

@@ -7,13 +7,14 @@ transition fires once stays possible, and no circuit is free of tokens.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 
 from factory.layout.certificate import Precedence
 from factory.layout.feeding import passing
-from factory.layout.hands.leaving import leavings
+from factory.layout.hands.leaving import raised
+from factory.layout.hands.limbs import rises_first
 from factory.layout.layout import Layout
 from factory.nets.coordinated import CoordinatedNet, Coordination, Past
 from factory.plant.factory import Operation
@@ -56,34 +57,31 @@ class _Feeding:
     past: Past | None
 
 
-def coordinated(layout: Layout, orders: Sequence[Precedence] | None = None) -> Coordinated:
-    """The coordinated net of a layout with bodies, and the order places that keep its machines
-    apart: those of its certificate unless others are given."""
+def with_machines(
+    layout: Layout, passes: Iterable[Past], orders: Sequence[Precedence] = ()
+) -> Coordinated:
+    """The coordinated net of a layout with bodies: with some passes of robots on their way home,
+    and the order places that keep its machines apart."""
     factory, build = layout.factory, Coordination(layout.factory.net)
-    position = {number: place for place, number in enumerate(factory.order)}
-    waits, feedings = leavings(layout).items(), [*_feedings(layout)]
-    passes = dict.fromkeys(feeding.past for feeding in feedings if feeding.past is not None)
-    passes |= dict.fromkeys(past for _, many in waits for past in many)
-    by_way = sorted(passes, key=lambda past: _way_of(layout, past))
+    feedings, lifted = [*_feedings(layout)], [*_lifted(layout)]
+    every = dict.fromkeys(feeding.past for feeding in feedings if feeding.past is not None)
+    every |= dict.fromkeys([*(past for past, _ in lifted), *passes])
+    by_way = sorted(every, key=lambda past: _way_of(layout, past))
     for (after, robot, _), along in groupby(by_way, key=lambda past: _way_of(layout, past)[:3]):
         _chain(layout, build, (factory.operations[after // 2], robot), [*along])
-    for start, many in waits:
-        operation = factory.operations[start]
-        for past in many:
-            before = factory.operations[past.after // 2]
-            tokens = int(position[before.index] >= position[start])
-            name = f"order:{before.label}:{_axis(layout, past)}:{operation.label}"
-            build.order(name, past, operation.start, tokens)
+    for past, number in lifted:
+        before, operation = factory.operations[past.after // 2], factory.operations[number]
+        robot = _way_of(layout, past)[1]
+        name = f"order:{before.label}:{_axis(layout, past)}:{operation.label}"
+        first = factory.robots[robot].operations[0]
+        build.order(name, past, operation.start, int(first == number))
     served = {one.leaf.index: _served(layout, build, one) for one in feedings}
     away = {}
     for step, dropoff in enumerate(factory.dropoffs):
         then = factory.dropoffs[(step + 1) % factory.period]
         name, ends = f"tray:{dropoff.label}", (dropoff.end, then.start)
         away[dropoff.index] = build.place(name, ends, int(then.turn == 0), "tray", dropoff.label)
-    certificate = layout.certificate
-    if orders is None and certificate is not None and certificate.is_of(factory):
-        orders = [order for order in certificate.orders if order.kept]
-    for order in orders or ():
+    for order in orders:
         build.precede(order.name, (order.before, order.start), order.tokens)
     return Coordinated(build.built(), served, away)
 
@@ -94,6 +92,15 @@ def _way_of(layout: Layout, past: Past) -> tuple[int, int, bool, float]:
     count = len(layout.factory.robots)
     robot = past.axis if past.axis < count else layout.lifts[past.axis - count]
     return past.after, robot, past.axis < count, past.at * past.direction
+
+
+def _lifted(layout: Layout) -> Iterator[tuple[Past, int]]:
+    """The lifts that have to be up before their robots go home, since their hands are above what
+    they have let go: the pass, and the operation (index) that leads home."""
+    for robot, tours in enumerate(layout.factory.tours):
+        if rises_first(layout, robot):
+            for last, tour in zip((*tours[-1:], *tours), tours, strict=False):
+                yield raised(layout, robot, last[-1]), tour[0]
 
 
 def _axis(layout: Layout, past: Past) -> str:

@@ -17,9 +17,9 @@ from factory.layout.certificate import ALWAYS, LOADS, Certificate, Region
 from factory.layout.clearance import certify
 from factory.layout.dimensions import Clearance, up
 from factory.layout.durations import Pace
+from factory.layout.exclusions import crowded
 from factory.layout.guidepath import Point2, hull
 from factory.layout.hands.choosing import Hands
-from factory.layout.hands.leaving import crowded
 from factory.layout.layout import Layout
 from factory.layout.optimising import bounds, optimised
 from factory.plant.factory import Factory
@@ -45,9 +45,8 @@ def lay_out(
     layout = optimised(known, product, c, pace, floor, (), hands)
     certificate = None
     for _ in range(AGAIN if hands else 0):
-        if not (further := crowded(layout)):
-            certificate = certify(layout)
-            further = _parted(layout, certificate)
+        certificate = certify(layout)
+        further = crowded(layout, certificate) or _parted(layout, certificate)
         if not further:
             break
         assert hands is not None

@@ -100,7 +100,8 @@ class Presence:
     stands: its `bodies` and what it holds, as its axes go over pairs of spans, one after another.
     `robot` (index): itself, or the one that it serves; `partners`: numbers that it shares with the
     machines that it works together with; whether it `bears` on what it hands over; `label`: what it
-    holds, or shows next, "" for nothing."""
+    holds, or shows next, "" for nothing; `since`: the end of the operation, a transition, since
+    which a robot has nothing to hold, -1 for others."""
 
     robot: int
     machine: str
@@ -110,6 +111,7 @@ class Presence:
     partners: frozenset[int] = field(default=frozenset(), repr=False)
     bears: bool = False
     label: str = ""
+    since: int = -1
 
     @cached_property
     def boxes(self) -> Array:
@@ -166,11 +168,11 @@ def near(presences: Sequence[Presence], clearance: float) -> Iterator[Near]:
             one, other = presences[i], presences[j]
             if not {*one.places}.isdisjoint(other.places):
                 continue
-            if (nearest := _nearest(one, other, clearance)) is not None:
-                yield nearest
+            if (pair := nearest(one, other, clearance)) is not None:
+                yield pair
 
 
-def _nearest(one: Presence, other: Presence, clearance: float) -> Near | None:
+def nearest(one: Presence, other: Presence, clearance: float) -> Near | None:
     """Two presences with the bodies whose boxes come nearest for what they need, if any do."""
     pairs = _pairs(one, other, clearance)
     lacking, i, j = max(pairs, default=(0.0, 0, 0))

@@ -195,7 +195,7 @@ def held_shape(
         reach = arm = up(max(reach, c.c + MAST / 2 - rear))
         if hand.kind == "above" and hands.is_fed(robot):
             post, offset = round((last[2] + last[3]) / 2, 3), round(last[2] - c.c - MAST / 2, 3)
-            if hand.waits and not factory.lowers(robot):
+            if hand.wait and not factory.lowers(robot):
                 thick = 2 * max(hand.radius, FINGER / 2)
                 least = last[1] + max(ahead) - min(ahead) + thick - rear + 2 * c.c
     least = max(least, hands.travels.get(robot, 0.0))

@@ -96,7 +96,9 @@ class Staying:
                     bodies += self.held(index, number, label)
                 for places, sweeps in (*self._waits(index, step), *self._works(index, step)):
                     held = "" if label == NOPART else label
-                    yield Presence(index, robot.name, places, bodies, sweeps, partners, label=held)
+                    since = 2 * robot.operations[step - 1] + 1 if label == NOPART else -1
+                    told = robot.name, places, bodies, sweeps, partners, False, held, since
+                    yield Presence(index, *told)
 
     def held(self, robot: int, operation: int, label: str) -> MachineBodies:
         """What a robot holds on its tour with an operation, with its axes at 0."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from factory.control.mode import ROUNDING, Array, Mode
 from factory.control.profile import World
-from factory.layout.hands.leaving import awaited_positions
+from factory.layout.exclusions import awaited_positions
 from factory.layout.hands.limbs import rises_first
 from factory.layout.layout import Layout
 from factory.modes.modes import operation_starts

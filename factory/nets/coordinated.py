@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked, stuck_circuit, token_free
@@ -130,10 +131,9 @@ class Coordination:
         """An order place between two transitions of the net, by their names; none where one is not
         of the net. A supervisor keeps it where the first is of the compiled net or a pass, and the
         second the start of an operation."""
-        numbers = {event.name: number for number, event in enumerate(self.transitions)}
-        if not numbers.keys() >= {*ends}:
+        if not self._numbers.keys() >= {*ends}:
             return
-        before, start = (numbers[end] for end in ends)
+        before, start = (self._numbers[end] for end in ends)
         past = next((past for past, event in self.events.items() if event == before), None)
         if past is not None:
             self.order(name, past, start, tokens)
@@ -141,6 +141,11 @@ class Coordination:
         self.place(name, (before, start), tokens, "order", name)
         if before < self._compiled and start < self._compiled and start % 2 == 0:
             self.orders.append(Order(before, start, tokens))
+
+    @cached_property
+    def _numbers(self) -> dict[str, int]:
+        """All transitions by name, of a net that gets no more of them."""
+        return {event.name: number for number, event in enumerate(self.transitions)}
 
     def built(self) -> CoordinatedNet:
         """The net."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from factory.layout.coordinating import coordinated
+from factory.layout.exclusions import coordinated
 from factory.nets.coordinated import CoordinatedNet
 from factory.nets.gears import Gear, GearNet
 from factory.nets.marked import MarkedNet, marked

@@ -11,7 +11,8 @@ import numpy as np
 
 from factory.control.mode import Array, Limits, Mode
 from factory.control.profile import SpeedProfile, World, mode_time
-from factory.layout.coordinating import HOME, Coordinated, coordinated
+from factory.layout.coordinating import HOME, Coordinated
+from factory.layout.exclusions import coordinated
 from factory.layout.feeding import feeder_of
 from factory.layout.hands.limbs import rises_first
 from factory.layout.layout import Layout

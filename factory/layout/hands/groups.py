@@ -38,7 +38,7 @@ class Groups:
     """Groups (g,) of clear `places`: the numbers of the two, or of one twice, `chosen` (g, 2); the
     `share` (g,) of the strength of its tips that is used by suction and if they are `pinned` (g,);
     how badly those that deliver to it would hold from below then, `served` (g,); if the hand has to
-    be there `first` (g,), and how far it `waits` (g, k) for each later operation [m]."""
+    be there `first` (g,), and how far back it goes until its carrier may go on (`waits`, g) [m]."""
 
     places: Places
     chosen: Index
@@ -84,7 +84,7 @@ class Groups:
 
     def cost(self, tip: TipName) -> Array:
         """How bad it is (g,) to hold by a tip, inf where that is too weak."""
-        bad, wait = self.served + PINNED * (tip == "pin"), self.waits[:, 0]
+        bad, wait = self.served + PINNED * (tip == "pin"), self.waits
         strong = self.share <= ENOUGH if tip == "suction" else self.pinned <= STRONG
         return np.where(strong, bad + np.minimum(WAIT * wait, LONG), np.inf)
 
@@ -96,14 +96,14 @@ class Groups:
         """The place of each (g,) in their order: the least far `beside` the best (g,) first, then
         the least bad, what never waits, is in nobody's way, simple, strong."""
         two, rank = self.chosen[:, 0] != self.chosen[:, 1], np.empty(len(self), np.intp)
-        keys = self.used(tip), two, self.first, self.waits[:, 0], self.cost(tip), beside
+        keys = self.used(tip), two, self.first, self.waits, self.cost(tip), beside
         rank[np.lexsort(keys)] = np.arange(len(self))
         return rank
 
     def keys(self, tip: TipName) -> tuple[float, ...]:
         """What the first group is ordered by where it is as bad as others."""
         one, other = self.chosen[0].tolist()
-        keys = self.waits[0, 0], self.first[0], one != other, self.used(tip)[0]
+        keys = self.waits[0], self.first[0], one != other, self.used(tip)[0]
         return tuple(map(float, keys))
 
     def points(self) -> tuple[Point3, ...]:

@@ -48,8 +48,8 @@ class Hand:
     its lower edge [m]; `covered`: which share of a tip's face the surface covers on each tour of
     its robot, where that holds by suction; `share`: which share of the strength of its tips weight
     and acceleration take, as predicted; `tip`: what it holds with; `first`: whether it has to be in
-    its place before what it takes comes there; `waits`: how far it has to go back until each of its
-    carrier's next operations may start [m], none where they need not wait. Of the kind `none` where
+    its place before what it takes comes there; `wait`: how far it has to go back until its
+    carrier's next operation may start [m], as predicted. Of the kind `none` where
     nothing can hold."""
 
     kind: Kind
@@ -59,18 +59,13 @@ class Hand:
     share: float = 0.0
     tip: TipName = "suction"
     first: bool = False
-    waits: tuple[float, ...] = ()
+    wait: float = 0.0
     covered: tuple[float, ...] = (1.0,)
 
     @property
     def tall(self) -> bool:
         """Whether its mast reaches up among the payloads."""
         return self.kind in ("behind", "above")
-
-    @property
-    def clear(self) -> float:
-        """How far it has to go back until none of these waits for it [m]."""
-        return max(self.waits, default=0.0)
 
     @property
     def width(self) -> float:

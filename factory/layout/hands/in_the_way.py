@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.control.mode import Index, Truth
+from factory.control.mode import Truth
 from factory.geometry.meshes import Array
 from factory.layout.dimensions import SLOT
 from factory.layout.hands.apart import BESIDE, HandsApart, Swept
@@ -60,16 +60,6 @@ class Passed:
     later: Truth
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Onward:
-    """The `boxes` (m, 2, 3) of what a hand could meet in its carrier's next operations, and the
-    numbers of those `operations` (m,), of which there are so many (`count`)."""
-
-    boxes: Array
-    operations: Index
-    count: int
-
-
 class InTheWay:
     """What is in the way of a factory's hands. `hand_of`: that of a carrier with a heading."""
 
@@ -77,7 +67,7 @@ class InTheWay:
         self.holding, self.apart = holding, HandsApart(holding, hand_of)
         self._checked: dict[tuple[object, ...], tuple[dict[str, Truth], Truth]] = {}
         self._passed: dict[tuple[object, ...], Passed] = {}
-        self._onward: dict[int, Onward] = {}
+        self._onward: dict[int, Array] = {}
 
     def possible(
         self, robot: int, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]
@@ -113,13 +103,12 @@ class InTheWay:
     def waits(
         self, robot: int, kind: Kind, found: Places, frames: Sequence[tuple[Way, Way]]
     ) -> Array:
-        """How far a hand at each place (n, k) goes back, in any frame, until each of its carrier's
-        next operations may start [m]."""
-        waits = np.zeros((len(found), 1))
+        """How far a hand at each place (n,) goes back, in any frame, until its carrier's next
+        operation may start [m]."""
+        waits = np.zeros(len(found))
         for u, t in frames if len(found) else ():
             going = self._going_on(robot, kind, found, u, t)
-            going[:, 0] = np.maximum(going[:, 0], self.apart.crossing(robot, found, u, t))
-            waits = np.maximum(waits, going)
+            waits = np.maximum.reduce([waits, going, self.apart.crossing(robot, found, u, t)])
         return waits
 
     def _looked_at(
@@ -251,36 +240,30 @@ class InTheWay:
                 yield (*swept(low, high, back(u), side), boxes)
 
     def _going_on(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Array:
-        """How far a hand has to go back (n, k) [m], as its lift rises, until each of the next k
-        operations of its carrier may start, which leaves along t, or either way where it turns."""
+        """How far a hand has to go back (n,) [m], as its lift rises, until the next operation of
+        its carrier may start, which leaves along t, or either way where it turns."""
         if self.holding.factory.drops(self.holding.last(robot).index):
-            return np.zeros((len(found), 1))
+            return np.zeros(len(found))
         low, high = self.reach(kind, found, u)
         high[:, 2] += self.holding.factory.strokes.get(robot, 0.0)
         onward = self._met_onward(robot)
-        past = retreat(low, high, onward.boxes, (back(u), back(t)))
+        past = retreat(low, high, onward, (back(u), back(t)))
         if self.holding.on[robot] in self.holding.turning:
-            past = np.maximum(past, retreat(low, high, onward.boxes, (back(u), t)))
-        far = np.zeros((len(found), onward.count))
-        operations, begin = np.unique(onward.operations, return_index=True)
-        far[:, operations] = np.maximum.reduceat(past, begin, axis=1)
-        return far
+            past = np.maximum(past, retreat(low, high, onward, (back(u), t)))
+        return np.asarray(past.max(axis=1, initial=0.0))
 
-    def _met_onward(self, robot: int) -> Onward:
-        """What a hand could meet in its carrier's next operations: all that is there by the end of
-        the first, and what each later one adds, down from above or not."""
+    def _met_onward(self, robot: int) -> Array:
+        """The boxes (m, 2, 3) of what a hand could meet in its carrier's next operation: all that
+        is there by its end, and what is lowered there."""
         factory, last = self.holding.factory, self.holding.last(robot)
         if last.index not in self._onward:
             made = [o for o in self.holding.made(last.carrier) if not factory.drops(o.index)]
-            there, found = set[str](), list[Array]()
-            for o in made[made.index(last) + 1 :] if last in made else ():
-                added = [part for part in factory.contents[o.label] if part not in there]
-                there.update(added)
-                above = list(self._from_above(o, last.carrier, ()))
-                found.append(np.concatenate([self.holding.surfaces.boxes(added), *above]))
-            found = found or [self.holding.boxes(last.label)]
-            of = np.repeat(np.arange(len(found)), [len(boxes) for boxes in found])
-            self._onward[last.index] = Onward(np.concatenate(found), of, len(found))
+            then = made[made.index(last) + 1 :][:1] if last in made else ()
+            boxes = [self.holding.boxes(last.label)]
+            for o in then:
+                above = self._from_above(o, last.carrier, ())
+                boxes = [self.holding.surfaces.boxes(factory.contents[o.label]), *above]
+            self._onward[last.index] = np.concatenate(boxes)
         return self._onward[last.index]
 
     def coming(

@@ -219,13 +219,7 @@ class OneHand:
         chosen: Sequence[Groups],
     ) -> tuple[Hand, ...]:
         """One hand, in its place on each label."""
-        longest = max(one.waits.shape[1] for one in chosen)
-        waits = np.zeros((len(chosen), longest))
-        for wait, one in zip(waits, chosen, strict=True):
-            wait[: one.waits.shape[1]] = one.waits[0]
-        most = waits.max(axis=0).round(6).tolist()
-        while most and not most[-1]:
-            most.pop()
+        wait = round(max(float(one.waits[0]) for one in chosen), 6)
         points, beams = [one.points() for one in chosen], [0.0] * len(chosen)
         if kind == "above":
             apart, heights = self.in_the_way.apart, [z for ((_, _, z), *_) in points]
@@ -242,7 +236,7 @@ class OneHand:
             max(float(one.used(by)[0]) for one in chosen),
             by,
             any(bool(one.first[0]) for one in chosen),
-            (*most,),
+            wait,
             tuple(float(one.covered[0]) if by == "suction" else 1.0 for one in chosen),
         )
         both = zip(points, beams, strict=True)
@@ -251,8 +245,7 @@ class OneHand:
 
 def _cost(hand: Hand) -> float:
     """How bad a hand is."""
-    wait = hand.waits[0] if hand.waits else 0.0
-    return PINNED * (hand.tip == "pin") + min(WAIT * wait, LONG)
+    return PINNED * (hand.tip == "pin") + min(WAIT * hand.wait, LONG)
 
 
 def _level(

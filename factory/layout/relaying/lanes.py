@@ -152,7 +152,7 @@ class InTheWayInLanes(InTheWay):
 
     def _going_on(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Array:
         if self.holding.gives(robot):
-            return np.zeros((len(found), 1))
+            return np.zeros(len(found))
         return super()._going_on(robot, kind, found, u, t)
 
     def _leaving(self, robot: int, kind: Kind, found: Places, u: Way) -> Iterator[Swept]:

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Any
 
 from factory.compiler.taking_over import present, without_gone
-from factory.layout.hands.leaving import goes_early
+from factory.layout.exclusions import goes_early
 from factory.layout.layout import Layout
 from factory.nets.history import firings
 from factory.nets.petri import Marking
