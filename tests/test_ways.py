@@ -18,6 +18,7 @@ from ways_checker import check
 
 from factory.export.ways import ways
 from factory.layout.clearance import certify
+from factory.layout.coordinating import with_machines
 from factory.layout.exclusions import awaited_positions, coordinated
 from factory.layout.layout import Layout
 from factory.layout.machines import presences
@@ -31,6 +32,9 @@ from factory.simulation.ordering import Ordering
 from factory.support.settings import Settings
 
 Json = dict[str, Any]
+
+ORDER = "order:past:r8:0.134:s1/5:s1/4"
+"""What a carrier waits for with its next unit: a hand that has gone from its station."""
 
 SEEDS = (39014, 39018)
 """Random products: a fetch that a carrier waits for; lifts."""
@@ -76,19 +80,18 @@ def test_what_comes_near_has_its_circuit(seed: int) -> None:
 
 def test_a_wait_that_is_taken_out_is_refused() -> None:
     m, machines, clearance = written(39014)
-    gone = next(row for row in machines["places"] if row["place"] == "order:p4:s1/4")
+    gone = next(row for row in machines["places"] if row["place"] == ORDER)
     machines["places"].remove(gone)
-    refused(check(m, machines, clearance), "r1 and r8", "not of the net", "order:p4:s1/4")
+    refused(check(m, machines, clearance), "r1 and r8", "not of the net", ORDER)
 
 
 def test_exchanged_tokens_are_refused() -> None:
     m, machines, clearance = written(39014)
     one, other = (
-        next(row for row in machines["places"] if row["place"] == name)
-        for name in ("order:p4:s1/4", "r8:nopart")
+        next(row for row in machines["places"] if row["place"] == name) for name in (ORDER, "p3")
     )
     one["tokens"], other["tokens"] = other["tokens"], one["tokens"]
-    refused(check(m, machines, clearance), "r1 and r8", "tokens", "order:p4:s1/4")
+    refused(check(m, machines, clearance), "r1 and r8", "tokens", ORDER)
 
 
 @pytest.mark.parametrize(("geom", "axis"), [("r2/column", 2), ("r5/bar", 0), ("r6/stem", 2)])
@@ -147,7 +150,7 @@ def test_machines_are_apart_in_every_marking(seed: int) -> None:
     by its field, and what a magazine does before long before by its speed."""
     layout = laid_out(seed)
     assert layout.certificate is not None
-    net = coordinated(layout, layout.certificate.orders)
+    net = with_machines(layout, layout.certificate.passes, layout.certificate.orders)
     found = [*presences(layout, net, awaited_positions(layout))]
     for number in range(60):
         marked = marked_at_random(layout, 40 + 17 * number, number)
@@ -172,7 +175,7 @@ def meet(one: Presence, other: Presence) -> bool:
 
 def test_robots_go_back_by_themselves_for_what_waits_for_that() -> None:
     """To where their certificate says; the same is found where there is none."""
-    layout = laid_out(39097)
+    layout = laid_out(39014)
     back = awaited_positions(layout)
     assert back and layout.certificate is not None
     assert awaited_positions(replace(layout, certificate=None)) == back
