@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -25,7 +26,7 @@ from factory.mjcf import names
 from factory.mjcf.loading import load
 from factory.mjcf.model import Model, model_files
 from factory.simulation.modelling import physical_model
-from factory.support.errors import InputError
+from factory.support.errors import InputError, RunError
 from factory.support.files import write_all
 from factory.support.settings import Settings
 from tests.command_line import PAPER, ROOT, Terminal, files_in
@@ -318,6 +319,10 @@ def test_the_engine_takes_every_size_that_is_accepted(tmp_path: Path) -> None:
     for size, turn in zip(SIZES, cycle(TURNS), strict=False):
         try:
             layout = laid_out(tmp_path / "p.pag", f"root = a; a = atomic({size}{turn})")
+        except RunError as error:  # a hand is thicker than what it holds over the tray's slot
+            assert {found.code for found in error.diagnostics} == {"Layout"}
+            assert min(map(float, re.findall(r"[\d.e-]+", size.partition("=")[2]))) < 2e-3
+            continue
         except InputError as error:
             (found,) = error.diagnostics
             assert found.code == "BadValue" and found.position

@@ -24,7 +24,7 @@ from factory.layout.dimensions import PAYLOADS
 
 ACROSS = 5e-5
 """Bodies of machines that work together come no nearer than this: a robot's pad is 0.2 mm off what
-it holds, a feeder's 0.1 mm; what bears on something is no deeper in it [m]."""
+it holds, a feeder's 0.1 mm [m]."""
 
 ALONG = 5e-5
 """A robot is no further than this from where its reference is, along its guidepath [m]: 0.06 mm is
@@ -192,7 +192,7 @@ def nearer(found: Near, clearance: float) -> Near | None:
 
 def _pairs(one: Presence, other: Presence, clearance: float) -> list[tuple[float, int, int]]:
     """The pairs of boxes of two presences that come near, and by how much nearer than they may."""
-    across = -ACROSS if one.bears or other.bears else ACROSS
+    across = 0.0 if one.bears or other.bears else ACROSS
     apart = across if one.partners & other.partners else clearance - 2 * (ALONG + ROUNDING)
     here = _within(one.boxes, other.hull, apart)
     there = _within(other.boxes, one.hull, apart)
