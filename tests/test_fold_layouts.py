@@ -8,7 +8,6 @@ import pytest
 
 from factory.compiler.folding import folded, kind_of
 from factory.layout.clearance import certify
-from factory.layout.coordinating import coordinated
 from factory.layout.durations import Pace
 from factory.layout.embedding import lay_out
 from factory.layout.exclusions import exclusions
@@ -59,7 +58,7 @@ def test_one_that_comes_back_under_its_feeder_is_refused() -> None:
         stations[operations[label].index] = 0.0
     moved = replace(layout, stations=tuple(stations), certificate=None)
     assert not certify(moved).holds
-    messages = [fault.message for fault in exclusions(moved, coordinated(moved, ())).faults]
+    messages = [fault.message for fault in exclusions(moved).faults]
     assert any("p0 of r1, in x4, and p0 of magazine of r1" in message for message in messages)
 
 

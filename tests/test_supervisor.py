@@ -80,7 +80,7 @@ def test_nothing_is_asked_while_nothing_changes(
         assert world.time < LONG
     changes = len({event.t for event in supervisor.events}) + 2 * world.delivered()
     assert len(asked) <= changes + len(changed) + 1 < ticks / 2
-    waits = name in ("chest", "truck", "20") and isinstance(world, MujocoWorld)
+    waits = name in ("chest", "truck") and isinstance(world, MujocoWorld)
     assert ("hand" in changed) is waits
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -24,6 +24,7 @@ from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
     from factory.compiler.mating.findings import Matings
+    from factory.nets.coordinated import CoordinatedNet
     from factory.nets.verdict import Witness
     from factory.pipeline import Project
     from factory.study.checking import Checked
@@ -167,8 +168,8 @@ def _describe(checked: Checked, verbose: bool) -> None:
         if not verbose and len(alike) > AGAINST:
             name = alike[0].property.replace("_", " ")
             say(f"  not {name}: and {len(alike) - AGAINST} more (-v shows all)")
-    if "coordinated" in document:
-        _describe_coordinated(document["coordinated"])
+    if checked.coordinated is not None:
+        _describe_coordinated(checked.coordinated)
     if checked.pool:
         most = sorted(checked.pool.items(), key=lambda item: -item[1])[:POOLED]
         listed = ", ".join(f"{label} {count}" for label, count in most)
@@ -179,16 +180,16 @@ def _describe(checked: Checked, verbose: bool) -> None:
         _describe_deputies(document["deputies"])
 
 
-def _describe_coordinated(net: Mapping[str, Any]) -> None:
+def _describe_coordinated(coordinated: CoordinatedNet) -> None:
     """For people: the net that runs, with its order places."""
-    rows = [
-        (order["place"].removeprefix("order:"), str(order["tokens"])) for order in net["orders"]
-    ]
+    net = coordinated.net
+    live = "NO" if coordinated.deadlock else "yes"
     say(
-        f"coordinated with hands, magazines and the tray: {net['places']} places,"
-        f" {net['transitions']} transitions, live: {'yes' if net['live'] else 'NO'}"
+        f"coordinated with hands, magazines and the tray: {len(net.tokens)} places,"
+        f" {len(net.net.transitions)} transitions, live: {live}"
     )
-    if rows:
+    places = zip(net.net.places, net.tokens, strict=True)
+    if rows := [(p.name, str(n)) for p, n in places if p.mode == "order"]:
         table("", ("order place", "tokens"), rows)
 
 

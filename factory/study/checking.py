@@ -7,8 +7,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from factory.layout.exclusions import coordinated
-from factory.nets.coordinated import CoordinatedNet
 from factory.nets.gears import Gear, GearNet
 from factory.nets.marked import MarkedNet, marked
 from factory.nets.petri import Place
@@ -26,6 +24,7 @@ if TYPE_CHECKING:
     from factory.compiler.mating.findings import Matings
     from factory.geometry.solids import Product
     from factory.layout.hands.misses import NoGrip
+    from factory.nets.coordinated import CoordinatedNet
 
 
 @dataclass(frozen=True)
@@ -150,8 +149,14 @@ def check_project(
         factory,
         least_robots(project.pag, project.templates),
         _deputies(project, factory) if deputies else None,
-        coordinated(project.layout).net if laid_out else None,
+        _coordinated(project) if laid_out else None,
     )
+
+
+def _coordinated(project: Project) -> CoordinatedNet:
+    from factory.layout.exclusions import coordinated
+
+    return coordinated(project.layout).net
 
 
 def _deputies(project: Project, factory: Factory) -> tuple[tuple[int, ...], ...]:

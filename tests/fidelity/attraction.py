@@ -66,6 +66,8 @@ class Bench:
         self.tick = self.simulation.request.settings.tick
         self.kept = mujoco.MjData(self.world.m)
         mujoco.mj_copyData(self.kept, self.world.m, self.world.d)
+        m = self.world.m  # which drives keep samples is in the model
+        self.samples = m.actuator_delay.copy(), m.actuator_history.copy()
 
     @property
     def patience(self) -> float:
@@ -79,6 +81,7 @@ class Bench:
         and should not."""
         world, m, d = self.world, self.world.m, self.world.d
         mujoco.mj_copyData(d, m, self.kept)
+        m.actuator_delay[:], m.actuator_history[:] = self.samples
         world.inspection.tick()
         still = np.zeros(len(x))
         d.qpos[world.motion.axes.qpos[self.axes]] = x
