@@ -219,7 +219,8 @@ def with_parts(layout: Layout, solids: dict[str, Any]) -> Layout:
 )
 def test_parts_that_touch_do_so_without_it(make: Callable[[], Layout], fuse: bool) -> None:
     layout = make()
-    fast, plain = (traced(ready(layout, fuse=fuse, fast=f), MOST, 12.0) for f in (True, False))
+    # later on the engine gives parts up that are pressed into each other
+    fast, plain = (traced(ready(layout, fuse=fuse, fast=f), MOST, 2.0) for f in (True, False))
     assert fast.figures.unintended_contacts > 0
     assert fast.agrees(plain)
 

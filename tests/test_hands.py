@@ -214,7 +214,7 @@ def test_bores_are_where_pins_hold() -> None:
 
 def test_robots_do_not_go_back_from_home_to_where_they_would_wait() -> None:
     """A robot begins at its B end: it has not yet delivered what its hand has to go back from."""
-    layout = with_hands("chest")
+    layout = with_hands("gearbox")
     awaited = awaited_positions(layout)
     short = {r for r, at in awaited.items() if at < layout.guidepaths[r].length - 0.01}
     made = Simulation(layout, RunRequest(units=1))
