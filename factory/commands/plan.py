@@ -240,7 +240,8 @@ def _document(
 
 def _by_label(found: InPlace, planned: Planned, project: Project) -> dict[str, PlannedJoin]:
     """The joins of a plan by the labels of the operations that they have become: those that make
-    the same of units. Operations in sub-trees that were kept have none."""
+    the same of units, but for screws that are driven before, which joins leave out. Operations in
+    sub-trees that were kept have none."""
     made = {frozenset((*join.pile, *join.come)): join for join in planned.operations}
     inside = {part.label: frozenset([label]) for label, own in found.units() for part in own}
     matings = project.matings.all if project.matings else ()
@@ -250,7 +251,12 @@ def _by_label(found: InPlace, planned: Planned, project: Project) -> dict[str, P
             inside[node.label] = frozenset[str]().union(*(inside[name] for name in node.inputs))
     for label, inputs in steps.items():
         inside[label] = frozenset[str]().union(*(inside[name] for name in inputs))
-    return {label: made[inside[label]] for label in steps if inside[label] in made}
+    joins = {label: made.pop(inside[label]) for label in steps if inside[label] in made}
+    joined = frozenset[str]().union(*made)
+    for label in steps:
+        if label not in joins and inside[label] & joined in made:
+            joins[label] = made.pop(inside[label] & joined)
+    return joins
 
 
 def _tell(
