@@ -340,7 +340,11 @@ def test_robots_that_set_the_pace_together() -> None:
     timing = Timing(paper_layout(), Settings(), "ideal")
     net = timed_net(timing)
     slow = [replace(c, seconds=9.0) if c.name in ("r5", "r6") else c for c in net.named]
-    found = scenarios(timing, replace(net, named=tuple(slow)), None)
+    seconds = list(net.seconds)
+    for before, after in zip(net.named, slow, strict=True):
+        seconds[before.places[0]] += after.seconds - before.seconds
+    late = replace(net.timed, seconds=tuple(seconds))
+    found = scenarios(timing, replace(net, timed=late, named=tuple(slow)), None)
     assert [s.words for s in found] == [
         "r5 and r6 10 % faster",
         "every robot 10 % faster",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import inf
 
 from factory.study.analysis.flow import Flow, flow
 from factory.study.analysis.measured import Comparison, RunRecord, compare
@@ -80,16 +79,5 @@ def operation_slacks(timing: Timing, net: TimedNet) -> tuple[float, ...]:
     """How much longer each operation may take before it sets the pace [s]: the slack of the
     tightest circuit through it."""
     operations = timing.factory.operations
-    if not net.is_plain:
-        found = slacks(net.ratio, (o.place for o in operations))
-        return tuple(found[o.place].seconds for o in operations)
-    least = [inf] * len(operations)
-    for circuit in net.named:
-        for place in circuit.places:
-            if place < len(operations):
-                least[place] = min(least[place], net.slack(circuit))
-    for (robot, number), way in net.ways.items():
-        circuit = net.named[robot]
-        longer = max(net.seconds[way] - net.seconds[number], 0.0)
-        least[number] = min(least[number], net.slack(circuit) + longer)
-    return tuple(least)
+    tightest = slacks(net.ratio, (o.place for o in operations))
+    return tuple(tightest[o.place].seconds for o in operations)

@@ -80,21 +80,13 @@ class TimedNet:
         return self.timed.timing.factory.period
 
     @property
-    def is_plain(self) -> bool:
-        """Whether all simple circuits have a name."""
-        timing = self.timed.timing
-        return timing.world == "ideal" and not self.timed.bounds and timing.factory.net.is_tree
-
-    @property
     def ratio(self) -> CycleRatio:
         """The maximum cycle ratio with its proof."""
         return self.timed.ratio
 
-    @cached_property
+    @property
     def pace(self) -> float:
         """The cycle time in the long run [s]."""
-        if self.is_plain:
-            return max(c.pace for c in self.named)
         return self.timed.pace
 
     @cached_property
