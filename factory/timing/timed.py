@@ -104,7 +104,7 @@ def timed(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None) -> 
         seconds[place] = max(0.0, dates[past] - (dates[before] if before else 0.0))
         owners[place] = (timing.robot_of(past.axis),)
     for number, served in coordinated.served.items():
-        seconds[served.up], seconds[served.down] = timing.strokes(served.before, number)
+        seconds[served.up], seconds[served.down] = timing.strokes[number]
     for place in coordinated.away.values():
         seconds[place] = timing.outfeed
     bounds: tuple[int, ...] = ()

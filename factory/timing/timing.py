@@ -162,7 +162,14 @@ class Timing:
         profile = SpeedProfile(self.settings.speed, self.settings.acceleration)
         return profile.rest(abs(one - other)) + self.settings.settle
 
-    def strokes(self, before: int, leaf: int) -> tuple[float, float]:
+    @cached_property
+    def strokes(self) -> Mapping[int, tuple[float, float]]:
+        """How long the slider of each magazine goes up and comes down [s], as `_strokes`, by the
+        operation (index) that takes the part."""
+        served = self.coordinated.served.items()
+        return {leaf: self._strokes(one.before, leaf) for leaf, one in served}
+
+    def _strokes(self, before: int, leaf: int) -> tuple[float, float]:
         """How long a slider goes up after the part of one operation, and comes down with that of
         the next until its robot may set out [s]: a robot comes when the part is down, one whose
         hand holds from above sets out then, and one whose hand is there first is there."""
