@@ -343,8 +343,7 @@ def test_robots_that_set_the_pace_together() -> None:
     seconds = list(net.seconds)
     for before, after in zip(net.named, slow, strict=True):
         seconds[before.places[0]] += after.seconds - before.seconds
-    late = replace(net.timed, seconds=tuple(seconds))
-    found = scenarios(timing, replace(net, timed=late, named=tuple(slow)), None)
+    found = scenarios(timing, replace(net, seconds=tuple(seconds), named=tuple(slow)), None)
     assert [s.words for s in found] == [
         "r5 and r6 10 % faster",
         "every robot 10 % faster",

@@ -79,7 +79,7 @@ def product_of(seed: int, folder: Path) -> Layout:
 @pytest.mark.parametrize("seed", range(6))
 def test_it_is_the_compiled_net_with_more_that_restricts_it(seed: int, tmp_path: Path) -> None:
     layout = product_of(1200 + seed, tmp_path)
-    net, compiled = coordinated(layout).net, marked(layout.factory.net)
+    net, compiled = coordinated(layout), marked(layout.factory.net)
     assert net.net.net.places[: len(compiled.tokens)] == compiled.net.places
     assert net.net.tokens[: len(compiled.tokens)] == compiled.tokens
     assert net.net.is_marked_graph and not net.deadlock
@@ -89,7 +89,7 @@ def test_it_is_the_compiled_net_with_more_that_restricts_it(seed: int, tmp_path:
 def test_one_unit_can_be_made_alone_and_everything_is_as_before(name: str) -> None:
     """Σ stays possible, whatever waits were added, and leads back to where it began."""
     layout = with_hands(name)
-    net = coordinated(layout).net
+    net = coordinated(layout)
     assert fired(net.net, one_unit_alone(layout, net)) == list(net.net.tokens)
 
 
@@ -133,7 +133,7 @@ def test_what_runs_is_what_was_proved(distributed: bool) -> None:
     """Each operation of a run starts when the hands that it waits for are past, by positions alone;
     without the orders some do not."""
     layout = with_hands("truck")
-    orders = coordinated(layout).net.orders
+    orders = coordinated(layout).orders
     assert late(layout, RunRequest(units=4, jitter=0.3, distributed=distributed), True) == []
     assert {order.start for order in orders} > set()
     assert late(layout, RunRequest(units=4, jitter=0.3, distributed=distributed), False)
@@ -143,7 +143,7 @@ def late(layout: Layout, request: RunRequest, kept: bool) -> list[str]:
     """The starts that came while a hand that was to be away was not: since its last delivery its
     robot has been short of the point all the time."""
     simulation = Simulation(layout, request)
-    orders = coordinated(layout).net.orders
+    orders = coordinated(layout).orders
     if not kept:
         simulation.supervisor.ordering = Ordering()
     transitions = layout.factory.net.threaded.transitions
@@ -168,7 +168,7 @@ def late(layout: Layout, request: RunRequest, kept: bool) -> list[str]:
 def test_machines_without_a_program_are_in_it() -> None:
     layout = with_hands("stool")
     made = coordinated(layout)
-    modes = {place.mode for place in made.net.net.net.places}
+    modes = {place.mode for place in made.net.net.places}
     assert modes >= {"hand", "way", "order", "magazine", "tray"}
     assert made.served.keys() == {leaf.index for leaf in layout.factory.leaves}
     assert made.away.keys() == {dropoff.index for dropoff in layout.factory.dropoffs}

@@ -159,7 +159,7 @@ def test_layouts_with_hands_are_certified() -> None:
 
 def test_those_that_wait_for_a_hand_wait_for_one_that_leaves() -> None:
     layout = with_hands("truck")
-    orders = coordinated(layout).net.orders
+    orders = coordinated(layout).orders
     waited = {order.past.axis for order in orders if order.past is not None}
     assert waited
     for axis in waited:

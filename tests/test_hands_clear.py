@@ -11,8 +11,8 @@ from scipy.spatial import ConvexHull
 
 from factory.layout import clearance
 from factory.layout import exclusions as excluding
+from factory.layout.certificate import Exclusions
 from factory.layout.dimensions import FINGER_TOP, PAYLOAD
-from factory.layout.exclusions import Exclusions
 from factory.layout.feeding import feeder_of
 from factory.layout.hands.apart import LEVEL, HandsApart
 from factory.layout.hands.hand import BEAM, Hand

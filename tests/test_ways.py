@@ -132,7 +132,7 @@ def test_a_clear_point_that_is_5_mm_short_is_refused() -> None:
 
 def marked_at_random(layout: Layout, steps: int, seed: int) -> set[int]:
     """The places that are marked after so many firings of a coordinated net."""
-    net, rng = coordinated(layout).net.net, random.Random(seed)
+    net, rng = coordinated(layout).net, random.Random(seed)
     tokens = list(net.tokens)
     for _ in range(steps):
         presets = enumerate(net.net.preset)
@@ -150,7 +150,8 @@ def test_machines_are_apart_in_every_marking(seed: int) -> None:
     by its field, and what a magazine does before long before by its speed."""
     layout = laid_out(seed)
     assert layout.certificate is not None
-    net = with_machines(layout, layout.certificate.passes, layout.certificate.orders)
+    apart = layout.certificate.apart
+    net = with_machines(layout, apart.passes, apart.orders)
     found = [*presences(layout, net, awaited_positions(layout))]
     for number in range(60):
         marked = marked_at_random(layout, 40 + 17 * number, number)
@@ -180,7 +181,8 @@ def test_robots_go_back_by_themselves_for_what_waits_for_that() -> None:
     assert back and layout.certificate is not None
     assert awaited_positions(replace(layout, certificate=None)) == back
     robot = next(iter(back))
-    told = replace(layout.certificate, backs=((robot, back[robot] + 0.01),))
+    apart = replace(layout.certificate.apart, backs=((robot, back[robot] + 0.01),))
+    told = replace(layout.certificate, apart=apart)
     assert awaited_positions(replace(layout, certificate=told)) == {robot: back[robot] + 0.01}
 
 

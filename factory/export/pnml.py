@@ -51,7 +51,7 @@ def export(subject: Subject) -> str:
     if chosen == "net":
         return write_pnml(subject.net)
     if chosen == "coordinated":
-        return write_pnml(coordinated(subject.project.layout).net.net)
+        return write_pnml(coordinated(subject.project.layout).net)
     factory = subject.project.factory
     return write_pnml(factory.net, tuple(failing_transitions(factory)))
 

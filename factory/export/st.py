@@ -160,7 +160,7 @@ class _Writer:
         """The set-points of the robot's own axes; behind a gate short of the goal."""
         mode, axes = self.modes[step.operation.index], self._axes(step)
         for slot, axis in enumerate(axes):
-            if self._owner(axis) != robot:
+            if self.layout.factory.robot_of(axis) != robot:
                 continue
             target, goal = f"Axes[{axis + 1}].Target", float(mode.goals[slot])
             gate = int(mode.gate[slot]) if len(mode.gate) else -1
@@ -175,11 +175,6 @@ class _Writer:
 
     def _axes(self, step: ProgramStep) -> tuple[int, ...]:
         return self.layout.factory.axes[step.operation.index]
-
-    def _owner(self, axis: int) -> int:
-        """The robot that an axis belongs to."""
-        count = len(self.layout.guidepaths)
-        return axis if axis < count else self.layout.lifts[axis - count]
 
     def _at(self, axis: int, goal: float, eps: float) -> str:
         return f"ABS(Axes[{axis + 1}].Position - {_real(goal)}) < {_real(eps)}"

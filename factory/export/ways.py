@@ -25,7 +25,7 @@ def ways(model: Model) -> Json:
     tokens, and the ways of its machines [m]."""
     layout = model.layout
     coordination = coordinated(layout)
-    net, written = coordination.net.net, _Writer(model)
+    net, written = coordination.net, _Writer(model)
     events = net.net.transitions
     found = [*presences(layout, coordination, awaited_positions(layout))]
     return {

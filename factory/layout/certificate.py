@@ -159,6 +159,23 @@ class Precedence:
     tokens: int
     kept: bool = True
 
+    def as_json(self) -> dict[str, object]:
+        """The order place as the certificate's document lists it."""
+        return {"place": self.name, "tokens": self.tokens, "kept": self.kept}
+
+
+@dataclass(frozen=True, slots=True)
+class Exclusions:
+    """What keeps the machines of a layout apart: the pairs that come near, each with its circuit;
+    the order places, and the passes on ways home, that are needed for that; the robots (index) that
+    go back by themselves to an arc length [m]; and the pairs for which there is none."""
+
+    excluded: tuple[Excluded, ...] = field(default=(), repr=False)
+    orders: tuple[Precedence, ...] = field(default=(), repr=False)
+    passes: tuple[Past, ...] = field(default=(), repr=False)
+    backs: tuple[tuple[int, float], ...] = field(default=(), repr=False)
+    faults: tuple[Fault, ...] = ()
+
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
@@ -167,10 +184,8 @@ class Certificate:
     Uncoupled regions of different robots in one layer are at least `clearance` [m] apart in plan;
     end stops are beyond the regions by less than half of that. `layers` gives each layer's z range
     and `gaps` the vertical distance to the one below [m]; where a coupled region is nearer to
-    another robot's, `shared` names the junction. Machines that come near are `excluded`, some by
-    `orders` and `passes` that the net needs for that, and robots (index) that go back by themselves
-    to an arc length [m], `backs`. It holds if there is no fault; at most `clearance.MOST` faults
-    are listed.
+    another robot's, `shared` names the junction. `apart`: what keeps machines apart
+    that come near. It holds if there is no fault; at most `clearance.MOST` faults are listed.
     """
 
     clearance: float
@@ -182,10 +197,7 @@ class Certificate:
     shared: tuple[Shared, ...] = field(repr=False)
     faults: tuple[Fault, ...] = ()
     pairs: int = 0
-    excluded: tuple[Excluded, ...] = field(default=(), repr=False)
-    orders: tuple[Precedence, ...] = field(default=(), repr=False)
-    passes: tuple[Past, ...] = field(default=(), repr=False)
-    backs: tuple[tuple[int, float], ...] = field(default=(), repr=False)
+    apart: Exclusions = field(default_factory=Exclusions, repr=False)
 
     @property
     def holds(self) -> bool:
@@ -211,8 +223,8 @@ class Certificate:
             "vertical_gaps_m": {name: round(gap, 6) for name, gap in self.gaps},
             "regions": [self._region(region) for region in self.regions],
             "shared": [shared.as_json() for shared in self.shared],
-            "excluded": [excluded.as_json() for excluded in self.excluded],
-            "orders": [{"place": o.name, "tokens": o.tokens, "kept": o.kept} for o in self.orders],
+            "excluded": [excluded.as_json() for excluded in self.apart.excluded],
+            "orders": [order.as_json() for order in self.apart.orders],
             "faults": [fault.as_json() for fault in self.faults],
         }
 
@@ -224,7 +236,7 @@ class Certificate:
             "clearance_m": self.clearance,
             "regions": len(self.regions),
             "shared": len(self.shared),
-            "excluded": len(self.excluded),
+            "excluded": len(self.apart.excluded),
         }
 
     def _region(self, region: Region) -> dict[str, object]:

@@ -27,6 +27,7 @@ from factory.layout.certificate import (
     RAISED,
     STATIONS,
     Certificate,
+    Exclusions,
     Fault,
     Region,
     Shared,
@@ -43,7 +44,7 @@ from factory.layout.dimensions import (
     PAYLOAD,
     PAYLOADS,
 )
-from factory.layout.exclusions import Exclusions, exclusions
+from factory.layout.exclusions import exclusions
 from factory.layout.guidepath import Box
 from factory.layout.layout import Layout
 from factory.layout.sweeps import Pile, piles, regions
@@ -88,10 +89,7 @@ def certify(layout: Layout) -> Certificate:
         tuple(search.shared.values()),
         (*faults[:MOST], *apart.faults[:MOST]),
         search.pairs,
-        apart.excluded,
-        apart.orders,
-        apart.passes,
-        apart.backs,
+        apart,
     )
 
 

@@ -17,6 +17,7 @@ from factory.layout.hands.leaving import raised
 from factory.layout.hands.limbs import rises_first
 from factory.layout.layout import Layout
 from factory.nets.coordinated import CoordinatedNet, Coordination, Past
+from factory.nets.gears import GearNet
 from factory.plant.factory import Operation
 
 HOME = 1e-3
@@ -36,11 +37,10 @@ class Served:
 
 
 @dataclass(frozen=True)
-class Coordinated:
+class Coordinated(CoordinatedNet):
     """The coordinated net of a layout. `served`: by the operation (index) that takes a part;
     `away`: the place in which the tray is away after a dropoff, by its operation (index)."""
 
-    net: CoordinatedNet
     served: Mapping[int, Served] = field(default_factory=dict, repr=False)
     away: Mapping[int, int] = field(default_factory=dict, repr=False)
 
@@ -71,7 +71,7 @@ def with_machines(
         _chain(layout, build, (factory.operations[after // 2], robot), [*along])
     for past, number in lifted:
         before, operation = factory.operations[past.after // 2], factory.operations[number]
-        robot = _way_of(layout, past)[1]
+        robot = layout.factory.robot_of(past.axis)
         name = f"order:{before.label}:{_axis(layout, past)}:{operation.label}"
         first = factory.robots[robot].operations[0]
         build.order(name, past, operation.start, int(first == number))
@@ -83,15 +83,24 @@ def with_machines(
         away[dropoff.index] = build.place(name, ends, int(then.turn == 0), "tray", dropoff.label)
     for order in orders:
         build.precede(order.name, (order.before, order.start), order.tokens)
-    return Coordinated(build.built(), served, away)
+    return _of(build, served, away)
+
+
+def without_bodies(net: GearNet) -> Coordinated:
+    """The coordinated net of a factory without bodies: the compiled one."""
+    return _of(Coordination(net), {}, {})
+
+
+def _of(build: Coordination, served: Mapping[int, Served], away: Mapping[int, int]) -> Coordinated:
+    made = build.built()
+    return Coordinated(made.net, made.passes, made.beside, made.orders, served, away)
 
 
 def _way_of(layout: Layout, past: Past) -> tuple[int, int, bool, float]:
     """The transition that a pass follows, its robot, and in which order the robot comes past
     points: its lift first, where that has to be up before it goes home."""
-    count = len(layout.factory.robots)
-    robot = past.axis if past.axis < count else layout.lifts[past.axis - count]
-    return past.after, robot, past.axis < count, past.at * past.direction
+    robot = layout.factory.robot_of(past.axis)
+    return past.after, robot, past.axis == robot, past.at * past.direction
 
 
 def _lifted(layout: Layout) -> Iterator[tuple[Past, int]]:
@@ -105,7 +114,7 @@ def _lifted(layout: Layout) -> Iterator[tuple[Past, int]]:
 
 def _axis(layout: Layout, past: Past) -> str:
     """Whose axis it is."""
-    robot = layout.factory.robots[_way_of(layout, past)[1]]
+    robot = layout.factory.robots[layout.factory.robot_of(past.axis)]
     return robot.name if past.axis == robot.index else f"{robot.name} up"
 
 

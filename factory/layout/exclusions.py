@@ -8,13 +8,21 @@ machine stands, or holds something, where another has to pass.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
 from heapq import heapify, heappop, heappush
 from itertools import product
 
 from factory.control.mode import ROUNDING
-from factory.layout.certificate import MILLI, Certificate, Excluded, Fault, Precedence, fault
+from factory.layout.certificate import (
+    MILLI,
+    Certificate,
+    Excluded,
+    Exclusions,
+    Fault,
+    Precedence,
+    fault,
+)
 from factory.layout.coordinating import Coordinated, with_machines
 from factory.layout.hands.leaving import SPARE, before_next, farther, gone_by, homes
 from factory.layout.hands.limbs import rises_first
@@ -22,7 +30,15 @@ from factory.layout.layout import Layout
 from factory.layout.machines import presences
 from factory.layout.presence import Near, Presence, near, nearer, nearest
 from factory.nets.coordinated import CoordinatedNet, Past
-from factory.nets.exclusion import Circuit, Pair, excluding, ordered
+from factory.nets.exclusion import (
+    Circuit,
+    Pair,
+    excluding,
+    marked_after,
+    ordered,
+    overlap,
+    times,
+)
 from factory.nets.marked import MarkedNet
 from factory.nets.verdict import listing
 from factory.plant.factory import Factory
@@ -32,19 +48,6 @@ ROUNDS = 8
 
 BISECTIONS = 12
 """Halvings of a way home until where it is clear is known."""
-
-
-@dataclass(frozen=True)
-class Exclusions:
-    """What keeps the machines of a layout apart: the pairs that come near, each with its circuit;
-    the passes on ways home, and the order places, that are needed for that; the robots (index) that
-    go back by themselves to an arc length [m]; and the pairs for which there is none."""
-
-    excluded: tuple[Excluded, ...] = ()
-    orders: tuple[Precedence, ...] = ()
-    passes: tuple[Past, ...] = ()
-    backs: tuple[tuple[int, float], ...] = ()
-    faults: tuple[Fault, ...] = field(default=())
 
 
 def coordinated(layout: Layout) -> Coordinated:
@@ -66,7 +69,7 @@ def goes_early(layout: Layout) -> list[tuple[int, int]]:
 def crowded(layout: Layout, certificate: Certificate) -> dict[int, float]:
     """How far robots are to go at the least, from where they deliver, so that hands that hold from
     above get out of the way before they come to where the next part comes down [m]."""
-    more = ((robot, at - before_next(layout, robot)) for robot, at in certificate.backs)
+    more = ((robot, at - before_next(layout, robot)) for robot, at in certificate.apart.backs)
     return {robot: farther(layout, robot, by) for robot, by in more if by > ROUNDING}
 
 
@@ -74,8 +77,7 @@ def kept(layout: Layout) -> Exclusions:
     """What keeps the machines of a layout apart: by its certificate, if that is of its factory."""
     certificate = layout.certificate
     if certificate is not None and certificate.is_of(layout.factory):
-        c = certificate
-        return Exclusions(c.excluded, c.orders, c.passes, c.backs)
+        return certificate.apart
     known: Exclusions | None = layout.__dict__.get("kept")
     if known is None:
         known = layout.__dict__["kept"] = exclusions(layout)
@@ -87,114 +89,104 @@ def exclusions(layout: Layout) -> Exclusions:
     new is found; what the net does not exclude then is ordered."""
     backs, passes = homes(layout), dict[Past, None]()
     for further in range(ROUNDS, -1, -1):
-        made = with_machines(layout, passes)
-        if made.net.deadlock:
-            return Exclusions(faults=(_stuck(layout, made.net),))
-        pairs = [*near([*presences(layout, made, backs)], layout.clearance)]
-        circuits = _circuits(made.net.net, dict(enumerate(pairs)))
+        net = with_machines(layout, passes)
+        if net.deadlock:
+            return Exclusions(faults=(_stuck(layout, net),))
+        sequence = one_unit(net.net, layout.factory)
+        pairs = [*near([*presences(layout, net, backs)], layout.clearance)]
+        circuits = _circuits(net.net, dict(enumerate(pairs)))
         needed = {
             n: pair
             for n, boxed in enumerate(pairs)
             if n not in circuits and (pair := nearer(boxed, layout.clearance)) is not None
         }
-        cuts = _cuts(layout, made, needed.values()) if further else []
+        cuts = _cuts(layout, net.net, sequence, needed.values()) if further else []
         if passes.keys() >= {*cuts}:
             break
         passes |= dict.fromkeys(cuts)
         for past in cuts:
             at = gone_by(layout, past.axis, past.at)
             backs[past.axis] = max(at, backs.get(past.axis, 0.0))
-    apart = _ordered(layout, made, pairs, circuits, needed)
-    whole = with_machines(layout, passes, apart.orders).net
-    if whole.deadlock:
+    orders, ordered_net = _orders(net, layout.factory, sequence, needed.values())
+    circuits |= _circuits(ordered_net, needed)
+    if (whole := with_machines(layout, passes, orders)).deadlock:
         return Exclusions(faults=(_stuck(layout, whole),))
-    return replace(apart, passes=tuple(passes), backs=tuple(backs.items()))
+    return Exclusions(
+        tuple(_excluded(ordered_net, pairs[n], circuit) for n, circuit in circuits.items()),
+        orders,
+        tuple(passes),
+        tuple(backs.items()),
+        tuple(_fault(layout, net.net, p) for n, p in needed.items() if n not in circuits),
+    )
 
 
-def _stuck(layout: Layout, coordination: CoordinatedNet) -> Fault:
+def _stuck(layout: Layout, net: CoordinatedNet) -> Fault:
     """A circuit of the coordinated net that carries no token: what is on it never moves."""
-    net, operations, circuit = coordination.net, layout.factory.operations, coordination.deadlock
-    events = (net.right[place] // 2 for place in circuit)
+    operations, circuit = layout.factory.operations, net.deadlock
+    events = (net.net.right[place] // 2 for place in circuit)
     robots = sorted({operations[n].carrier for n in events if n < len(operations)})
-    names = listing(net.net.places[place].name for place in circuit)
+    names = listing(net.net.net.places[place].name for place in circuit)
     return fault(layout.factory, f"these wait for each other for ever: {names}", *robots)
 
 
-def _cuts(layout: Layout, made: Coordinated, pairs: Iterable[Near]) -> list[Past]:
-    """Where ways home are clear of what they come near, for each pair that allows it."""
-    net = made.net.net
-    sequence = one_unit(net, layout.factory)
-    when = {event: time for time, event in enumerate(sequence)}
-    cuts = list[Past]()
+def _cuts(
+    layout: Layout, net: MarkedNet, sequence: Sequence[int], pairs: Iterable[Near]
+) -> list[Past]:
+    """Where ways home are clear of what they come near, for each pair that allows it: the shortest
+    way of both."""
+    when, cuts = times(net, sequence), list[Past]()
     for pair in pairs:
-        sides = (pair.one, pair.other), (pair.other, pair.one)
-        found = (_cut(layout, *both, when, net) for both in sides if both[0].since >= 0)
-        ways = [past for past in found if past is not None]
+        sides = ((pair.one, pair.other), (pair.other, pair.one))
+        ways = [
+            cut
+            for own, other in sides
+            if own.since >= 0
+            and not all(marked_after(net, when, place, own.since) for place in other.places)
+            and (cut := _cut(layout, own, other)) is not None
+        ]
         if ways:
-            cuts.append(
-                min(ways, key=lambda past: past.at - layout.legs[past.after // 2, past.axis][1])
-            )
+            legs = layout.legs
+            cuts.append(min(ways, key=lambda past: past.at - legs[past.after // 2, past.axis][1]))
     return cuts
 
 
-def _cut(
-    layout: Layout, own: Presence, other: Presence, when: Mapping[int, int], net: MarkedNet
-) -> Past | None:
-    """The pass by which a robot that goes home is clear of another machine; None where it never is,
-    or where that is there already as it sets out."""
+def _cut(layout: Layout, own: Presence, other: Presence) -> Past | None:
+    """The pass by which a robot that goes home is clear of another machine; None where it never
+    is, or always."""
     robot, since = own.robot, own.since
-    if all(_under_way(net, when, place, since) for place in other.places):
-        return None
     begin, home = layout.legs[since // 2, robot][1], layout.guidepaths[robot].length
     heights = [z for _, span in own.sweeps for z in span]
-    span = (min(heights), max(heights))
-    if rises_first(layout, robot):
-        span = (max(heights), max(heights))
+    low = max(heights) if rises_first(layout, robot) else min(heights)
 
     def clear(at: float) -> bool:
-        there = replace(own, sweeps=(((at, home), span),))
+        there = replace(own, sweeps=(((at, home), (low, max(heights))),))
         pair = nearest(there, other, layout.clearance)
         return pair is None or nearer(pair, layout.clearance) is None
 
-    if begin >= home or not clear(home - SPARE):
-        return None
-    low, high = begin, home - SPARE
-    if clear(low):
+    short, far = begin, home - SPARE
+    if begin >= home or not clear(far) or clear(short):
         return None
     for _ in range(BISECTIONS):
-        middle = (low + high) / 2
-        low, high = (low, middle) if clear(middle) else (middle, high)
-    return Past(since, robot, round(min(high + SPARE, home - SPARE), 6))
+        middle = (short + far) / 2
+        short, far = (short, middle) if clear(middle) else (middle, far)
+    return Past(since, robot, round(min(far + SPARE, home - SPARE), 6))
 
 
-def _under_way(net: MarkedNet, when: Mapping[int, int], place: int, event: int) -> bool:
-    """Whether a place is marked directly after a transition as one unit is made alone."""
-    begin, end, now = when[net.left[place]], when[net.right[place]], when[event]
-    return begin <= now < end if begin < end else now >= begin or now < end
-
-
-def _ordered(
-    layout: Layout,
-    made: Coordinated,
-    pairs: Sequence[Near],
-    circuits: dict[int, Circuit],
-    needed: Mapping[int, Near],
-) -> Exclusions:
-    """The pairs that come near, with order places for those that are not excluded yet."""
-    net, factory = made.net.net, layout.factory
-    whole, sequence, orders = net, one_unit(net, factory), list[Precedence]()
-    for by_magazine, starts in ((True, {}), (False, _starts(made.net, factory))):
-        asked = (p for p in needed.values() if (p.one.bears or p.other.bears) == by_magazine)
-        apart = (_orderable(net, sequence, pair) for pair in asked)
+def _orders(
+    net: CoordinatedNet, factory: Factory, sequence: Sequence[int], pairs: Collection[Near]
+) -> tuple[tuple[Precedence, ...], MarkedNet]:
+    """The order places by which pairs that come near are excluded, and the net with them: first
+    those for magazines, which no run keeps."""
+    whole, orders, when = net.net, list[Precedence](), times(net.net, sequence)
+    for by_magazine, starts in ((True, {}), (False, _starts(net, factory))):
+        asked = (pair for pair in pairs if (pair.one.bears or pair.other.bears) == by_magazine)
+        apart = (_orderable(net.net, when, pair) for pair in asked)
         wanted = [both for both in apart if both is not None]
         count, whole = len(whole.tokens), ordered(whole, sequence, wanted, starts).net
         orders += (
             _precedence(whole, place, not by_magazine) for place in range(count, len(whole.tokens))
         )
-    circuits |= _circuits(whole, needed)
-    excluded = tuple(_excluded(whole, pairs[n], circuit) for n, circuit in circuits.items())
-    faults = (_fault(layout, net, pair) for n, pair in needed.items() if n not in circuits)
-    return Exclusions(excluded, tuple(orders), (), (), tuple(faults))
+    return tuple(orders), whole
 
 
 def _precedence(net: MarkedNet, place: int, kept: bool) -> Precedence:
@@ -243,10 +235,10 @@ def one_unit(net: MarkedNet, factory: Factory) -> list[int]:
     return sequence
 
 
-def _orderable(net: MarkedNet, sequence: Sequence[int], pair: Near) -> Pair | None:
-    """Of the places of two presences two that the sequence does not mark at once: those that are
-    left last and entered first, None where there are none."""
-    apart = [both for both in _places(pair) if not ordered(net, sequence, [both]).overlapping]
+def _orderable(net: MarkedNet, when: Sequence[int], pair: Near) -> Pair | None:
+    """Of the places of two presences two that one unit made alone does not mark at once: those that
+    are left last and entered first, None where there are none."""
+    apart = [both for both in _places(pair) if not overlap(net, when, both)]
     return apart[-1] if apart else None
 
 

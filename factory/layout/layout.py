@@ -138,7 +138,7 @@ class Layout:
         """
         chosen = self.factory.operations[operation]
         if slot >= len(chosen.robots):
-            robot = self.lifts[self.factory.axes[operation][slot] - len(self.guidepaths)]
+            robot = self.factory.robot_of(self.factory.axes[operation][slot])
             level = self.level(robot, operation)
             return level.down if self.factory.delivers(robot, operation) else level.up
         path = self.guidepaths[chosen.robots[slot]]

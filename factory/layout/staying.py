@@ -211,15 +211,13 @@ class Staying:
 
     def _chains(self, after: int, robot: int) -> tuple[Chain, Chain]:
         """The passes of a robot's carriage that follow a transition, and of its lift."""
-        lifts = self.layout.lifts
-        lift = len(self.layout.guidepaths) + lifts.index(robot) if robot in lifts else -1
-        chains = self._by_axis
+        lift, chains = self.layout.factory.lift_axis.get(robot, -1), self._by_axis
         return chains.get((after, robot), NO_PASS), chains.get((after, lift), NO_PASS)
 
     @cached_property
     def _by_axis(self) -> Mapping[tuple[int, int], Chain]:
         """The chains by the transition that they follow and their axis."""
-        coordinated, passes = self.net.net, dict[tuple[int, int], list[Past]]()
+        coordinated, passes = self.net, dict[tuple[int, int], list[Past]]()
         for past in sorted(coordinated.passes, key=lambda past: past.at * past.direction):
             passes.setdefault((past.after, past.axis), []).append(past)
         net, after = coordinated.net, {coordinated.net.left[p]: p for p in coordinated.beside}

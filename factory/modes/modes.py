@@ -149,7 +149,7 @@ def _with_lifts(mode: Mode, layout: Layout, operation: Operation) -> Mode:
     axes = factory.axes[operation.index][count:]
     if not axes:
         return mode
-    robots = [layout.lifts[axis - len(factory.robots)] for axis in axes]
+    robots = [*map(factory.robot_of, axes)]
     strokes = np.array([layout.strokes[robot] for robot in robots])
     goals = np.array([layout.goal(operation.index, count + n) for n in range(len(axes))])
     lowers = np.array([factory.lowers(robot) for robot in robots]) & (goals < strokes)

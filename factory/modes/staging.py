@@ -85,7 +85,7 @@ def _rising(
     robot = operation.robots[slot]
     if not layout.factory.begins(robot, operation.index):
         return
-    axis = len(layout.factory.robots) + layout.lifts.index(robot)
+    axis = layout.factory.lift_axis[robot]
     raised = layout.factory.axes[operation.index].index(axis)
     stage = _ahead(operation, mode, raised, float(mode.goals[raised]), 0.0)
     yield replace(stage, robot=robot, axis=axis)
@@ -100,7 +100,7 @@ def _adjusting(
     robot = operation.robots[slot]
     if robot not in layout.factory.adjusted or not layout.factory.begins(robot, operation.index):
         return
-    axis = len(layout.factory.robots) + layout.lifts.index(robot)
+    axis = layout.factory.lift_axis[robot]
     raised = layout.factory.axes[operation.index].index(axis)
     goal, at = float(mode.goals[raised]), float(start[raised])
     if abs(goal - at) > ROUNDING:

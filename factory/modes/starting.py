@@ -14,8 +14,7 @@ def start_positions(layout: Layout, marking: Marking) -> np.ndarray:
     waits with no part at the beginning of its cycle, and then its lift may still be down, unless
     its hand is above what it takes; 0 for one that is gone."""
     factory, net = layout.factory, layout.factory.net
-    positions = np.zeros(len(factory.robots) + len(layout.lifts))
-    lifts = {robot: len(factory.robots) + n for n, robot in enumerate(layout.lifts)}
+    positions, lifts = np.zeros(len(factory.robots) + len(layout.lifts)), factory.lift_axis
     for robot, gear in zip(factory.robots, net.gears, strict=True):
         if not robot.operations:
             continue

@@ -128,11 +128,9 @@ class Coordination:
         self.orders.append(Order(past.after, start, tokens, past, *self._ends[past]))
 
     def precede(self, name: str, ends: tuple[str, str], tokens: int) -> None:
-        """An order place between two transitions of the net, by their names; none where one is not
-        of the net. A supervisor keeps it where the first is of the compiled net or a pass, and the
-        second the start of an operation."""
-        if not self._numbers.keys() >= {*ends}:
-            return
+        """An order place between two transitions of the net, by their names. A supervisor keeps it
+        where the first is of the compiled net or a pass, and the second the start of an
+        operation."""
         before, start = (self._numbers[end] for end in ends)
         past = next((past for past, event in self.events.items() if event == before), None)
         if past is not None:

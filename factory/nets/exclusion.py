@@ -67,11 +67,11 @@ def ordered(
     order places lead to that where the sequence lets them. Raises ValueError where it is no such
     sequence, or the net no marked graph.
     """
-    when = _times(net, sequence)
+    when = times(net, sequence)
     paths, added = _Paths(net), dict[Pair, list[_Arc]]()
     overlapping = []
     for p, q in dict.fromkeys(pairs):
-        if _overlap(net, when, (p, q)):
+        if overlap(net, when, (p, q)):
             overlapping.append((p, q))
             continue
         added[p, q] = []
@@ -181,8 +181,9 @@ def _back(arrived: Mapping[int, _Arc], source: int, goal: int) -> Circuit:
     return tuple(reversed(path))
 
 
-def _times(net: MarkedNet, sequence: Sequence[int]) -> list[int]:
-    """When each transition fires in a sequence that fires each once."""
+def times(net: MarkedNet, sequence: Sequence[int]) -> list[int]:
+    """When each transition fires in a sequence that fires each once, from the initial marking.
+    Raises ValueError where it is no such sequence."""
     when = [-1] * len(net.net.transitions)
     for time, event in enumerate(sequence):
         when[event] = time
@@ -195,7 +196,7 @@ def _times(net: MarkedNet, sequence: Sequence[int]) -> list[int]:
     return when
 
 
-def _overlap(net: MarkedNet, when: Sequence[int], pair: Pair) -> bool:
+def overlap(net: MarkedNet, when: Sequence[int], pair: Pair) -> bool:
     """Whether two places are marked together at some time of a sequence that returns to the
     marking. A place is marked from its producer on to its consumer, which may be in the next
     round."""
@@ -207,6 +208,12 @@ def _overlap(net: MarkedNet, when: Sequence[int], pair: Pair) -> bool:
     if q0 < q1:
         return not (p1 <= q0 and q1 <= p0)
     return True
+
+
+def marked_after(net: MarkedNet, when: Sequence[int], place: int, event: int) -> bool:
+    """Whether a place is marked directly after a transition in such a sequence."""
+    begin, end, now = when[net.left[place]], when[net.right[place]], when[event]
+    return begin <= now < end if begin < end else now >= begin or now < end
 
 
 def _arc(net: MarkedNet, when: Sequence[int], pair: Pair) -> _Arc:

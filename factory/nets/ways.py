@@ -51,21 +51,18 @@ def train_ratio(
             delays[wait] = max(delays[wait], taken - delays[number])
     delays += apart.values()
     found = max_cycle_ratio(with_ways(marked(gears), gears, apart), delays)
-    owners = {len(seconds) + number: key[:1] for number, key in enumerate(apart)}
-    return found, busiest(gears, owners, found.circuit, delays)
+    owners = dict(enumerate(gears.slots))
+    owners |= {len(seconds) + number: key[:1] for number, key in enumerate(apart)}
+    return found, busiest(owners, found.circuit, delays)
 
 
 def busiest(
-    gears: GearNet,
-    owners: Mapping[int, tuple[int, ...]],
-    circuit: Iterable[int],
-    seconds: Sequence[float],
+    owners: Mapping[int, tuple[int, ...]], circuit: Iterable[int], seconds: Sequence[float]
 ) -> list[int]:
-    """The robots on a circuit, those first that spend most seconds on it. All robots of an
-    operation do. `owners`: the robots of places beyond those of the gears; others are of none."""
-    robots = dict(enumerate(gears.slots)) | dict(owners)
+    """The robots on a circuit, those first that spend most seconds on it, with the robots of each
+    place, none for those that are left out. All robots of an operation do."""
     spent: dict[int, float] = {}
     for place in circuit:
-        for robot in robots.get(place, ()):
+        for robot in owners.get(place, ()):
             spent[robot] = spent.get(robot, 0.0) + seconds[place]
     return sorted(spent, key=lambda robot: (-spent[robot], robot))

@@ -253,14 +253,23 @@ class Factory:
         their robots' numbers, and the lifts that are raised or lowered in it, numbered from R on in
         the order of `strokes`. A lift is up but for the operations that it delivers to; one that is
         adjusted stays where it is on a tour."""
-        lift = {robot: len(self.robots) + n for n, robot in enumerate(self.strokes)}
         found = [list(operation.robots) for operation in self.operations]
-        for robot, axis in lift.items():
+        for robot, axis in self.lift_axis.items():
             for tour in self.tours[robot]:
                 ends = (tour[0],) if robot in self.adjusted else (tour[0], tour[-1])
                 for number in dict.fromkeys(ends):
                     found[number].append(axis)
         return tuple(map(tuple, found))
+
+    @cached_property
+    def lift_axis(self) -> Mapping[int, int]:
+        """The axis of the lift of each robot (index) that has one."""
+        return {robot: len(self.robots) + n for n, robot in enumerate(self.strokes)}
+
+    def robot_of(self, axis: int) -> int:
+        """The robot (index) of an axis: of its carriage, or of its lift."""
+        count = len(self.robots)
+        return axis if axis < count else [*self.strokes][axis - count]
 
     def lowers(self, robot: int) -> bool:
         """Whether a robot (index) lowers what it delivers."""

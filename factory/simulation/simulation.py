@@ -108,7 +108,7 @@ class Simulation:
             self.world = MujocoWorld(self.model, request, at, gains, self.counts, loaded)
         self.before = self.world.delivered()
         self.supervisor = (self._distributed if request.distributed else self._central)(stages)
-        self.supervisor.ordering = Ordering(self.timing.coordinated.net.orders)
+        self.supervisor.ordering = Ordering(self.timing.coordinated.orders)
         if self.start != net.initial_marking:
             self.supervisor.ordering.keep_passes()
 

@@ -156,7 +156,7 @@ def check_project(
 def _coordinated(project: Project) -> CoordinatedNet:
     from factory.layout.exclusions import coordinated
 
-    return coordinated(project.layout).net
+    return coordinated(project.layout)
 
 
 def _deputies(project: Project, factory: Factory) -> tuple[tuple[int, ...], ...]:

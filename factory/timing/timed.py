@@ -24,7 +24,7 @@ OUTFEED, FEEDER = "outfeed", "feeder"
 class Timed:
     """A net with the `seconds` that a token stays in each place. `ways`: the places of robots that
     go ahead while they wait, by robot and operation; `bounds`: those of a bound `wip` on what is
-    inside; `owners`: the robots that are in a place beyond those of the compiled net."""
+    inside; `owners`: the robots (indices) that are in a place."""
 
     timing: Timing
     net: MarkedNet
@@ -47,16 +47,13 @@ class Timed:
     @cached_property
     def busiest(self) -> list[int]:
         """The robots on the critical circuit, those first that spend most seconds on it."""
-        gears = self.timing.factory.net
-        return busiest(gears, self.owners, self.ratio.circuit, self.seconds)
+        return busiest(self.owners, self.ratio.circuit, self.seconds)
 
     @property
     def waited_for(self) -> list[int]:
         """The robots in places of their own on the critical circuit: for their hands, ways or turns
         another waits."""
-        gears = self.timing.factory.net
-        owners = dict(enumerate(gears.slots)) | dict(self.owners)
-        alone = (owners.get(place, ()) for place in self.ratio.circuit)
+        alone = (self.owners.get(place, ()) for place in self.ratio.circuit)
         return [*dict.fromkeys(robots[0] for robots in alone if len(robots) == 1)]
 
     @cached_property
@@ -98,11 +95,11 @@ def timed(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None) -> 
     net, count = _copied(timing, change), len(factory.net.threaded.places)
     delays = timing.changed(change)
     seconds = [*delays, *[0.0] * (len(net.tokens) - len(delays))]
-    owners: dict[int, tuple[int, ...]] = {}
+    owners = dict(enumerate(factory.net.slots))
     dates = timing.passes(change)
-    for past, (place, before) in coordinated.net.passes.items():
+    for past, (place, before) in coordinated.passes.items():
         seconds[place] = max(0.0, dates[past] - (dates[before] if before else 0.0))
-        owners[place] = (timing.robot_of(past.axis),)
+        owners[place] = (factory.robot_of(past.axis),)
     for number, served in coordinated.served.items():
         seconds[served.up], seconds[served.down] = timing.strokes[number]
     for place in coordinated.away.values():
@@ -128,7 +125,7 @@ def timed(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None) -> 
 
 def _copied(timing: Timing, change: Change) -> MarkedNet:
     """The coordinated net, in which the gear of a robot with copies has so many tokens."""
-    coordinated, factory = timing.coordinated.net, timing.factory
+    coordinated, factory = timing.coordinated, timing.factory
     tokens = list(coordinated.net.tokens)
     for robot, copies in change.copies.items():
         tokens[factory.net.initial[robot]] += copies - 1

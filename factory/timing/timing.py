@@ -11,7 +11,7 @@ import numpy as np
 
 from factory.control.mode import Array, Limits, Mode
 from factory.control.profile import SpeedProfile, World, mode_time
-from factory.layout.coordinating import HOME, Coordinated
+from factory.layout.coordinating import HOME, Coordinated, without_bodies
 from factory.layout.exclusions import coordinated
 from factory.layout.feeding import feeder_of
 from factory.layout.hands.limbs import rises_first
@@ -20,7 +20,7 @@ from factory.layout.outfeed import away, leaving
 from factory.modes.modes import operation_modes, operation_starts, robot_limits
 from factory.modes.staging import HeadStart, staged, stages_of, with_time
 from factory.modes.starting import start_positions
-from factory.nets.coordinated import Coordination, Past
+from factory.nets.coordinated import Past
 from factory.plant.factory import Factory
 from factory.support.settings import Settings
 
@@ -91,7 +91,7 @@ class Timing:
         one."""
         if self.world == "mujoco":
             return coordinated(self.layout)
-        return Coordinated(Coordination(self.factory.net).built())
+        return without_bodies(self.factory.net)
 
     @cached_property
     def left(self) -> list[Array]:
@@ -127,11 +127,11 @@ class Timing:
         """How long after the transition that it follows each pass of the coordinated net comes
         [s]: robots set out at once."""
         delays = self.changed(change)
-        return {past: self._past(past, delays, change) for past in self.coordinated.net.passes}
+        return {past: self._past(past, delays, change) for past in self.coordinated.passes}
 
     def _past(self, past: Past, delays: Sequence[float], change: Change) -> float:
         """When an axis comes past a point, from rest."""
-        layout, robot, number = self.layout, self.robot_of(past.axis), past.after // 2
+        layout, robot, number = self.layout, self.factory.robot_of(past.axis), past.after // 2
         profile = self._profile(past.axis, change)
         if past.axis != robot:
             return profile.passes(layout.strokes[robot], past.at)
@@ -145,8 +145,7 @@ class Timing:
             return profile.passes(way, way - left)
         rises = 0.0
         if rises_first(layout, robot):
-            axis = len(self.factory.robots) + layout.lifts.index(robot)
-            rises = self._profile(axis, change).rest(layout.strokes[robot])
+            rises = self._profile(self.factory.lift_axis[robot], change).rest(layout.strokes[robot])
         way = (layout.guidepaths[robot].length - begin[1]) * factor
         if past.at < layout.guidepaths[robot].length - HOME:
             return rises + profile.passes(way, min(way, (past.at - begin[1]) * factor))
@@ -190,13 +189,8 @@ class Timing:
         return up, max(0.0, down)
 
     def _profile(self, axis: int, change: Change) -> SpeedProfile:
-        limits = self._limits((axis,), (self.robot_of(axis),), change)
+        limits = self._limits((axis,), (self.factory.robot_of(axis),), change)
         return SpeedProfile(float(limits.speed[0]), float(limits.acceleration[0]))
-
-    def robot_of(self, axis: int) -> int:
-        """The robot (index) of an axis."""
-        count = len(self.factory.robots)
-        return axis if axis < count else self.layout.lifts[axis - count]
 
     @cached_property
     def first_ways(self) -> Mapping[tuple[int, int], float]:
@@ -233,7 +227,7 @@ class Timing:
 
     @cached_property
     def delays(self) -> tuple[float, ...]:
-        """The delay of every operation [s], as `factory.timing.prediction` has it."""
+        """The delay of every operation [s]."""
         return tuple(self.delay(number) for number in range(len(self.modes)))
 
     def delay(self, number: int, change: Change = AS_IT_IS) -> float:
@@ -293,7 +287,7 @@ class Timing:
 
     def _of(self, number: int) -> tuple[int, ...]:
         """The robot of each axis of an operation."""
-        return tuple(map(self.robot_of, self.factory.axes[number]))
+        return tuple(map(self.factory.robot_of, self.factory.axes[number]))
 
     def _delay(self, number: int, start: Array, change: Change) -> float:
         mode, robots = self.modes[number], self._of(number)

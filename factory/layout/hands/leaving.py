@@ -21,14 +21,14 @@ ON = 0.009
 def homes(layout: Layout) -> dict[int, float]:
     """The robots (index) whose hands have to be there before what they take, and where that is, an
     arc length [m]; unless others could be where a tall hand comes to."""
-    first = (
-        layout.factory.operations[r.operations[0]] for r in layout.factory.robots if r.operations
-    )
-    return {
-        robot: layout.guidepaths[robot].length
-        for (robot, hand), operation in zip(enumerate(layout.hands), first, strict=False)
-        if hand is not None and hand.first and not (operation.inputs and hand.tall)
-    }
+    operations, ways = layout.factory.operations, dict[int, float]()
+    for robot in layout.factory.robots:
+        hand = layout.hand(robot.index)
+        if hand is None or not hand.first or not robot.operations:
+            continue
+        if not (operations[robot.operations[0]].inputs and hand.tall):
+            ways[robot.index] = layout.guidepaths[robot.index].length
+    return ways
 
 
 def gone_by(layout: Layout, robot: int, least: float) -> float:
@@ -48,8 +48,7 @@ def before_next(layout: Layout, robot: int) -> float:
 
 def raised(layout: Layout, robot: int, after: int) -> Past:
     """When a robot's lift is up after an operation (index)."""
-    axis = len(layout.factory.robots) + list(layout.lifts).index(robot)
-    return Past(2 * after + 1, axis, layout.strokes[robot] - SPARE)
+    return Past(2 * after + 1, layout.factory.lift_axis[robot], layout.strokes[robot] - SPARE)
 
 
 def farther(layout: Layout, robot: int, by: float) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 
 from factory.control.mode import STILL, Array, Index, Truth
 from factory.control.profile import SpeedProfile
+from factory.layout.coordinating import HOME
 from factory.layout.feeding import Outlet, outlets_of, passing
 from factory.mjcf import names
 from factory.mjcf.model import Model
@@ -19,9 +20,6 @@ from factory.support.engine import mujoco
 
 LEVEL = 5e-4
 """A lift is where it is to be for a part within this [m]."""
-
-HOME = 1e-3
-"""A robot is at home within this [m]."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -92,7 +92,7 @@ class Deputising:
         own = [replace(s, robot=stay[s.robot], axis=axes[s.axis]) for s in stages]
         ordering = Ordering(
             replace(order, past=replace(order.past, axis=axes[order.past.axis]))
-            for order in timing.coordinated.net.orders
+            for order in timing.coordinated.orders
             if order.past is not None
         )
         self._books.supervisor.exchange(takeover.crew, modes, own, undone, fired, ordering)

@@ -102,7 +102,7 @@ class Returning:
     def home(self, robot: int) -> list[Goal]:
         """The way of a robot to the B end of its guidepath: its lift first, but for one that is set
         for what the robot holds, which goes back as high as it came."""
-        lift, layout = self._lift(robot), self._layout
+        lift, layout = self._layout.factory.lift_axis.get(robot), self._layout
         stays = robot in layout.factory.adjusted
         rise = [] if lift is None or stays else [(lift, _highest(layout, robot))]
         return [*rise, (robot, layout.guidepaths[robot].length)]
@@ -118,7 +118,7 @@ class Returning:
         to come down before it, it waits out of the way."""
         layout, gear = self._layout, self._layout.factory.net.gears[robot]
         step = next(i for i, place in enumerate(gear.places) if place in marking) // 2
-        at, lift = start_positions(layout, marking), self._lift(robot)
+        at, lift = start_positions(layout, marking), self._layout.factory.lift_axis.get(robot)
         goals = [(robot, _waiting(layout, robot, step))]
         if lift is None:
             return goals
@@ -132,10 +132,6 @@ class Returning:
         not begun."""
         x, _ = self._supervisor.world.sense()
         return any(abs(x[axis] - at) > LEFT for axis, at in self.rest(robot, marking))
-
-    def _lift(self, robot: int) -> int | None:
-        lifts = self._layout.lifts
-        return len(self._layout.guidepaths) + lifts.index(robot) if robot in lifts else None
 
 
 def order_of(mode: Mode, robots: Sequence[int]) -> tuple[int, ...]:
@@ -167,7 +163,7 @@ def _highest(layout: Layout, robot: int) -> float:
 def _goals(layout: Layout) -> Iterable[Goal]:
     """Every goal that a robot may be sent to."""
     factory = layout.factory
-    lifts = {robot: len(factory.robots) + n for n, robot in enumerate(layout.lifts)}
+    lifts = factory.lift_axis
     for robot in (robot for robot in factory.robots if robot.operations):
         yield _rounded((robot.index, layout.guidepaths[robot.index].length))
         for step, number in enumerate(robot.operations):

@@ -39,7 +39,7 @@ class Standing:
         self._now: frozenset[int] = frozenset()
         self.stood: list[Stood] = []
         factory = simulation.layout.factory
-        lifts = {r: len(factory.robots) + n for n, r in enumerate(simulation.layout.lifts)}
+        lifts = factory.lift_axis
         self._axes = [[r, lifts[r]] if r in lifts else [r] for r in range(len(factory.robots))]
         self._begun: dict[int, float] = {}
         self._went: dict[int, float] = {}

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from math import lcm
 
-from factory.nets.cycle_ratio import CycleRatio
 from factory.nets.marked import NONE, MarkedNet
 from factory.nets.petri import PetriNet, Place
 from factory.study.analysis.firing import Firings, settled_firings
@@ -42,7 +41,7 @@ class Circuit:
 
 
 @dataclass(frozen=True)
-class TimedNet:
+class TimedNet(Timed):
     """A timed net, and those of its circuits that have a name.
 
     In the ideal world the named circuits of a gear net without a bound `wip` are all its simple
@@ -54,46 +53,20 @@ class TimedNet:
     that set out at the beginning, where those are other times.
     """
 
-    timed: Timed
-    named: tuple[Circuit, ...] = field(repr=False)
+    named: tuple[Circuit, ...] = field(default=(), repr=False)
     first: Mapping[int, float] = field(default_factory=dict, repr=False)
     ready: Mapping[int, float] = field(default_factory=dict, repr=False)
 
     @property
-    def net(self) -> MarkedNet:
-        """The net."""
-        return self.timed.net
-
-    @property
-    def seconds(self) -> tuple[float, ...]:
-        """The time of each place [s]."""
-        return self.timed.seconds
-
-    @property
-    def ways(self) -> Mapping[tuple[int, int], int]:
-        """The places of robots that go ahead, by robot and operation."""
-        return self.timed.ways
-
-    @property
     def units(self) -> int:
         """How many products come in a cycle of the net."""
-        return self.timed.timing.factory.period
-
-    @property
-    def ratio(self) -> CycleRatio:
-        """The maximum cycle ratio with its proof."""
-        return self.timed.ratio
-
-    @property
-    def pace(self) -> float:
-        """The cycle time in the long run [s]."""
-        return self.timed.pace
+        return self.timing.factory.period
 
     @cached_property
     def circuits(self) -> tuple[Circuit, ...]:
         """Those with a name, the tightest through each bound, and the critical one, the slowest
         first."""
-        bounds = self.timed.bounds
+        bounds = self.bounds
         tightest = circuits(self.ratio, bounds) if bounds else ()
         found = [self._bounded(slack) for slack in tightest]
         found += self._meeting([*self.named, *found])
@@ -106,7 +79,7 @@ class TimedNet:
 
     def _bounded(self, slack: Slack) -> Circuit:
         tokens = sum(self.net.tokens[p] for p in slack.circuit)
-        names = [self.net.net.places[p].name for p in slack.circuit if p in self.timed.bounds]
+        names = [self.net.net.places[p].name for p in slack.circuit if p in self.bounds]
         seconds = sum(self.seconds[p] for p in slack.circuit)
         name = " ".join(names).replace(":", " ")
         return Circuit(name, seconds, tokens, slack.circuit, self.units)
@@ -115,9 +88,9 @@ class TimedNet:
         """The critical circuit, where none of those `known` is as slow."""
         if max(circuit.pace for circuit in known) >= self.pace * (1 - SAME):
             return []
-        places, robots = self.ratio.circuit, self.timed.timing.factory.robots
-        first = self.timed.busiest[0]
-        names = ", ".join(robots[robot].name for robot in self.timed.waited_for if robot != first)
+        places, robots = self.ratio.circuit, self.timing.factory.robots
+        first = self.busiest[0]
+        names = ", ".join(robots[robot].name for robot in self.waited_for if robot != first)
         return [
             Circuit(
                 f"{robots[first].name} with {names}" if names else robots[first].name,
@@ -162,13 +135,20 @@ def timed_net(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None)
         seconds.append(0.0)
         named.append(Circuit(name, seconds[operation.place], 1, circuit, factory.period))
     named += _machines(timing, made)
-    whole = replace(
-        made,
-        net=MarkedNet(PetriNet(made.net.net.transitions, tuple(places)), tuple(tokens)),
-        seconds=tuple(seconds),
-    )
+    whole = PetriNet(made.net.net.transitions, tuple(places))
     ready = {made.ways[key]: taken for key, taken in timing.first_ways.items() if key in made.ways}
-    return TimedNet(whole, tuple(named), timing.first, ready)
+    return TimedNet(
+        timing,
+        MarkedNet(whole, tuple(tokens)),
+        tuple(seconds),
+        made.ways,
+        made.bounds,
+        made.wip,
+        made.owners,
+        tuple(named),
+        timing.first,
+        ready,
+    )
 
 
 def _machines(timing: Timing, made: Timed) -> Iterator[Circuit]:
