@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from factory.geometry.meshes import Array
 from factory.support.engine import mujoco
@@ -20,21 +21,6 @@ SETTLING = 0.025
 RIGID = 1e-6
 """Bodies have settled when none of their vertices is further than this from its place beside the
 first [m]."""
-
-
-def _turning() -> Array:
-    """What the products (16,) of a unit quaternion's components add to the nine of the identity to
-    give those of its rotation matrix."""
-    found = np.zeros((4, 4, 3, 3))
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        for other in (j, k):
-            found[1 + other, 1 + other, i, i] = -2.0
-        found[1 + i, 1 + j, i, j] = found[1 + i, 1 + j, j, i] = 2.0
-        found[0, 1 + k, i, j], found[0, 1 + k, j, i] = -2.0, 2.0
-    return found.reshape(16, 9)
-
-
-_TURN = _turning()
 
 
 class Fusion:
@@ -98,12 +84,8 @@ class Fusion:
 
 
 def rotations(quaternions: Array) -> Array:
-    """Rotation matrices (n, 3, 3) of unit quaternions (n, 4); many times faster than SciPy's for
-    few."""
-    q = np.asarray(quaternions)
-    products = q[:, :, None] * q[:, None, :]
-    turns = np.eye(3).ravel() + products.reshape(-1, 16) @ _TURN
-    return np.asarray(turns.reshape(-1, 3, 3))
+    """Rotation matrices (n, 3, 3) of unit quaternions (n, 4)."""
+    return np.asarray(Rotation.from_quat(quaternions, scalar_first=True).as_matrix())
 
 
 def angles(turns: Array) -> Array:
