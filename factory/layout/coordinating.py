@@ -113,7 +113,7 @@ def _lifted(layout: Layout) -> Iterator[tuple[Past, int]]:
 
 
 def _axis(layout: Layout, past: Past) -> str:
-    """Whose axis it is."""
+    """The name of a pass's axis: that of its robot, `up` for a lift."""
     robot = layout.factory.robots[layout.factory.robot_of(past.axis)]
     return robot.name if past.axis == robot.index else f"{robot.name} up"
 
@@ -127,10 +127,10 @@ def _chain(
     names = {p: f"past:{_axis(layout, p)}:{p.at:.3f}:{operation.label}" for p in passes}
     name = factory.robots[robot].name
     if passes[0].after == operation.start:
-        said = "way", f"of {name} from its feeder"
-        build.chain(names, said, operation.end, operation.place)
+        kind = "way", f"of {name} from its feeder"
+        build.chain(names, kind, operation.end, operation.place)
         return
-    said = "hand", f"of {name} over {operation.label}"
+    kind = "hand", f"of {name} over {operation.label}"
     gear = factory.robots[robot].operations
     step = (gear.index(operation.index) + 1) % len(gear)
     then, wait = factory.operations[gear[step]], factory.net.gears[robot].places[2 * step]
@@ -138,7 +138,7 @@ def _chain(
         axis: layout.goal(then.index, slot) for slot, axis in enumerate(factory.axes[then.index])
     }
     beyond = all(past.axis in goals and past.holds(goals[past.axis]) for past in passes)
-    build.chain(names, said, then.end if beyond else then.start, wait)
+    build.chain(names, kind, then.end if beyond else then.start, wait)
 
 
 def _feedings(layout: Layout) -> Iterator[_Feeding]:

@@ -2,8 +2,8 @@
 are never in both at once.
 
 Either a circuit of the net that carries one token goes through both places, or order places are
-added for them, which one unit made alone tells. What one unit made alone marks both is a fault: a
-machine stands, or holds something, where another has to pass.
+added, in the order in which a single unit is made. A pair that is marked together while a single
+unit is made is a fault: a machine stands, or holds something, where another has to pass.
 """
 
 from __future__ import annotations
@@ -44,10 +44,10 @@ from factory.nets.verdict import listing
 from factory.plant.factory import Factory
 
 ROUNDS = 8
-"""So often it is looked at again, as ways home are cut."""
+"""Most rounds in which ways home are cut."""
 
 BISECTIONS = 12
-"""Halvings of a way home until where it is clear is known."""
+"""Bisection steps to the point from which on a way home is clear."""
 
 
 def coordinated(layout: Layout) -> Coordinated:
@@ -85,8 +85,8 @@ def kept(layout: Layout) -> Exclusions:
 
 
 def exclusions(layout: Layout) -> Exclusions:
-    """The same, found: ways home are cut where they are clear of what comes near, until nothing
-    new is found; what the net does not exclude then is ordered."""
+    """Find what keeps the machines of a layout apart: ways home are cut where they are clear of
+    what comes near, until there is no new cut; what the net does not exclude then is ordered."""
     backs, passes = homes(layout), dict[Past, None]()
     for further in range(ROUNDS, -1, -1):
         net = with_machines(layout, passes)
@@ -269,8 +269,8 @@ def _fault(layout: Layout, net: MarkedNet, pair: Near) -> Fault:
         for side, body in zip((pair.one, pair.other), pair.bodies, strict=True)
     )
     message = (
-        f"{one} and {other} come {pair.lacking * MILLI:.2f} mm nearer than they may; one unit made"
-        " alone has both at once"
+        f"{one} and {other} come {pair.lacking * MILLI:.2f} mm nearer than they may; making"
+        " a single unit needs both at once"
     )
     robots = pair.one.robot, pair.other.robot
     return fault(layout.factory, message, *robots, lacking=pair.lacking)

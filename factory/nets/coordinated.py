@@ -94,42 +94,42 @@ class Coordination:
         self.orders: list[Order] = []
 
     def transition(self, name: str) -> int:
-        """A transition more."""
+        """Add a transition; gives its index."""
         self.transitions.append(Transition(name))
         return len(self.transitions) - 1
 
     def place(self, name: str, ends: tuple[int, int], tokens: int, mode: str, label: str) -> int:
-        """A place [before; after] more."""
+        """Add a place [before; after], its `ends`; gives its index."""
         before, after = ends
         self.places.append(Place(name, (before,), (after,), mode, label, 0))
         self.tokens.append(tokens)
         return len(self.places) - 1
 
     def chain(
-        self, passes: Mapping[Past, str], said: tuple[str, str], end: int, beside: int
+        self, passes: Mapping[Past, str], kind: tuple[str, str], end: int, beside: int
     ) -> None:
-        """Passes that come one after the other, with their names, between the transition that all
-        of them follow and the transition `end`, with as many tokens as a place that they are
-        `beside`; `said`: the mode and the label of their places."""
+        """Add a path of passes, with their names, from the transition that all of them follow to
+        the transition `end`. It carries as many tokens as the place of the compiled net that it is
+        `beside`; `kind`: mode and label of its places."""
         before: Past | None = None
         for past, name in passes.items():
             start = past.after if before is None else self.events[before]
             event = self.events[past] = self.transition(name)
-            self.passes[past] = self.place(name, (start, event), 0, *said), before
+            self.passes[past] = self.place(name, (start, event), 0, *kind), before
             self._ends[past] = end, self.tokens[beside]
             before = past
         if before is not None:
             name, ends = f"{passes[before]} on", (self.events[before], end)
-            self.beside[self.place(name, ends, self.tokens[beside], *said)] = beside
+            self.beside[self.place(name, ends, self.tokens[beside], *kind)] = beside
 
     def order(self, name: str, past: Past, start: int, tokens: int) -> None:
-        """An order place, from a pass to a transition of the compiled net."""
+        """Add an order place from a pass to a transition of the compiled net."""
         self.place(name, (self.events[past], start), tokens, "order", name)
         self.orders.append(Order(past.after, start, tokens, past, *self._ends[past]))
 
     def precede(self, name: str, ends: tuple[str, str], tokens: int) -> None:
-        """An order place between two transitions of the net, by their names. A supervisor keeps it
-        where the first is of the compiled net or a pass, and the second the start of an
+        """Add an order place between two transitions of the net, by their names. A supervisor keeps
+        it where the first is of the compiled net or a pass, and the second the start of an
         operation."""
         before, start = (self._numbers[end] for end in ends)
         past = next((past for past, event in self.events.items() if event == before), None)
