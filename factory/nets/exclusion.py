@@ -198,20 +198,14 @@ def times(net: MarkedNet, sequence: Sequence[int]) -> list[int]:
 
 def overlap(net: MarkedNet, when: Sequence[int], pair: Pair) -> bool:
     """Whether two places are marked together at some time of a sequence that returns to the
-    marking. A place is marked from its producer on to its consumer, which may be in the next
-    round."""
-    (p0, p1), (q0, q1) = ((when[net.left[p]], when[net.right[p]]) for p in pair)
-    if p0 < p1 and q0 < q1:
-        return p0 < q1 and q0 < p1
-    if p0 < p1:
-        return not (q1 <= p0 and p1 <= q0)
-    if q0 < q1:
-        return not (p1 <= q0 and q1 <= p0)
-    return True
+    marking: one is where the other becomes marked."""
+    p, q = pair
+    return marked_after(net, when, p, net.left[q]) or marked_after(net, when, q, net.left[p])
 
 
 def marked_after(net: MarkedNet, when: Sequence[int], place: int, event: int) -> bool:
-    """Whether a place is marked directly after a transition in such a sequence."""
+    """Whether a place is marked directly after a transition in such a sequence: from its producer
+    on to its consumer, which may be in the next round."""
     begin, end, now = when[net.left[place]], when[net.right[place]], when[event]
     return begin <= now < end if begin < end else now >= begin or now < end
 
