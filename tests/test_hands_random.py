@@ -7,7 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from factory.layout.dimensions import TOOL_TRAVEL
+from factory.layout.shapes import is_tool
 from factory.pipeline import Project, read
+from factory.problem.plan import Plan
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.simulation.watched import watched
@@ -140,3 +143,18 @@ def test_hands_hold_and_meet_nothing(seed: int, tmp_path: Path) -> None:
 def test_hands_of_few_robots_meet_nothing(seed: int, tmp_path: Path) -> None:
     project = allocated(project_of(random_blocks(seed), tmp_path), Aim(LEAST, effort=12))
     succeeds(project, seed, 3, 0.3 * (seed % 2))
+
+
+def test_a_tool_comes_from_behind_what_is_held_nearer_to_it(tmp_path: Path) -> None:
+    """A carrier that holds one part in another place than the next stands so that the tool stops
+    early for one of them: its home is farther out than that."""
+    forms = {"s6/2": 0, "s4/2": 1, "s5/2": 1, "s3": 0, "s1": 0}
+    turns = ((0, 1, 1, 2, 3, 3, 4, 5, 6, 6, 6),)
+    project = project_of(random_product(2611280006), tmp_path)
+    layout = project.with_plan(Plan(forms, {}, turns)).layout
+    (tool,) = (robot for robot in layout.factory.robots if is_tool(layout.factory, robot.index))
+    (weld,) = tool.operations
+    slot = layout.factory.operations[weld].robots.index(tool.index)
+    assert layout.apart(weld, slot)[0] > 0
+    stands = layout.goal(weld, slot)
+    assert layout.guidepaths[tool.index].length - stands >= TOOL_TRAVEL

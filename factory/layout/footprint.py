@@ -160,6 +160,15 @@ class Footprint:
         aside = {o.index: shapes[0][1].shift(o.index)[1] for o in stop.operations}
         return {n: round(far - self.shape.shift(n)[0], 6) for n, far in aside.items()}
 
+    def early(self, stop: Stop, side: int, guest: Shape) -> float:
+        """How much earlier than at the end of its guidepath one that delivers from a side does so
+        at the most, since both hold in other places what they bring for the operations of a stop
+        [m]."""
+        found = (
+            guest.shift(o.index)[0] + side * self.shape.shift(o.index)[1] for o in stop.operations
+        )
+        return max(found, default=0.0)
+
 
 def footprint(
     factory: Factory, robot: int, shape: Shape, clearance: Clearance, corridor: bool = False

@@ -120,7 +120,7 @@ class Packing:
             yield self._added(way, stop, least, ())
             return
         for sides in self._options(stop, robots):
-            alternatives = (self._guests(way, r, side) for r, side in sides.items())
+            alternatives = (self._guests(way, stop, r, side) for r, side in sides.items())
             for guests in product(*alternatives):
                 if not way.piles:
                     yield self._added(way, stop, 0.0, guests)
@@ -141,11 +141,13 @@ class Packing:
                 for robot, side in sides.items():
                     yield side, self.outline(robot, side)
 
-    def _guests(self, way: _Way, robot: int, side: int) -> list[Guest]:
+    def _guests(self, way: _Way, stop: Stop, robot: int, side: int) -> list[Guest]:
         """A robot that delivers from a side, as near as can be, or with its crown so far out that
         robots without one that deliver soon find room before it."""
         outline, strip = self.outline(robot, side), self.own.strips[side]
-        near = Guest(robot, outline, side, outline.clear(strip))
+        early = self.own.early(stop, side, outline.shape)
+        wanted = up(outline.least + early) if early > 0 else 0.0
+        near = Guest(robot, outline, side, max(outline.clear(strip), wanted), wanted)
         if outline.crown == -inf:
             return [near]
         depths = (
