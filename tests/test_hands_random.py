@@ -99,6 +99,7 @@ MET = {
     2499: "a lift rises through what is brought",
     2611261150: "what a lift raises its hand from is higher than that beside it",
     261125186: "what waits is beside a hand that reaches over the line",
+    2611270266: "a hand above is narrower than its beam, which what is lowered meets",
 }
 """Random products whose hands met, each for a cause of its own."""
 

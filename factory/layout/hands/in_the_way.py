@@ -17,7 +17,7 @@ from factory.layout.hands.apart import BESIDE, HandsApart, Swept
 from factory.layout.hands.hand import Hand, Kind
 from factory.layout.hands.holding import Holding, held
 from factory.layout.hands.places import SMALL, Places
-from factory.layout.hands.reach import back, halves, reach
+from factory.layout.hands.reach import back, halves, reach, under_beam
 from factory.layout.hands.surfaces import Way, hit, retreat, swept
 from factory.layout.hands.tips import STRONG
 from factory.plant.factory import Operation
@@ -214,8 +214,9 @@ class InTheWay:
                 whole = held(self.holding.factory, robot, at_last=True)
                 yield (*swept(low, high, back(u)), self.holding.boxes(whole))
             return
+        broad = under_beam(kind, low, high, found.radius)
         for boxes in self._from_above(last, robot, (u,)):
-            yield (*swept(low, high, back(u)), boxes)
+            yield (*swept(*broad, back(u)), boxes)
         lifted = robot in self.holding.factory.strokes
         gone = swept(low, high) if kind == "above" and lifted else swept(low, high, back(u))
         if kind == "below":
@@ -304,7 +305,7 @@ class InTheWay:
 
     def _lowered(self, robot: int, kind: Kind, found: Places, u: Way) -> Iterator[Swept]:
         """The same of each input that comes down to a carrier from above."""
-        low, high = self.reach(kind, found, u)
+        low, high = under_beam(kind, *self.reach(kind, found, u), found.radius)
         if kind != "below":
             low, high = swept(low, high, back(u))
         for operation in self.holding.made(robot):

@@ -6,6 +6,7 @@ import numpy as np
 
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
+from factory.layout.dimensions import FINGER
 from factory.layout.hands.hand import AIR, BEAM, Kind, widths
 from factory.layout.hands.surfaces import Way
 
@@ -29,6 +30,12 @@ def reach(product: Product, kind: Kind, at: Array, radius: Array, u: Way) -> tup
         axis, ahead = (0, u[0]) if u[0] else (1, u[1])
         (high if ahead > 0 else low)[:, axis] = at[:, axis] - ahead * AIR
     return low, high
+
+
+def under_beam(kind: Kind, low: Array, high: Array, radius: Array) -> tuple[Array, Array]:
+    """The same as what comes from above sees it: hands above are as broad as their beams."""
+    more = np.maximum(0.0, FINGER / 2 - radius)[:, None] * [1.0, 1.0, 0.0] * (kind == "above")
+    return low - more, high + more
 
 
 def halves(radius: Array) -> Array:
