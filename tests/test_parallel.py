@@ -458,3 +458,12 @@ def test_a_log_is_of_its_branches(run: Terminal, file: Path, tmp_path: Path) -> 
     net = tmp_path / "net.pnml"
     assert run("export", file, *options[1:], "--format", "pnml", "-o", net).status == 0
     assert run("check", net).status == 0
+
+
+def test_a_unit_waits_for_none_that_comes_after_it() -> None:
+    """Units are made one after the other in the order by which machines are kept apart: the last
+    unit that is asked for does not wait for a part of a unit that nobody asks for."""
+    layout = read("examples/truck.pag").with_branches([("log2", 2)]).layout
+    turns = [layout.factory.operations[number].turn for number in layout.factory.order]
+    assert turns == sorted(turns)
+    assert watched(Simulation(layout, RunRequest(units=1)), max_time=120.0).succeeded

@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import pairwise
+from heapq import heappop, heappush
+from itertools import count, pairwise
 from types import MappingProxyType
 
 from factory.nets.gears import GearNet
@@ -200,8 +201,9 @@ class Factory:
 
     @cached_property
     def order(self) -> tuple[int, ...]:
-        """The operations in an order in which every robot's program ascends, dropoff last: so one
-        unit can be made. Raises ValueError where there is none: then the net is not live."""
+        """The operations in an order in which every robot's program ascends, unit by unit, each
+        unit's dropoff last: so units can be made one after the other. Raises ValueError where there
+        is none: then the net is not live."""
         if not self.folded:
             return (*reversed(range(len(self.operations) - 1)), len(self.operations) - 1)
         waits = [len(operation.robots) for operation in self.operations]
@@ -210,15 +212,19 @@ class Factory:
             waits[robot.operations[0]] -= 1
             for before, number in pairwise(robot.operations):
                 onward[before].append(number)
-        found = [number for number, count in enumerate(waits) if not count]
-        for number in found:
+        came, ordered, ready = count(), list[int](), list[tuple[int, int, int]]()
+        free = [number for number, left in enumerate(waits) if not left]
+        while free or ready:
+            for number in free:
+                heappush(ready, (self.operations[number].turn, next(came), number))
+            *_, number = heappop(ready)
+            ordered.append(number)
             for after in onward[number]:
                 waits[after] -= 1
-                if not waits[after]:
-                    found.append(after)
-        if len(found) < len(self.operations):
+            free = [after for after in onward[number] if not waits[after]]
+        if len(ordered) < len(self.operations):
             raise ValueError("the robots' programs wait for each other: the net is not live")
-        return tuple(found)
+        return tuple(ordered)
 
     @cached_property
     def postorder(self) -> tuple[int, ...]:
