@@ -11,8 +11,9 @@ from factory.nets.petri import Marking
 
 def start_positions(layout: Layout, marking: Marking) -> np.ndarray:
     """Every axis in a marking: a robot where its last operation left it, or at its B end where it
-    waits with no part at the beginning of its cycle, and then its lift may still be down, unless
-    its hand is above what it takes; 0 for one that is gone."""
+    waits with no part at the beginning of its cycle, and then its lift is where its last tour
+    leaves it, unless that is set by then, or its hand is above what it takes; 0 for one that is
+    gone."""
     factory, net = layout.factory, layout.factory.net
     positions, lifts = np.zeros(len(factory.robots) + len(layout.lifts)), factory.lift_axis
     for robot, gear in zip(factory.robots, net.gears, strict=True):
@@ -21,7 +22,8 @@ def start_positions(layout: Layout, marking: Marking) -> np.ndarray:
         step = next(i for i, place in enumerate(gear.places) if place in marking) // 2
         positions[robot.index] = layout.home(robot.index, robot.operations[step])
         always = robot.index in factory.adjusted or rises_first(layout, robot.index)
-        if robot.index in lifts and (step or always):
+        if robot.index in lifts:
             level = layout.level(robot.index, robot.operations[step])
-            positions[lifts[robot.index]] = level.up
+            last = layout.level(robot.index, robot.operations[step - 1])
+            positions[lifts[robot.index]] = level.up if step or always else last.down
     return positions
