@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import factory
-from factory.export.grip_picture import picture_names
 from factory.layout.hands.misses import NoGrip
 from factory.layout.hands.tips import STRONG
 from factory.pipeline import read
@@ -185,12 +184,3 @@ def test_without_hands_nothing_is_listed_or_drawn(run: Terminal, tub: Path, out:
     assert run("check", tub, "--hands", "--json").json["no_grips"]
     stool = run("check", ROOT / "examples" / "stool.pag", "--clashes", out, "--json")
     assert stool.json["no_grips"] == [] and not list(out.iterdir())
-
-
-def test_names_of_pictures_are_safe_and_differ() -> None:
-    (grip, *_) = of_the_gearbox()
-    labels = ["../../etc/x", "a/2", "a_2", "..", "x" * 300]
-    fakes = [NoGrip(label, grip.robot, grip.parts, grip.beside, grip.misses) for label in labels]
-    names = picture_names(fakes)
-    assert len(set(names)) == len(labels)
-    assert all("/" not in name and len(name) < 60 for name in names)

@@ -1,6 +1,6 @@
-"""Pictures of what no hand can hold as SVG: for each kind of hand its nearest miss with what is in
-its way, from the side, and all places that were tried, face on. The robot heads to the right where
-that is seen. The same product gives the same bytes."""
+"""Pictures of sub-assemblies that no hand can hold as SVG: for each kind of hand its nearest miss
+with the obstacles, from the side, and all places that were tried, face on. The robot heads to the
+right in the side view."""
 
 from __future__ import annotations
 
@@ -9,37 +9,28 @@ from pathlib import Path
 
 import numpy as np
 
-from factory.export.part_view import PartView
+from factory.export.product_view import EDGE, ROW, PartView, ViewSheet, picture_names
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
 from factory.layout.hands.misses import Miss, NoGrip
-from factory.support.canvas import Canvas, Point, shortened
+from factory.support.canvas import shortened
 
-WIDTH, TALL, EDGE, HEAD, GAP, BETWEEN = 560.0, 330.0, 50.0, 92.0, 108.0, 40.0
-"""Of the sheet: the width of a view and its height at most, the margin, the room for the title,
-above a row of views, and between two."""
+HEAD, GAP, INDENT = 92.0, 108.0, 150.0
+"""Height of the title, height of the words above a row of views, indentation of these."""
 
 ROOM = 0.3
-"""Around the sub-assembly so much of its length is shown."""
-
-ROW = 36.0
-"""Room below a row of views."""
+"""Margin around the sub-assembly, as a share of its length."""
 
 DOT, RING = 2.4, 9.0
 """Radii of a place that was tried, and of the ring around the nearest miss."""
 
-UNIT = 21.4
-"""What the sizes of the legend are multiples of."""
-
 LINE = 112
-"""The most letters of a line of words."""
+"""Greatest number of letters in a line of words."""
 
 WAYS = {"below": "from below", "behind": "from behind", "above": "from above"}
-"""From where a kind of hand holds."""
+"""Direction from which a kind of hand holds."""
 
 STYLE = """
-.view { fill: #fbfbfa; stroke: #cbd2d9; stroke-width: 1.5; }
-path { stroke-linejoin: round; fill-rule: evenodd; }
 .beside { fill: #d9dde3; stroke: #a3adba; stroke-width: 1; fill-opacity: 0.4; }
 .held { fill: #6f9fd8; stroke: #274f82; stroke-width: 1.5; fill-opacity: 0.6; }
 .obstacle { fill: #f2a73d; stroke: #8f5a0c; stroke-width: 1.5; fill-opacity: 0.45; }
@@ -49,155 +40,107 @@ path { stroke-linejoin: round; fill-rule: evenodd; }
 .met { fill: #d3122a; stroke: #8e0717; stroke-width: 1; fill-opacity: 0.6; }
 .tried { fill: #1f2933; stroke: #ffffff; stroke-width: 0.8; }
 .nearest { fill: none; stroke: #d3122a; stroke-width: 3; }
-.name { stroke: #ffffff; stroke-width: 4; paint-order: stroke; font-weight: bold; }
 """
 
 
-def picture_names(found: Sequence[NoGrip]) -> list[str]:
-    """A file name for each: numbered, so that no two are the same, with what of the label is safe
-    in a name."""
-    safe = ("".join(c if c.isalnum() or c in "-_." else "_" for c in g.label) for g in found)
-    return [f"grip-{n:03d}-{name[:40]}.svg" for n, name in enumerate(safe, start=1)]
-
-
-def pictures(folder: Path, found: Sequence[NoGrip], product: Product) -> dict[Path, bytes]:
+def pictures(folder: Path, grips: Sequence[NoGrip], product: Product) -> dict[Path, bytes]:
     """The files to write: a picture of everything that no hand can hold."""
+    names = picture_names("grip", (grip.label for grip in grips))
     return {
-        folder / name: draw(grip, product).encode()
-        for name, grip in zip(picture_names(found), found, strict=True)
+        folder / name: _GripSheet(grip, product).text().encode()
+        for name, grip in zip(names, grips, strict=True)
     }
 
 
-def draw(grip: NoGrip, product: Product) -> str:
-    """The picture of one sub-assembly that no hand can hold."""
-    return _Picture(grip, product).text()
-
-
-class _Picture:
-    """Draws it on a canvas: a row of two views for each kind of hand, all at one scale [1/m]."""
+class _GripSheet(ViewSheet):
+    """A row of two views for each kind of hand."""
 
     def __init__(self, grip: NoGrip, product: Product) -> None:
-        self.grip, self.product, self.canvas = grip, product, Canvas()
         solids = [product.solids[part] for part in grip.parts]
         low = np.min([solid.low for solid in solids], axis=0)
         high = np.max([solid.high for solid in solids], axis=0)
-        self.middle, span = (low + high) / 2, high - low
-        room = ROOM * float(span.max())
-        self.half = span / 2 + room
-        level = 2 * float(self.half[:2].max())
-        self.scale = min(WIDTH / level, TALL / max(2 * float(self.half[2]), level))
+        super().__init__(product, low, high, ROOM)
+        self.grip = grip
 
     def text(self) -> str:
         """The document."""
-        grip, canvas = self.grip, self.canvas
-        canvas.text((EDGE, 34), f"No hand can hold {shortened(grip.label)}", 24, "h")
-        words = f"{grip.robot} would carry it; the nearest miss of each kind of hand, with what is"
-        canvas.text((EDGE, 66), f"{words} in its way", 17)
+        label = self.grip.label
+        self.canvas.text((EDGE, 34), f"No hand can hold {shortened(label)}", 24, "h")
+        words = "would carry it; the nearest miss of each kind of hand, with what is in its way"
+        self.canvas.text((EDGE, 66), f"{self.grip.robot} {words}", 17)
         y = HEAD
-        for miss in grip.misses:
+        for miss in self.grip.misses:
             y = self._row(miss, y)
-        canvas.scale_bar((EDGE, y), WIDTH / 3, 15, self.scale / 1e3)
-        entries = [("held", shortened(grip.label)), ("obstacle", "in the way")]
-        entries += [
+        entries = [
+            ("held", shortened(label)),
+            ("obstacle", "in the way"),
             ("beside", "other parts"),
             ("hand", "hand"),
             ("way", "way of the hand, or of the part"),
+            ("met", "in both"),
+            ("tried", "place tried"),
         ]
-        entries += [("met", "in both"), ("tried", "place tried")]
-        right = EDGE + 2 * WIDTH + BETWEEN
-        below = canvas.legend(entries, (EDGE, y + 48), right, UNIT)
-        page = 0.0, EDGE + right, 0.0, below + 2
-        return canvas.document(f"{grip.label}: no hand can hold it", page, STYLE)
+        return self.document(f"{label}: no hand can hold it", y, entries, STYLE)
 
     def _row(self, miss: Miss, y: float) -> float:
-        """The words and views of one kind; gives y below them."""
-        kind = WAYS[miss.kind]
-        self.canvas.text((EDGE, y + 22), kind.capitalize(), 19, "h")
+        """The words and views of one kind of hand; returns the height below them."""
+        kind, canvas = WAYS[miss.kind], self.canvas
+        canvas.text((EDGE, y + 22), kind.capitalize(), 19, "h")
         if miss.at is None:
-            self.canvas.text((EDGE + 150, y + 22), "there is no place for a pad", 17)
+            canvas.text((EDGE + INDENT, y + 22), "there is no place for a pad", 17)
             return y + 22 + ROW
         at = ", ".join(f"{c * 1e3:.4g}" for c in miss.at)
         words = f"{len(miss.tried)} places tried, none clear; nearest miss at ({at}) mm"
-        words += f", where {miss.strength}"
-        self.canvas.text((EDGE + 150, y + 22), words, 17)
-        named = f"in its way: {', '.join(found.named for found in miss.obstacles)}"
+        canvas.text((EDGE + INDENT, y + 22), f"{words}, where {miss.strength}", 17)
+        named = f"in its way: {', '.join(obstacle.named for obstacle in miss.obstacles)}"
         cut = named if len(named) <= LINE else f"{named[: LINE - 1]}…"
-        self.canvas.text((EDGE + 150, y + 50), cut, 17, title="" if cut == named else named)
+        title = "" if cut == named else named
+        canvas.text((EDGE + INDENT, y + 50), cut, 17, title=title)
         u, z = np.array([*miss.heading, 0.0]), np.array([0.0, 0.0, 1.0])
         left = np.cross(z, u)
         faces = {"below": (u, -left), "above": (u, left), "behind": (-left, z)}
-        top = y + GAP
         views = [
-            self._framed("seen from the side", (u, z), EDGE, top),
-            self._framed(f"seen {kind}", faces[miss.kind], EDGE + WIDTH + BETWEEN, top),
+            self.view("seen from the side", (u, z), 0, y + GAP),
+            self.view(f"seen {kind}", faces[miss.kind], 1, y + GAP),
         ]
+        self.arrow(views[0], 1, "the robot heads")
         for view, tried in zip(views, (miss.tried[:0], miss.tried), strict=True):
-            with self.canvas.group(id=f"{miss.kind}-{view.name.split()[-1]}"):
-                self._view(view, miss)
-                self._marks(view, miss, tried)
-        self._arrow(views[0])
+            with canvas.group(id=f"{miss.kind}-{view.name.split()[-1]}"):
+                self._draw(view, miss)
+                self._mark(view, miss, tried)
         return max(view.box[3] for view in views) + ROW
 
-    def _framed(self, name: str, axes: tuple[Array, Array], left: float, top: float) -> PartView:
-        """A view of the sub-assembly with room around it."""
-        both = np.stack(axes)
-        middle, half = both @ self.middle, np.abs(both) @ self.half
-        half[0] = WIDTH / 2 / self.scale
-        box = left, left + WIDTH, top, top + 2 * float(half[1]) * self.scale
-        return PartView(name, both, middle - half, middle + half, self.scale, box)
-
-    def _view(self, view: PartView, miss: Miss) -> None:
-        """The parts, those farther away first, then the hand, its way and what it meets there."""
-        canvas, solids = self.canvas, self.product.solids
-        canvas.rectangle(view.box, "view")
-        canvas.text((view.box[0], view.box[2] - 16), view.name, 16, "grey")
-        held, meets = frozenset(self.grip.parts), frozenset(miss.parts)
-        shown = sorted(
-            (*self.grip.parts, *self.grip.beside), key=lambda n: float(view.nearness(solids[n]))
-        )
-        for part in shown:
-            style = "held" if part in held else "obstacle" if part in meets else "beside"
-            if part in held & meets:
-                style = "obstacle"
-            view.area(canvas, view.seen(self.product, part), style, part)
+    def _draw(self, view: PartView, miss: Miss) -> None:
+        """The parts, then the hand, its way and where obstacles overlap it."""
+        styles = dict.fromkeys(self.grip.parts, "held") | dict.fromkeys(self.grip.beside, "beside")
+        styles |= {part: "obstacle" for part in miss.parts if part in styles}
+        for part in self.nearest_last(view, styles):
+            self.area(view, self.outline(view, part), styles[part], part)
         pairs = [pair for o in miss.obstacles for pair in zip(o.ways, o.bodies, strict=True)]
-        self._boxed(view, [way for way, _ in pairs], "way")
-        self._boxed(view, [body for _, body in pairs if np.isinf(body).any()], "way")
-        lows = (np.maximum(way[0], body[0]) for way, body in pairs)
-        highs = (np.minimum(way[1], body[1]) for way, body in pairs)
-        self._boxed(view, [np.array(both) for both in zip(lows, highs, strict=True)], "met")
-        self._boxed(view, [miss.box], "hand")
+        self._boxes(view, [way for way, _ in pairs], "way")
+        self._boxes(view, [body for _, body in pairs if np.isinf(body).any()], "way")
+        met = [(np.maximum(a[0], b[0]), np.minimum(a[1], b[1])) for a, b in pairs]
+        self._boxes(view, [np.array(ends) for ends in met], "met")
+        self._boxes(view, [miss.box], "hand")
 
-    def _boxed(self, view: PartView, boxes: Sequence[Array], style: str) -> None:
-        """What boxes (2, 3), which may be endless, cover together, as far as it is in view."""
+    def _boxes(self, view: PartView, boxes: Sequence[Array], style: str) -> None:
+        """The union of boxes (2, 3), which may be infinite, as far as it is in view."""
         from shapely import box, union_all
 
         far, shapes = 10.0 * float(self.half.max()), []
         for ends in boxes:
             flat = np.clip(ends, self.middle - far, self.middle + far) @ view.axes.T
             shapes.append(box(*flat.min(axis=0), *flat.max(axis=0)))
-        view.area(self.canvas, union_all(shapes), style)
+        self.area(view, union_all(shapes), style)
 
-    def _marks(self, view: PartView, miss: Miss, tried: Array) -> None:
-        """Places that were tried (n, 3), the nearest miss, and the names of what is in its way."""
-        from shapely import box
-
-        canvas, found = self.canvas, [(place, DOT) for place in view.points(tried @ view.axes.T)]
-        for place, radius in found:
-            canvas.circle(place, radius, "tried")
+    def _mark(self, view: PartView, miss: Miss, tried: Array) -> None:
+        """Places that were tried (n, 3), the nearest miss, and the names of the obstacles."""
+        circles = [(place, DOT, "tried") for place in view.points(tried @ view.axes.T)]
         (here,) = view.points(np.array([miss.at]) @ view.axes.T)
-        canvas.circle(here, RING, "nearest")
-        for (x, y), radius in dict.fromkeys([*found, (here, RING)]):
-            canvas.block((x - radius, x + radius, y - radius, y + radius))
+        for (x, y), radius, style in (*circles, (here, RING, "nearest")):
+            self.canvas.circle((x, y), radius, style)
+            self.canvas.block((x - radius, x + radius, y - radius, y + radius))
         for part in miss.parts:
-            seen = view.seen(self.product, part).intersection(box(*view.low, *view.high))
+            seen = view.inside(self.outline(view, part))
             if not seen.is_empty:
-                (at,) = view.points(np.array(seen.representative_point().coords))
-                canvas.place(at, part, 16.0, 12.0, "name")
-
-    def _arrow(self, view: PartView) -> None:
-        """Which way the robot heads, above a view from the side."""
-        right, y = view.box[1], view.box[2] - 16
-        ends: tuple[Point, Point] = (right - 60.0, y), (right, y)
-        self.canvas.arrow(*ends, ("path", "black"), (14.0, 6.0))
-        self.canvas.text((right - 72, y), "the robot heads", 16, "grey", "end")
+                self.name(view, seen, part)
