@@ -21,7 +21,7 @@ from factory.export.certificate.check import check_certificate
 from factory.export.certificate.listing import digest
 from factory.export.certificate.writer import certificate
 from factory.export.pnml import write_pnml
-from factory.foreign_nets.general import analyse
+from factory.foreign_nets.behaviour import analyse
 from factory.foreign_nets.pnml_reader import read_pnml
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked

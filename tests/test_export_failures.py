@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from factory.export import Subject, exporters
 from factory.export.events import rows
 from factory.export.pnml import write_pnml
-from factory.foreign_nets.general import analyse
+from factory.foreign_nets.behaviour import analyse
 from factory.foreign_nets.pnml_reader import read_pnml
 from factory.nets.marked import marked
 from factory.nets.undo import marking_after, undo

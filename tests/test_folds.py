@@ -27,9 +27,8 @@ from factory.export.certificate.check import check_certificate
 from factory.export.certificate.listing import digest
 from factory.export.certificate.writer import certificate
 from factory.export.pnml import write_pnml
-from factory.foreign_nets.behaviour import play
+from factory.foreign_nets.behaviour import analyse, play
 from factory.foreign_nets.explore import explore
-from factory.foreign_nets.general import analyse
 from factory.foreign_nets.pnml_reader import read_pnml
 from factory.lang import write_pag
 from factory.layout.durations import Pace, cycle_of

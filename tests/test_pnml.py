@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from factory.export.dot import write_dot
 from factory.export.pnml import write_pnml
-from factory.foreign_nets.general import analyse
+from factory.foreign_nets.behaviour import analyse
 from factory.foreign_nets.pnml_reader import read_pnml
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import factory
-from factory.foreign_nets.behaviour import behaviour
+from factory.foreign_nets.behaviour import analyse
 from factory.lang import read_pag
 from factory.mjcf import loading, model
 from factory.nets.marked import MarkedNet, marked
@@ -72,7 +72,7 @@ def test_pools_are_attained(factory: Factory) -> None:
 @given(factories(), st.integers(1, 4))
 def test_wip_bounds_the_pool_and_keeps_the_net_live(factory: Factory, wip: int) -> None:
     net = with_wip(factory, wip)
-    found = behaviour(net)
+    found = analyse(net)
     assert (found.live, found.reversible) == (True, True)
     free, bound = part_pool(factory), part_pool(factory, wip)
     assert {label: min(n, wip) for label, n in free.items()} == dict(bound)

@@ -10,8 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.foreign_nets.behaviour import play
-from factory.foreign_nets.general import analyse
+from factory.foreign_nets.behaviour import analyse, play
 from factory.nets.history import firings
 from factory.nets.marked import MarkedNet, marked
 from factory.nets.petri import Marking

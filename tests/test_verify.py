@@ -9,8 +9,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from factory.foreign_nets.behaviour import analyse
 from factory.foreign_nets.explore import explore
-from factory.foreign_nets.general import analyse
 from factory.nets.gears import Gear, GearNet
 from factory.nets.marked import MarkedNet, marked
 from factory.nets.verdict import Verdict, Witness

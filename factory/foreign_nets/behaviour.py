@@ -1,4 +1,4 @@
-"""Live, safe and reversible: from the structure of a marked graph, else by exploring the markings.
+"""The properties of any net: from the structure of a marked graph, else by exploring the markings.
 
 Guarantees, for a marked graph: live where no circuit is free of tokens and every place has a
 producer (Commoner et al., Theorem 1); safe where each place lies on a circuit with at most one
@@ -8,15 +8,22 @@ Theorem 21: a marking is reachable where it keeps the tokens of every circuit).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import networkx as nx
 
+from factory.foreign_nets.discover import discover
 from factory.foreign_nets.explore import LIMIT, Exploration, explore
-from factory.nets.composition import cover
-from factory.nets.marked import NONE, MarkedNet, dead_ends, stuck_circuit, token_free
-from factory.nets.verdict import Defect, listing
+from factory.nets.composition import compose, cover
+from factory.nets.gears import GearNet
+from factory.nets.marked import NONE, MarkedNet, dead_ends, marked, stuck_circuit, token_free
+from factory.nets.train import no_way_back
+from factory.nets.verdict import Defect, Verdict, listing, verdict
+from factory.nets.verify import legality_defects, shape_defects
+from factory.support.collector import collector_paused
+from factory.support.errors import Position
 
 WORK = 5_000_000
 """How many places the search for an unsafe one may look at."""
@@ -25,32 +32,51 @@ RUN_DOWN, NAMED = 10_000, 12
 """The most firings to a deadlock of a marked graph; the most that are named in a sentence."""
 
 
-@dataclass(frozen=True, slots=True)
-class Behaviour:
-    """Live, safe and reversible, with what speaks against them and how it was found."""
-
-    live: bool | None
-    safe: bool | None
-    reversible: bool | None
-    defects: tuple[Defect, ...]
-    method: str
+NO_GEARS = "undecided: a legal marking marks each gear once, and the net has no gears"
 
 
-def behaviour(net: MarkedNet, closed: Sequence[bool] = (), limit: int = LIMIT) -> Behaviour:
-    """How the net behaves from m_0. `closed` says which of `net.gears` are cycles of the net; a
-    net with choice is explored up to `limit` markings."""
-    if not net.is_marked_graph:
-        return _explored(net, limit)
+@collector_paused()
+def analyse(
+    net: GearNet | MarkedNet,
+    sources: Mapping[str, Position] | None = None,
+    limit: int = LIMIT,
+) -> Verdict:
+    """The verdict on a net that may come from elsewhere.
+
+    Gears that it claims are checked as `verify` does, otherwise those of a gear net are discovered.
+    Without gears there is no legal marking: `legal` and `gear_train` are None. Linear in the net;
+    only a net with choice is explored, up to `limit` markings. `sources`: as for `verify`.
+    """
+    against: tuple[Defect, ...] = ()
+    if isinstance(net, MarkedNet) and not net.gears:
+        gears, against = discover(net)
+        net = net.with_gears(gears) if gears else net
+    subject, train, closed = marked(net), None, tuple[bool, ...]()
+    if against:
+        illegal: tuple[Defect, ...] = (Defect("legal", "undecided", NO_GEARS),)
+    else:
+        composition = compose(subject)
+        closed = composition.closed
+        against, train = shape_defects(net, subject, composition)
+        illegal = legality_defects(net, subject)
+    if subject.is_marked_graph:
+        method, defects = "structure", _of_marked_graph(subject, closed)
+    else:
+        method, defects = "exploration", _explored(subject, explore(subject, limit))
+    return verdict(subject, (*against, *defects, *illegal), train, sources, method)
+
+
+def _of_marked_graph(net: MarkedNet, closed: Sequence[bool]) -> Iterator[Defect]:
+    """What speaks against a live, safe and reversible marked graph; `closed`: which of its gears
+    are cycles."""
     stuck = token_free(net).stuck
-    dying = tuple(_dying(net, stuck))
-    overfull = tuple(_unsafe(net, closed, frozenset(stuck)))
-    open_ended = NONE in net.left or NONE in net.right
-    one_way = tuple(_one_way(net, stuck) if stuck or open_ended else ())
-    safe = None if any(v.kind == "undecided" for v in overfull) else not overfull
-    return Behaviour(not dying, safe, not one_way, (*dying, *overfull, *one_way), "structure")
+    yield from _dying(net, stuck)
+    yield from _unsafe(net, closed, frozenset(stuck))
+    if stuck or NONE in net.left or NONE in net.right:
+        yield from _one_way(net, stuck)
 
 
-def _dying(net: MarkedNet, stuck: tuple[int, ...]) -> Iterable[Defect]:
+def _dying(net: MarkedNet, stuck: tuple[int, ...]) -> Iterator[Defect]:
     """Why a marked graph is not live: a circuit free of tokens, or a place without producer."""
     names = net.net.places
     if stuck:
@@ -74,7 +100,7 @@ def _dying(net: MarkedNet, stuck: tuple[int, ...]) -> Iterable[Defect]:
         yield Defect("live", "missing producer", text, (), (p,), (net.right[p],))
 
 
-def _unsafe(net: MarkedNet, closed: Sequence[bool], stuck: frozenset[int]) -> Iterable[Defect]:
+def _unsafe(net: MarkedNet, closed: Sequence[bool], stuck: frozenset[int]) -> Iterator[Defect]:
     """A place of a marked graph that can hold two tokens, with the firings that put them there."""
     covered = cover(net, closed)
     work = 0
@@ -165,12 +191,9 @@ def play(net: MarkedNet, firings: Mapping[int, int]) -> tuple[int, ...]:
         while left.get(event) and all(tokens[p] for p in net.net.preset[event]):
             left[event] -= 1
             sequence.append(event)
-            for p in net.net.preset[event]:
-                tokens[p] -= 1
-            for p in net.net.postset[event]:
-                tokens[p] += 1
-                if left.get(net.right[p]):
-                    ready.append(net.right[p])
+            net.fire(tokens, event)
+            after = (net.right[p] for p in net.net.postset[event])
+            ready += (e for e in after if left.get(e))
     if any(left.values()):
         raise ValueError("the events cannot all fire that often")
     return tuple(sequence)
@@ -189,10 +212,7 @@ def run_down(net: MarkedNet, most: int = RUN_DOWN) -> tuple[int, ...] | None:
         if len(firing) == most:
             return None
         firing.append(event)
-        for p in net.net.preset[event]:
-            tokens[p] -= 1
-        for p in net.net.postset[event]:
-            tokens[p] += 1
+        net.fire(tokens, event)
         after = [net.right[p] for p in net.net.postset[event]]
         ready += [event, *(e for e in after if e != NONE and e not in net.blocked)]
     return tuple(firing)
@@ -209,18 +229,13 @@ def _after(net: MarkedNet, firing: Sequence[int]) -> str:
 
 def _stopped(net: MarkedNet, firing: Sequence[int]) -> str:
     """That nothing is enabled after a firing sequence, and where the tokens are then."""
-    tokens = list(net.tokens)
-    for event in firing:
-        for p in net.net.preset[event]:
-            tokens[p] -= 1
-        for p in net.net.postset[event]:
-            tokens[p] += 1
-    where = [place.name for place, count in zip(net.net.places, tokens, strict=True) if count]
+    pairs = zip(net.net.places, net.after(firing), strict=True)
+    where = [place.name for place, count in pairs if count]
     held = f", with tokens in {listing(where)}" if where else ""
     return f"{_after(net, firing)} nothing is enabled any more{held}"
 
 
-def _one_way(net: MarkedNet, stuck: tuple[int, ...]) -> Iterable[Defect]:
+def _one_way(net: MarkedNet, stuck: tuple[int, ...]) -> Iterator[Defect]:
     """An enabled transition connected to something that fires finitely often: in a component that
     repeats at all, all fire equally often."""
     graph, finite = nx.Graph(), set(stuck)
@@ -229,28 +244,12 @@ def _one_way(net: MarkedNet, stuck: tuple[int, ...]) -> Iterable[Defect]:
         if not place.left or not place.right:
             finite.update(place.left + place.right)
     ending = {e for part in nx.connected_components(graph) if part & finite for e in part}
-    for event in sorted(ending - net.blocked):
-        if all(net.tokens[p] for p in net.net.preset[event]):
-            name = net.net.transitions[event].name
-            text = f"{name} can fire, but not so often that the initial marking returns"
-            yield Defect("reversible", "no way back", text, transitions=(event,))
-            return
+    for event in islice((e for e in net.enabled(net.tokens) if e in ending), 1):
+        yield no_way_back(net, event)
 
 
-def _explored(net: MarkedNet, limit: int) -> Behaviour:
-    """The properties of a net with choice, by its markings."""
-    found = explore(net, limit)
-    against = tuple(_found(net, found))
-    named = {defect.property for defect in against if defect.kind != "undecided"}
-    live, safe, reversible = (
-        False if name in named else True if found.complete else None
-        for name in ("live", "safe", "reversible")
-    )
-    return Behaviour(live, safe, reversible, against, "exploration")
-
-
-def _found(net: MarkedNet, found: Exploration) -> Iterable[Defect]:
-    """What an exploration shows, or leaves undecided, of each property."""
+def _explored(net: MarkedNet, found: Exploration) -> Iterator[Defect]:
+    """The defects that an exploration shows, and the properties that it leaves undecided."""
     names, events = net.net.places, net.net.transitions
     text = f"undecided: {found.markings} markings were explored, and there are more"
     if found.deadlock is not None:

@@ -52,7 +52,9 @@ class StateSpace:
         for number, marking in enumerate(markings):
             self.edges.append([])
             for event in self._enabled(marking):
-                after = self._fire(marking, event)
+                tokens = bytearray(marking)
+                self.net.fire(tokens, event)
+                after = bytes(tokens)
                 if max(after) == 255 or (after not in self.index and len(markings) >= self.limit):
                     return False
                 if after not in self.index:
@@ -74,14 +76,6 @@ class StateSpace:
         near.update(e for e, needs in enumerate(net.preset) if not needs)
         ready = (e for e in near if all(marking[p] for p in net.preset[e]))
         return sorted(e for e in ready if e not in self.net.blocked)
-
-    def _fire(self, marking: bytes, event: int) -> bytes:
-        after = bytearray(marking)
-        for p in self.net.net.preset[event]:
-            after[p] -= 1
-        for p in self.net.net.postset[event]:
-            after[p] += 1
-        return bytes(after)
 
     def firing(self, number: int) -> Firing:
         """A sequence that leads to a marking."""

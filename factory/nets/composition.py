@@ -30,15 +30,15 @@ MOST = 10
 class Joint:
     """How a gear is added to those before it (Definition 3.6): along place [a; b], with c before a.
 
-    The first gear has -1 for all; c is None for a tool of one operation only, of which condition
-    (b) is not demanded.
+    The first gear has None for all; a tool of one operation only, of which condition (b) is not
+    demanded, has None for c.
     """
 
     gear: int
-    place: int
-    a: int
-    b: int
-    c: int | None
+    place: int | None = None
+    a: int | None = None
+    b: int | None = None
+    c: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,7 +253,7 @@ def _joints(
     for number in order:
         gear, place = net.gears[number], entry[number]
         if place == NONE:
-            joints.append(Joint(number, -1, -1, -1, None))
+            joints.append(Joint(number))
         else:
             c = gear.transitions[gear.places.index(place) - 1]
             a, b = net.left[place], net.right[place]

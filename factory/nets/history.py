@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from factory.nets.gears import GearNet
+from factory.nets.marked import breadth_first
 from factory.nets.petri import Marking
 from factory.nets.verdict import listing
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
@@ -95,8 +96,8 @@ def unreached(net: GearNet, marking: Marking) -> tuple[int, ...]:
     places, initial = net.threaded.places, net.initial_marking
     left, right = [place.left[0] for place in places], [place.right[0] for place in places]
     gain = [(p in marking) - (p in initial) for p in range(len(places))]
-    there = _tree(net.threaded.net.postset, right)
-    back = _tree(net.threaded.net.preset, left)
+    there = breadth_first(net.threaded.net.postset, right)
+    back = breadth_first(net.threaded.net.preset, left)
     level = {0: 0}
     for event, place in there.items():
         level[event] = level[left[place]] + gain[place]
@@ -108,18 +109,6 @@ def unreached(net: GearNet, marking: Marking) -> tuple[int, ...]:
             found = (c for walk in (way, other) for c in _circuits(walk, left, right))
             return next(circuit for circuit in found if sum(gain[p] for p in circuit))
     return ()
-
-
-def _tree(beside: Sequence[Sequence[int]], onward: Sequence[int]) -> dict[int, int]:
-    """By which place each transition but the first is reached from that, in breadth-first order."""
-    found, seen, queue = dict[int, int](), {0}, [0]
-    for event in queue:
-        for place in beside[event]:
-            if onward[place] not in seen:
-                seen.add(onward[place])
-                found[onward[place]] = place
-                queue.append(onward[place])
-    return found
 
 
 def _walk(tree: Mapping[int, int], event: int, toward: Sequence[int]) -> Iterator[int]:

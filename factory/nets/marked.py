@@ -9,7 +9,7 @@ in both its preset and its postset never fires (a 1-gear is dead by Definition 3
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, MutableSequence, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -68,6 +68,26 @@ class MarkedNet:
             for place in gear.places:
                 owners[place].append(number)
         return tuple(map(tuple, owners))
+
+    def fire(self, tokens: MutableSequence[int], event: int) -> None:
+        """Move the tokens of a transition, whether or not it is enabled."""
+        for p in self.net.preset[event]:
+            tokens[p] -= 1
+        for p in self.net.postset[event]:
+            tokens[p] += 1
+
+    def after(self, firing: Iterable[int]) -> list[int]:
+        """The tokens after a firing sequence from m_0."""
+        tokens = list(self.tokens)
+        for event in firing:
+            self.fire(tokens, event)
+        return tokens
+
+    def enabled(self, tokens: Sequence[int]) -> Iterator[int]:
+        """The transitions that tokens enable."""
+        for event, needs in enumerate(self.net.preset):
+            if event not in self.blocked and all(tokens[p] for p in needs):
+                yield event
 
     def with_gears(self, gears: tuple[Gear, ...]) -> MarkedNet:
         """The net with gears, and sizes and slots of its places that fit them."""
@@ -143,6 +163,20 @@ def stuck_circuit(net: MarkedNet, stuck: Iterable[int]) -> tuple[int, ...]:
             if before in never and not net.tokens[place]:
                 waits.add_edge(before, event, place=place)
     return tuple(waits.edges[edge]["place"] for edge in nx.find_cycle(waits))
+
+
+def breadth_first(beside: Sequence[Sequence[int]], onward: Sequence[int]) -> dict[int, int]:
+    """By which place each transition but the first is reached from that, in breadth-first order.
+    `beside`: the places after (or before) each transition; `onward`: the consumer (or producer) of
+    each place."""
+    tree, reached, queue = dict[int, int](), {0, NONE}, [0]
+    for event in queue:
+        for place in beside[event]:
+            if onward[place] not in reached:
+                reached.add(onward[place])
+                tree[onward[place]] = place
+                queue.append(onward[place])
+    return tree
 
 
 def dead_ends(net: MarkedNet) -> tuple[int, ...]:

@@ -71,12 +71,13 @@ def dead_train_defects(net: MarkedNet, stuck: tuple[int, ...]) -> Iterator[Defec
     text = f"the circuit through {shown} carries no token"
     gears = tuple(dict.fromkeys(gear for place in circuit for gear in net.owners[place]))
     yield Defect("live", "token-free circuit", text, gears, circuit, events)
-    ready = (
-        event
-        for event, needs in enumerate(net.net.preset)
-        if all(net.tokens[place] for place in needs)
-    )
-    for event in islice(ready, 1):
-        name = net.net.transitions[event].name
-        text = f"{name} can fire, but not so often that the initial marking returns"
-        yield Defect("reversible", "no way back", text, transitions=(event,))
+    for event in islice(net.enabled(net.tokens), 1):
+        yield no_way_back(net, event)
+
+
+def no_way_back(net: MarkedNet, event: int) -> Defect:
+    """That a net is not reversible, as a transition that can fire is connected to something that
+    fires finitely often."""
+    name = net.net.transitions[event].name
+    text = f"{name} can fire, but not so often that the initial marking returns"
+    return Defect("reversible", "no way back", text, transitions=(event,))

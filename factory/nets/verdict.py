@@ -107,11 +107,21 @@ class Verdict:
         return {**found, "method": self.method, "witness": [w.as_json() for w in self.witness]}
 
 
-def testify(
-    net: MarkedNet, defects: Iterable[Defect], sources: Mapping[str, Position] | None
-) -> tuple[Witness, ...]:
-    """The defects by names. `sources` adds the source positions of robots, by their names."""
-    return tuple(_witness(net, defect, sources or {}) for defect in defects)
+def verdict(
+    net: MarkedNet,
+    defects: Iterable[Defect],
+    gear_train: bool | None,
+    sources: Mapping[str, Position] | None,
+    method: str = "structure",
+) -> Verdict:
+    """The verdict on a net with these defects: a property without any holds, one of which they say
+    no more than that it is undecided is None. `sources`: source positions of robots by name."""
+    found = tuple(defects)
+    kinds = {name: {d.kind for d in found if d.property == name} for name in PROPERTIES}
+    holds = {name: None if own == {"undecided"} else not own for name, own in kinds.items()}
+    witness = tuple(_witness(net, defect, sources or {}) for defect in found)
+    gears = net.gears
+    return Verdict(**holds, witness=witness, gears=gears, method=method, gear_train=gear_train)
 
 
 def _witness(net: MarkedNet, against: Defect, sources: Mapping[str, Position]) -> Witness:

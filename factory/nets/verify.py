@@ -12,14 +12,14 @@ any net does.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import islice
 
 from factory.nets.composition import MOST, Composition, compose, named
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked, token_free
 from factory.nets.train import dead_train_defects, train_defects
-from factory.nets.verdict import Defect, Verdict, listing, testify
+from factory.nets.verdict import Defect, Verdict, listing, verdict
 from factory.support.collector import collector_paused
 from factory.support.errors import Diagnostic, Position, RunError
 
@@ -27,13 +27,13 @@ from factory.support.errors import Diagnostic, Position, RunError
 def proved(net: GearNet) -> Verdict:
     """The verdict on a net all of whose properties hold. Raises RunError (NotProved) with a witness
     for each that does not."""
-    verdict = verify(net)
-    if not verdict.holds:
+    proof = verify(net)
+    if not proof.holds:
         raise RunError(
             Diagnostic("NotProved", str(witness), None, "see factory check")
-            for witness in verdict.faults
+            for witness in proof.faults
         )
-    return verdict
+    return proof
 
 
 @collector_paused()
@@ -44,49 +44,30 @@ def verify(net: GearNet | MarkedNet, sources: Mapping[str, Position] | None = No
     safe and reversible are undecided (None) where the claim or the marking fails.
     """
     subject = marked(net)
-    composition = compose(subject)
-    against = gear_net_defects(net, composition)
-    untrained = gear_train_defects(net, subject, composition)
+    against, train = shape_defects(net, subject, compose(subject))
     illegal = legality_defects(net, subject)
-    text = "undecided: it is proved of gear nets with a legal marking only"
-    decided: dict[str, bool | None] = dict.fromkeys(("live", "safe", "reversible"), True)
-    defects = [Defect(name, "undecided", text) for name in decided]
-    if untrained or illegal:
-        decided = dict.fromkeys(decided, None)
-    else:
-        stuck = token_free(subject).stuck
-        defects = list(dead_train_defects(subject, stuck)) if stuck else []
-        decided |= {defect.property: False for defect in defects}
-    more = [defect for defect in untrained if defect.property == "gear_train"]
-    return Verdict(
-        not against,
-        decided["live"],
-        decided["safe"],
-        decided["reversible"],
-        not illegal,
-        testify(subject, (*against, *more, *defects, *illegal), sources),
-        subject.gears,
-        gear_train=not untrained,
-    )
+    defects: Iterable[Defect] = ()
+    if illegal or not train:
+        text = "undecided: it is proved of gear nets with a legal marking only"
+        defects = (Defect(name, "undecided", text) for name in ("live", "safe", "reversible"))
+    elif stuck := token_free(subject).stuck:
+        defects = dead_train_defects(subject, stuck)
+    return verdict(subject, (*against, *defects, *illegal), train, sources)
 
 
-def gear_net_defects(net: GearNet | MarkedNet, composition: Composition) -> tuple[Defect, ...]:
-    """What speaks against a gear net: its composition, and slots that change their robot."""
-    moved = _changed_slots(net) if isinstance(net, GearNet) else ()
-    return *composition.defects, *islice(moved, MOST)
-
-
-def gear_train_defects(
+def shape_defects(
     net: GearNet | MarkedNet, subject: MarkedNet, composition: Composition
-) -> tuple[Defect, ...]:
-    """What speaks against a gear train, of a net and of the same as a marked net; some of it speaks
-    against a gear net, too (`gear_net_defects`)."""
-    moved = _changed_slots(net) if isinstance(net, GearNet) else ()
-    return *train_defects(subject, composition), *islice(moved, MOST)
+) -> tuple[tuple[Defect, ...], bool]:
+    """What speaks against a gear net and against a gear train: its composition, and slots that
+    change their robot; and whether the net is a gear train. `subject`: the net with its tokens."""
+    moved = tuple(islice(_changed_slots(net), MOST)) if isinstance(net, GearNet) else ()
+    untrained = train_defects(subject, composition)
+    more = (defect for defect in untrained if defect.property == "gear_train")
+    return (*composition.defects, *moved, *more), not untrained and not moved
 
 
 def legality_defects(net: GearNet | MarkedNet, subject: MarkedNet) -> tuple[Defect, ...]:
-    """What speaks against a legal initial marking of a net, and of the same as a marked net."""
+    """What speaks against a legal initial marking of a net; `subject`: the net with its tokens."""
     return tuple(islice(_illegal(net, subject), MOST))
 
 

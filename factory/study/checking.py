@@ -173,7 +173,7 @@ def _deputies(project: Project, factory: Factory) -> tuple[tuple[int, ...], ...]
 
 def check_net(file: Path) -> Checked:
     """Check a net in PNML, which need not be that of a factory. Raises InputError."""
-    from factory.foreign_nets.general import analyse
+    from factory.foreign_nets.behaviour import analyse
     from factory.foreign_nets.pnml_reader import load_net
 
     net = load_net(file)

@@ -1,7 +1,7 @@
 """Checking a certificate from the document alone, in linear time.
 
-Nothing that made the certificate is used here: any program that reads JSON can do the same. A
-certificate that claims a failure must show it, too.
+The checker shares no code with the writer: any program that reads JSON can do the same. A claim
+that a property fails must be proved as well.
 """
 
 from __future__ import annotations
@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 from typing import Any
+
+import networkx as nx
 
 from factory.export.certificate.listing import (
     CLAIMS,
@@ -20,16 +22,16 @@ from factory.export.certificate.listing import (
     digest,
     number,
 )
-from factory.export.certificate.refute import one_way, refute
+from factory.export.certificate.refute import incidence, one_way, refute
 
 
 def check_certificate(document: object) -> list[str]:
     """The faults of a certificate, [] where every claim in it is proved by it."""
-    return list(_told("the certificate", _check(document)))
+    return list(_checked("the certificate", _check(document)))
 
 
-def _told(where: str, faults: Iterator[str]) -> Iterator[str]:
-    """These faults; where looking for them fails, that a part is not of the documented form."""
+def _checked(where: str, faults: Iterator[str]) -> Iterator[str]:
+    """The faults; where the search for them fails, that the part is not of the documented form."""
     try:
         yield from faults
     except KeyError as error:
@@ -48,7 +50,7 @@ def _check(document: Any) -> Iterator[str]:
     yield from faults
     if not faults:
         for claim in (*CLAIMS, TRAIN) if TRAIN in document else CLAIMS:
-            yield from _told(claim, _claim(net, claim, document))
+            yield from _checked(claim, _claim(net, claim, document))
 
 
 def _claim(net: Net, claim: str, document: Section) -> Iterator[str]:
@@ -74,19 +76,15 @@ def _prove_gear_net(net: Net, section: Section, document: Section) -> Iterator[s
     passing = [0] * len(net.events)
     for step in section["order"]:
         robot = net.robots[step["gear"]]
-        if step is section["order"][0]:
-            if any(step[key] is not None for key in ("place", "a", "b", "c", "exempt")):
-                yield f"gear_net: {robot.name} comes first and is joined to nothing"
-        else:
+        if step is not section["order"][0]:
             yield from _added(net, step, at_place, passing)
+        elif any(step[key] is not None for key in ("place", "a", "b", "c", "exempt")):
+            yield f"gear_net: {robot.name} comes first and is joined to nothing"
         for p, e in zip(robot.places, robot.turns, strict=True):
             at_place[p].append(step["gear"])
             passing[e] += 1
-    if not all(at_place) or not all(passing):
-        yield "gear_net: some place or transition is in no gear"
-    if not all(net.fits(p, sorted(own)) for p, own in enumerate(at_place)):
-        yield "gear_net: the slots of some place are not its gears'"
-    yield from net.wrong_moves()
+    yield from net.uncovered("gear_net")
+    yield from net.wrong_moves("gear_net")
 
 
 def _added(net: Net, step: Section, at_place: Rows, passing: list[int]) -> Iterator[str]:
@@ -116,39 +114,19 @@ def _prove_gear_train(net: Net, section: Section, document: Section) -> Iterator
     if not net.robots or not all(map(net.closed, net.robots)):
         yield "gear_train: some robot's gear is no cycle (Definition 3.5)"
         return
-    at_place: Rows = [[] for _ in net.names]
-    passing: Rows = [[] for _ in net.events]
-    for index, robot in enumerate(net.robots):
-        for p, e in zip(robot.places, robot.turns, strict=True):
-            at_place[p].append(index)
-            passing[e].append(index)
-    if not all(at_place) or not all(passing):
-        yield "gear_train: some place or transition is in no gear"
-    if not all(net.fits(p, own) for p, own in enumerate(at_place)):
-        yield "gear_train: the slots of some place are not its gears'"
-    shared = {p for p, own in enumerate(at_place) if len(own) > 1}
+    yield from net.uncovered("gear_train")
+    shared = {p for p, own in enumerate(net.owners) if len(own) > 1}
     for robot in net.robots:
-        steps = zip(robot.places[-1:] + robot.places[:-1], robot.places, strict=True)
-        if any({p, q} <= shared for p, q in steps):
+        if any({robot.places[i - 1], p} <= shared for i, p in enumerate(robot.places)):
             yield f"gear_train: {robot.name} has no wait of its own before each operation"
-    for event, gears in enumerate(passing):
+    for event, gears in enumerate(net.meeting):
         around = shared & {*net.preset[event], *net.postset[event]}
-        if len(gears) > 1 and [at_place[p] for p in around] != [gears]:
+        if len(gears) > 1 and [net.owners[p] for p in around] != [gears]:
             yield f"gear_train: the gears at {net.events[event]} share more or less than a place"
-    if _apart(net, at_place):
+    if not nx.is_connected(incidence(net)):
         yield "gear_train: some gear is apart from the rest"
-    yield from (fault.replace("gear_net", "gear_train", 1) for fault in net.wrong_moves())
+    yield from net.wrong_moves("gear_train")
     yield from _ascending(net, section, document)
-
-
-def _apart(net: Net, at_place: Rows) -> bool:
-    """Whether some gear shares no operation with the first, directly or not."""
-    seen, queue = {0}, [0]
-    for index in queue:
-        met = {other for p in net.robots[index].places for other in at_place[p]} - seen
-        seen |= met
-        queue += met
-    return len(seen) < len(net.robots)
 
 
 def _ascending(net: Net, section: Section, document: Section) -> Iterator[str]:
@@ -168,9 +146,9 @@ def _ascending(net: Net, section: Section, document: Section) -> Iterator[str]:
             continue
         turns = robot.turns[on[0] + 1 :] + robot.turns[: on[0] + 1]
         ranks = [rank[net.events[e]] for e in turns]
-        for step, (one, other) in enumerate(pairwise(ranks)):
-            if one >= other:
-                names = f"{net.events[turns[step + 1]]} before {net.events[turns[step]]}"
+        for (one, earlier), (other, later) in pairwise(zip(turns, ranks, strict=True)):
+            if earlier >= later:
+                names = f"{net.events[other]} before {net.events[one]}"
                 yield f"gear_train: the order has {names}, which {robot.name} does after it"
                 break
 

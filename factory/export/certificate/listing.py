@@ -1,10 +1,11 @@
-"""The listing of a net in a certificate, as a checker reads it. Imports nothing of this package."""
+"""The net of a certificate, as a checker reads it. Imports nothing of this package."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 from collections.abc import Iterator
+from functools import cached_property
 from typing import Any
 
 Section = dict[str, Any]
@@ -13,7 +14,7 @@ Rows = list[list[int]]
 SCHEMA = 1
 CLAIMS = ("gear_net", "safe", "live", "reversible", "legal")
 TRAIN = "gear_train"
-"""The claim that a certificate makes of a gear train, besides."""
+"""The additional claim in the certificate of a gear train."""
 
 
 def digest(document: Section) -> str:
@@ -64,6 +65,24 @@ class Net:
         if min(self.tokens, default=0) < 0:
             yield "a place has fewer than no tokens"
 
+    @cached_property
+    def owners(self) -> Rows:
+        """For each place the gears through it."""
+        owners: Rows = [[] for _ in self.names]
+        for index, robot in enumerate(self.robots):
+            for p in robot.places:
+                owners[p].append(index)
+        return owners
+
+    @cached_property
+    def meeting(self) -> Rows:
+        """For each transition the gears through it."""
+        meeting: Rows = [[] for _ in self.events]
+        for index, robot in enumerate(self.robots):
+            for e in robot.turns:
+                meeting[e].append(index)
+        return meeting
+
     def marked_graph(self) -> bool:
         """Whether each place has at most one producer and one consumer."""
         return all(len(row) <= 1 for row in self.left + self.right)
@@ -85,7 +104,14 @@ class Net:
             starting[robot.initial].append(index)
         return all(robots and self.fits(p, robots) for p, robots in starting.items())
 
-    def wrong_moves(self) -> Iterator[str]:
+    def uncovered(self, claim: str) -> Iterator[str]:
+        """What is in no gear, or has other slots than those of its gears."""
+        if not all(self.owners) or not all(self.meeting):
+            yield f"{claim}: some place or transition is in no gear"
+        if not all(self.fits(p, own) for p, own in enumerate(self.owners)):
+            yield f"{claim}: the slots of some place are not its gears'"
+
+    def wrong_moves(self, claim: str) -> Iterator[str]:
         """Redistribution functions that are no bijection, or change a robot's slot."""
         for event, moves in enumerate(self.moves):
             if moves is None:
@@ -94,9 +120,9 @@ class Net:
             here = sorted((p, i) for p in self.preset[event] for i in range(len(self.slots[p])))
             there = sorted((q, j) for q in self.postset[event] for j in range(len(self.slots[q])))
             if sorted(x for x, _ in pairs) != here or sorted(y for _, y in pairs) != there:
-                yield f"gear_net: the redistribution of {self.events[event]} is no bijection"
+                yield f"{claim}: the redistribution of {self.events[event]} is no bijection"
             elif any(self.slots[p][i] != self.slots[q][j] for (p, i), (q, j) in pairs):
-                yield f"gear_net: {self.events[event]} moves a robot into another's slot"
+                yield f"{claim}: {self.events[event]} moves a robot into another's slot"
 
     def edge(self, place: int) -> tuple[int, int] | None:
         """(a, b) of a place [a; b]; None for one of another form, or that is not there."""

@@ -25,13 +25,13 @@ the SHA-256 of the rest. `check_certificate` (module `check`) gives the faults o
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from factory.export.certificate.listing import CLAIMS, SCHEMA, TRAIN, digest
 from factory.nets.composition import Composition, compose, cover
 from factory.nets.gears import GearNet
-from factory.nets.marked import NONE, MarkedNet, marked, token_free
+from factory.nets.marked import NONE, MarkedNet, breadth_first, marked, token_free
 from factory.nets.verdict import Verdict, Witness
 
 Json = dict[str, Any]
@@ -126,18 +126,10 @@ def _gear_net(net: MarkedNet, composition: Composition) -> Json:
     order = []
     present: list[list[int]] = [[] for _ in net.tokens]
     for joint in composition.joints:
-        first = joint.place == NONE
-        order.append(
-            {
-                "gear": joint.gear,
-                "place": None if first else joint.place,
-                "a": None if first else joint.a,
-                "b": None if first else joint.b,
-                "c": joint.c,
-                "meets": [] if first else list(present[joint.place]),
-                "exempt": None if first or joint.c is not None else "tool of one operation",
-            }
-        )
+        meets = [] if joint.place is None else list(present[joint.place])
+        exempt = "tool of one operation" if meets and joint.c is None else None
+        ends = {"place": joint.place, "a": joint.a, "b": joint.b, "c": joint.c}
+        order.append({"gear": joint.gear, **ends, "meets": meets, "exempt": exempt})
         for place in net.gears[joint.gear].places:
             present[place].append(joint.gear)
     return {"order": order}
@@ -179,31 +171,26 @@ def _live(net: MarkedNet, composition: Composition) -> Json:
 
 
 def _reversible(net: MarkedNet, composition: Composition) -> Json:
-    if token_free(net).stuck:
-        return {"root": None}
-    there = _tree(net, net.net.postset, net.right)
-    back = _tree(net, net.net.preset, net.left)
-    if there is None or back is None:
+    there = _tree(net, net.net.postset, net.left, net.right)
+    back = _tree(net, net.net.preset, net.right, net.left)
+    if token_free(net).stuck or there is None or back is None:
         return {"root": None}
     return {"root": 0, "there": there, "back": back}
 
 
 def _tree(
-    net: MarkedNet, beside: tuple[tuple[int, ...], ...], onward: tuple[int, ...]
+    net: MarkedNet, beside: Sequence[Sequence[int]], inward: Sequence[int], onward: Sequence[int]
 ) -> Json | None:
-    """A breadth-first tree from transition 0: by which place each is reached, and how deep."""
-    size = len(net.net.transitions)
-    place: list[int | None] = [None] * size
-    depth = [NONE] * size
-    queue = [0] if size else []
-    depth[:1] = [0] * len(queue)
-    for event in queue:
-        for p in beside[event]:
-            after = onward[p]
-            if after != NONE and depth[after] == NONE:
-                place[after], depth[after] = p, depth[event] + 1
-                queue.append(after)
-    return None if len(queue) < size or not size else {"place": place, "depth": depth}
+    """A breadth-first tree from transition 0: by which place each is reached, and how deep; None
+    where some is not."""
+    events = range(len(net.net.transitions))
+    tree = breadth_first(beside, onward) if events else {}
+    if len(tree) + 1 != len(events):
+        return None
+    depth = {0: 0}
+    for event, place in tree.items():
+        depth[event] = depth[inward[place]] + 1
+    return {"place": [tree.get(e) for e in events], "depth": [depth[e] for e in events]}
 
 
 def _legal(net: MarkedNet, composition: Composition) -> Json:
@@ -226,7 +213,7 @@ def _failure(claim: str, net: MarkedNet, witness: Witness) -> Json:
     section: Json = {"holds": False, "kind": witness.kind, "reason": witness.reason}
     section["robots"] = list(witness.robots)
     structural = net.is_marked_graph
-    lasting = claim == "reversible" and not (structural or _stops(net, events))
+    lasting = claim == "reversible" and not structural and [*net.enabled(net.after(events))]
     if witness.kind == "dead transition" or lasting:
         return {"holds": None, "reason": f"{witness.reason}; found by exploring: not certified"}
     if claim == "safe":
@@ -238,15 +225,3 @@ def _failure(claim: str, net: MarkedNet, witness: Witness) -> Json:
         event = events[0] if structural else None
         return {**section, "transition": event, "firing": None if structural else events}
     return {**section, "places": places, "transitions": events}
-
-
-def _stops(net: MarkedNet, events: list[int]) -> bool:
-    """Whether a net with choice is in a deadlock after a firing sequence."""
-    tokens = list(net.tokens)
-    for event in events:
-        for p in net.net.preset[event]:
-            tokens[p] -= 1
-        for p in net.net.postset[event]:
-            tokens[p] += 1
-    ready = (all(tokens[p] for p in needs) for needs in net.net.preset)
-    return not any(on and e not in net.blocked for e, on in enumerate(ready))
