@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 from collections import deque
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -20,10 +20,10 @@ from factory.geometry.meshes import Array
 from factory.record.log import Log
 from factory.support.extras import optional
 
-if TYPE_CHECKING:
-    from factory.support.engine import mujoco
-
 FORMAT, TAKES, BINARY = "mcap", "log", True
+
+UNTAPERED = {"bottom_scale": 1.0, "top_scale": 1.0}
+"""The ends of a cylinder that is no cone."""
 
 
 def export(subject: Subject) -> bytes:
@@ -43,14 +43,13 @@ class _Recorder:
     """Writes a motion and events to the channels of a context, in the order of time."""
 
     def __init__(self, context: Any, motion: BodyMotion, log: Log) -> None:
-        self.channels = optional("foxglove.channels", "foxglove-sdk", "MCAP", "export")
-        self.schemas = optional("foxglove.messages", "foxglove-sdk", "MCAP", "export")
-        self.motion, self.log = motion, log
-        self.looks = Looks(motion.m, self.schemas)
-        self.tf = self.channels.FrameTransformsChannel("/tf", context=context)
-        self.scene = self.channels.SceneUpdateChannel("/scene", context=context)
-        self.joints = self.channels.JointStatesChannel("/joints", context=context)
-        self.events = self.channels.LogChannel("/events", context=context)
+        channels = optional("foxglove.channels", "foxglove-sdk", "MCAP", "export")
+        self.messages = optional("foxglove.messages", "foxglove-sdk", "MCAP", "export")
+        self.motion, self.log, self.m = motion, log, motion.m
+        self.tf = channels.FrameTransformsChannel("/tf", context=context)
+        self.scene = channels.SceneUpdateChannel("/scene", context=context)
+        self.joints = channels.JointStatesChannel("/joints", context=context)
+        self.events = channels.LogChannel("/events", context=context)
 
     def record(self, events: list[EventRow]) -> None:
         """Everything."""
@@ -68,61 +67,53 @@ class _Recorder:
             self._event(late)
 
     def _transforms(self, time: float, frame: int, bodies: list[int]) -> None:
-        found = []
-        for body in bodies:
-            x, y, z = self.motion.position[frame, body].tolist()
-            w, i, j, k = self.motion.quaternion[frame, body].tolist()
-            found.append(
-                self.schemas.FrameTransform(
-                    timestamp=self._stamp(time),
-                    parent_frame_id=self.motion.parent(body),
-                    child_frame_id=self.motion.name(body),
-                    translation=self.schemas.Vector3(x=x, y=y, z=z),
-                    rotation=self.schemas.Quaternion(x=i, y=j, z=k, w=w),
-                )
+        transforms = [
+            self.messages.FrameTransform(
+                timestamp=self._stamp(time),
+                parent_frame_id=self.motion.parent(body),
+                child_frame_id=self.motion.name(body),
+                translation=self._vector(self.motion.position[frame, body]),
+                rotation=self._quaternion(self.motion.quaternion[frame, body]),
             )
-        if found:
-            message = self.schemas.FrameTransforms(transforms=found)
+            for body in bodies
+        ]
+        if transforms:
+            message = self.messages.FrameTransforms(transforms=transforms)
             self.tf.log(message, log_time=_nanoseconds(time))
 
     def _scene(self, time: float, before: Truth, now: Truth) -> None:
-        """What has come into sight is added, what has gone out of it deleted."""
-        entities = []
+        """Add the bodies that have come into sight, delete those that have gone out of it."""
+        stamp, entities = {"timestamp": self._stamp(time)}, []
         for body in np.flatnonzero(before & ~now).tolist():
-            shapes = self.looks.of(body)
+            shapes, name = self._shapes(body), self.motion.name(body)
             if any(shapes.values()):
-                name = self.motion.name(body)
-                frame = {"timestamp": self._stamp(time), "frame_id": name, "id": name}
-                entities.append(self.schemas.SceneEntity(**frame, frame_locked=True, **shapes))
+                frame = {"frame_id": name, "id": name, "frame_locked": True}
+                entities.append(self.messages.SceneEntity(**stamp, **frame, **shapes))
         deletions = [
-            self.schemas.SceneEntityDeletion(
-                timestamp=self._stamp(time), id=self.motion.name(int(body))
-            )
+            self.messages.SceneEntityDeletion(**stamp, id=self.motion.name(int(body)))
             for body in np.flatnonzero(now & ~before)
         ]
         if entities or deletions:
-            message = self.schemas.SceneUpdate(deletions=deletions, entities=entities)
+            message = self.messages.SceneUpdate(deletions=deletions, entities=entities)
             self.scene.log(message, log_time=_nanoseconds(time))
 
     def _joints(self, time: float, row: int) -> None:
         from factory.support.engine import mujoco
 
-        m, found = self.motion.m, []
-        for joint in range(m.njnt):
-            if m.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE:
-                position = float(self.log.qpos[row][m.jnt_qposadr[joint]])
-                speed = float(self.log.qvel[row][m.jnt_dofadr[joint]])
-                name = m.joint(joint).name
-                state = self.schemas.JointState(name=name, position=position, velocity=speed)
-                found.append(state)
-        message = self.schemas.JointStates(timestamp=self._stamp(time), joints=found)
+        m, states = self.m, []
+        for joint in np.flatnonzero(m.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE).tolist():
+            at = float(self.log.qpos[row][m.jnt_qposadr[joint]])
+            speed = float(self.log.qvel[row][m.jnt_dofadr[joint]])
+            state = {"name": m.joint(joint).name, "position": at, "velocity": speed}
+            states.append(self.messages.JointState(**state))
+        message = self.messages.JointStates(timestamp=self._stamp(time), joints=states)
         self.joints.log(message, log_time=_nanoseconds(time))
 
     def _event(self, event: EventRow) -> None:
         what = f"{event.template}({event.operation}) {event.kind}, unit {event.unit}"
-        message = self.schemas.Log(
+        message = self.messages.Log(
             timestamp=self._stamp(event.time_s),
-            level=self.schemas.LogLevel.Info,
+            level=self.messages.LogLevel.Info,
             name=event.transition,
             message=f"{what}: {' '.join(event.robots)}",
             file=event.file,
@@ -130,66 +121,46 @@ class _Recorder:
         )
         self.events.log(message, log_time=_nanoseconds(event.time_s))
 
-    def _stamp(self, time: float) -> Any:
-        seconds, rest = divmod(_nanoseconds(time), 10**9)
-        return self.schemas.Timestamp(seconds, rest)
-
-
-class Looks:
-    """What the bodies of a model look like, in Foxglove's primitives."""
-
-    def __init__(self, m: mujoco.MjModel, schemas: Any) -> None:
-        self.m, self.schemas = m, schemas
-
-    def of(self, body: int) -> dict[str, list[Any]]:
-        """The primitives of a body by the field of the entity that they belong to."""
-        from factory.mjcf.replica import half_sizes, paint, shown
+    def _shapes(self, body: int) -> dict[str, list[Any]]:
+        """Foxglove's primitives of a body by the field of the entity that they belong to."""
+        from factory.mjcf.replica import half_sizes, mesh_of, paint, shown
         from factory.support.engine import mujoco
 
-        found: dict[str, list[Any]] = {"cubes": [], "cylinders": [], "spheres": [], "triangles": []}
-        for geom in shown(self.m, body):
-            red, green, blue, alpha = (round(float(c), 4) for c in paint(self.m, geom))
-            look = {
-                "pose": self._pose(geom),
-                "color": self.schemas.Color(r=red, g=green, b=blue, a=alpha),
-            }
-            kind, size = mujoco.mjtGeom(self.m.geom_type[geom]), self.m.geom_size[geom]
-            if kind == mujoco.mjtGeom.mjGEOM_MESH:
-                found["triangles"].append(self._triangles(geom, look))
-            elif kind == mujoco.mjtGeom.mjGEOM_SPHERE:
-                ball = self._vector(size[[0, 0, 0]])
-                found["spheres"].append(self.schemas.SpherePrimitive(size=ball, **look))
-            elif kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
-                ends = {"bottom_scale": 1.0, "top_scale": 1.0}
-                whole = self._vector(size[[0, 0, 1]])
-                found["cylinders"].append(
-                    self.schemas.CylinderPrimitive(size=whole, **ends, **look)
-                )
+        m, kinds, messages = self.m, mujoco.mjtGeom, self.messages
+        shapes = {name: list[Any]() for name in ("cubes", "cylinders", "spheres", "triangles")}
+        for geom in shown(m, body):
+            red, green, blue, alpha = (round(float(c), 4) for c in paint(m, geom))
+            at, turn = self._vector(m.geom_pos[geom]), self._quaternion(m.geom_quat[geom])
+            pose = messages.Pose(position=at, orientation=turn)
+            look = {"pose": pose, "color": messages.Color(r=red, g=green, b=blue, a=alpha)}
+            kind, size = m.geom_type[geom], 2 * m.geom_size[geom]
+            if kind == kinds.mjGEOM_MESH:
+                vertices, faces = mesh_of(m, geom)
+                points = [messages.Point3(x=x, y=y, z=z) for x, y, z in vertices.tolist()]
+                look |= {"points": points, "indices": faces.ravel().tolist()}
+                shapes["triangles"].append(messages.TriangleListPrimitive(**look))
+            elif kind == kinds.mjGEOM_SPHERE:
+                look["size"] = self._vector(size[[0, 0, 0]])
+                shapes["spheres"].append(messages.SpherePrimitive(**look))
+            elif kind == kinds.mjGEOM_CYLINDER:
+                look |= {"size": self._vector(size[[0, 0, 1]]), **UNTAPERED}
+                shapes["cylinders"].append(messages.CylinderPrimitive(**look))
             else:
-                cube = self._vector(half_sizes(self.m, geom))
-                found["cubes"].append(self.schemas.CubePrimitive(size=cube, **look))
-        return found
+                look["size"] = self._vector(2 * half_sizes(m, geom))
+                shapes["cubes"].append(messages.CubePrimitive(**look))
+        return shapes
 
-    def _triangles(self, geom: int, look: dict[str, Any]) -> Any:
-        from factory.mjcf.replica import mesh_of
+    def _vector(self, at: Array) -> Any:
+        x, y, z = at.tolist()
+        return self.messages.Vector3(x=x, y=y, z=z)
 
-        vertices, faces = mesh_of(self.m, geom)
-        points = [self.schemas.Point3(x=x, y=y, z=z) for x, y, z in vertices.tolist()]
-        indices = faces.ravel().tolist()
-        return self.schemas.TriangleListPrimitive(points=points, indices=indices, **look)
+    def _quaternion(self, turn: Array) -> Any:
+        w, x, y, z = turn.tolist()
+        return self.messages.Quaternion(x=x, y=y, z=z, w=w)
 
-    def _pose(self, geom: int) -> Any:
-        x, y, z = self.m.geom_pos[geom].tolist()
-        w, i, j, k = self.m.geom_quat[geom].tolist()
-        return self.schemas.Pose(
-            position=self.schemas.Vector3(x=x, y=y, z=z),
-            orientation=self.schemas.Quaternion(x=i, y=j, z=k, w=w),
-        )
-
-    def _vector(self, half: Array) -> Any:
-        """Full lengths from half lengths."""
-        x, y, z = (2 * np.asarray(half, float)).tolist()
-        return self.schemas.Vector3(x=x, y=y, z=z)
+    def _stamp(self, time: float) -> Any:
+        seconds, rest = divmod(_nanoseconds(time), 10**9)
+        return self.messages.Timestamp(seconds, rest)
 
 
 def _nanoseconds(time: float) -> int:
