@@ -1,18 +1,23 @@
-"""Reading PNML: an XML tree to a net, with every fault of the document at its line and column."""
+"""Reading PNML: an XML tree to a net, with every fault of the document at its line and column.
+
+Elements of this project name the gears of a net, the slots of its places and the redistribution
+functions of its transitions.
+"""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
-from factory.foreign_nets.pnml_gears import NetNotes, claimed
 from factory.foreign_nets.xml_tree import Element, XmlDocument
 from factory.lang.source import read_text
-from factory.nets.gears import GearNet
+from factory.nets.composition import compose
+from factory.nets.gears import Gear, GearNet
 from factory.nets.marked import MarkedNet
 from factory.nets.petri import PetriNet, Place, Transition
+from factory.nets.threaded import Redistribution, ThreadedNet
 from factory.support.collector import collector_paused
 from factory.support.errors import Position, did_you_mean
 from factory.support.files import NET
@@ -31,6 +36,7 @@ SUGGESTIONS = 20
 
 _NODES = ("place", "transition", "referencePlace", "referenceTransition")
 _NUMBER = re.compile(r"[0-9]{1,9}")
+_DIGITS = re.compile(r"[0-9]+")
 
 
 @collector_paused()
@@ -60,9 +66,9 @@ class _Reader:
         self.arcs: list[Element] = []
 
     def net(self, root: Element) -> GearNet | MarkedNet:
-        """The one net of the document."""
-        found = self._only_net(root)
-        self._collect(found)
+        """The only net of the document."""
+        net = self._only_net(root)
+        self._collect(net)
         self.stop()
         targets = {name: self._resolve(element) for name, element in self.nodes.items()}
         self.stop()
@@ -79,16 +85,44 @@ class _Reader:
             self._place(key, name, left[key], right[key])
             for key, name in self._names(places).items()
         )
-        notes = NetNotes(
-            PetriNet(transitions, made),
-            tokens,
-            {name: i for i, name in enumerate(places)},
-            {name: i for i, name in enumerate(events)},
-            tuple(gear for tool in tools(found) for gear in tool.all("gear")),
-            tuple(tuple(tools(self.nodes[name])) for name in places),
-            tuple(tuple(tools(self.nodes[name])) for name in events),
-        )
-        return claimed(notes, self.document)
+        marked = MarkedNet(PetriNet(transitions, made), tokens)
+        gears = list(_notes(net, "gear"))
+        return self._claimed(marked, gears, places, events) if gears else marked
+
+    def _claimed(
+        self, net: MarkedNet, elements: list[Element], places: list[str], events: list[str]
+    ) -> GearNet | MarkedNet:
+        """The net with the gears that the document claims.
+
+        A GearNet where each is marked once, every event has a redistribution function and every
+        place a slot for each robot that its size speaks of; a MarkedNet where arcs, tokens or notes
+        are missing. Raises InputError where notes contradict a net that is whole.
+        """
+        place_index, event_index = _numbers(places), _numbers(events)
+        gears = tuple(_gear(element, place_index, event_index) for element in elements)
+        robots = _numbers(gear.robot for gear in gears)
+        for element, gear in zip(elements, gears, strict=True):
+            if len(gear.robot.split()) != 1 or len(robots) < len(gears):
+                message = f"the robots of the gears need names of their own; found '{gear.robot}'"
+                self.fault(element, message, "name them r1, r2, ...")
+        self.stop()
+        slots = tuple(_slots(self.nodes[name], robots) for name in places)
+        loose = MarkedNet(net.net, net.tokens, gears, slots)
+        initial = _initial(loose)
+        moves = [_redistribution(self.nodes[name], place_index) for name in events]
+        redistribution = tuple(move for move in moves if move is not None)
+        pairs = zip(net.net.places, slots, strict=True)
+        sized = all(place.size == len(own) for place, own in pairs)
+        if initial is None or len(redistribution) < len(moves) or not sized:
+            return loose
+        try:
+            return GearNet(ThreadedNet(net.net, redistribution), gears, initial, slots)
+        except ValueError as error:
+            if not compose(loose).defects:
+                hint = "name each slot before and after it once, or leave the notes out"
+                self.fault(elements[0], str(error), hint)
+                self.stop()
+            return loose
 
     def _only_net(self, root: Element) -> Element:
         if root.name != "pnml":
@@ -223,17 +257,16 @@ class _Reader:
 
     def _source(self, element: Element) -> Position:
         """The user's line that the document names for a node, else the node's own."""
-        for tool in tools(element):
-            for source in tool.all("source"):
-                notes = source.attributes
-                line, column = notes.get("line", ""), notes.get("column", "")
-                if _NUMBER.fullmatch(line) and _NUMBER.fullmatch(column):
-                    return Position(notes.get("file", "?"), int(line), int(column))
+        for source in _notes(element, "source"):
+            notes = source.attributes
+            line, column = notes.get("line", ""), notes.get("column", "")
+            if _NUMBER.fullmatch(line) and _NUMBER.fullmatch(column):
+                return Position(notes.get("file", "?"), int(line), int(column))
         return self.document.at(element)
 
     def _place(self, key: str, name: str, left: list[int], right: list[int]) -> Place:
         element = self.nodes[key]
-        mode = next((m for tool in tools(element) for m in tool.all("mode")), None)
+        mode = next(_notes(element, "mode"), None)
         notes = {} if mode is None else mode.attributes
         size = notes.get("size", "1")
         if not _NUMBER.fullmatch(size):
@@ -250,6 +283,55 @@ class _Reader:
         )
 
 
-def tools(element: Element) -> list[Element]:
-    """The toolspecific elements of this project."""
-    return [t for t in element.all("toolspecific") if t.attributes.get("tool") == "factory"]
+def _notes(element: Element, name: str) -> Iterator[Element]:
+    """The elements of this project within another, by name."""
+    for tool in element.all("toolspecific"):
+        if tool.attributes.get("tool") == "factory":
+            yield from tool.all(name)
+
+
+def _numbers(names: Iterable[str]) -> dict[str, int]:
+    return {name: number for number, name in enumerate(names)}
+
+
+def _gear(element: Element, places: Mapping[str, int], events: Mapping[str, int]) -> Gear:
+    """A gear; a place that is gone is left out together with the transition before it."""
+    notes = element.attributes
+    through = [places.get(name, -1) for name in notes.get("places", "").split()]
+    turns = [events.get(name, -1) for name in notes.get("transitions", "").split()]
+    if len(through) == len(turns):
+        turns = [e for p, e in zip(through, turns, strict=True) if p >= 0]
+    present = tuple(p for p in through if p >= 0)
+    return Gear(notes.get("robot", ""), notes.get("type", ""), present, tuple(turns))
+
+
+def _slots(place: Element, robots: Mapping[str, int]) -> tuple[int, ...]:
+    """The robots that a place acts on, by number; -1 for one that has no gear."""
+    named = (mode.attributes.get("slots", "") for mode in _notes(place, "mode"))
+    return tuple(robots.get(robot, -1) for robot in next(named, "").split())
+
+
+def _initial(net: MarkedNet) -> tuple[int, ...] | None:
+    """The marked place of each gear, None where some has none or several."""
+    marked = [[p for p in gear.places if net.tokens[p]] for gear in net.gears]
+    if any(len(on) != 1 for on in marked):
+        return None
+    inside = {on[0] for on in marked}
+    stray = any(t > 1 or (t and p not in inside) for p, t in enumerate(net.tokens))
+    lost = any(min(gear.transitions, default=-1) < 0 for gear in net.gears)
+    return None if stray or lost else tuple(on[0] for on in marked)
+
+
+def _redistribution(event: Element, places: Mapping[str, int]) -> Redistribution | None:
+    """d_e of an event, None where it is missing or names what is not there."""
+    note = next(_notes(event, "redistribution"), None)
+    if note is None:
+        return None
+    moves = []
+    for move in note.all("move"):
+        slots = [move.attributes.get(end, "").partition(" ") for end in ("from", "to")]
+        if any(name not in places or not _DIGITS.fullmatch(i) for name, _, i in slots):
+            return None
+        before, after = ((places[name], int(i[:9])) for name, _, i in slots)
+        moves.append((before, after))
+    return tuple(sorted(moves))
