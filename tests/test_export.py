@@ -34,7 +34,7 @@ from factory.export import Subject, exporters
 from factory.export.bodies import file_name
 from factory.export.events import COLUMNS
 from factory.export.svg import draw_net
-from factory.export.swimlanes import owners_of, swimlanes
+from factory.export.swimlanes import swimlanes
 from factory.export.tina import write_tina
 from factory.export.tree_drawing import draw_tree
 from factory.export.urdf import roll_pitch_yaw
@@ -327,7 +327,7 @@ def test_nodes_are_drawn_apart_and_time_goes_right(
     ElementTree.fromstring(draw_net(net, "<&"))
     if which >= 0:
         return
-    for place, owners in enumerate(owners_of(net)):
+    for place, owners in enumerate(net.owners):
         shape = net.net.places[place]
         assert at.places[place][1] in [at.lanes[gear] for gear in owners]
         assert at.x[shape.right[0]] > at.places[place][0]

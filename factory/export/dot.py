@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from factory.export.subject import Subject
-from factory.export.swimlanes import colour, owners_of
+from factory.export.swimlanes import colour
 from factory.export.tree_drawing import pag_of, view_of
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked
@@ -42,34 +42,33 @@ def write_tree(pag: PAG) -> str:
 
 
 def _lines(net: MarkedNet) -> Iterator[str]:
-    owners = owners_of(net)
     yield "digraph factory {"
     yield '  graph [rankdir=LR, fontname="sans-serif"];'
     yield '  node [fontname="sans-serif", fontsize=10];'
     for number, gear in enumerate(net.gears):
-        yield from _robot(net, number, gear.robot, owners)
+        yield from _robot(net, number, gear.robot)
     for index in range(len(net.tokens)):
-        if len(owners[index]) != 1:
-            yield f"  {_place(net, index, owners[index])}"
+        if len(net.owners[index]) != 1:
+            yield f"  {_place(net, index)}"
     for index, transition in enumerate(net.net.transitions):
         name = f'label="", xlabel={_quote(transition.name)}'
         yield f"  t{index} [shape=box, height=0.1, style=filled, fillcolor=black, {name}];"
-    yield from _arcs(net, owners)
+    yield from _arcs(net)
     yield "}"
 
 
-def _robot(net: MarkedNet, number: int, robot: str, owners: list[list[int]]) -> Iterator[str]:
+def _robot(net: MarkedNet, number: int, robot: str) -> Iterator[str]:
     """A cluster with the places of one robot alone."""
     yield f"  subgraph cluster_{number} {{"
     yield f"    label={_quote(robot)}; color={_quote(colour([number]))}; style=rounded;"
     for place in net.gears[number].places:
-        if owners[place] == [number]:
-            yield f"    {_place(net, place, [number])}"
+        if net.owners[place] == (number,):
+            yield f"    {_place(net, place)}"
     yield "  }"
 
 
-def _place(net: MarkedNet, index: int, owners: list[int]) -> str:
-    place, tokens = net.net.places[index], net.tokens[index]
+def _place(net: MarkedNet, index: int) -> str:
+    place, tokens, owners = net.net.places[index], net.tokens[index], net.owners[index]
     mode = place.mode if place.mode not in ("", place.name) else ""
     shown = [place.name, mode, "●" * tokens if tokens < 5 else f"● {tokens}"]
     label = "\n".join(line for line in shown if line)
@@ -77,9 +76,9 @@ def _place(net: MarkedNet, index: int, owners: list[int]) -> str:
     return f"p{index} [shape=ellipse, penwidth={width}, color={paint}, label={_quote(label)}];"
 
 
-def _arcs(net: MarkedNet, owners: list[list[int]]) -> Iterator[str]:
+def _arcs(net: MarkedNet) -> Iterator[str]:
     for index, place in enumerate(net.net.places):
-        paint = _quote(colour(owners[index]))
+        paint = _quote(colour(net.owners[index]))
         for event in place.left:
             yield f"  t{event} -> p{index} [color={paint}];"
         for event in place.right:

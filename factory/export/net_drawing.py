@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from factory.export.swimlanes import LEFT, apart, owners_of, swimlanes
+from factory.export.swimlanes import LEFT, apart, swimlanes
 from factory.nets.marked import MarkedNet
 from factory.support.canvas import Canvas, Point
 
@@ -32,7 +32,7 @@ class NetDrawing:
         self, net: MarkedNet, styles: Callable[[Sequence[int]], str], every: bool = False
     ) -> None:
         self.net, self.styles, self.every = net, styles, every
-        self.at, self.owners, self.canvas = swimlanes(net), owners_of(net), Canvas()
+        self.at, self.owners, self.canvas = swimlanes(net), net.owners, Canvas()
         self.page = (0.0, self.at.width, 0.0, self.at.height)
         for layer in (self._arcs, self._lanes, self._transitions, self._crossings, self._places):
             with self.canvas.group():

@@ -91,25 +91,16 @@ def colour(owners: Sequence[int]) -> str:
     return COLOURS[owners[0] % len(COLOURS)] if len(owners) == 1 else SHARED
 
 
-def owners_of(net: MarkedNet) -> list[list[int]]:
-    """For each place the gears (indices) that it is in."""
-    owners: list[list[int]] = [[] for _ in net.tokens]
-    for number, gear in enumerate(net.gears):
-        for place in gear.places:
-            owners[place].append(number)
-    return owners
-
-
 def swimlanes(net: MarkedNet) -> Swimlanes:
     """The coordinates of a net; one without gears has its places one under the other."""
-    owners = owners_of(net)
+    owners = net.owners
     x = [LEFT + PITCH * (column + 0.5) for column in _columns(net)]
-    order = _lane_order(net, owners, x)
+    order = _lane_order(net, x)
     row = {gear: number for number, gear in enumerate(order)}
     lanes = tuple(TOP + LANE * row[gear] for gear in range(len(net.gears)))
     across = [_across(net, place, x) for place in range(len(owners))]
     down = _heights(owners, across, lanes, _rows(net))
-    spans = _spans(net, owners, down, lanes, x)
+    spans = _spans(net, down, lanes, x)
     width = max([*x, *across], default=LEFT) + PITCH
     height = max([*down, *lanes, *(low for low, _ in spans)], default=TOP) + TOP
     places = tuple(zip(across, down, strict=True))
@@ -136,10 +127,10 @@ def _across(net: MarkedNet, place: int, x: Sequence[float]) -> float:
     return max((x[event] for event in before), default=LEFT) + PITCH / 2
 
 
-def _lane_order(net: MarkedNet, owners: Sequence[Sequence[int]], x: Sequence[float]) -> list[int]:
+def _lane_order(net: MarkedNet, x: Sequence[float]) -> list[int]:
     """The gears from top to bottom: below each robot those it meets, the earliest first."""
     meetings: list[list[tuple[float, int]]] = [[] for _ in net.gears]
-    for place, gears in enumerate(owners):
+    for place, gears in enumerate(net.owners):
         if len(gears) > 1:
             when = min((x[event] for event in net.net.places[place].left), default=0.0)
             for gear in gears:
@@ -186,7 +177,6 @@ def _rows(net: MarkedNet) -> list[int]:
 
 def _spans(
     net: MarkedNet,
-    owners: Sequence[Sequence[int]],
     down: Sequence[float],
     lanes: Sequence[float],
     x: Sequence[float],
@@ -200,7 +190,7 @@ def _spans(
     alone = {event for event, found in enumerate(rows) if not found}
     for place, shape in enumerate(net.net.places):
         for event in {*shape.left, *shape.right}:
-            if not owners[place] or event in alone:
+            if not net.owners[place] or event in alone:
                 rows[event].append(down[place])
     for event, height in _spread(alone, rows, x).items():
         rows[event] = [height]
