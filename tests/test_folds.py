@@ -379,7 +379,7 @@ def test_of_fifty_legal_markings_of_three_robots_24_are_dead() -> None:
             assert set(firings(net, marking)) == set(range(len(net.threaded.transitions)))
             continue
         dead += 1
-        with pytest.raises(InputError, match="BadMarking the robots are never there together"):
+        with pytest.raises(InputError, match="BadMarking the marking is unreachable"):
             legal_marking(net, names)
         with pytest.raises(ValueError, match="contradicts the others"):
             firings(net, marking)
@@ -391,8 +391,8 @@ def test_what_the_error_says() -> None:
     with pytest.raises(InputError) as caught:
         legal_marking(three_robots().net, "r1:part1, r2:nopart/part3")
     found = caught.value.diagnostics[0]
-    assert found.message.startswith("the robots are never there together: the circuit through sub3")
-    assert found.message.endswith("would have no tokens, and always has 1")
+    assert found.message.startswith("the marking is unreachable: the circuit through sub3")
+    assert found.message.endswith("would carry no tokens instead of 1")
     assert found.hint == "say where each of r1, r2, r3 is"
 
 

@@ -642,7 +642,7 @@ def test_pictures_are_written_into_the_folder_alone(run: Terminal, tmp_path: Pat
     root = ElementTree.fromstring(text)
     assert root.tag.endswith("svg") and "href" not in text and "url(" not in text
     words = "".join(root.itertext())
-    assert "b and front pass through each other, 20.00 mm deep" in words
+    assert "b and front overlap by 20.00 mm, 25.00 mm before" in words
     assert 'class="clash"' in text and " mm" in words
 
 

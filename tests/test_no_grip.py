@@ -166,7 +166,7 @@ def test_check_lists_and_draws_it(run: Terminal, tub: Path, out: Path) -> None:
     root = ElementTree.fromstring(text)
     assert "href" not in text and "url(" not in text
     words = "".join(root.itertext())
-    assert "No hand can hold axle" in words and "in its way: gear lowered onto it" in words
+    assert "No hand can hold axle" in words and "obstacles: gear lowered onto it" in words
     drawn = [element.get("class") for element in root.iter()]
     assert drawn.count("nearest") == 6 and drawn.count("hand") == 6 + 1
     tried = sum(miss["tried"] for miss in listed["nearest_misses"])

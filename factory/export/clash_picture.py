@@ -86,8 +86,8 @@ class _ClashSheet(ViewSheet):
             with self.canvas.group(id=view.name.split()[-1]):
                 self._draw(view)
         standing, coming = self.mating.inputs[0], self.mating.inputs[-1]
-        entries = [("struck", "stands"), ("striking", "comes"), ("place", "its place")]
-        entries += [("clash", "in both"), ("standing", shortened(standing))]
+        entries = [("struck", "fixed part"), ("striking", "moving part"), ("place", "its position")]
+        entries += [("clash", "overlap"), ("standing", shortened(standing))]
         entries += [("coming", shortened(coming))]
         below = max(view.box[3] for view in views) + ROW
         return self.document(f"{self.mating.label}: blocked", below, entries, STYLE)
@@ -95,14 +95,16 @@ class _ClashSheet(ViewSheet):
     def _title(self) -> None:
         clash, more = self.clash, len(self.mating.clashes) - 1
         label, coming = shortened(self.mating.label), shortened(self.mating.inputs[-1])
-        title = f"{label} is blocked: {coming} cannot come to its place"
+        title = f"{label} is blocked: {coming} cannot reach its position"
         self.canvas.text((EDGE, 34), title, 24, "h")
         pair = f"{shortened(self.striking)} and {shortened(self.struck)}"
-        words = f"{pair} pass through each other, {clash.depth * 1e3:.2f} mm deep"
-        self.canvas.text((EDGE, 66), f"{words}, {clash.shift * 1e3:.2f} mm before the end", 17)
+        words = f"{pair} overlap by {clash.depth * 1e3:.2f} mm"
+        self.canvas.text(
+            (EDGE, 66), f"{words}, {clash.shift * 1e3:.2f} mm before the final position", 17
+        )
         if more:
-            pairs = "another pair clashes" if more == 1 else f"{more} other pairs clash"
-            self.canvas.text((EDGE, 89), f"{pairs} on the way", 17, "grey")
+            pairs = "another pair overlaps" if more == 1 else f"{more} other pairs overlap"
+            self.canvas.text((EDGE, 89), f"{pairs} during the motion", 17, "grey")
 
     def _draw(self, view: PartView) -> None:
         """The other parts, the two that overlap, their overlap, and the direction of motion."""

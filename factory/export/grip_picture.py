@@ -66,18 +66,18 @@ class _GripSheet(ViewSheet):
         """The document."""
         label = self.grip.label
         self.canvas.text((EDGE, 34), f"No hand can hold {shortened(label)}", 24, "h")
-        words = "would carry it; the nearest miss of each kind of hand, with what is in its way"
+        words = "would carry it; nearest miss of each kind of hand, with the obstacles"
         self.canvas.text((EDGE, 66), f"{self.grip.robot} {words}", 17)
         y = HEAD
         for miss in self.grip.misses:
             y = self._row(miss, y)
         entries = [
             ("held", shortened(label)),
-            ("obstacle", "in the way"),
+            ("obstacle", "obstacle"),
             ("beside", "other parts"),
             ("hand", "hand"),
-            ("way", "way of the hand, or of the part"),
-            ("met", "in both"),
+            ("way", "path of the hand or of the obstacle"),
+            ("met", "overlap"),
             ("tried", "place tried"),
         ]
         return self.document(f"{label}: no hand can hold it", y, entries, STYLE)
@@ -87,12 +87,12 @@ class _GripSheet(ViewSheet):
         kind, canvas = WAYS[miss.kind], self.canvas
         canvas.text((EDGE, y + 22), kind.capitalize(), 19, "h")
         if miss.at is None:
-            canvas.text((EDGE + INDENT, y + 22), "there is no place for a pad", 17)
+            canvas.text((EDGE + INDENT, y + 22), "no place for a pad", 17)
             return y + 22 + ROW
         at = ", ".join(f"{c * 1e3:.4g}" for c in miss.at)
         words = f"{len(miss.tried)} places tried, none clear; nearest miss at ({at}) mm"
         canvas.text((EDGE + INDENT, y + 22), f"{words}, where {miss.strength}", 17)
-        named = f"in its way: {', '.join(obstacle.named for obstacle in miss.obstacles)}"
+        named = f"obstacles: {', '.join(obstacle.named for obstacle in miss.obstacles)}"
         cut = named if len(named) <= LINE else f"{named[: LINE - 1]}…"
         title = "" if cut == named else named
         canvas.text((EDGE + INDENT, y + 50), cut, 17, title=title)
@@ -103,7 +103,7 @@ class _GripSheet(ViewSheet):
             self.view("seen from the side", (u, z), 0, y + GAP),
             self.view(f"seen {kind}", faces[miss.kind], 1, y + GAP),
         ]
-        self.arrow(views[0], 1, "the robot heads")
+        self.arrow(views[0], 1, "the robot's direction")
         for view, tried in zip(views, (miss.tried[:0], miss.tried), strict=True):
             with canvas.group(id=f"{miss.kind}-{view.name.split()[-1]}"):
                 self._draw(view, miss)

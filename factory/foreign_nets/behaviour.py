@@ -268,7 +268,7 @@ def _explored(net: MarkedNet, found: Exploration) -> Iterator[Defect]:
     elif not found.complete:
         yield Defect("safe", "undecided", text)
     if one_way := found.one_way or found.deadlock:
-        reason = f"{_after(net, one_way)} the initial marking is out of reach"
+        reason = f"{_after(net, one_way)} the initial marking is unreachable"
         yield Defect("reversible", "no way back", reason, transitions=one_way)
     elif not found.complete:
         yield Defect("reversible", "undecided", text)

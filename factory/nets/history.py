@@ -65,7 +65,7 @@ def legal_marking(net: GearNet, names: str) -> Marking:
 
     An operation place is named by the label that it makes, and takes all its robots; a wait place
     by robot and label, `r3:sub1`. Raises InputError (BadMarking) with every fault found: an unknown
-    place, a robot marked twice, or places at which the robots never are together (`unreached`).
+    place, a robot marked twice, or an unreachable marking (`unreached`).
     """
     faults: list[Diagnostic] = []
     at: dict[int, int] = {}
@@ -132,12 +132,12 @@ def _circuits(
 
 
 def _never(net: GearNet, circuit: tuple[int, ...], marking: Marking, names: str) -> Diagnostic:
-    """That a circuit has other tokens than it always has."""
+    """The diagnostic of a circuit whose number of tokens is not that of m_0."""
     here, always = (sum(p in m for p in circuit) for m in (marking, net.initial_marking))
     shown = listing(net.threaded.places[p].name for p in circuit)
     message = (
-        f"the robots are never there together: the circuit through {shown} would have"
-        f" {here or 'no'} token{'' if here == 1 else 's'}, and always has {always}"
+        f"the marking is unreachable: the circuit through {shown} would carry"
+        f" {here or 'no'} token{'' if here == 1 else 's'} instead of {always}"
     )
     own = dict.fromkeys(robot for p in circuit for robot in net.slots[p])
     robots = listing(net.gears[robot].robot for robot in own)

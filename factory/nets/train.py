@@ -79,5 +79,5 @@ def no_way_back(net: MarkedNet, event: int) -> Defect:
     """That a net is not reversible, as a transition that can fire is connected to something that
     fires finitely often."""
     name = net.net.transitions[event].name
-    text = f"{name} can fire, but not so often that the initial marking returns"
+    text = f"{name} can fire, after which the initial marking is unreachable"
     return Defect("reversible", "no way back", text, transitions=(event,))

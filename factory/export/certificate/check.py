@@ -79,7 +79,7 @@ def _prove_gear_net(net: Net, section: Section, document: Section) -> Iterator[s
         if step is not section["order"][0]:
             yield from _added(net, step, at_place, passing)
         elif any(step[key] is not None for key in ("place", "a", "b", "c", "exempt")):
-            yield f"gear_net: {robot.name} comes first and is joined to nothing"
+            yield f"gear_net: {robot.name} is the first gear, and must not name a place"
         for p, e in zip(robot.places, robot.turns, strict=True):
             at_place[p].append(step["gear"])
             passing[e] += 1
@@ -124,7 +124,7 @@ def _prove_gear_train(net: Net, section: Section, document: Section) -> Iterator
         if len(gears) > 1 and [net.owners[p] for p in around] != [gears]:
             yield f"gear_train: the gears at {net.events[event]} share more or less than a place"
     if not nx.is_connected(incidence(net)):
-        yield "gear_train: some gear is apart from the rest"
+        yield "gear_train: the gears are not connected"
     yield from net.wrong_moves("gear_train")
     yield from _ascending(net, section, document)
 
@@ -162,13 +162,13 @@ def _prove_safe(net: Net, section: Section, document: Section) -> Iterator[str]:
     if len(cover) != len(net.names):
         yield "safe: the cover does not name one circuit for each place"
     elif not all(0 <= c < len(good) and p in good[c] for p, c in enumerate(cover)):
-        yield "safe: a place is not on the circuit that is to cover it, or that has two tokens"
+        yield "safe: a place is not on its circuit of the cover, or that circuit has two tokens"
 
 
 def _prove_live(net: Net, section: Section, document: Section) -> Iterator[str]:
     """The places without tokens, in an order in which each comes after all that it waits for."""
     if not net.marked_graph():
-        yield "live: an order of places proves nothing for a net with choice"
+        yield "live: an order of places is no proof for a net with choice"
         return
     order = [number(p) for p in section["order"]]
     empty = [p for p, tokens in enumerate(net.tokens) if not tokens]
@@ -193,7 +193,7 @@ def _prove_reversible(net: Net, section: Section, document: Section) -> Iterator
         return
     if section["root"] is None:
         if one_way(net):
-            yield "reversible: something can fire that cannot be undone"
+            yield "reversible: a transition can fire after which the marking cannot return"
         return
     if document["live"]["holds"] is not True:
         yield "reversible: this follows from the trees for live nets only"
