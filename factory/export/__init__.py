@@ -1,11 +1,10 @@
 """Exporters, found by directory: every module here that defines `FORMAT`, `TAKES` and `export`.
 
-`FORMAT` is the name of the format and, where there is no `ENDING`, the ending of its files; `TAKES`
-what it is made from: "net" (a PAG, or a net in PNML), "pag", "log" or "factory" (a PAG or a log).
-`export(subject)` gives a text, bytes where `BINARY` is
-set, or several files by name beside the file asked for, that itself under ""; where the subject is
-`whole`, files in a folder. `OF`, where there is a choice, says what `--of` means. The module's
-docstring is its line in `factory export --help`.
+`FORMAT`: name of the format and, without `ENDING`, the ending of its files; `TAKES`: its source,
+"net" (a PAG, or a net in PNML), "pag", "log" or "factory" (a PAG or a log); `OF`: meaning of
+`--of`, where there is a choice. `export(subject)` returns a text, bytes where `BINARY` is set, or
+several files by name beside the requested one, which has the name ""; where the subject is `whole`,
+the files of a folder. The docstring is the line in `factory export --help`.
 """
 
 from __future__ import annotations
@@ -41,16 +40,16 @@ class Exporter:
 def exporters() -> Mapping[str, Exporter]:
     """The exporters by the names of their formats, sorted."""
     modules = (import_module(f"{__name__}.{m.name}") for m in pkgutil.iter_modules(__path__))
-    found = [_exporter(module) for module in modules if hasattr(module, "FORMAT")]
-    return MappingProxyType({e.format: e for e in sorted(found, key=lambda e: e.format)})
+    exporting = [_exporter(module) for module in modules if hasattr(module, "FORMAT")]
+    return MappingProxyType({e.format: e for e in sorted(exporting, key=lambda e: e.format)})
 
 
 def _exporter(module: ModuleType) -> Exporter:
     summary = " ".join((module.__doc__ or "").strip().partition("\n\n")[0].split())
     words = ("FORMAT", "TAKES", "BINARY", "OF", "FOLDER", "ENDING")
     names = [name for name in words if hasattr(module, name)]
-    given = {name.lower(): getattr(module, name) for name in names}
-    return Exporter(**given, summary=summary, export=module.export)
+    fields = {name.lower(): getattr(module, name) for name in names}
+    return Exporter(**fields, summary=summary, export=module.export)
 
 
 __all__ = ["Exporter", "Made", "Subject", "exporters"]

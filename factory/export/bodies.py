@@ -57,8 +57,8 @@ def parts_of(pag: PAG, label: str) -> list[str]:
 
 
 def wanted(subject: Subject, ending: str) -> Iterator[tuple[str, str]]:
-    """The labels to be written with the names of their files: the one asked for, or the product,
-    under ""; for a whole folder every sub-assembly and part. Raises InputError."""
+    """Labels to write, with the names of their files: the requested one, or the product, under "";
+    for a whole folder every sub-assembly and part. Raises InputError."""
     pag = subject.project.pag
     if not subject.whole:
         yield subject.choose(list(dict.fromkeys((pag.root, *pag.by_label))), "labels"), ""
@@ -70,7 +70,8 @@ def wanted(subject: Subject, ending: str) -> Iterator[tuple[str, str]]:
 
 
 def file_name(label: str, taken: set[str]) -> str:
-    """A name for a file, not yet taken in whatever case, that is the label where that is safe."""
+    """A file name for a label, distinct from those `taken` whatever the case; the label itself
+    where that is a safe name."""
     safe = "".join(c if c.isalnum() or c in "-_." else "_" for c in label).strip(".") or "_"
     name, number = safe[:80], 2
     while name.casefold() in taken:

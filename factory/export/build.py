@@ -40,8 +40,8 @@ class BuildRequest:
 
 @dataclass(frozen=True)
 class Built:
-    """A build's model, its clearance certificate and its files, those included that were there
-    already; `mjcf`: that of the model."""
+    """A build's model, its clearance certificate and its files, including those that existed
+    before; `mjcf`: the file of the model."""
 
     model: Model
     clearance: Certificate
@@ -50,7 +50,7 @@ class Built:
 
 
 def build(project: Project, verdict: Verdict, request: BuildRequest) -> Built:
-    """Build the model and write what is asked for, with the proof of the net's `verdict`.
+    """Build the model and write the requested files, with the proof of the net's `verdict`.
 
     Raises RunError where the layout is not certified; InputError where an operation cannot reach
     its goal in it, where the engine refuses the model, and where a file whose name is chosen here
@@ -90,8 +90,8 @@ def files_read(project: Project) -> tuple[Path, ...]:
 
 
 def _binary(model: Model, path: Path | None) -> dict[Path, bytes]:
-    """The engine's binary model and its seal, to be written; nothing where they are at `path`
-    already: the engine has accepted this model before. Raises InputError where it does not."""
+    """The files of the engine's binary model and its seal; none where they are at `path` already,
+    since the engine has accepted this model then. Raises InputError where it does not."""
     if path and kept(path, key_of(model)) is not None:
         return {}
     from factory.mjcf.loading import load

@@ -1,8 +1,8 @@
 """CSV (RFC 4180, with a line of names) of a log's events: time, transition, operation, unit,
 robots, source line.
 
-A spreadsheet takes a text that begins as a formula does for one, and does what it says: such a text
-gets an apostrophe before it, and control codes become spaces."""
+A spreadsheet evaluates a text that begins like a formula; such a text gets an apostrophe before it.
+Control codes become spaces."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from factory.support.errors import one_line
 FORMAT, TAKES = "csv", "log"
 
 FORMULA = ("=", "+", "-", "@")
-"""What a formula begins with."""
+"""First characters of a formula."""
 
 
 def export(subject: Subject) -> str:

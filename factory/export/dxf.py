@@ -1,4 +1,4 @@
-"""DXF R2013 of the floor plan in millimetres, a layer for each kind of thing: floor, outfeed,
+"""DXF R2013 of the floor plan in millimetres, a layer for each kind of object: floor, outfeed,
 sweeps, feeders, guidepaths, robots, parts, junctions, labels."""
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from factory.support.extras import optional
 FORMAT, TAKES = "dxf", "pag"
 
 VERSION, MILLIMETRES = "R2013", 4
-"""Of DXF; the code of the unit in its header."""
+"""Version of DXF; code of the unit in the header."""
 
 LAYERS = {
     "FLOOR": (8, ("floor",)),
@@ -68,7 +68,7 @@ def write_dxf(layout: Layout) -> str:
 
 @contextmanager
 def _undated(ezdxf: Any) -> Iterator[None]:
-    """Without the time of day and new identifiers in the header."""
+    """Leave the time of day and new identifiers out of the header."""
     before = ezdxf.options.write_fixed_meta_data_for_testing
     ezdxf.options.write_fixed_meta_data_for_testing = True
     try:
@@ -78,7 +78,7 @@ def _undated(ezdxf: Any) -> Iterator[None]:
 
 
 def _frame(document: Any, floor: Box) -> None:
-    """What a viewer shows first, and the extents in the header."""
+    """Set the initial view and the extents in the header."""
     (xlo, ylo), (xhi, yhi) = _point((floor[0], floor[2])), _point((floor[1], floor[3]))
     document.header["$EXTMIN"], document.header["$EXTMAX"] = (xlo, ylo, 0.0), (xhi, yhi, 0.0)
     middle = (xlo + xhi) / 2, (ylo + yhi) / 2
@@ -101,7 +101,7 @@ def _shape(space: Any, shape: Flat) -> None:
 
 
 def _labels(layout: Layout) -> Iterator[tuple[str, Point2]]:
-    """Parts at their feeders, robots on their carriages, operations where robots meet."""
+    """Labels: parts at their feeders, robots on their carriages, operations at their junctions."""
     for leaf in layout.factory.leaves:
         xlo, _, _, yhi = feeder_of(layout, leaf.label).post
         yield leaf.label, (xlo, yhi + 0.005)

@@ -1,5 +1,5 @@
-"""The events of a log as rows of a table: what fired when, of which operation, on which line, and
-what of that was undone when something failed."""
+"""Events of a log as rows of a table: a row for each transition that fired, or was undone after a
+failure."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from factory.record.project_table import factory_of
 
 @dataclass(frozen=True, slots=True)
 class EventRow:
-    """A transition that fired, or was undone: at `time_s` [s]; `kind` is start or end, or one of
-    these undone; `operation` the label it makes; `unit` how often it has fired by then, without
-    what was undone before; `robots` those of the operation."""
+    """A transition that fired, or was undone, at `time_s` [s]. `kind`: start, end, start undone or
+    end undone; `operation`: the label it makes; `unit`: how often the transition has fired, less
+    how often it was undone; `robots`: those of the operation."""
 
     time_s: float
     transition: str

@@ -1,4 +1,4 @@
-"""What stands on the floor of a layout, as flat shapes in metres that its drawings share."""
+"""Shapes of a floor plan [m], shared by its drawings."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from factory.layout.sweeps import piles, regions
 from factory.support.canvas import hexadecimal, hull
 
 JUNCTION = 0.008
-"""Radius of the circle where robots meet [m]."""
+"""Radius of the circle at a junction [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Flat:
-    """A shape in plan: `style` says what it is. Of a box `points` are two opposite corners, of a
-    circle of `radius` [m] they are its middle, of a line its ends, else the corners of an area;
-    `name` and `paint` (`#rrggbb`) are a part's."""
+    """A shape in plan. `style`: its kind; `points`: two opposite corners of a box, the middle of a
+    circle of `radius` [m], the ends of a line, or the corners of an area; `name`, `paint`: label
+    and colour (`#rrggbb`) of a part."""
 
     style: str
     points: tuple[Point2, ...]
@@ -40,10 +40,10 @@ class Flat:
 
 
 def flat_shapes(layout: Layout) -> Iterator[Flat]:
-    """All of them, from the ground up: `floor`, `coupled` and `uncoupled` sweeps, `belt` with the
-    `product` on it, `boom`, `post` and `housing` of feeders, `path` (where carriages go) and `last`
-    (from there to A) of guidepaths, `finger`, `arm` and carriage (`dot` or `tool`) of robots at
-    home, `part`, `junction`."""
+    """The shapes of a layout, from the ground up: `floor`, `coupled` and `uncoupled` sweeps,
+    `belt` with the `product` on it, `boom`, `post` and `housing` of feeders, `path` (where
+    carriages go) and `last` (from there to A) of guidepaths, `finger`, `arm` and carriage (`dot`
+    or `tool`) of robots at home, `part`, `junction`."""
     yield Flat.of_box("floor", layout.floor)
     yield from _sweeps(layout)
     yield Flat.of_box("belt", layout.outfeed)
@@ -70,19 +70,19 @@ def flat_shapes(layout: Layout) -> Iterator[Flat]:
 
 
 def stations(layout: Layout) -> dict[Point2, list[str]]:
-    """Where robots meet (x, y) [m], and the operations for which they do, the last first."""
-    found: dict[Point2, list[str]] = {}
+    """Junctions (x, y) [m], each with the operations that take place there, the last first."""
+    junctions: dict[Point2, list[str]] = {}
     for operation in reversed(layout.factory.operations):
         if len(operation.robots) > 1:
             path = layout.guidepaths[operation.carrier]
             x, y = path.middle(path.length - layout.stations[operation.index])
-            found.setdefault((round(x, 6), round(y, 6)), []).append(operation.label)
-    return found
+            junctions.setdefault((round(x, 6), round(y, 6)), []).append(operation.label)
+    return junctions
 
 
 def part_outline(layout: Layout, label: str, at: Point2, style: str) -> Flat:
-    """The outline of a part for a product whose middle is at a point: round for a ball and for a
-    cylinder that stands."""
+    """Outline of a part in a product whose middle is at a point: a circle for spheres and upright
+    cylinders."""
     solid, middle = layout.product.solids[label], layout.product.middle
     x, y = at[0] - float(middle[0]), at[1] - float(middle[1])
     paint = hexadecimal(solid.rgba)
@@ -94,12 +94,12 @@ def part_outline(layout: Layout, label: str, at: Point2, style: str) -> Flat:
 
 
 def _sweeps(layout: Layout) -> Iterator[Flat]:
-    """Coupled regions first, so that what is always kept clear lies on top."""
+    """Regions swept by payloads: the coupled ones first, so that those of every mode lie on top."""
     swept = regions(layout, piles(layout.factory, layout.product))
     payloads = [region for region in swept if region.kind == PAYLOAD_BODY]
     for style in ("coupled", "uncoupled"):
-        found = (r.box for r in payloads if (r.mode == ALWAYS) == (style == "uncoupled"))
-        yield from (Flat.of_box(style, box) for box in dict.fromkeys(found))
+        boxes = (r.box for r in payloads if (r.mode == ALWAYS) == (style == "uncoupled"))
+        yield from (Flat.of_box(style, box) for box in dict.fromkeys(boxes))
 
 
 def _robot(layout: Layout, robot: int, style: str) -> Iterator[Flat]:

@@ -17,10 +17,10 @@ FONT = 17.0
 """Size of a label on the floor [mm]."""
 
 ARROWS = 600.0
-"""A guidepath has an arrow about every so far [mm]."""
+"""Approximate distance of the arrows on a guidepath [mm]."""
 
 RIM = 60.0
-"""Round the floor labels keep off so much [mm]."""
+"""Width of the margin around the floor in which there are no labels [mm]."""
 
 GROUPS = {
     "floor": ("floor",),
@@ -35,7 +35,7 @@ GROUPS = {
 """The groups of the drawing, from the ground up, and the shapes in each."""
 
 SOLID = frozenset({"post", "dot", "tool", "junction"})
-"""What labels keep off."""
+"""Styles of shapes that labels do not cover."""
 
 LEGEND = (
     ("dot", "robot at home"),
@@ -151,7 +151,7 @@ class _Sheet:
             self.canvas.block(box)
 
     def _chevrons(self, belt: Box) -> None:
-        """The way the belt runs."""
+        """Chevrons in the direction of the belt."""
         left, right, top, bottom = belt
         middle, half = (top + bottom) / 2, min((bottom - top) / 4, 40.0)
         steps = max(1, floor((right - left) / (4 * half)))
@@ -187,7 +187,7 @@ class _Sheet:
     # --- around the floor ------------------------------------------------------------------------
 
     def _around(self) -> Box:
-        """Title, figures, dimensions, scale bar and legend; gives the whole page."""
+        """Draw title, figures, dimensions, scale bar and legend; returns the bounds of the page."""
         unit, (left, right, top, bottom) = self.unit, self.floor
         layout, title = self.layout, self._name()
         figures = (

@@ -27,7 +27,7 @@ FACTORY = "/factory"
 """The outermost node of the factory."""
 
 FLOOR, MARGIN, THICK = (0.93, 0.935, 0.94, 1.0), 0.2, 0.002
-"""The floor's colour, how far it goes on beside what stands on it, and its thickness [m]."""
+"""Colour of the floor, its margin around the geoms [m], and its thickness [m]."""
 
 
 def export(subject: Subject) -> bytes:
@@ -37,7 +37,7 @@ def export(subject: Subject) -> bytes:
 
 
 def _state(subject: Subject) -> Replica:
-    """The engine's model, in the state that is asked for."""
+    """The engine's model in the requested state."""
     from factory.mjcf.loading import load
     from factory.mjcf.replica import Replica
     from factory.record.log.model import model_of
@@ -81,11 +81,11 @@ def write_factory(replica: Replica, binary: bool) -> bytes:
     for body in range(m.nbody):
         if body and (d.xpos[body, 2] < HIDDEN or m.body(body).name == names.COMPASS):
             continue
-        own = _node(replica, body)
+        node = _node(replica, body)
         if body:
             parent = int(m.body_parentid[body])
             there, here = _pose(replica, parent), _pose(replica, body)
-            scene.graph.update(own, _node(replica, parent), matrix=np.linalg.solve(there, here))
+            scene.graph.update(node, _node(replica, parent), matrix=np.linalg.solve(there, here))
         for geom in shown(m, body):
             key = _look(replica, geom)
             if key not in meshes:
@@ -94,7 +94,7 @@ def write_factory(replica: Replica, binary: bool) -> bytes:
             name = m.geom(geom).name or f"geom{geom}"
             name = f"{name}/shape" if name in scene.graph.nodes else name
             place = pose(m.geom_pos[geom], rotation(m.geom_quat[geom]))
-            scene.graph.update(name, own, matrix=place, geometry=meshes[key])
+            scene.graph.update(name, node, matrix=place, geometry=meshes[key])
             geoms.append(geom)
     low, high = _ground(replica, geoms)
     scene.geometry["floor"] = shaded(_slab(high - low), FLOOR)
@@ -112,7 +112,7 @@ def _pose(replica: Replica, body: int) -> Array:
 
 
 def _look(replica: Replica, geom: int) -> tuple[object, ...]:
-    """What shapes that look alike have in common."""
+    """Key of a geom's appearance: type, mesh, size and colour."""
     from factory.mjcf.replica import paint
 
     m = replica.m

@@ -1,5 +1,6 @@
-"""MCAP of a log for Foxglove and Rerun, with Foxglove's Protobuf schemas: `/tf` where each body is,
-`/scene` what it looks like, `/joints` the robots' positions and speeds, `/events` what fired.
+"""MCAP of a log for Foxglove and Rerun, with Foxglove's Protobuf schemas: `/tf` poses of
+the bodies, `/scene` their shapes, `/joints` positions and speeds of the robots, `/events` the
+transitions that fired.
 
 Frames and joints are named as the links and joints of the URDF, and have the same parents.
 """

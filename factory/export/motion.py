@@ -1,4 +1,4 @@
-"""The motion in a log: where each body of the engine is, frame by frame, and when it moves."""
+"""Motion of the engine's bodies in a log, frame by frame."""
 
 from __future__ import annotations
 
@@ -18,20 +18,21 @@ if TYPE_CHECKING:
     from factory.support.engine import mujoco
 
 RATE = 50.0
-"""Frames a second, at most."""
+"""Greatest rate of frames [1/s]."""
 
 MOST = 8_000_000
-"""Poses in all frames, at most: 450 MB of them."""
+"""Greatest number of poses in all frames, which take 450 MB."""
 
 STILL = 1e-6
-"""What moves less from frame to frame [m], or in a component of its quaternion, stands still."""
+"""Greatest displacement [m] from frame to frame, and change of a component of the quaternion, of a
+body that counts as stationary."""
 
 
 @dataclass(frozen=True)
 class BodyMotion:
     """A log's motion: `rows` of the log that are frames; for each its bodies' positions (n, bodies,
     3) [m] and quaternions (n, bodies, 4), each relative to its parent. `gone` (n, bodies): which
-    are of robots that a deputy has taken over for."""
+    belong to robots that a deputy has replaced."""
 
     m: mujoco.MjModel
     rows: Indices
@@ -48,8 +49,8 @@ class BodyMotion:
         return self.name(int(self.m.body_parentid[body]))
 
     def shown(self) -> Iterator[list[int]]:
-        """For each frame the bodies whose pose a reader needs to draw this frame and, by going
-        straight from pose to pose, all up to the next: those that have moved or are about to."""
+        """For each frame the bodies whose pose a reader needs in order to interpolate linearly:
+        those that have moved since the last frame or move before the next."""
         change = np.abs(np.diff(self.position, axis=0)).max(axis=2)
         turned = np.abs(np.diff(self.quaternion, axis=0)).max(axis=2)
         moved = (change > STILL) | (turned > STILL)
@@ -59,8 +60,8 @@ class BodyMotion:
             yield [int(body) for body in np.flatnonzero(frame) if body]
 
     def unseen(self) -> Truth:
-        """For each frame and body whether it is out of sight: a spare one, under the floor, or of a
-        robot that is gone."""
+        """Whether a body is invisible in a frame (n, bodies): a spare one below the floor, or one
+        of a robot that was replaced."""
         return np.asarray((self.position[:, :, 2] < HIDDEN) | self.gone)
 
 
@@ -87,7 +88,7 @@ def motion_of(log: Log) -> BodyMotion:
 
 
 def _relative(d: mujoco.MjData, parent: int, body: int, position: Array, turn: Array) -> None:
-    """Writes the pose of a body relative to its parent."""
+    """Write the pose of a body relative to its parent into `position` and `turn`."""
     from factory.support.engine import mujoco
 
     back = np.zeros(4)
@@ -97,8 +98,8 @@ def _relative(d: mujoco.MjData, parent: int, body: int, position: Array, turn: A
 
 
 def _frames(log: Log, bodies: int) -> Indices:
-    """Rows of a log at most RATE a second, the first and the last among them; fewer of a run that
-    is so long, or has so many bodies, that their poses would be more than MOST."""
+    """Rows of a log, the first and the last included, at most RATE per second; fewer where their
+    poses would be more than MOST."""
     kept, next_time = [], -np.inf
     rate = min(RATE, MOST / max(1.0, bodies * float(log.time[-1])))
     for row, time in enumerate(log.time.tolist()):

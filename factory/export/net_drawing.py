@@ -12,21 +12,21 @@ from factory.nets.marked import MarkedNet
 from factory.support.canvas import Canvas, Point
 
 RADIUS, HEAD = 12.0, (8.0, 3.5)
-"""Of a place; the length of an arrowhead and half its width."""
+"""Radius of a place; length and half width of an arrowhead."""
 
 ARC = "arc", "tip"
 """The styles of an arc and its head."""
 
 EDGE = 20.0
-"""How far arcs cross the edges apart."""
+"""Distance between arcs where they cross the edges."""
 
 ALONG = 60.0
-"""A bar that is longer crosses several lanes."""
+"""Length above which a bar crosses several lanes."""
 
 
 class NetDrawing:
-    """Draws a net on its `canvas`. `styles` gives the class of what belongs to some gears; `every`:
-    whether each place has a token, for a page that shows and hides them."""
+    """Draws a net on its `canvas`. `styles`: style class for the elements of some gears; `every`:
+    whether each place gets a token, for a page that shows and hides them."""
 
     def __init__(
         self, net: MarkedNet, styles: Callable[[Sequence[int]], str], every: bool = False
@@ -39,7 +39,8 @@ class NetDrawing:
                 layer()
 
     def _arcs(self) -> None:
-        """Those that close a circle leave at the right edge and come in at the left."""
+        """Draw the arcs; those that close a circuit leave at the right edge and enter at the
+        left."""
         edges = self._edges()
         for place, shape in enumerate(self.net.net.places):
             x, y = self.at.places[place]
@@ -58,7 +59,7 @@ class NetDrawing:
                     self._arc(place, (x + RADIUS, y), self.at.touch(event, y), 3.0)
 
     def _edges(self) -> dict[int, float]:
-        """Where arcs to places without a robot cross the edges, each at a height of its own."""
+        """The y at which arcs to places without a robot cross the edges, all different."""
         back = [
             (place, self.at.places[place][1])
             for place, shape in enumerate(self.net.net.places)
@@ -67,14 +68,14 @@ class NetDrawing:
         return apart(dict(back), EDGE)
 
     def _arc(self, place: int, start: Point, end: Point, off: float = 0.0) -> None:
-        """An arc of a place, straight along the lane of its robot, or past what is between."""
+        """Draw an arc of a place, straight along the lane of its robot, or around other nodes."""
         points = [start, end] if self.owners[place] else self.at.way(start, end)
         if points[2:]:
             self.canvas.line("arc", *points[:-1])
         self.canvas.arrow(points[-2], end, ARC, HEAD, off)
 
     def _lanes(self) -> None:
-        """The names of the robots, and the ways of those that an operation has beside its
+        """Draw the names of robots, and the lanes of those that an operation has besides its
         carrier."""
         for number, gear in enumerate(self.net.gears):
             y = self.at.lanes[number]
@@ -95,7 +96,7 @@ class NetDrawing:
                 self.canvas.label((x, low - 7), transition.name, 9.5)
 
     def _crossings(self) -> None:
-        """Where robots go through long bars."""
+        """Draw a dot where a robot passes a long bar."""
         for number, gear in enumerate(self.net.gears):
             with self.canvas.group(f"lane {self.styles([number])}", data_robot=number):
                 for event in (e for e in gear.transitions if e >= 0):

@@ -1,8 +1,8 @@
 """PNML 2009 (ISO/IEC 15909-2), place/transition nets: the net for other tools, and back.
 
-Nodes stand where the SVG of the net has them. What the standard has no place for (the gears, modes,
-labels, slots and redistribution functions) stands in `toolspecific` elements of tool `factory`,
-version 1. What `foreign_nets.pnml_reader` reads of a legally marked gear net is equal to that net.
+Nodes have the positions of the SVG drawing. What the standard does not define (gears, modes,
+labels, slots and redistribution functions) is in `toolspecific` elements of tool `factory`,
+version 1. `foreign_nets.pnml_reader` reads a legally marked gear net back as an equal value.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ PNML = "http://www.pnml.org/version-2009/grammar/pnml"
 NET_TYPE = "http://www.pnml.org/version-2009/grammar/ptnet"
 
 BELOW, ABOVE = (0.0, 22.0), (0.0, -26.0)
-"""Where names are drawn."""
+"""Offsets of names from their nodes."""
 
 ROUND, BAR = (24.0, 24.0), 6.0
 """Size of a place, width of a transition's bar."""
 
 ASIDE = 40.0
-"""How far below the start of its operation a failure is drawn."""
+"""Offset of a failure below the start of its operation."""
 
 _ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
@@ -115,7 +115,7 @@ def _gear(gear: Gear) -> str:
 
 
 def _name(name: str, offset: Point2) -> str:
-    """A node's name, and where it is drawn relative to the node."""
+    """A node's name, with the offset at which it is drawn."""
     place = f'<graphics><offset x="{offset[0]:.0f}" y="{offset[1]:.0f}"/></graphics>'
     return f"<name>{place}<text>{escape(legal(name))}</text></name>"
 
@@ -128,7 +128,7 @@ def _source(at: Position | None) -> str:
 
 
 def _drawn(at: Point2, size: Point2) -> str:
-    """Where a node is drawn, and how large."""
+    """Position and size of a node in the drawing."""
     position = f'<position x="{at[0]:.0f}" y="{at[1]:.0f}"/>'
     return f'<graphics>{position}<dimension x="{size[0]:.0f}" y="{size[1]:.0f}"/></graphics>'
 

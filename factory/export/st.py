@@ -1,10 +1,10 @@
 """IEC 61131-3 Structured Text: a function block for each robot's program, a CASE over its steps,
 and a PROGRAM that calls them all in every scan.
 
-The blocks share what the paper's robots share: a cell each, and the positions of the axes. They are
-the programs of `run --distributed` (each cell counts the operations its robot has finished, the
-carrier alone ends an operation) with set-points in place of the navigation function: a gate that
-the mode has is kept, the rest of the way is the drives' affair.
+As in the paper, the blocks share a cell for each robot and the positions of the axes. They are the
+programs of `run --distributed` (each cell counts the operations its robot has finished; only the
+carrier ends an operation) with set-points instead of the navigation function: gates of a mode are
+kept, the motion itself is left to the drives.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from factory.problem.pag import NOPART
 FORMAT, TAKES = "st", "pag"
 
 WAIT, RUN, LEAVE = range(3)
-"""The phases of a step; each has a state of its own."""
+"""Phases of a step, each a state."""
 
 
 def export(subject: Subject) -> str:
@@ -49,7 +49,7 @@ class _Writer:
 
     @cached_property
     def labels(self) -> Mapping[str, str]:
-        """The identifier of each label that is carried; that of no part first, the default."""
+        """Identifier of each label that is carried; first that of `nopart`, the default."""
         operations = self.layout.factory.operations
         found = {label: None for o in operations for label in (*o.before, *o.after)}
         found.pop(NOPART, None)
@@ -57,11 +57,11 @@ class _Writer:
 
     @property
     def axes(self) -> int:
-        """How many there are: the carriages, then the lifts."""
+        """Number of axes: the carriages, then the lifts."""
         return len(self.layout.guidepaths) + len(self.layout.lifts)
 
     def _identifier(self, prefix: str, text: str) -> str:
-        """An identifier of its own in whatever case: letters, digits, single underscores."""
+        """A new identifier, distinct whatever the case: letters, digits, single underscores."""
         plain = re.sub("[^A-Za-z0-9]+", "_", text).strip("_") or "X"
         name, number = f"{prefix}{plain}", 2
         while name.upper() in self.taken:
@@ -138,7 +138,7 @@ class _Writer:
         return " ".join(dict.fromkeys(names))
 
     def _entered(self, step: ProgramStep) -> str:
-        """Every other robot shows what it must bring, or has gone on already."""
+        """The condition that every other robot shows the label that it brings, or has gone on."""
         found = []
         for robot, label in step.until:
             cell, turn = f"Cells[{robot + 1}]", self._turn(robot, step.operation.index)
@@ -147,7 +147,7 @@ class _Writer:
         return " AND ".join(found) or "Ready"
 
     def _turn(self, robot: int, operation: int) -> str:
-        """How many operations a robot has finished when it comes to this one."""
+        """Number of operations that a robot has finished before this one."""
         gear = self.layout.factory.robots[robot].operations
         before = gear.index(operation)
         return f"Unit * {len(gear)}{f' + {before}' if before else ''}"
@@ -180,7 +180,7 @@ class _Writer:
         return f"ABS(Axes[{axis + 1}].Position - {_real(goal)}) < {_real(eps)}"
 
     def _end(self, program: Program, number: int, step: ProgramStep) -> Iterator[str]:
-        """The carrier judges whether all are there; the others look at its cell."""
+        """The end of a step: the carrier tests the positions; the others read its cell."""
         carrier, condition = step.operation.carrier, "Reached"
         if step.is_carrier:
             yield from self._judge(step)
@@ -268,5 +268,5 @@ def _time(seconds: float) -> str:
 
 
 def _comment(text: str) -> str:
-    """A text as a comment can hold it."""
+    """A text that is safe in a comment."""
     return text.replace("(*", "( *").replace("*)", "* )")

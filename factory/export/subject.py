@@ -1,4 +1,4 @@
-"""What is exported: a project, the net of a project or of a PNML file, or the log of a run."""
+"""Subjects of exports: a project, the net of a project or of a PNML file, or the log of a run."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from factory.record.log import Log
 from factory.support.errors import Diagnostic, InputError, did_you_mean
 
 Source = Project | GearNet | MarkedNet | Log
-"""What an exporter makes a file of."""
+"""Source of an export."""
 
 
 @dataclass(frozen=True)
 class Subject:
-    """What is exported, and how. `file`: where it was read from; `of`: what is wanted of it, "" for
-    the usual; `name`: of the file that is written; `whole`: whether a folder with everything is
-    wanted."""
+    """Source and options of an export. `file`: the file that was read; `of`: the value of `--of`,
+    "" for the default; `name`: name of the file to write; `whole`: whether to write a folder with
+    everything."""
 
     file: Path
     source: Source = field(repr=False)
@@ -53,7 +53,7 @@ class Subject:
         return self.source
 
     def choose(self, valid: list[str], noun: str) -> str:
-        """What `of` names; the first where it names nothing. Raises InputError (Usage)."""
+        """The choice that `of` names, the first by default. Raises InputError (Usage)."""
         if self.of and self.of not in valid:
             hint = did_you_mean(self.of, valid, noun)
             message = f"--of '{self.of}' is none of the {noun}"

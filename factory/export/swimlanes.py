@@ -1,5 +1,4 @@
-"""Where the nodes of a net are drawn, and in which colour: a lane for each robot's gear, time from
-left to right.
+"""Layout of the drawing of a net: a lane for each robot's gear, time from left to right.
 
 A transition is a bar across the lanes of its robots; a place lies in the lane of its robot, that of
 an operation in the middle one of its robots. Where there are no robots, as in a net with choice, a
@@ -20,28 +19,28 @@ from factory.support.canvas import Point
 COLOURS = (
     "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8c6d00", "#56b4e9", "#7f3c8d", "#e73f74",
 )  # fmt: skip
-"""Of gears, which the colour-blind can tell apart (Okabe and Ito)."""
+"""Colours of gears, distinguishable for the colour-blind (Okabe and Ito)."""
 
 SHARED = "#333333"
-"""The colour of what belongs to several robots, or to none."""
+"""Colour of places of several robots, or of none."""
 
 PITCH, LANE = 120.0, 64.0
-"""Distance of columns, and of lanes."""
+"""Distances of columns and of lanes."""
 
 LEFT, TOP = 96.0, 64.0
-"""Where the first column and the first lane are."""
+"""Positions of the first column and the first lane."""
 
 CLEAR, AWAY = 22.0, 8.0
-"""How far arcs keep from the middles of places, and from bars, that they pass."""
+"""Least distances of arcs from the middles of places, and from bars."""
 
 OVERHANG = 18.0
-"""How far a bar goes beyond its outermost lanes, or beyond its middle."""
+"""Length of a bar beyond its outermost lanes, or beyond its middle."""
 
 
 @dataclass(frozen=True, slots=True)
 class Swimlanes:
-    """Coordinates on a page, y downwards: the middle of each place, the `x` of each transition and
-    from where to where its bar goes (`spans`), the `lanes` of the gears, the size of the page."""
+    """Coordinates on a page, y downwards: the middles of the `places`, `x` and ends (`spans`) of
+    the transitions' bars, y of the gears' `lanes`, and the size of the page."""
 
     places: tuple[Point, ...]
     x: tuple[float, ...]
@@ -56,12 +55,12 @@ class Swimlanes:
         return self.x[event], (low + high) / 2
 
     def touch(self, event: int, y: float) -> Point:
-        """The point of a transition's bar that is nearest to a height."""
+        """Point of a transition's bar nearest to a height."""
         low, high = self.spans[event]
         return self.x[event], min(max(y, low), high)
 
     def way(self, start: Point, end: Point) -> list[Point]:
-        """A way to the right between two points, past the bars and places that are between."""
+        """Points of a line to the right from one point to another that avoids bars and places."""
         columns: dict[float, list[Point]] = {}
         for x, y in self.places:
             columns.setdefault(x, []).append((y - CLEAR, y + CLEAR))
@@ -80,14 +79,14 @@ class Swimlanes:
 
 
 def _free(y: float, taken: Sequence[Point]) -> float:
-    """The height nearest to y that is within none of some others."""
+    """The height nearest to y outside some intervals."""
     ends = [y, *(end for pair in taken for end in pair)]
     free = [end for end in ends if not any(low < end < high for low, high in taken)]
     return min(free, key=lambda end: abs(end - y))
 
 
 def colour(owners: Sequence[int]) -> str:
-    """The colour of what belongs to these gears (indices)."""
+    """Colour of a place of these gears (indices)."""
     return COLOURS[owners[0] % len(COLOURS)] if len(owners) == 1 else SHARED
 
 
@@ -108,8 +107,8 @@ def swimlanes(net: MarkedNet) -> Swimlanes:
 
 
 def _columns(net: MarkedNet) -> list[int]:
-    """For each transition the length of the longest path to it without tokens; 0 for those on a
-    circle without."""
+    """For each transition the length of the longest token-free path to it; 0 on a token-free
+    circuit."""
     columns = [0] * len(net.net.transitions)
     for event in token_free(net).order:
         for place in net.net.postset[event]:
@@ -120,7 +119,7 @@ def _columns(net: MarkedNet) -> list[int]:
 
 
 def _across(net: MarkedNet, place: int, x: Sequence[float]) -> float:
-    """A place stands half a column before what it leads to."""
+    """The x of a place: half a column before its first consumer."""
     before, after = net.net.places[place].left, net.net.places[place].right
     if after:
         return min(x[event] for event in after) - PITCH / 2
@@ -128,7 +127,8 @@ def _across(net: MarkedNet, place: int, x: Sequence[float]) -> float:
 
 
 def _lane_order(net: MarkedNet, x: Sequence[float]) -> list[int]:
-    """The gears from top to bottom: below each robot those it meets, the earliest first."""
+    """The gears from top to bottom: below each robot those with which it shares operations, in
+    order of time."""
     meetings: list[list[tuple[float, int]]] = [[] for _ in net.gears]
     for place, gears in enumerate(net.owners):
         if len(gears) > 1:
@@ -154,7 +154,7 @@ def _heights(
     lanes: Sequence[float],
     order: Sequence[int],
 ) -> list[float]:
-    """The height of each place: its lane, else a row below that is free in that column."""
+    """The y of each place: that of its lane, or of a free row below the lanes."""
     below = max(lanes, default=TOP - LANE) + LANE
     taken: dict[float, int] = {}
     found = [0.0] * len(owners)
@@ -181,7 +181,7 @@ def _spans(
     lanes: Sequence[float],
     x: Sequence[float],
 ) -> list[Point]:
-    """From where to where each transition's bar goes."""
+    """Ends of each transition's bar."""
     rows: list[list[float]] = [[] for _ in net.net.transitions]
     for number, gear in enumerate(net.gears):
         for event in gear.transitions:
@@ -202,8 +202,8 @@ def _spans(
 def _spread(
     events: Iterable[int], rows: Sequence[Sequence[float]], x: Sequence[float]
 ) -> dict[int, float]:
-    """The height of transitions without a lane: in the middle of their places, a lane apart from
-    others in their column."""
+    """The y of transitions without a lane: the mean of their places, at least a lane from others in
+    their column."""
     columns: dict[float, dict[int, float]] = {}
     for event in events:
         height = sum(rows[event]) / max(len(rows[event]), 1)
@@ -212,8 +212,8 @@ def _spread(
 
 
 def apart(wanted: Mapping[int, float], least: float) -> dict[int, float]:
-    """Heights of things that are so far apart at the least, as near below what is wanted as can
-    be, in the same order."""
+    """Heights with at least the distance `least`, in the order of the `wanted` ones and no smaller
+    than these."""
     found: dict[int, float] = {}
     lowest = -inf
     for key in sorted(wanted, key=lambda key: (wanted[key], key)):

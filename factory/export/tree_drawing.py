@@ -13,7 +13,7 @@ ROW, COLUMN, BOX, EDGE = 34.0, 190.0, 120.0, 24.0
 """Height of a row, distance of columns, width of a box, margin."""
 
 BEND = 22.0
-"""How far before a box its inputs come together."""
+"""Distance from a box at which the lines of its inputs join."""
 
 STYLE = """
 .edge { fill: none; stroke: #9aa5b1; stroke-width: 1.8; }
@@ -23,7 +23,7 @@ STYLE = """
 
 
 def view_of(subject: Subject) -> str:
-    """Which view is asked for: net or tree. Raises InputError (Usage) for anything else."""
+    """The requested view: net or tree. Raises InputError (Usage) for anything else."""
     return subject.choose(["net", "tree"], "views")
 
 
@@ -57,8 +57,8 @@ def draw_tree(pag: PAG) -> str:
 
 
 def _places(pag: PAG) -> dict[str, Point]:
-    """The middle of each label's box: parts in a row each, the others between their inputs and
-    to the right of all of them."""
+    """Middle of each label's box: a row for each part; an assembly lies between its inputs, to the
+    right of them."""
     found: dict[str, Point] = {}
     row = 0
     for node in pag.postorder():
@@ -73,7 +73,7 @@ def _places(pag: PAG) -> dict[str, Point]:
 
 
 def _box(canvas: Canvas, at: Point, node: Assembly) -> None:
-    """The label in a box; what is made has its operation below."""
+    """Draw the label in a box, that of an assembly with its operation below."""
     (x, y), made = at, bool(node.inputs)
     half = 15 if made else 11
     box = x - BOX / 2, x + BOX / 2, y - half, y + half

@@ -17,7 +17,7 @@ from factory.support.extras import optional
 FORMAT, TAKES, BINARY = "usd", "log", True
 
 NAME = "usd"
-"""Of the exporter's folder, within a temporary one."""
+"""Name of the exporter's folder, within a temporary one."""
 
 
 def export(subject: Subject) -> Mapping[str, bytes]:
@@ -29,14 +29,14 @@ def export(subject: Subject) -> Mapping[str, bytes]:
         _record(motion, subject.log, folder)
         (written,) = Path(folder, NAME, "frames").iterdir()
         _finish(usd, written, motion, subject.log, textures)
-        found = {"": written.read_bytes()}
+        files = {"": written.read_bytes()}
         for image in sorted(Path(folder, NAME, "assets").iterdir()):
-            found[f"{textures}/{image.name}"] = image.read_bytes()
-    return found
+            files[f"{textures}/{image.name}"] = image.read_bytes()
+    return files
 
 
 def _record(motion: BodyMotion, log: Log, folder: str) -> None:
-    """Every frame, by MuJoCo's exporter."""
+    """Write every frame with MuJoCo's exporter."""
     from factory.mjcf.replica import SHOWN, Replica
     from factory.support.engine import mujoco
 
@@ -57,7 +57,7 @@ def _record(motion: BodyMotion, log: Log, folder: str) -> None:
 
 
 def _finish(usd: Any, path: Path, motion: BodyMotion, log: Log, textures: str) -> None:
-    """Frames as fast as they are in the log; textures beside the file."""
+    """Set the frame rate of the log, and paths of textures beside the file."""
     utilities = optional("pxr.UsdUtils", "usd-core", "USD", "usd")
     stage = usd.Stage.Open(str(path))
     step = float(np.median(np.diff(log.time[motion.rows]))) if len(motion.rows) > 1 else 1.0

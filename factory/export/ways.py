@@ -1,8 +1,9 @@
-"""The ways of a factory's machines, so that another program can check that they never meet.
+"""The motions of a factory's machines, from which another program can check that they never
+collide.
 
-For each machine and each place of the coordinated net in which it is: which bodies of the MJCF it
-has, over which spans its joints go, and by which welds it holds what it holds. The pairs that come
-near, and their circuits, are in the clearance certificate. Standing machines have no ways.
+For each machine and each place of the coordinated net in which it is: its bodies in the MJCF,
+the spans of its joints, and the welds by which it holds parts. The pairs that come
+near, and their circuits, are in the clearance certificate. Stationary machines have none.
 """
 
 from __future__ import annotations
@@ -27,7 +28,6 @@ def ways(model: Model) -> Json:
     coordination = coordinated(layout)
     net, written = coordination.net, _Writer(model)
     events = net.net.transitions
-    found = [*presences(layout, coordination, awaited_positions(layout))]
     return {
         "places": [
             {"place": place.name, "before": events[a].name, "after": events[b].name, "tokens": n}
@@ -35,21 +35,21 @@ def ways(model: Model) -> Json:
         ],
         "ways": [
             {"places": [net.net.places[p].name for p in one.places], **written.way(one)}
-            for one in found
+            for one in presences(layout, coordination, awaited_positions(layout))
             if one.places
         ],
     }
 
 
 class _Writer:
-    """Writes where machines are, by the names of a model."""
+    """Writes the presences of machines with the names of a model."""
 
     def __init__(self, model: Model) -> None:
         self._model, self._hanging = model, Hanging.of(model.layout)
         self._outlets = {(o.label, o.robot): o.name for o in outlets_of(model.layout)}
 
     def way(self, one: Presence) -> Json:
-        """One of them."""
+        """One presence."""
         name, held = one.machine, self._model.carried.carried.get(one.label, ())
         robot = self._model.factory.robots[one.robot].name
         if name == robot:

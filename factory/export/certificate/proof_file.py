@@ -41,8 +41,8 @@ def read_certificate(path: Path) -> Json:
         raise InputError(_bad(path, what, at)) from None
     except (ValueError, RecursionError):
         raise InputError(_bad(path, "its content is no JSON in UTF-8")) from None
-    wanted = ("schema", "net", "robots", *CLAIMS, "digest")
-    missing = [key for key in wanted if not isinstance(document, dict) or key not in document]
+    sections = ("schema", "net", "robots", *CLAIMS, "digest")
+    missing = [key for key in sections if not isinstance(document, dict) or key not in document]
     if missing:
         raise InputError(_bad(path, f"it lacks {', '.join(map(repr, missing))}"))
     found: Json = document
@@ -71,28 +71,28 @@ def check_against(path: Path, net: GearNet | MarkedNet, verdict: Verdict) -> Jso
 
 
 def differences(one: Json, other: Json, has_gears: bool) -> Iterator[str]:
-    """How the net of a certificate differs from that of another, with robots, their gears and slots
-    if it `has_gears`."""
+    """Differences between the nets of two certificates, including robots, gears and slots if the
+    net `has_gears`."""
     try:
-        found, wanted = _named(one, has_gears), _named(other, has_gears)
+        ours, theirs = _named(one, has_gears), _named(other, has_gears)
     except (KeyError, TypeError, IndexError, ValueError, AttributeError):
         yield "its net is not of the documented form"
         return
-    for kind, name in found:
-        if (kind, name) not in wanted:
+    for kind, name in ours:
+        if (kind, name) not in theirs:
             yield f"the net has no {kind} '{name}'"
-    for (kind, name), known in wanted.items():
-        given = found.get((kind, name))
-        if given is None:
+    for (kind, name), wanted in theirs.items():
+        row = ours.get((kind, name))
+        if row is None:
             yield f"it has no {kind} '{name}'"
             continue
-        for key in (key for key in known if given[key] != known[key]):
-            there, here = _shown(given[key]), _shown(known[key])
+        for key in (key for key in wanted if row[key] != wanted[key]):
+            there, here = _shown(row[key]), _shown(wanted[key])
             yield f"{key} of {kind} '{name}': {there} in the certificate, {here} in the net"
 
 
 def _named(document: Json, has_gears: bool) -> Named:
-    """What a certificate lists, with names in place of numbers."""
+    """The net of a certificate with names in place of numbers."""
     net, robots = document["net"], document["robots"]
     events, places = ([row["name"] for row in net[key]] for key in ("transitions", "places"))
     names = [robot["name"] for robot in robots]
@@ -120,7 +120,8 @@ def _named(document: Json, has_gears: bool) -> Named:
 
 
 def first_difference(one: Any, other: Any, path: str = "") -> str:
-    """Where two documents differ first, as `live.order[3]`; "" where they are equal."""
+    """Path of the first difference of two documents, as `live.order[3]`; "" where they are
+    equal."""
     if isinstance(one, dict) and isinstance(other, dict):
         for key in dict.fromkeys([*other, *one]):
             place = f"{path}.{key}" if path else key

@@ -207,7 +207,7 @@ _EVIDENCE: dict[str, Callable[[MarkedNet, Composition], Json | None]] = {
 
 
 def _failure(claim: str, net: MarkedNet, witness: Witness) -> Json:
-    """Why a property fails, with what a checker needs to see it."""
+    """The reason for the failure of a property, and the evidence that a checker needs."""
     places = [net.net.place_index[name] for name in witness.places]
     events = [net.net.transition_index[name] for name in witness.transitions]
     section: Json = {"holds": False, "kind": witness.kind, "reason": witness.reason}
