@@ -26,10 +26,10 @@ from factory.support.collector import collector_paused
 from factory.support.errors import Position
 
 WORK = 5_000_000
-"""How many places the search for an unsafe one may look at."""
+"""Greatest number of places visited by the search for an unsafe one."""
 
 RUN_DOWN, NAMED = 10_000, 12
-"""The most firings to a deadlock of a marked graph; the most that are named in a sentence."""
+"""Greatest number of firings to a deadlock of a marked graph, and of names in a sentence."""
 
 
 NO_GEARS = "undecided: a legal marking marks each gear once, and the net has no gears"
@@ -67,7 +67,7 @@ def analyse(
 
 
 def _of_marked_graph(net: MarkedNet, closed: Sequence[bool]) -> Iterator[Defect]:
-    """What speaks against a live, safe and reversible marked graph; `closed`: which of its gears
+    """The defects of a marked graph as to live, safe and reversible; `closed`: which of its gears
     are cycles."""
     stuck = token_free(net).stuck
     yield from _dying(net, stuck)
@@ -219,7 +219,7 @@ def run_down(net: MarkedNet, most: int = RUN_DOWN) -> tuple[int, ...] | None:
 
 
 def _after(net: MarkedNet, firing: Sequence[int]) -> str:
-    """`after a, b`: what has fired, in words."""
+    """A firing sequence in words: `after a, b`."""
     names = [net.net.transitions[event].name for event in firing]
     if len(names) > NAMED:
         left = len(names) - NAMED
@@ -228,7 +228,7 @@ def _after(net: MarkedNet, firing: Sequence[int]) -> str:
 
 
 def _stopped(net: MarkedNet, firing: Sequence[int]) -> str:
-    """That nothing is enabled after a firing sequence, and where the tokens are then."""
+    """A deadlock in words: the firing sequence, and the places of the tokens after it."""
     pairs = zip(net.net.places, net.after(firing), strict=True)
     where = [place.name for place, count in pairs if count]
     held = f", with tokens in {listing(where)}" if where else ""

@@ -1,4 +1,4 @@
-"""The gears of a net that does not name them (Definition 3.6, read backwards).
+"""Discovery of the gears of a net that does not name them (Definition 3.6, read backwards).
 
 Contract each shared place [a; b], the only output of a and only input of b, to a node. What is left
 of a gear net is a digraph in which every edge lies on exactly one simple circuit, and these are the
@@ -19,7 +19,7 @@ from factory.nets.verdict import Defect, listing
 
 
 def discover(net: MarkedNet) -> tuple[tuple[Gear, ...], tuple[Defect, ...]]:
-    """The gears of a gear net, named g1, g2, ..., or the exact reasons why it is none."""
+    """The gears of a gear net, named g1, g2, ..., or the reasons for which it is none."""
     if not net.net.places:
         return (), (no_gear_net("no gear", "the net has no places"),)
     shared = _shared(net)
@@ -58,7 +58,7 @@ def _shared(net: MarkedNet) -> frozenset[int]:
 
 
 def _local(net: MarkedNet, shared: frozenset[int]) -> Iterator[Defect]:
-    """What around a single place or transition cannot be part of a gear net."""
+    """Places and transitions whose neighbourhood cannot be part of a gear net."""
     for place, (before, after) in enumerate(zip(net.left, net.right, strict=True)):
         called = f"place {net.net.places[place].name} = {notation(net, place)}"
         if before == NONE:
@@ -96,7 +96,8 @@ def _contracted(net: MarkedNet, shared: frozenset[int]) -> nx.DiGraph:
 
 
 def _no_circuit(net: MarkedNet, part: nx.DiGraph) -> Defect:
-    """Why a biconnected component is no circuit: some of it lies on none, or on several."""
+    """The defect of a biconnected component that is no circuit: some place lies on none, or
+    several."""
     for strong in nx.strongly_connected_components(part):
         if len(strong) == 1 and (place := ~next(iter(strong))) >= 0:
             called = f"place {net.net.places[place].name} = {notation(net, place)}"

@@ -1,4 +1,4 @@
-"""The state space of a small net, marking by marking. Assumes nothing about its shape."""
+"""Exploration of the state space of a small net of any shape, marking by marking."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from scipy.sparse.csgraph import connected_components
 from factory.nets.marked import MarkedNet
 
 LIMIT = 200_000
-"""How many markings are explored at most."""
+"""Greatest number of markings that are explored."""
 
 Firing = tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Exploration:
-    """The markings reached, by number, and what they show; a firing sequence is a witness.
+    """The number of `markings`, and firing sequences to those that violate a property.
 
-    `complete`: whether these are all the reachable markings. `deadlock`: fires nothing any more;
-    `unsafe`: ends with two tokens on a place; `starved`: a transition that can fire no more after
-    the sequence; `one_way`: a marking from which the initial one is out of reach.
+    `complete`: whether these are all the reachable markings; `deadlock`: nothing is enabled;
+    `unsafe`: a place has two tokens; `starved`: a transition can never fire again; `one_way`: the
+    initial marking is unreachable.
     """
 
     markings: int
@@ -34,7 +34,7 @@ class Exploration:
 
 
 class StateSpace:
-    """The markings reachable from m_0 with what fires between them; at most `limit` of them."""
+    """The reachability graph from m_0, of at most `limit` markings."""
 
     def __init__(self, net: MarkedNet, limit: int = LIMIT) -> None:
         self.net, self.limit = net, limit

@@ -23,7 +23,7 @@ from factory.support.errors import Position, did_you_mean
 from factory.support.files import NET
 
 DRAWN = frozenset({"graphics"})
-"""Elements that say how a net looks, and are not read."""
+"""Elements that describe the drawing of a net, and are not read."""
 
 FORM = (
     'a net starts <pnml xmlns="http://www.pnml.org/version-2009/grammar/pnml">'
@@ -32,7 +32,7 @@ FORM = (
 WEIGHT = "the paper's nets have arcs of weight 1"
 
 SUGGESTIONS = 20
-"""The most unknown nodes that get a suggestion, which takes time."""
+"""Greatest number of unknown nodes that get a suggestion, since these take time."""
 
 _NODES = ("place", "transition", "referencePlace", "referenceTransition")
 _NUMBER = re.compile(r"[0-9]{1,9}")
@@ -134,8 +134,8 @@ class _Reader:
             self.stop()
         kind = nets[0].attributes.get("type", "")
         if kind.rpartition("/")[2] != "ptnet":
-            found = f"of type '{kind}'" if kind else "without a type"
-            self.fault(nets[0], f"a net {found}, not a place/transition net", FORM)
+            typed = f"of type '{kind}'" if kind else "without a type"
+            self.fault(nets[0], f"a net {typed}, not a place/transition net", FORM)
         if nets[0].first("page") is None:
             self.fault(nets[0], "the net has no page", 'wrap its nodes in <page id="page">')
         return nets[0]
@@ -171,8 +171,8 @@ class _Reader:
             ids[name] = element
 
     def _resolve(self, element: Element) -> str:
-        """The id of the node that a reference stands for in the end; of a node, its own. What it
-        passes on the way then stands for that node at once."""
+        """The id of the node to which a reference finally refers; of a node, its own id. References
+        passed on the way are shortened to that node."""
         start, seen = element, dict[str, Element]()
         while element.name.startswith("reference"):
             name = element.attributes.get("ref", "")
@@ -248,11 +248,11 @@ class _Reader:
         return int(content)
 
     def _names(self, ids: Iterable[str]) -> dict[str, str]:
-        """A name for each id: its own name where that is not another's, too; else the id. Where
-        an id is the name of another, every name is an id."""
-        wanted = {key: self.nodes[key].content("name", "") or key for key in ids}
-        count = Counter(wanted.values())
-        names = {key: name if count[name] == 1 else key for key, name in wanted.items()}
+        """A name for each id: the node's name where it is unique, otherwise the id. Where an id is
+        the name of another node, all names are ids."""
+        given = {key: self.nodes[key].content("name", "") or key for key in ids}
+        count = Counter(given.values())
+        names = {key: name if count[name] == 1 else key for key, name in given.items()}
         return names if len(set(names.values())) == len(names) else {key: key for key in names}
 
     def _source(self, element: Element) -> Position:

@@ -9,13 +9,13 @@ from xml.parsers import expat
 from factory.support.errors import Diagnostic, InputError, Position
 
 MOST = 8_000_000
-"""The most elements of a document: they take 4 GB."""
+"""Greatest number of elements of a document, which take 4 GB."""
 
 
 @dataclass(slots=True)
 class Element:
-    """An element: its name without the namespace, attributes, text before its first child, and
-    where its start tag stands (line and column from 1)."""
+    """An element: its name without the namespace, attributes, text before its first child, and the
+    position of its start tag (line and column from 1)."""
 
     name: str
     attributes: dict[str, str]
@@ -127,7 +127,7 @@ class _Builder:
             self.text.append(text)
 
     def end_text(self) -> None:
-        """The text that has come belongs to the innermost element."""
+        """Assign the text read so far to the innermost element."""
         if self.text:
             self.stack[-1].text = "".join(self.text)
             self.text.clear()

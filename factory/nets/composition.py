@@ -1,4 +1,4 @@
-"""Whether claimed gears compose a gear net: Definitions 3.5 and 3.6, gear by gear, in linear time.
+"""Composition of gear nets: Definitions 3.5 and 3.6 checked gear by gear, in linear time.
 
 The text of condition (a) intersects all the gears that meet the new one, so that two of them could
 share more if a third does not. It is read strictly: the new gear S and the net so far have exactly
@@ -23,7 +23,7 @@ from factory.nets.marked import MANY, NONE, MarkedNet
 from factory.nets.verdict import Defect, listing
 
 MOST = 10
-"""How many defects of one kind are listed."""
+"""Greatest number of defects of one kind that are listed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,16 +65,16 @@ def compose(net: MarkedNet) -> Composition:
             if event >= 0:
                 passing[event] += 1
     broken = (_unclosed(net, number) for number, good in enumerate(closed) if not good)
-    found = [*islice(broken, MOST)]
-    found += islice(_uncovered(net, passing), MOST)
-    found += islice(_misplaced(net), MOST)
+    defects = [*islice(broken, MOST)]
+    defects += islice(_uncovered(net, passing), MOST)
+    defects += islice(_misplaced(net), MOST)
     joints: tuple[Joint, ...] = ()
-    if not found:
-        found += islice(_shared(net, passing), MOST)
-    fitting = not found
+    if not defects:
+        defects += islice(_shared(net, passing), MOST)
+    fitting = not defects
     if fitting:
-        joints, found = _tree(net)
-    return Composition(joints, tuple(found), closed, fitting)
+        joints, defects = _tree(net)
+    return Composition(joints, tuple(defects), closed, fitting)
 
 
 def cover(net: MarkedNet, closed: Iterable[bool]) -> list[int]:

@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 ROUNDING = 1e-12
-"""Dates that differ by no more than this share of the greatest are the same."""
+"""Relative tolerance of dates."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class CycleRatio:
 
     @cached_property
     def tolerance(self) -> float:
-        """What counts as nothing [s]."""
+        """Greatest duration that counts as zero [s]."""
         return 1e-9 * (1.0 + float(np.abs(self.dates).max(initial=0.0)))
 
 
@@ -66,7 +66,7 @@ def max_cycle_ratio(net: MarkedNet, seconds: Sequence[float]) -> CycleRatio:
     graph.evaluate()
     while graph.improve():
         graph.evaluate()
-    ratio, circuit = max(graph.circuits, key=lambda found: found[0])
+    ratio, circuit = max(graph.circuits, key=lambda pair: pair[0])
     dates = graph.dates - graph.dates.min()
     slack = dates[graph.after] - dates[graph.before] - graph.seconds + ratio * graph.tokens
     places = tuple(int(graph.places[e]) for e in circuit)
@@ -120,7 +120,7 @@ class _Graph:
         """The circuits that the policies run into, as edges in order."""
         policy, before = self.policy.tolist(), self.before.tolist()
         seen: dict[int, int] = {}
-        found = []
+        circuits = []
         for start in self.nodes:
             event = start
             while event not in seen:
@@ -130,8 +130,8 @@ class _Graph:
                 edges = [policy[event]]
                 while before[edges[-1]] != event:
                     edges.append(policy[before[edges[-1]]])
-                found.append(edges[::-1])
-        return found
+                circuits.append(edges[::-1])
+        return circuits
 
     def _date(self, ratio: float, root: int) -> None:
         """Dates from the root on: along the policies first, and along any place to what they do not
@@ -153,7 +153,8 @@ class _Graph:
         self.ratio[events] = ratio
 
     def improve(self) -> bool:
-        """Follow, where some place gives a later date, the one that gives the latest."""
+        """Let each transition follow the place with the latest date; whether any policy has
+        changed."""
         ratio = self.ratio[self.after]
         dates = self.dates[self.before] + self.seconds - ratio * self.tokens
         gain = dates - self.dates[self.after]

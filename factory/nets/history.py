@@ -18,7 +18,7 @@ from factory.support.errors import Diagnostic, InputError, Position, did_you_mea
 
 
 def firings(net: GearNet, marking: Marking) -> dict[int, int]:
-    """For each transition how often it fires on the least way from m_0 to a legal marking.
+    """The least number of firings of each transition that lead from m_0 to a legal marking.
 
     Along each gear a place has as many tokens more as its producer fires oftener than its consumer,
     which fixes all counts up to a constant; the least is 0. Such counts can be fired, since no
@@ -72,9 +72,8 @@ def legal_marking(net: GearNet, names: str) -> Marking:
     for name, position in _items(names):
         place = net.threaded.net.place_index.get(name)
         if place is None:
-            known = list(net.threaded.net.place_index)
-            message = f"the net has no place '{name}'"
-            faults.append(_bad(message, position, did_you_mean(name, known, "places")))
+            hint = did_you_mean(name, list(net.threaded.net.place_index), "places")
+            faults.append(_bad(f"the net has no place '{name}'", position, hint))
             continue
         for robot in net.slots[place]:
             if at.setdefault(robot, place) != place:
@@ -91,8 +90,8 @@ def legal_marking(net: GearNet, names: str) -> Marking:
 
 
 def unreached(net: GearNet, marking: Marking) -> tuple[int, ...]:
-    """A circuit of a net of gears that has not as many tokens in a marking as in m_0, by its places
-    in order; () where there is none. Linear."""
+    """The places of a circuit, in order, whose number of tokens in a marking is not that in m_0; ()
+    where there is none. Linear."""
     places, initial = net.threaded.places, net.initial_marking
     left, right = [place.left[0] for place in places], [place.right[0] for place in places]
     gain = [(p in marking) - (p in initial) for p in range(len(places))]
@@ -106,8 +105,8 @@ def unreached(net: GearNet, marking: Marking) -> tuple[int, ...]:
             home = [*_walk(back, b, right)]
             way = [*reversed([*_walk(there, a, left)]), place, *home]
             other = [*reversed([*_walk(there, b, left)]), *home]
-            found = (c for walk in (way, other) for c in _circuits(walk, left, right))
-            return next(circuit for circuit in found if sum(gain[p] for p in circuit))
+            circuits = (c for walk in (way, other) for c in _circuits(walk, left, right))
+            return next(circuit for circuit in circuits if sum(gain[p] for p in circuit))
     return ()
 
 
@@ -121,7 +120,7 @@ def _walk(tree: Mapping[int, int], event: int, toward: Sequence[int]) -> Iterato
 def _circuits(
     walk: Iterable[int], left: Sequence[int], right: Sequence[int]
 ) -> Iterator[tuple[int, ...]]:
-    """The simple circuits that a closed walk along places falls into."""
+    """The simple circuits of which a closed walk along places consists."""
     way: list[int] = []
     for place in walk:
         way.append(place)
@@ -139,8 +138,8 @@ def _never(net: GearNet, circuit: tuple[int, ...], marking: Marking, names: str)
         f"the marking is unreachable: the circuit through {shown} would carry"
         f" {here or 'no'} token{'' if here == 1 else 's'} instead of {always}"
     )
-    own = dict.fromkeys(robot for p in circuit for robot in net.slots[p])
-    robots = listing(net.gears[robot].robot for robot in own)
+    numbers = dict.fromkeys(robot for p in circuit for robot in net.slots[p])
+    robots = listing(net.gears[robot].robot for robot in numbers)
     return _bad(message, Position("--from", 1, 1, names), f"say where each of {robots} is")
 
 
@@ -159,7 +158,7 @@ def _bad(message: str, position: Position, hint: str) -> Diagnostic:
 
 
 def _twice(net: GearNet, robot: int, places: tuple[int, int], position: Position) -> Diagnostic:
-    """Robot `robot` is at two places."""
+    """The diagnostic of a robot at two places."""
     named = [net.threaded.places[p].name for p in places]
     message = f"{net.gears[robot].robot} is marked twice: at {named[0]} and at {named[1]}"
     hints = [
@@ -171,7 +170,7 @@ def _twice(net: GearNet, robot: int, places: tuple[int, int], position: Position
 
 
 def _whole(net: GearNet, at: dict[int, int], names: str) -> Marking:
-    """The marking, where no operation place lacks one of its robots."""
+    """The marking of these places. Raises InputError where an operation lacks one of its robots."""
     for robot, place in sorted(at.items()):
         missing = [r for r in net.slots[place] if at.get(r) != place]
         if missing:

@@ -117,7 +117,7 @@ def _only(events: tuple[int, ...]) -> int:
 
 @dataclass(frozen=True, slots=True)
 class TokenFree:
-    """What a marked graph's token-free places say about its transitions.
+    """The transitions of a marked graph, ordered along its token-free places.
 
     `order` holds the transitions that token-free places lead to in no circuit, each after those it
     waits for; `stuck` those that never fire.

@@ -71,11 +71,11 @@ class PetriNet:
         return {transition.name: i for i, transition in enumerate(self.transitions)}
 
     def _adjacent(self, side: str) -> tuple[tuple[int, ...], ...]:
-        found: list[list[int]] = [[] for _ in self.transitions]
+        adjacent: list[list[int]] = [[] for _ in self.transitions]
         for index, place in enumerate(self.places):
             for event in getattr(place, side):
-                found[event].append(index)
-        return tuple(tuple(places) for places in found)
+                adjacent[event].append(index)
+        return tuple(map(tuple, adjacent))
 
     def is_detached(self, events: Iterable[int]) -> bool:
         """Whether the presets are pairwise disjoint, and the postsets too (section 3.1)."""

@@ -63,7 +63,7 @@ class _Game:
         return ""
 
     def fire(self, name: str) -> str:
-        """Fire an event; why it could not, "" where it could."""
+        """Fire an event. Returns the reason for which it could not fire, "" where it could."""
         event = self.number.get(name)
         if event is None:
             return f"the net has no transition '{name}'"
@@ -109,8 +109,8 @@ class _Game:
         return ""
 
     def take_back(self, entry: Undone, joins: Joins, after: GearNet | None) -> str:
-        """Take back what was undone, and go on in the net `after`, if one is given; why that is not
-        the least that had to be undone, "" where it is."""
+        """Undo the transitions of an entry, and go on in the net `after` if there is one. Returns
+        the reason for which they are not the least that had to be undone, "" where they are."""
         unknown = next(
             (x for x in (*entry.asked, *entry.transitions) if x not in self.number), None
         )
@@ -152,17 +152,17 @@ class _Game:
 
     def _counted(self, net: GearNet) -> list[int]:
         """The tokens that the counts give in a net, where some may be missing (negative)."""
-        found = [int(place in net.initial_marking) for place in range(len(net.threaded.places))]
+        tokens = [int(place in net.initial_marking) for place in range(len(net.threaded.places))]
         for event, times in enumerate(self.fired):
             for place in self.gives[event]:
-                found[place] += times
+                tokens[place] += times
             for place in self.needs[event]:
-                found[place] -= times
-        return found
+                tokens[place] -= times
+        return tokens
 
     def _taken_back(self, asked: Counter[int], joins: Joins, begin: Iterable[int]) -> Counter[int]:
-        """Fire backwards, one by one, what is due: it is asked for, a token that it took is
-        missing, or what was made of its result is taken back oftener. Only what must be is."""
+        """Fire transitions backwards, one by one, that must be undone: those that are asked for,
+        whose token is missing, or whose result is used by one that is undone oftener."""
         back = Counter[int]()
         made_into = _turned(joins)
         todo = list(begin)
@@ -186,7 +186,7 @@ class _Game:
         return back
 
     def _find_robots(self, events: Iterable[int]) -> str:
-        """Where the robots are that the events move."""
+        """Locate the robots that the events move. Returns the first contradiction, or ""."""
         sides = (self.needs, self.gives)
         places = {p for event in events for side in sides for p in side[event]}
         for robot in sorted({robot for place in places for robot in self.net.slots[place]}):
@@ -205,15 +205,15 @@ class _Game:
 
 def _turned(joins: Joins) -> dict[int, list[int]]:
     """For each transition the ends that are undone no oftener than it is."""
-    found: dict[int, list[int]] = {}
+    ends: dict[int, list[int]] = {}
     for end, others in joins.items():
         for other in others:
-            found.setdefault(other, []).append(end)
-    return found
+            ends.setdefault(other, []).append(end)
+    return ends
 
 
 def _differs(entry: Undone, least: Counter[str]) -> str:
-    """The first transition that was undone more or less often than it had to be."""
+    """The first transition that was undone more or less often than necessary, in words."""
     said = Counter(entry.transitions)
     name = next(name for name in sorted(said | least) if said[name] != least[name])
     times = f"{said[name]} times, where {least[name]} is the least"
@@ -251,7 +251,7 @@ def replay(
 
 
 def _take_back(game: _Game, entry: Undone, joins: Joins | None, nets: list[GearNet]) -> str:
-    """Take back what was undone; why that cannot be, "" where it can."""
+    """Undo an entry. Returns the reason for which that is impossible, "" where it is not."""
     if joins is None:
         return f"the undo of {entry.operation} cannot be judged: no material is known"
     if not entry.exchanged:

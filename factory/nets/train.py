@@ -24,8 +24,8 @@ from factory.nets.verdict import Defect, listing
 
 
 def train_defects(net: MarkedNet, composition: Composition) -> tuple[Defect, ...]:
-    """What speaks against a gear train, () where nothing does. Where gears do not even fit one by
-    one, that is said of the gear net already. Linear."""
+    """The defects of a gear train; those of the composition where gears do not fit one by one.
+    Linear."""
     if not composition.fitting or not net.gears:
         return composition.defects
     if not composition.defects:
@@ -34,7 +34,7 @@ def train_defects(net: MarkedNet, composition: Composition) -> tuple[Defect, ...
 
 
 def _hasty(net: MarkedNet) -> Iterator[Defect]:
-    """Shared operations that a robot comes to from another one without a wait of its own."""
+    """Shared operations that directly follow a shared operation in some gear, without a wait."""
     owners, names = net.owners, net.net.places
     for number, gear in enumerate(net.gears):
         for step, place in enumerate(gear.places):
@@ -62,9 +62,9 @@ def _apart(net: MarkedNet) -> Iterator[Defect]:
 
 
 def dead_train_defects(net: MarkedNet, stuck: tuple[int, ...]) -> Iterator[Defect]:
-    """Why a gear train whose gears carry one token each is not live, given the transitions that
-    never fire: a circuit without token. With a transition that can fire before it stops, it is not
-    reversible either."""
+    """The defects of a gear train whose gears carry one token each, given the transitions that
+    never fire: it is not live, because of a circuit without token. With a transition that can fire
+    before it stops, it is not reversible either."""
     circuit, names = stuck_circuit(net, stuck), net.net.places
     events = tuple(net.right[place] for place in circuit)
     shown = listing(names[place].name for place in circuit)
@@ -76,8 +76,8 @@ def dead_train_defects(net: MarkedNet, stuck: tuple[int, ...]) -> Iterator[Defec
 
 
 def no_way_back(net: MarkedNet, event: int) -> Defect:
-    """That a net is not reversible, as a transition that can fire is connected to something that
-    fires finitely often."""
+    """The defect of a net that is not reversible: a transition that can fire is connected to one
+    that fires finitely often."""
     name = net.net.transitions[event].name
     text = f"{name} can fire, after which the initial marking is unreachable"
     return Defect("reversible", "no way back", text, transitions=(event,))

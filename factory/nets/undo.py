@@ -77,24 +77,24 @@ def _greatest(
 ) -> tuple[int, ...]:
     """The greatest counts that meet the conditions. Each is settled when it comes off the heap,
     since no condition bounds a count by less than another."""
-    found = list(fired)
+    counts = list(fired)
     for event, times in asked.items():
-        found[event] -= times
-        if found[event] < 0:
+        counts[event] -= times
+        if counts[event] < 0:
             name = net.net.transitions[event].name
             raise ValueError(f"{name} is to be undone {times} times, and has fired {fired[event]}")
-    heap = [(found[event], event) for event in begin]
+    heap = [(counts[event], event) for event in begin]
     heapify(heap)
     right, postset = net.right, net.net.postset
     while heap:
         count, event = heappop(heap)
-        if count > found[event]:
+        if count > counts[event]:
             continue
         bounds = [(right[p], count + net.tokens[p]) for p in postset[event]]
         undone = fired[event] - count
         bounds += [(made, fired[made] - undone) for made in joins.get(event, ())]
         for other, bound in bounds:
-            if other >= 0 and found[other] > bound:
-                found[other] = bound
+            if other >= 0 and counts[other] > bound:
+                counts[other] = bound
                 heappush(heap, (bound, other))
-    return tuple(found)
+    return tuple(counts)

@@ -1,4 +1,5 @@
-"""What a record of a run says of a failure, or of robots that were exchanged."""
+"""Entries of a run's record: firings, and transitions that were undone after a failure or where
+robots were exchanged."""
 
 from __future__ import annotations
 
@@ -17,10 +18,10 @@ that made what it joined. `factory.plant.material.joins_of` makes it."""
 class Undone:
     """Transitions that were undone at time t [s].
 
-    `operation`: the label of the operation that failed; `reason`: why, in words; `asked`: the
-    transitions that had to be undone for that; `transitions`: all that were, in the order of their
-    numbers. Each name stands there as often as it is undone. `exchanged`: the run went on in the
-    next of its nets; then nothing need be undone. `robots`: that which is dead, and its deputy.
+    `operation`: label of the operation that failed; `reason`: cause, in words; `asked`: the
+    transitions that had to be undone; `transitions`: all that were undone, by number. Names are
+    repeated for each time that they are undone. `exchanged`: whether the run went on in the next of
+    its nets, where both may be empty; `robots`: the dead robot and its deputy.
     `factory.nets.undo` has the definition.
     """
 
@@ -42,7 +43,7 @@ class Undone:
         after: Sequence[int],
         exchanged: bool = False,
     ) -> Undone:
-        """What was undone between two counts of firings; `what`: time, operation and reason."""
+        """The difference between two counts of firings; `what`: time, operation and reason."""
         names = [transition.name for transition in net.threaded.transitions]
         triples = zip(names, before, after, strict=True)
         undone = (name for name, was, now in triples for _ in range(was - now))
@@ -66,13 +67,12 @@ Entry = str | Undone
 
 
 def exchanges(entries: Iterable[Entry]) -> Iterator[Undone]:
-    """The entries in which a robot that is dead was exchanged for its deputy."""
+    """The entries in which a dead robot was exchanged for its deputy."""
     return (e for e in entries if isinstance(e, Undone) and len(e.robots) == 2)
 
 
 def lasting(entries: Iterable[Entry]) -> list[int]:
-    """Which entries (index) are firings that last: an undo takes back the latest of its
-    transitions.
+    """Indices of the firings that are not undone: an undo takes back the latest of its transitions.
 
     They too are a firing sequence of the net, to the same marking, unless robots are exchanged:
     counts with m_0 + C n >= 0 are closed under the lesser of two.

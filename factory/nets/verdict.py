@@ -1,4 +1,4 @@
-"""What is found out about a net: values, with a witness for every failure."""
+"""Verdicts on nets: the properties that hold, and a witness for each that does not."""
 
 from __future__ import annotations
 
@@ -67,9 +67,9 @@ class Witness:
 class Verdict:
     """Which properties a net has: True, False, or None where that is undecided.
 
-    For each that is not True there is a witness; what speaks against a gear train may be told of
-    the gear net. `gears` are the gears it was judged by, claimed or discovered; `method` says how
-    the behaviour was found: `structure` or `exploration`. A gear net is a `gear_train`, too.
+    Each that is not True has a witness; a defect of a gear train may be listed with property
+    `gear_net`. `gears`: the gears, claimed or discovered; `method`: how the behaviour was decided,
+    `structure` or `exploration`. A gear net is also a `gear_train`.
     """
 
     gear_net: bool | None
@@ -84,27 +84,27 @@ class Verdict:
 
     @property
     def properties(self) -> tuple[str, ...]:
-        """What a factory's net has to have: it is a gear net, or else a gear train, and behaves."""
+        """The properties required of a factory's net: gear net, or gear train, and its
+        behaviour."""
         train = self.gear_train and not self.gear_net
         return ("gear_train" if train else "gear_net", *BEHAVIOUR)
 
     @property
     def holds(self) -> bool:
-        """Whether every property that a factory's net has to have is proved."""
+        """Whether every required property is proved."""
         return all(getattr(self, name) is True for name in self.properties)
 
     @property
     def faults(self) -> tuple[Witness, ...]:
-        """The witnesses against these properties: all, less that against a gear net where it is a
-        gear train."""
+        """The witnesses against the required properties."""
         train = "gear_train" in self.properties
         return tuple(w for w in self.witness if not (train and w.property == "gear_net"))
 
     def as_json(self) -> dict[str, object]:
         """The verdict's keys of the `--json` document."""
         names = (*PROPERTIES, "gear_train")
-        found: dict[str, object] = {name: getattr(self, name) for name in names}
-        return {**found, "method": self.method, "witness": [w.as_json() for w in self.witness]}
+        holds: dict[str, object] = {name: getattr(self, name) for name in names}
+        return {**holds, "method": self.method, "witness": [w.as_json() for w in self.witness]}
 
 
 def verdict(
@@ -114,12 +114,12 @@ def verdict(
     sources: Mapping[str, Position] | None,
     method: str = "structure",
 ) -> Verdict:
-    """The verdict on a net with these defects: a property without any holds, one of which they say
-    no more than that it is undecided is None. `sources`: source positions of robots by name."""
-    found = tuple(defects)
-    kinds = {name: {d.kind for d in found if d.property == name} for name in PROPERTIES}
-    holds = {name: None if own == {"undecided"} else not own for name, own in kinds.items()}
-    witness = tuple(_witness(net, defect, sources or {}) for defect in found)
+    """The verdict on a net with these defects: a property without defects holds, one whose defects
+    are all `undecided` is None. `sources`: source positions of robots by name."""
+    listed = tuple(defects)
+    kinds = {name: {d.kind for d in listed if d.property == name} for name in PROPERTIES}
+    holds = {name: None if k == {"undecided"} else not k for name, k in kinds.items()}
+    witness = tuple(_witness(net, defect, sources or {}) for defect in listed)
     gears = net.gears
     return Verdict(**holds, witness=witness, gears=gears, method=method, gear_train=gear_train)
 
@@ -150,11 +150,11 @@ def _witness(net: MarkedNet, against: Defect, sources: Mapping[str, Position]) -
 
 
 def _owners(net: MarkedNet, places: tuple[int, ...]) -> tuple[int, ...]:
-    """The gears through all the places; where there is none, through any of them."""
+    """The gears through all the places; without any, those through some of them."""
     if not net.slots or not places:
         return ()
-    known = range(len(net.gears))
-    rows = [[g for g in net.slots[p] if g in known] for p in places]
+    gears = range(len(net.gears))
+    rows = [[g for g in net.slots[p] if g in gears] for p in places]
     common = set(rows[0]).intersection(*rows)
     return tuple(dict.fromkeys(g for row in rows for g in row if g in common or not common))
 

@@ -6,8 +6,7 @@ Definitions 3.5 and 3.6 are checked gear by gear (`composition`), and 3.6' for a
 one token: so the net is safe. It is live where the places without token can be put in an order,
 each after those it waits for (Commoner et al. 1971, Theorem 1), and a live marked graph that
 consists of circuits is reversible (Murata 1989, Theorem 21). Theorems 3.1 and 3.2 are not used, but
-tested. Of a net that is not composed so, no more is said here: `factory.foreign_nets` decides what
-any net does.
+tested. `factory.foreign_nets` decides the properties of nets that are not composed in this way.
 """
 
 from __future__ import annotations
@@ -58,8 +57,8 @@ def verify(net: GearNet | MarkedNet, sources: Mapping[str, Position] | None = No
 def shape_defects(
     net: GearNet | MarkedNet, subject: MarkedNet, composition: Composition
 ) -> tuple[tuple[Defect, ...], bool]:
-    """What speaks against a gear net and against a gear train: its composition, and slots that
-    change their robot; and whether the net is a gear train. `subject`: the net with its tokens."""
+    """The defects of a gear net or gear train, in its composition and in slots that change their
+    robot, and whether the net is a gear train. `subject`: the net with its tokens."""
     moved = tuple(islice(_changed_slots(net), MOST)) if isinstance(net, GearNet) else ()
     untrained = train_defects(subject, composition)
     more = (defect for defect in untrained if defect.property == "gear_train")
@@ -67,7 +66,7 @@ def shape_defects(
 
 
 def legality_defects(net: GearNet | MarkedNet, subject: MarkedNet) -> tuple[Defect, ...]:
-    """What speaks against a legal initial marking of a net; `subject`: the net with its tokens."""
+    """The defects of the initial marking; `subject`: the net with its tokens."""
     return tuple(islice(_illegal(net, subject), MOST))
 
 
@@ -86,7 +85,7 @@ def _changed_slots(net: GearNet) -> Iterator[Defect]:
 
 
 def _illegal(net: GearNet | MarkedNet, subject: MarkedNet) -> Iterator[Defect]:
-    """Gears that are not marked exactly once, and what keeps f_m from being a bijection."""
+    """Gears that are not marked exactly once, and reasons for which f_m is no bijection."""
     miscounted = tuple(_miscounted(subject))
     yield from miscounted
     if isinstance(net, GearNet) and len(net.initial) != len(net.gears):

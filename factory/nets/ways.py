@@ -1,4 +1,4 @@
-"""Ways that robots go ahead while they wait, in a timed net, and the cycle time with them."""
+"""Places for ways on which robots move ahead while they wait, and the cycle time with them."""
 
 from __future__ import annotations
 
@@ -50,17 +50,17 @@ def train_ratio(
         else:
             delays[wait] = max(delays[wait], taken - delays[number])
     delays += apart.values()
-    found = max_cycle_ratio(with_ways(marked(gears), gears, apart), delays)
+    ratio = max_cycle_ratio(with_ways(marked(gears), gears, apart), delays)
     owners = dict(enumerate(gears.slots))
     owners |= {len(seconds) + number: key[:1] for number, key in enumerate(apart)}
-    return found, busiest(owners, found.circuit, delays)
+    return ratio, busiest(owners, ratio.circuit, delays)
 
 
 def busiest(
     owners: Mapping[int, tuple[int, ...]], circuit: Iterable[int], seconds: Sequence[float]
 ) -> list[int]:
-    """The robots on a circuit, those first that spend most seconds on it, with the robots of each
-    place, none for those that are left out. All robots of an operation do."""
+    """The robots on a circuit, in descending order of the time that they spend on it; `owners`: the
+    robots of each place."""
     spent: dict[int, float] = {}
     for place in circuit:
         for robot in owners.get(place, ()):

@@ -26,7 +26,7 @@ from factory.export.certificate.refute import incidence, one_way, refute
 
 
 def check_certificate(document: object) -> list[str]:
-    """The faults of a certificate, [] where every claim in it is proved by it."""
+    """The faults of a certificate, [] if it proves all its claims."""
     return list(_checked("the certificate", _check(document)))
 
 
@@ -166,7 +166,7 @@ def _prove_safe(net: Net, section: Section, document: Section) -> Iterator[str]:
 
 
 def _prove_live(net: Net, section: Section, document: Section) -> Iterator[str]:
-    """The places without tokens, in an order in which each comes after all that it waits for."""
+    """The token-free places, in an order in which each comes after those it waits for."""
     if not net.marked_graph():
         yield "live: an order of places is no proof for a net with choice"
         return

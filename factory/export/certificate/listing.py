@@ -57,7 +57,7 @@ class Net:
                 self.preset[e].append(p)
 
     def faults(self) -> Iterator[str]:
-        """What makes the listing no listing of a net."""
+        """Faults of the listing itself."""
         if len(set(self.events)) < len(self.events) or len(set(self.names)) < len(self.names):
             yield "two places or two transitions have one name"
         if len({robot.name for robot in self.robots}) < len(self.robots):
@@ -105,7 +105,8 @@ class Net:
         return all(robots and self.fits(p, robots) for p, robots in starting.items())
 
     def uncovered(self, claim: str) -> Iterator[str]:
-        """What is in no gear, or has other slots than those of its gears."""
+        """Places and transitions in no gear, and places whose slots are not those of their
+        gears."""
         if not all(self.owners) or not all(self.meeting):
             yield f"{claim}: some place or transition is in no gear"
         if not all(self.fits(p, own) for p, own in enumerate(self.owners)):

@@ -1,4 +1,5 @@
-"""Whether a property fails as a certificate says: decided again from its listing, linearly."""
+"""Refutations: whether a property fails as a certificate claims, decided from its listing in linear
+time."""
 
 from __future__ import annotations
 
