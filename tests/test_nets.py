@@ -9,10 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from factory.compiler.expanding import expand
-from factory.nets import threads as nets_threads
+from factory.nets import threaded
 from factory.nets.petri import PetriNet, Place, Transition
-from factory.nets.threaded import Slot, ThreadedNet
-from factory.nets.threads import Threads
+from factory.nets.threaded import Slot, ThreadedNet, Threads
 from factory.plant.factory import Factory
 from tests.net_values import legal_markings, random_legal_marking
 from tests.pag_values import TEMPLATES, factories, factory_of, paper
@@ -133,7 +132,7 @@ def test_sets_fire_as_definition_3_4_says(factory: Factory, seed: int) -> None:
     here = ThreadedMarking(factory.net.threads_of(marking))
     kept = rng.choice((1, 2, 100))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(nets_threads, "KEPT", kept)
+        patch.setattr(threaded, "KEPT", kept)
         threads = threads_of(factory, marking)
     for _ in range(20):
         can = enabled(net.net, here.marked)

@@ -16,7 +16,7 @@ from factory.control.mode import STILL, Array, Index, Limits, Mode
 from factory.control.navigation import Bundle
 from factory.modes.staging import HeadStart
 from factory.nets.petri import Marking
-from factory.nets.threads import Threads
+from factory.nets.threaded import Threads
 from factory.nets.undo import marking_after
 from factory.nets.undone import Undone
 from factory.plant.factory import Factory, Operation
