@@ -160,16 +160,12 @@ def _transition(
 
 
 def _arcs(net: MarkedNet, failing: Sequence[FailingTransition]) -> Iterator[str]:
-    number = 0
+    ends: list[tuple[str, str]] = []
     for index, place in enumerate(net.net.places):
-        pairs = [(f"t{e}", f"p{index}") for e in place.left]
-        pairs += [(f"p{index}", f"t{e}") for e in place.right]
-        for source, target in pairs:
-            yield f'<arc id="a{number}" source="{source}" target="{target}"/>'
-            number += 1
+        ends += [(f"t{e}", f"p{index}") for e in place.left]
+        ends += [(f"p{index}", f"t{e}") for e in place.right]
     for event, failure in enumerate(failing, len(net.net.transitions)):
-        pairs = [(f"p{failure.takes}", f"t{event}")]
-        pairs += [(f"t{event}", f"p{place}") for place in failure.gives]
-        for source, target in pairs:
-            yield f'<arc id="a{number}" source="{source}" target="{target}"/>'
-            number += 1
+        ends.append((f"p{failure.takes}", f"t{event}"))
+        ends += [(f"t{event}", f"p{place}") for place in failure.gives]
+    for number, (source, target) in enumerate(ends):
+        yield f'<arc id="a{number}" source="{source}" target="{target}"/>'

@@ -57,8 +57,7 @@ class _Writer:
     def text(self, name: str) -> str:
         """The document."""
         root = Element("robot", {"name": name})
-        paths = {"strippath": "false", "fusestatic": "false", "meshdir": "."}
-        add(add(root, "mujoco"), "compiler", **paths)
+        add(add(root, "mujoco"), "compiler", strippath="false", fusestatic="false", meshdir=".")
         for body in (n for n in range(self.m.nbody) if self.m.body(n).name != names.COMPASS):
             self._link(root, body)
             if body:
@@ -82,11 +81,10 @@ class _Writer:
                 self._shapes(link, "collision", geom)
 
     def _inertial(self, link: Element, body: int) -> None:
-        m = self.m
         inertial = add(link, "inertial")
-        _origin(inertial, m.body_ipos[body], m.body_iquat[body])
-        add(inertial, "mass", value=exact([m.body_mass[body]]))
-        ixx, iyy, izz = (exact([moment]) for moment in m.body_inertia[body])
+        _origin(inertial, self.m.body_ipos[body], self.m.body_iquat[body])
+        add(inertial, "mass", value=exact([self.m.body_mass[body]]))
+        ixx, iyy, izz = (exact([moment]) for moment in self.m.body_inertia[body])
         add(inertial, "inertia", ixx=ixx, iyy=iyy, izz=izz, ixy="0", ixz="0", iyz="0")
 
     def _joint(self, root: Element, body: int) -> None:
