@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 import factory.export.certificate
 from factory.export.certificate.check import check_certificate
-from factory.export.certificate.listing import digest
+from factory.export.certificate.listing import CLAIMS, digest
 from factory.export.certificate.writer import certificate
 from factory.export.pnml import write_pnml
 from factory.foreign_nets.behaviour import analyse
@@ -48,10 +48,7 @@ def certified(net: GearNet | MarkedNet) -> Json:
 def test_certificates_of_factories_pass(factory: Factory) -> None:
     document = certified(factory.net)
     assert check_certificate(document) == []
-    assert all(document[claim]["holds"] is True for claim in _CLAIMS)
-
-
-_CLAIMS = ("gear_net", "live", "safe", "reversible", "legal")
+    assert all(document[claim]["holds"] is True for claim in CLAIMS)
 
 
 def test_a_large_certificate() -> None:
@@ -67,9 +64,9 @@ def test_certificates_of_broken_factories_pass(
     broken = planted(net, rng, which)
     document = certified(broken)
     assert check_certificate(document) == []
-    assert any(document[claim]["holds"] is False for claim in _CLAIMS)
+    assert any(document[claim]["holds"] is False for claim in CLAIMS)
     sealed = copy.deepcopy(document)
-    for claim in _CLAIMS:
+    for claim in CLAIMS:
         if document[claim]["holds"] is False:
             sealed[claim] = certified(net)[claim]
             assert check_certificate(seal(sealed)) != []
@@ -145,7 +142,7 @@ def test_certificates_of_altered_documents_pass(
     verdict = analyse(net)
     document = json.loads(json.dumps(certificate(net, verdict)))
     assert check_certificate(document) == []
-    for claim in _CLAIMS:
+    for claim in CLAIMS:
         found = document[claim]["holds"]
         undecided = found is None and claim not in ("gear_net", "legal")
         assert undecided or found == getattr(verdict, claim)
@@ -185,12 +182,6 @@ def tampered(document: Json, path: tuple[Any, ...]) -> Json:
     return changed
 
 
-def test_tampering_with_any_field_is_caught() -> None:
-    document = certified(factory_of(paper()).net)
-    for path in leaves(document):
-        assert check_certificate(tampered(document, path)) != [], path
-
-
 _FREE = {"name", "mode", "label", "type", "cover"}
 """What a forger may change without a lie: names, and a gear that covers as well."""
 
@@ -198,9 +189,11 @@ _FREE = {"name", "mode", "label", "type", "cover"}
 def test_tampering_is_caught_although_sealed_again() -> None:
     document = certified(factory_of(paper()).net)
     for path in leaves(document):
+        changed = tampered(document, path)
+        assert check_certificate(changed) != [], path
         other_way = path[0] == "reversible" and "place" in path
         if path != ("digest",) and not other_way and not _FREE & set(path):
-            assert check_certificate(seal(tampered(document, path))) != [], path
+            assert check_certificate(seal(changed)) != [], path
 
 
 def test_leaving_anything_out_is_caught() -> None:
@@ -217,7 +210,7 @@ def test_leaving_anything_out_is_caught() -> None:
             assert check_certificate(changed) != [], path
 
 
-@pytest.mark.parametrize("claim", _CLAIMS)
+@pytest.mark.parametrize("claim", CLAIMS)
 def test_a_false_refutation_is_caught(claim: str) -> None:
     document = certified(factory_of(paper()).net)
     for evidence in (
@@ -234,7 +227,7 @@ def test_a_false_refutation_is_caught(claim: str) -> None:
 def test_gears_without_slots_are_certified() -> None:
     document = certified(replace(marked(factory_of(paper()).net), slots=()))
     assert check_certificate(document) == []
-    assert all(document[claim]["holds"] is True for claim in _CLAIMS)
+    assert all(document[claim]["holds"] is True for claim in CLAIMS)
 
 
 def test_a_marked_place_without_robots_is_not_legal() -> None:

@@ -140,7 +140,14 @@ def minimal(content: str = "", kind: str = "http://www.pnml.org/version-2009/gra
     )
 
 
+def arc(target: str = "t", inside: str = "") -> str:
+    """A net with an arc from its place."""
+    return minimal(f'<arc id="a" source="p" target="{target}">{inside}</arc>')
+
+
 LAUGHS = '<!DOCTYPE x [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><pnml>&b;</pnml>'
+TWO = "<pnml><net id='a' type='ptnet'/>\n<net id='b' type='ptnet'/></pnml>"
+PLACE = '<place id="q">\n<initialMarking><text>two</text></initialMarking></place>'
 
 
 @pytest.mark.parametrize(
@@ -152,53 +159,26 @@ LAUGHS = '<!DOCTYPE x [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><pnml>&b;</pnml>
         ("\ud800", "Syntax", 1, "not well-formed"),
         (LAUGHS, "Syntax", 1, "document type"),
         ('<!DOCTYPE pnml SYSTEM "x.dtd"><pnml/>', "Syntax", 1, "document type"),
+        (minimal() + "\x00", "Syntax", 7, "not well-formed"),
         ("<html/>", "BadNet", 1, "<html>"),
         ("<pnml/>", "BadNet", 1, "0 nets"),
-        (
-            "<pnml><net id='a' type='ptnet'/>\n<net id='b' type='ptnet'/></pnml>",
-            "BadNet",
-            2,
-            "2 nets",
-        ),
+        (TWO, "BadNet", 2, "2 nets"),
         ('<pnml>\n<net id="n" type="x/ptnet"/></pnml>', "BadNet", 2, "no page"),
         (minimal(kind="http://x/symmetricnet"), "BadNet", 2, "symmetricnet"),
         (minimal(kind=""), "BadNet", 2, "without a type"),
-        (minimal('<arc id="a" source="p" target="q"/>'), "BadNet", 6, "unknown node 'q'"),
+        (arc("q"), "BadNet", 6, "unknown node 'q'"),
         (minimal('<arc id="a" source="p"/>'), "BadNet", 6, "nothing"),
-        (minimal('<arc id="p" source="p" target="t"/>'), "BadNet", 6, "used twice"),
+        (arc().replace('"a"', '"p"'), "BadNet", 6, "used twice"),
         (minimal("<place/>"), "BadNet", 6, "without id"),
-        (minimal('<arc id="a" source="p" target="p"/>'), "BadNet", 6, "from place 'p' to place"),
-        (
-            minimal(
-                '<arc id="a" source="p" target="t"><inscription><text>2</text></inscription></arc>'
-            ),
-            "BadNet",
-            6,
-            "weight '2'",
-        ),
-        (
-            minimal('<arc id="a" source="p" target="t"><type value="inhibitor"/></arc>'),
-            "BadNet",
-            6,
-            "type 'inhibitor'",
-        ),
-        (
-            minimal('<arc id="a" source="p" target="t"/>\n<arc id="b" source="p" target="t"/>'),
-            "BadNet",
-            7,
-            "second arc",
-        ),
-        (
-            minimal('<place id="q">\n<initialMarking><text>two</text></initialMarking></place>'),
-            "BadNet",
-            7,
-            "initial marking is 'two'",
-        ),
+        (arc("p"), "BadNet", 6, "from place 'p' to place"),
+        (arc("t", "<inscription><text>2</text></inscription>"), "BadNet", 6, "weight '2'"),
+        (arc("t", '<type value="inhibitor"/>'), "BadNet", 6, "type 'inhibitor'"),
+        (arc("t", '</arc>\n<arc id="b" source="p" target="t">'), "BadNet", 7, "second arc"),
+        (minimal(PLACE), "BadNet", 7, "initial marking is 'two'"),
         (minimal('<referencePlace id="r" ref="x"/>'), "BadNet", 6, "refers to unknown 'x'"),
         (minimal('<referencePlace id="r" ref="r"/>'), "BadNet", 6, "stands for itself"),
         (minimal('<referencePlace id="r" ref="t"/>'), "BadNet", 6, "refers to a transition"),
         (minimal().replace("</net>", '<place id="z"/></net>'), "BadNet", 7, "outside every page"),
-        (minimal() + "\x00", "Syntax", 7, "not well-formed"),
     ],
 )
 def test_what_is_broken_is_diagnosed(text: str, code: str, line: int, message: str) -> None:

@@ -11,12 +11,11 @@ from typing import Any
 
 import pytest
 
-from factory.export.certificate.listing import digest
+from factory.export.certificate.listing import CLAIMS, digest
 from factory.export.certificate.proof_file import first_difference
 from tests.command_line import PAPER, Done, Terminal
 
 Json = dict[str, Any]
-CLAIMS = ("gear_net", "safe", "live", "reversible", "legal")
 
 
 @pytest.fixture

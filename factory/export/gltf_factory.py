@@ -72,7 +72,7 @@ def write_factory(replica: Replica, binary: bool) -> bytes:
     """A factory in its present state as a glTF: a node for each body, named as in the MJCF, within
     it one for each shape; shapes of equal size and colour share a mesh. Spare parts are left
     out."""
-    from factory.mjcf.replica import paint, shown
+    from factory.mjcf.replica import paint, shown, triangles
 
     m, d = replica.m, replica.d
     scene = new_scene(FACTORY)
@@ -87,10 +87,12 @@ def write_factory(replica: Replica, binary: bool) -> bytes:
             there, here = _pose(replica, parent), _pose(replica, body)
             scene.graph.update(node, _node(replica, parent), matrix=np.linalg.solve(there, here))
         for geom in shown(m, body):
-            key = _look(replica, geom)
+            kind, colour = (int(m.geom_type[geom]), int(m.geom_dataid[geom])), paint(m, geom)
+            key = (*kind, *m.geom_size[geom].tolist(), *colour.tolist())
             if key not in meshes:
                 meshes[key] = f"mesh{len(meshes)}"
-                scene.geometry[meshes[key]] = shaded(_mesh(replica, geom), paint(m, geom))
+                mesh = Mesh("shape", *triangles(m, geom))
+                scene.geometry[meshes[key]] = shaded(mesh, colour)
             name = m.geom(geom).name or f"geom{geom}"
             name = f"{name}/shape" if name in scene.graph.nodes else name
             place = pose(m.geom_pos[geom], rotation(m.geom_quat[geom]))
@@ -109,21 +111,6 @@ def _node(replica: Replica, body: int) -> str:
 
 def _pose(replica: Replica, body: int) -> Array:
     return pose(replica.d.xpos[body], replica.d.xmat[body].reshape(3, 3))
-
-
-def _look(replica: Replica, geom: int) -> tuple[object, ...]:
-    """Key of a geom's appearance: type, mesh, size and colour."""
-    from factory.mjcf.replica import paint
-
-    m = replica.m
-    size, colour = m.geom_size[geom].tolist(), paint(m, geom).tolist()
-    return int(m.geom_type[geom]), int(m.geom_dataid[geom]), tuple(size), tuple(colour)
-
-
-def _mesh(replica: Replica, geom: int) -> Mesh:
-    from factory.mjcf.replica import triangles
-
-    return Mesh("shape", *triangles(replica.m, geom))
 
 
 def _ground(replica: Replica, geoms: list[int]) -> tuple[Array, Array]:
