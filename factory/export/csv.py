@@ -1,4 +1,4 @@
-"""CSV (RFC 4180, with a line of names) of a log's events: time, transition, operation, unit,
+"""CSV (RFC 4180, with a header line) of a log's events: time, transition, operation, unit,
 robots, source line.
 
 A spreadsheet evaluates a text that begins like a formula; such a text gets an apostrophe before it.

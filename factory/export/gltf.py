@@ -1,4 +1,4 @@
-"""glTF 2.0 in metres, y upwards as its standard has it: the finished product, or a sub-assembly
+"""glTF 2.0 in metres, y upwards (the standard's axes): the finished product, or a sub-assembly
 (`--of LABEL`), in the parts' colours, as a tree of nodes with the labels as names; .glb or .gltf by
 the ending of the file; into a folder, a .glb for every label."""
 

@@ -1,6 +1,6 @@
-"""glTF 2.0 of the whole factory in metres, y upwards: robots, feeders, outfeed, floor, and the
-parts where they are; of a PAG at the start, of a log at a time (`--of SECONDS`, its end without);
-.glb or .gltf by the ending of the file."""
+"""glTF 2.0 of the whole factory in metres, y upwards: robots, feeders, outfeed, floor and parts; of
+a PAG in its initial state, of a log at a time (`--of SECONDS`, its end by default); .glb or .gltf
+by the ending of the file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scenes as glTF 2.0, by trimesh: metres, y upwards as its standard has it, shaded meshes."""
+"""Scenes as glTF 2.0, by trimesh: metres, y upwards (the standard's axes), shaded meshes."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def pose(position: ArrayLike, turn: ArrayLike) -> Array:
 
 
 def shaded(mesh: Mesh, rgba: ArrayLike) -> Any:
-    """A mesh in a colour, with normals that are smooth on rounded surfaces and sharp at edges."""
+    """A mesh in a colour, with normals smooth on rounded surfaces and discontinuous at edges."""
     import trimesh
 
     vertices, faces, normals = _unwelded(mesh)
@@ -64,7 +64,7 @@ def shaded(mesh: Mesh, rgba: ArrayLike) -> Any:
 
 
 def _unwelded(mesh: Mesh) -> tuple[Array, Indices, Array]:
-    """Vertices, faces and normals in which a corner has a vertex for each of its normals."""
+    """Vertices, faces and normals, with a vertex for each distinct normal at a corner."""
     corners = np.concatenate(
         [mesh.vertices[mesh.faces], np.round(corner_normals(mesh), 6)], axis=2
     ).reshape(-1, 6)

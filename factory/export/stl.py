@@ -1,4 +1,4 @@
-"""STL, binary, in millimetres as slicers and CAD take it: the finished product, or a sub-assembly
+"""STL, binary, in millimetres, the unit of slicers and CAD: the finished product, or a sub-assembly
 (`--of LABEL`), in the product's frame; into a folder, a file for every label."""
 
 from __future__ import annotations

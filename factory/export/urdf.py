@@ -1,6 +1,6 @@
-"""URDF of the factory as the engine has it: a prismatic joint for each robot, lift and the outfeed
-(its position is the arc length or height of the run's log), a floating one for each part; meshes
-stand beside the file in a folder of its name.
+"""URDF of the engine's model of the factory: a prismatic joint for each robot, each lift and the
+outfeed (its position is the arc length or height in a run's log), a floating joint for each part;
+meshes are in a folder beside the file.
 
 Links have the names of the bodies in the MJCF, the log and the MCAP.
 """
