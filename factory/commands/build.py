@@ -52,15 +52,15 @@ def build(
     wip: int | None,
 ) -> int:
     """Compile, verify and lay out FILE.pag; write the MJCF model, the floor plan, the net."""
-    from factory.support import build_cache
+    from factory.support.cache import build_name, find_build, keep_build
 
     begin = perf_counter()
     writable(given.file, mjcf)
     writable_folder(output)
     wanted = {"mjcf": mjcf, "output": output, "units": units, "wip": wip}
     settings = given.settings()
-    name = build_cache.request(given.file, {**asdict(given), **wanted, "settings": settings})
-    kept = build_cache.find(name)
+    name = build_name(given.file, {**asdict(given), **wanted, "settings": settings})
+    kept = find_build(name)
     is_current = kept is not None
     if kept is None:
         from factory.export.build import BuildRequest, files_read
@@ -78,7 +78,7 @@ def build(
             built = build_files(project, verdict, request)
         kept = _printed(project, built, spent, wip)
         inputs = (*files_read(project), *plan, *_shipped_and_own(given.folders))
-        build_cache.keep(name, inputs, built.files, kept)
+        keep_build(name, inputs, built.files, kept)
     else:
         kept["document"]["compile_s"] = perf_counter() - begin
     for text in [] if out.silent else kept["all warnings" if out.verbose else "warnings"]:

@@ -18,7 +18,7 @@ import numpy as np
 from factory.geometry.alike import PartShape, motion_between, moved, shape_of
 from factory.geometry.meshes import Array, Mesh, is_closed, volume_of
 from factory.geometry.pieces import FLATNESS, closed_bodies, is_convex, joined
-from factory.support.array_cache import PACKED, digest, find, keep, packed, unpacked
+from factory.support.cache import digest, load_arrays, packed, store_arrays, unpacked
 from factory.support.environment import environment
 from factory.support.version import release
 
@@ -99,7 +99,7 @@ def _decomposed(mesh: Mesh) -> tuple[Array, ...]:
         if axes is not AS_DRAWN:
             found = tuple(piece @ axes for piece in found)
         arrays = {"vertices": shape.vertices, "faces": shape.faces, **packed(found)}
-        keep(FOLDER, _names(shape)[0], arrays)
+        store_arrays(FOLDER, _names(shape)[0], arrays)
     return found or (mesh.vertices,)
 
 
@@ -116,7 +116,7 @@ def _names(shape: PartShape) -> tuple[str, ...]:
 def _kept(shape: PartShape) -> tuple[Array, ...] | None:
     """The bodies that were found of a shape, here or elsewhere, moved with it; None for none."""
     for name in _names(shape):
-        kept = find(FOLDER, name, (*PACKED, "vertices", "faces"))
+        kept = load_arrays(FOLDER, name)
         if kept is None:
             continue
         if np.array_equal(kept["vertices"], shape.vertices):

@@ -16,7 +16,6 @@ from types import MappingProxyType
 
 import numpy as np
 
-from factory.geometry import kept_meshes
 from factory.geometry.decomposition import in_pieces
 from factory.geometry.limits import (
     FURTHEST,
@@ -36,12 +35,14 @@ from factory.geometry.meshes import (
     Indices,
     MassProperties,
     Mesh,
+    Remark,
     measured,
     mend_remark,
     usable,
 )
 from factory.geometry.solids import Product, Solid, from_mesh, primitive
 from factory.problem.pag import PAG, Assembly
+from factory.support.cache import digest, load_arrays, packed, program, store_arrays, unpacked
 from factory.support.errors import Diagnostic, InputError
 from factory.support.files import MESH, read_bytes
 from factory.support.interruption import side_by_side
@@ -55,6 +56,12 @@ class Work:
     to_do: Callable[[], MassProperties | Diagnostic]
     sizes: tuple[float, ...] | None = None
 
+
+FOLDER = "meshes"
+"""Where measured meshes are kept, in the user's cache."""
+
+PACKAGES = ("trimesh", "numpy", "scipy", "coacd")
+"""What reads, measures and decomposes meshes."""
 
 LATTICE = 0.2
 """Longest edge of the lattice of parts with no geometry [m]."""
@@ -177,8 +184,8 @@ class _Reader:
         path, scale = _file(node)
         try:
             content, suffix = self._content(path), Path(path).suffix.lower()
-            key = kept_meshes.key_of(content, suffix, scale)
-            kept = kept_meshes.find(key)
+            key = digest(content, suffix, scale, program(Path(__file__).parent, *PACKAGES))
+            kept = _kept(key)
             if kept is not None:
                 return key, Work(lambda: kept)
             file = read_mesh(content, suffix)
@@ -219,13 +226,42 @@ def _file(node: Assembly) -> tuple[str, float]:
 
 @np.errstate(all="ignore")
 def _finished(key: str, vertices: Array, faces: Indices) -> MassProperties:
-    """The mesh of a file, its vertices in one place made one, as the engine can use it."""
-    mesh, remark = usable(kept_meshes.UNNAMED, vertices, faces)
+    """The mesh of a file, its vertices in one place made one, as the engine can use it; it is kept
+    under a key. Its name is "" here: a product names its meshes itself."""
+    mesh, remark = usable("", vertices, faces)
     if remark is None:
         vertices, faces, was = mended(mesh.vertices, mesh.faces)
         remark = mend_remark(was) if was else None
         mesh = in_pieces(Mesh(mesh.name, vertices, faces))
-    return kept_meshes.keep(key, measured(mesh, remark))
+    found = measured(mesh, remark)
+    _keep(key, found)
+    return found
+
+
+def _keep(key: str, found: MassProperties) -> None:
+    remark, mesh = found.remark, found.mesh
+    arrays = {
+        "vertices": mesh.vertices,
+        "faces": mesh.faces,
+        "remark": np.array([remark.text, remark.many, remark.hint] if remark else [], str),
+        "volume": np.array(found.volume),
+        "centre": found.centre,
+        "inertia": found.inertia,
+        "hull": found.hull,
+        **packed(mesh.pieces),
+    }
+    store_arrays(FOLDER, key, arrays)
+
+
+def _kept(key: str) -> MassProperties | None:
+    """What `_finished` found before, in this process or another; None where nothing is kept."""
+    kept = load_arrays(FOLDER, key)
+    if kept is None:
+        return None
+    remark = Remark(*map(str, kept["remark"])) if len(kept["remark"]) else None
+    mesh = Mesh("", kept["vertices"], kept["faces"], unpacked(kept))
+    volume, centre, inertia = float(kept["volume"]), kept["centre"], kept["inertia"]
+    return MassProperties(mesh, remark, volume, centre, inertia, kept["hull"])
 
 
 def _half(kind: str, given: Array) -> Array:

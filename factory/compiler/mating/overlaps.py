@@ -7,7 +7,7 @@ two shapes are computed together, wherever they are.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -24,8 +24,7 @@ from factory.compiler.mating.paths import CLEAR, LAST, SIGNS, TOLERANCE, Depths,
 from factory.compiler.mating.seeking import MANY, sought
 from factory.geometry import overlap
 from factory.geometry.meshes import Array
-from factory.support import array_cache
-from factory.support.array_cache import Arrays, digest, program
+from factory.support.cache import digest, load_arrays, program, store_arrays
 
 FOLDER = "overlaps"
 """Where overlaps are kept, in the user's cache."""
@@ -117,12 +116,12 @@ class Finder:
         if self.bodies.boxes.all() and not self._meshes:  # found at once
             return self._by_parts(*self._search(axis, wanted))
         name = digest(self._product, axis, wanted)
-        kept = array_cache.find(FOLDER, name, (*KEYS, *DRAWN, ROUGH))
+        kept = load_arrays(FOLDER, name)
         if kept is None:
             bodies, parts, rough = self._search(axis, wanted)
             arrays = (*_arrays(bodies), *_arrays(parts), rough)
             kept = dict(zip((*KEYS, *DRAWN, ROUGH), arrays, strict=True))
-            array_cache.keep(FOLDER, name, kept)
+            store_arrays(FOLDER, name, kept)
         return self._by_parts(_pairs(kept, KEYS), _pairs(kept, DRAWN), kept[ROUGH])
 
     @cached_property
@@ -311,7 +310,7 @@ def _arrays(found: Pairs) -> tuple[NDArray[Any], ...]:
     return (*found[:3], *astuple(found[3]))
 
 
-def _pairs(kept: Arrays, keys: Sequence[str]) -> Pairs:
+def _pairs(kept: Mapping[str, NDArray[Any]], keys: Sequence[str]) -> Pairs:
     meeting, moving, standing, *rest = (kept[key] for key in keys)
     return meeting, moving, standing, Depths(*rest)
 
