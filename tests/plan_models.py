@@ -12,7 +12,7 @@ from manifold3d import Manifold
 
 from factory.pipeline import all_templates
 from factory.planning.parts import InPlace
-from factory.planning.source.reading import SourceOptions, read_source
+from factory.planning.source import SourceOptions, read_source
 
 MM = 1e-3
 

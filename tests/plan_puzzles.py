@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull
 
 from factory.pipeline import all_templates
 from factory.planning.parts import InPlace
-from factory.planning.source.reading import SourceOptions, read_source
+from factory.planning.source import SourceOptions, read_source
 
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 Body = Box | Sequence[tuple[float, float, float]]

@@ -18,7 +18,7 @@ from factory.geometry.product import product_geometry
 from factory.geometry.solids import Product
 from factory.pipeline import all_templates
 from factory.planning.plan import CannotAssemble, Planned, PlanOptions, plan
-from factory.planning.source.reading import SourceOptions, read_source
+from factory.planning.source import SourceOptions, read_source
 from factory.planning.writing import planned_product
 from factory.problem.pag import PAG
 

@@ -19,9 +19,9 @@ import trimesh
 
 from factory.geometry import glb_reader
 from factory.geometry.mesh_file import UnreadableMesh
+from factory.importing.scene_file import read_scene
 from factory.pipeline import all_templates
-from factory.planning.source.reading import SourceOptions, read_source
-from factory.planning.source.scene_file import read_scene
+from factory.planning.source import SourceOptions, read_source
 from factory.support.errors import FactoryError
 from tests.command_line import ROOT
 
@@ -134,7 +134,7 @@ MEMORY = 1_500_000
 READ = """
 import sys
 from pathlib import Path
-from factory.planning.source.scene_file import read_scene
+from factory.importing.scene_file import read_scene
 from factory.geometry.mesh_file import UnreadableMesh
 for name in sys.argv[1:]:
     path = Path(name)

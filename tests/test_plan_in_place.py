@@ -13,7 +13,7 @@ import trimesh
 
 from factory.pipeline import all_templates
 from factory.planning.parts import InPlace
-from factory.planning.source.reading import SourceOptions, read_source
+from factory.planning.source import SourceOptions, read_source
 from factory.support.errors import InputError
 from tests.command_line import ROOT, Terminal
 

@@ -11,7 +11,7 @@ from factory.compiler.mating.mating import matings
 from factory.geometry.product import product_geometry
 from factory.pipeline import all_templates, read
 from factory.planning.plan import Planned, PlanOptions, plan
-from factory.planning.source.reading import SourceOptions, read_source
+from factory.planning.source import SourceOptions, read_source
 from factory.planning.writing import planned_product
 from factory.timing.prediction import pace
 

@@ -27,7 +27,7 @@ from factory.planning.growing import Site, bettered, divided, units_of
 from factory.planning.judging import Judge, Judged
 from factory.planning.parts import InPlace
 from factory.planning.searching import Budget, Sought, trees
-from factory.planning.source.placing import placed
+from factory.planning.source import placed
 from factory.planning.stance import ROOT_AXIS, Stance, stances
 from factory.planning.subsets import subsets
 from factory.planning.writing import planned_product

@@ -25,7 +25,7 @@ from factory.geometry.alike import (
 from factory.geometry.meshes import Array
 from factory.pipeline import all_templates, read
 from factory.planning.parts import InPlace
-from factory.planning.source.reading import SourceOptions, read_source
+from factory.planning.source import SourceOptions, read_source
 from factory.planning.writing import planned_product
 from factory.support.files import write_all
 from tests.command_line import ROOT, Terminal, files_in

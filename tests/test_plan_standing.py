@@ -10,7 +10,7 @@ from manifold3d import Manifold
 
 from factory.pipeline import all_templates
 from factory.planning.plan import CannotAssemble, Planned, PlanOptions, plan
-from factory.planning.source.reading import SourceOptions, read_source
+from factory.planning.source import SourceOptions, read_source
 from factory.planning.standing import overhang
 from factory.support.errors import InputError
 from tests.plan_models import box, jig, model_source, slanted, socket, tail

@@ -13,7 +13,7 @@ from factory.support.errors import InputError
 
 if TYPE_CHECKING:
     from factory.planning.parts import InPlace
-    from factory.planning.source.reading import SourceOptions
+    from factory.planning.source import SourceOptions
 
 UNITS = ("m", "cm", "mm", "in", "ldu")
 """The names of units of length; `ldu` is that of LDraw, 0.4 mm."""

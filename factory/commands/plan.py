@@ -116,7 +116,7 @@ def plan(
     bodies (.glb, .3mf, .step), an LDraw model (.ldr, .mpd), or a PAG whose tree is thrown away."""
     from factory.pipeline import all_templates, read
     from factory.planning.plan import CannotAssemble, PlanOptions
-    from factory.planning.source.reading import SourceOptions, read_source
+    from factory.planning.source import SourceOptions, read_source
     from factory.planning.writing import planned_product
     from factory.support.files import own_names, write_all
 

@@ -9,7 +9,7 @@ unless the shape is its own mirror image.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -226,8 +226,3 @@ def _turn(one: Array, other: Array) -> Array:
 def moved(motion: RigidMotion, points: Array) -> Array:
     """Points (n, 3) after a motion."""
     return points @ motion.turn.T + motion.shift
-
-
-def after(motion: RigidMotion, turn: Array) -> RigidMotion:
-    """A motion, and then a rotation (3, 3) about the origin."""
-    return replace(motion, turn=turn @ motion.turn, shift=turn @ motion.shift)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from factory.geometry.alike import PartShape, motion_between, moved, shape_of
-from factory.geometry.meshes import Array, Mesh, is_closed, volume_of
+from factory.geometry.meshes import Array, Mesh, is_closed, normals_of, volume_of
 from factory.geometry.pieces import FLATNESS, closed_bodies, is_convex, joined
 from factory.support.cache import digest, load_arrays, packed, store_arrays, unpacked
 from factory.support.environment import environment
@@ -138,8 +138,7 @@ def _off(points: Array, shape: PartShape) -> float:
 def own_axes(mesh: Mesh) -> Array:
     """The axes (3, 3) of a body's own frame, as rows: the normals of its largest sides. Those of
     its file, where a share of ALONG of its surface lies along them."""
-    a, b, c = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
-    normals = np.cross(b - a, c - a)
+    normals = normals_of(mesh.vertices, mesh.faces)
     areas = np.linalg.norm(normals, axis=1)
     normals /= np.maximum(areas, 1e-300)[:, None]
     flat = np.abs(normals).max(axis=1) > 1 - LEVEL

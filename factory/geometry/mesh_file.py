@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.geometry.meshes import Array, Indices
+from factory.geometry.meshes import Array, Indices, normals_of
 from factory.geometry.pieces import joined
 
 EXPECTED = {
@@ -48,8 +48,7 @@ class MeshFile:
 
 def areas_of(vertices: Array, faces: Indices) -> Array:
     """The area of each triangle (m,)."""
-    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
-    return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
+    return np.asarray(np.linalg.norm(normals_of(vertices, faces), axis=1) / 2)
 
 
 def checked(bodies: Iterable[tuple[Array, Indices]], suffix: str) -> MeshFile:
@@ -63,6 +62,14 @@ def checked(bodies: Iterable[tuple[Array, Indices]], suffix: str) -> MeshFile:
         if not np.isfinite(vertices[faces]).all():
             raise UnreadableMesh("it has vertices that are not finite (nan or inf)")
     return MeshFile(tuple(found))
+
+
+def obj_of(vertices: Array, faces: Indices, comment: str) -> bytes:
+    """An OBJ file with a comment in its first line."""
+    lines = [f"# {comment}"]
+    lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in (np.round(vertices, 9) + 0.0).tolist()]
+    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces.tolist()]
+    return ("\n".join(lines) + "\n").encode()
 
 
 @np.errstate(all="ignore")

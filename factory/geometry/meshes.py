@@ -82,6 +82,12 @@ def hull_of(points: Array) -> Hull:
     return Hull(points[np.sort(found.vertices)], volume)
 
 
+def normals_of(vertices: Array, faces: Indices) -> Array:
+    """The normals (m, 3) of triangles, each twice as long as the area of its triangle."""
+    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
+    return np.asarray(np.cross(b - a, c - a))
+
+
 def volume_of(vertices: Array, faces: Indices) -> float:
     """The volume inside a closed mesh, negative where it is inside out."""
     a, b, c = (vertices[faces[:, corner]] - vertices.mean(axis=0) for corner in range(3))

@@ -22,7 +22,7 @@ from weakref import finalize
 
 import numpy as np
 
-from factory.geometry.meshes import Array, Indices, is_closed
+from factory.geometry.meshes import Array, Indices, is_closed, normals_of
 from factory.geometry.pieces import closed_bodies
 from factory.geometry.solids import Solid, rotation
 
@@ -131,8 +131,7 @@ def swept(body: Any, shift: Array) -> Any:
 
     mesh = body.to_mesh64()
     vertices, faces = _merged(mesh)
-    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
-    normals = np.cross(b - a, c - a)
+    normals = normals_of(vertices, faces)
     lengths = np.linalg.norm(normals, axis=1) * np.linalg.norm(shift)
     front = faces[normals @ shift > FACING * lengths]
     if not len(front):

@@ -3,14 +3,15 @@ allowed."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from weakref import finalize
 
 import numpy as np
 
+from factory.geometry.meshes import Indices
 from factory.geometry.overlap import common, drawn
-from factory.geometry.solids import Product
+from factory.geometry.solids import Product, Solid
 from factory.problem.pag import ROUNDING, AllowedOverlap, most_allowed
 from factory.support.errors import Diagnostic
 
@@ -113,7 +114,7 @@ def within(found: DrawnOverlaps, parts: Collection[str]) -> DrawnOverlaps:
 def _found(product: Product) -> DrawnOverlaps:
     labels, bodies = [*product.solids], [drawn(solid) for solid in product.solids.values()]
     pairs = []
-    for one, other in _near(product):
+    for one, other in near_pairs([*product.solids.values()], -SILENT).tolist():
         if bodies[one] is not None and bodies[other] is not None:
             depth = common(bodies[one], bodies[other]).depth
             if depth > SILENT:
@@ -123,10 +124,14 @@ def _found(product: Product) -> DrawnOverlaps:
     return DrawnOverlaps(tuple(pairs), tuple(left))
 
 
-def _near(product: Product) -> Iterator[tuple[int, int]]:
-    """The pairs of parts, by number, whose boxes overlap."""
-    low = np.array([solid.low for solid in product.solids.values()])
-    high = np.array([solid.high for solid in product.solids.values()])
-    for one in range(len(low)):
-        near = (low[one] < high[one + 1 :] - SILENT) & (low[one + 1 :] < high[one] - SILENT)
-        yield from ((one, one + 1 + int(n)) for n in np.flatnonzero(near.all(axis=1)))
+def near_pairs(solids: Sequence[Solid], gap: float) -> Indices:
+    """The pairs (n, 2) of solids, by number, whose boxes are at most a gap apart [m]; with a
+    negative gap, whose boxes overlap by at least as much."""
+    low = np.array([solid.low for solid in solids])
+    high = np.array([solid.high for solid in solids])
+    pairs = [np.zeros((0, 2), np.int64)]
+    for one in range(len(solids)):
+        near = (low[one] <= high[one + 1 :] + gap) & (low[one + 1 :] <= high[one] + gap)
+        others = one + 1 + np.flatnonzero(near.all(axis=1))
+        pairs.append(np.column_stack([np.full(len(others), one), others]))
+    return np.concatenate(pairs)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 from factory.importing.assembling import Mates, assemble
@@ -41,15 +42,26 @@ class Options:
     mates: Mates = "many"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Imported:
-    """A product and the contents of its files, by path in the output folder. `name` is that of the
-    PAG's file, without `.pag`."""
+    """A product as a PAG. `name`: that of the PAG's file, without `.pag`; `meshes`: the contents of
+    mesh files, by path in the output folder; `source`: the name of the file it was read from;
+    `notes`: what was read, in words; `has_tree`: whether the tree of the PAG says more than that
+    all parts belong to the product."""
 
-    pag: PAG
     name: str
-    files: Mapping[str, bytes]
-    warnings: tuple[Diagnostic, ...]
+    pag: PAG
+    meshes: Mapping[str, bytes] = field(repr=False)
+    source: str
+    notes: tuple[str, ...] = ()
+    warnings: tuple[Diagnostic, ...] = ()
+    has_tree: bool = True
+
+    @cached_property
+    def files(self) -> Mapping[str, bytes]:
+        """The contents of all files by path in the output folder, the PAG's first."""
+        text = f"// {self.name}, imported from {self.source}\n{write_pag(self.pag)}"
+        return {f"{self.name}.pag": text.encode(), **self.meshes}
 
 
 @collector_paused()
@@ -67,8 +79,7 @@ def import_product(
     if file.suffix.lower() in LDRAW:
         pag = _allowing(pag, store.files)
     name = file_stem(file.stem)
-    text = f"// {name}, imported from {file.name}\n".encode() + write_pag(pag).encode()
-    return Imported(pag, name, {f"{name}.pag": text, **store.files}, tuple(faults.warnings))
+    return Imported(name, pag, store.files, file.name, warnings=tuple(faults.warnings))
 
 
 def _allowing(pag: PAG, files: Mapping[str, bytes]) -> PAG:

@@ -13,10 +13,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from factory.geometry.meshes import Array
+from factory.geometry.meshes import Array, normals_of
 from factory.geometry.product import product_geometry
 from factory.planning.parts import InPlace, PlacedPart
-from factory.planning.source.placing import surface
+from factory.planning.source import surface
 from factory.planning.writing import planned_product
 
 NEAR = 1e-3
@@ -116,7 +116,7 @@ def _normals(parts: Sequence[PlacedPart]) -> tuple[Array, Array]:
     found, sizes = [], []
     for part in parts:
         corners = part.vertices[part.faces]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normal = normals_of(part.vertices, part.faces)
         area = np.linalg.norm(normal, axis=1)
         low, high = corners.min(axis=1) - NEAR, corners.max(axis=1) + NEAR
         near = np.zeros(len(corners), bool)

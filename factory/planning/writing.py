@@ -16,12 +16,11 @@ from factory.compiler.mating.mating import matings
 from factory.geometry.meshes import Array
 from factory.geometry.overlapping import overlaps_of
 from factory.geometry.product import product_geometry
-from factory.geometry.solids import rotation
 from factory.importing.labels import file_stem, label_of
-from factory.importing.places import UNTURNED, quaternion, rounded
+from factory.importing.places import Placement
 from factory.lang.writer import write_pag
 from factory.planning.parts import InPlace
-from factory.problem.pag import PAG, AllowedOverlap, Assembly, Parameter
+from factory.problem.pag import PAG, AllowedOverlap, Assembly
 from factory.problem.template import Template
 
 Unit = TypeVar("Unit", str, int)
@@ -151,10 +150,7 @@ def _turned(node: Assembly, turn: Array) -> Assembly:
     """A part after the product has been turned about the origin."""
     if np.array_equal(turn, np.eye(3)):
         return node
-    at = np.array(node.parameter("pos", (0.0, 0.0, 0.0)), float)
-    given = np.array(node.parameter("quat", UNTURNED), float)
-    stands = quaternion(turn @ rotation(given / np.linalg.norm(given)))
-    placed = [Parameter("pos", rounded(turn @ at))]
-    placed += [Parameter("quat", stands)] if stands != UNTURNED else []
+    given = {p.name: p.value for p in node.parameters}
+    placed = Placement(turn, moved=True).parameters(given)
     own = [p for p in node.parameters if p.name not in PLACES]
     return replace(node, parameters=(*own[:1], *placed, *own[1:]))

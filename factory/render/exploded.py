@@ -13,7 +13,7 @@ from factory.geometry.solids import Product
 from factory.mjcf.loose_parts import loose_parts
 from factory.mjcf.replica import Replica
 from factory.planning.exploding import Explosion
-from factory.planning.source.placing import surface
+from factory.planning.source import surface
 from factory.render.ink import Pixels
 from factory.render.painter import Renderer
 from factory.render.picture import Size

@@ -17,7 +17,7 @@ from factory.importing.ldraw.lines import LDrawFile, Reference, key_of
 from factory.importing.ldraw.shapes import LDU, LIBRARY, UPRIGHT, Shapes, matrix, mesh_of
 from factory.importing.ldraw.shelf import Shelf, children_first
 from factory.importing.mesh_files import MeshStore
-from factory.importing.places import quaternion, rounded
+from factory.importing.places import Placement
 from factory.lang.source import quoted
 from factory.problem.pag import Parameter
 from factory.support.errors import Diagnostic
@@ -165,9 +165,7 @@ class _ModelReader:
         at = UPRIGHT @ place.at * LDU
         if not mesh:
             at = at - turn @ np.array([0.0, 0.0, BRICK[2] / 2])
-        found.append(Parameter("pos", rounded(at)))
-        if rigid and np.abs(turn - np.eye(3)).max() > 1e-9:
-            found.append(Parameter("quat", quaternion(turn)))
+        found += Placement(turn if rigid else np.eye(3), at, moved=True).parameters({})
         found.append(Parameter("density", DENSITY))
         rgba = self._rgba(place.colour, reference)
         return (*found, Parameter("rgba", rgba)) if rgba else tuple(found)

@@ -6,6 +6,7 @@ from collections.abc import Set
 
 import numpy as np
 
+from factory.geometry.mesh_file import obj_of
 from factory.geometry.meshes import Array
 from factory.importing.ldraw.lines import LDrawFile, Reference
 from factory.importing.ldraw.shelf import Shelf, children_first
@@ -103,11 +104,5 @@ def mesh_of(triangles: Array, turn: Array) -> bytes | None:
         return None
     if body.is_watertight and body.is_winding_consistent and body.volume < 0:
         body.invert()
-    return _obj(points, np.asarray(body.faces))
-
-
-def _obj(points: Array, faces: Array) -> bytes:
-    lines = ["# made by factory import from LDraw parts; metres, z up"]
-    lines += [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in points.tolist()]
-    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces.tolist()]
-    return ("\n".join(lines) + "\n").encode()
+    comment = "made by factory import from LDraw parts; metres, z up"
+    return obj_of(points, np.asarray(body.faces), comment)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from factory.geometry.mesh_file import MeshFile, areas_of
 from factory.geometry.meshes import Array, is_closed, volume_of
 from factory.geometry.pieces import MOST_PIECES, components
 from factory.geometry.touching import bodies as shells
+from factory.lang.source import quoted
 from factory.lang.words import UNITS as LENGTHS
 from factory.support.errors import Diagnostic, InputError
 
@@ -25,6 +27,10 @@ heeds."""
 DOUBTFUL, SHEET = (1.0, 30.0), (0.1, 2.0)
 """A product may be so long in metres, centimetres and inches alike, between the two; one that is
 longer may be in either of the latter, too, where the median part is as thin as SHEET."""
+
+
+MOST_PARTS = 5000
+"""A plan has tables of all pairs of parts: of so many they take a gigabyte."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +61,23 @@ class Bodies:
     by: str = ""
     sure: bool = False
     notes: tuple[str, ...] = ()
-    warnings: tuple[Diagnostic, ...] = ()
+
+
+def check_count(path: Path, labels: Sequence[str], what: str = "parts") -> None:
+    """Raises InputError for a source with no part, or one (TooFewParts), or with more than can be
+    planned (TooLarge)."""
+    if len(labels) > MOST_PARTS:
+        message = f"{quoted(path.name)} has {len(labels)} {what}; at most {MOST_PARTS} are planned"
+        raise InputError(Diagnostic("TooLarge", message, None, "plan sub-assemblies of it"))
+    if len(labels) > 1:
+        return
+    if labels:
+        message = f"{quoted(path.name)} has one part, '{labels[0]}': there is nothing to assemble"
+        hint = "export each part as a mesh of its own, or as a body with a name, where it is"
+    else:
+        message = f"{quoted(path.name)} has no {what}"
+        hint = "a folder of .obj, .stl, .ply, .off, .glb, .3mf or .step files, a part each"
+    raise InputError(Diagnostic("TooFewParts", message, None, hint))
 
 
 def box_of(body: FileBody) -> tuple[Array, Array]:

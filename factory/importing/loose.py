@@ -8,26 +8,22 @@ from pathlib import Path
 import numpy as np
 
 from factory.geometry.alike import alike, shape_of
-from factory.geometry.mesh_file import ANEW, UnreadableMesh
+from factory.geometry.mesh_file import ANEW, UnreadableMesh, obj_of
 from factory.geometry.meshes import Array, Indices
 from factory.geometry.solids import colour
 from factory.importing.assembling import assemble
+from factory.importing.bodies import Bodies, FileBody, apart, check_count, unit_of
 from factory.importing.draft import PART, DraftNode, ImportFaults
+from factory.importing.importer import Imported
 from factory.importing.labels import file_stem, label_of
 from factory.importing.mesh_files import MeshStore
-from factory.importing.places import quaternion, rounded
+from factory.importing.places import Placement
+from factory.importing.scene_file import MESHES, SCENES, read_one, read_scene
 from factory.lang.source import quoted
-from factory.planning.source.bodies import Bodies, FileBody, apart, unit_of
-from factory.planning.source.faults import check_count
-from factory.planning.source.scene_file import MESHES, SCENES, read_one, read_scene
-from factory.planning.source.trees import TreeProduct
 from factory.problem.pag import PAG, Assembly, Parameter
 from factory.support.errors import Diagnostic, InputError, Position
 from factory.support.files import MESH, read_bytes
 from factory.support.order import natural
-
-STILL = 1e-9
-"""A rotation this close to none is none."""
 
 
 def bodies_in(path: Path) -> Bodies:
@@ -80,7 +76,7 @@ def _read(path: Path, faults: list[Diagnostic], whole: bool = False) -> Bodies |
         return None
 
 
-def loose_product(path: Path, bodies: Bodies, unit: str | None) -> TreeProduct:
+def loose_product(path: Path, bodies: Bodies, unit: str | None) -> Imported:
     """The product of loose bodies: a mesh a kind, and where each part of the kind is. A single body
     of several pieces is taken to pieces."""
     notes = list(bodies.notes)
@@ -90,8 +86,8 @@ def loose_product(path: Path, bodies: Bodies, unit: str | None) -> TreeProduct:
     check_count(path, [body.name for body in bodies.found], "bodies")
     metres, said = unit_of(bodies, unit)
     name = file_stem(path.resolve().name if path.is_dir() else path.stem)
-    pag, files = _assembled(name, path, bodies.found, metres)
-    return TreeProduct(name, pag, files, (*notes, said), bodies.warnings, has_tree=False)
+    pag, meshes = _assembled(name, path, bodies.found, metres)
+    return Imported(name, pag, meshes, path.name, (*notes, said), has_tree=False)
 
 
 def _assembled(
@@ -110,15 +106,13 @@ def _assembled(
             low, high = shapes[index].vertices.min(axis=0), shapes[index].vertices.max(axis=0)
             origins[kind] = np.round((low + high) / 2, 6)
             vertices, faces = _scaled(body.mesh.merged(), unit)
-            content = obj_of(vertices - origins[kind], faces)
+            content = obj_of(vertices - origins[kind], faces, "made by factory plan; metres")
             meshes[kind] = store.add(_name(body, index), ".obj", content)
         at = motion.turn @ origins[kind] + motion.shift
-        given = [Parameter("mesh", meshes[kind]), Parameter("pos", rounded(at))]
-        if np.abs(motion.turn - np.eye(3)).max() > STILL:
-            given.append(Parameter("quat", quaternion(motion.turn)))
-        plain = Assembly("", PART)
-        given.append(Parameter("rgba", body.colour or colour(plain, numbers[kind])))
-        drafts.append(DraftNode(_name(body, index), here, PART, [], tuple(given)))
+        stands = Placement(motion.turn, at, moved=True).parameters({})
+        rgba = body.colour or colour(Assembly("", PART), numbers[kind])
+        parameters = (Parameter("mesh", meshes[kind]), *stands, Parameter("rgba", rgba))
+        drafts.append(DraftNode(_name(body, index), here, PART, [], parameters))
     return assemble(drafts, ImportFaults()), store.files
 
 
@@ -132,11 +126,3 @@ def _name(body: FileBody, index: int) -> str:
     if not label:
         return f"part{index + 1}"
     return label if label[0].isalpha() else f"part-{label}"
-
-
-def obj_of(vertices: Array, faces: Indices) -> bytes:
-    """An OBJ file [m]."""
-    lines = ["# made by factory plan; metres"]
-    lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in (np.round(vertices, 9) + 0.0).tolist()]
-    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces.tolist()]
-    return ("\n".join(lines) + "\n").encode()

@@ -1,0 +1,237 @@
+"""From a source to parts in place: the choice of the reader, and the solids of the parts."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
+
+import numpy as np
+
+from factory.geometry.alike import Alike, alike, shape_of
+from factory.geometry.decomposition import can_decompose
+from factory.geometry.mesh_file import ANEW
+from factory.geometry.meshes import Array, Indices, hull_mesh
+from factory.geometry.product import product_geometry
+from factory.geometry.solids import Solid, rotation
+from factory.importing import Imported, Options, import_product
+from factory.importing.bodies import check_count
+from factory.importing.importer import LDRAW
+from factory.importing.labels import file_stem
+from factory.importing.loose import bodies_in, loose_product
+from factory.importing.mesh_files import MeshStore
+from factory.importing.scene_file import MESHES, SCENES
+from factory.lang.pag_reader import load_pag
+from factory.lang.source import quoted
+from factory.planning.faults import check_in_place, check_places, raise_if_any
+from factory.planning.hulls import EXTRA, hull_stands
+from factory.planning.parts import InPlace, Kept, PlacedPart
+from factory.problem.pag import PAG, Assembly, Parameter
+from factory.problem.shapes import SHAPED
+from factory.problem.template import Template
+from factory.support.collector import collector_paused
+from factory.support.errors import Diagnostic, InputError, did_you_mean
+from factory.support.files import MESH, read_bytes
+
+DECOMPOSE = f"{EXTRA}: then it is decomposed into convex bodies"
+
+AS_BODIES = "CoACD finds no bodies in it: write it as closed convex bodies that touch"
+
+SHOWN = 12
+"""So many kinds of parts are named."""
+
+
+@dataclass(frozen=True, slots=True)
+class SourceOptions:
+    """`unit`: that of lengths, None to be found out; `keep`: labels of sub-trees that stay;
+    `replan`: whether a PAG's tree is thrown away; `library` and `boxes` as for an LDraw import;
+    `in_place`: whether parts are taken to be in place, whatever they look like."""
+
+    unit: str | None = None
+    keep: tuple[str, ...] = ()
+    replan: bool = False
+    library: Path | None = None
+    boxes: bool = False
+    in_place: bool = False
+
+
+@collector_paused()
+def read_source(
+    path: Path, templates: Mapping[str, Template], options: SourceOptions | None = None
+) -> InPlace:
+    """The parts of a folder of meshes, of a scene file, of an LDraw model or of a PAG, in place.
+    Nothing is written. Raises InputError with every fault found."""
+    asked = options or SourceOptions()
+    made = _product(path, templates, asked)
+    check_count(path, [node.label for node in made.pag.parts()])
+    parts, warnings = placed(made.pag, made.meshes)
+    found = alike([shape_of(part.vertices, part.faces) for part in parts])
+    firsts = zip(parts, found.kinds, strict=True)
+    named = tuple(replace(part, kind=parts[first].label) for part, first in firsts)
+    doubtful = check_places(named, made.has_tree, asked.unit is not None)
+    if not (made.has_tree or asked.in_place):
+        raise_if_any(check_in_place(named))
+    notes = (*made.notes, _kinds(named), *_twins(named, found))
+    kept = _kept(made, asked.keep)
+    said = tuple(f"'{k.label}' stays as it is: {len(k.parts)} parts" for k in kept)
+    warnings = (*made.warnings, *warnings, *doubtful)
+    tree = made.pag if made.has_tree else None
+    allowed = made.pag.allowed
+    return InPlace(made.name, named, notes + said, kept, made.meshes, tree, warnings, allowed)
+
+
+def _product(path: Path, templates: Mapping[str, Template], asked: SourceOptions) -> Imported:
+    suffix = path.suffix.lower()
+    if not path.exists():
+        message = f"there is no file or folder '{path}'"
+        hint = "a folder of meshes, a .glb, .3mf or .step file, a model .ldr or .mpd, or a .pag"
+        raise InputError(Diagnostic("BadFile", message, None, hint))
+    if path.is_dir() or suffix in (*SCENES, *MESHES):
+        _refuse_keep(asked, f"{quoted(path.name)} has no tree")
+        return loose_product(path, bodies_in(path), asked.unit)
+    if asked.unit is not None:
+        message = f"{quoted(path.name)} is in metres, or states its unit"
+        raise InputError(Diagnostic("Usage", message, None, "leave out --unit"))
+    if suffix in LDRAW:
+        made = import_product(path, templates, Options(asked.library, asked.boxes))
+        steps = len(made.pag) - sum(1 for _ in made.pag.parts())
+        note = f"an LDraw model (its unit is 0.4 mm); its {steps} steps are thrown away"
+        return replace(made, notes=(note,))
+    if suffix != ".pag":
+        known = (*SCENES, *MESHES, *LDRAW[:2], ".pag")
+        message = f"{quoted(path.name)} is nothing that parts in place can be read from"
+        hint = did_you_mean(suffix, known, "endings")
+        raise InputError(Diagnostic("BadFile", message, None, hint))
+    if not (asked.replan or asked.keep):
+        message = f"{quoted(path.name)} has a tree already"
+        hint = "--replan throws it away; --keep LABEL keeps a sub-tree, and plans the rest"
+        raise InputError(Diagnostic("Usage", message, None, hint))
+    return _from_pag(path, templates)
+
+
+def _from_pag(path: Path, templates: Mapping[str, Template]) -> Imported:
+    """A PAG. Raises InputError, also for a part that has no shape (MissingPart): where a default
+    box stands follows from the tree."""
+    pag = load_pag(path, templates)
+    store, faults = MeshStore("meshes"), list[Diagnostic]()
+    nodes = tuple(_stored(node, pag, store, faults) for node in pag.nodes)
+    if faults:
+        raise InputError(faults)
+    made = replace(pag, nodes=nodes)
+    others = Counter(n.operation for n in pag.nodes if n.inputs and n.operation != "mate")
+    lost = ", ".join(f"{count} x {name}" for name, count in sorted(others.items()))
+    note = f"a PAG of {len(pag)} labels" + (f"; with its tree go {lost}" if lost else "")
+    return Imported(file_stem(path.stem), made, store.files, path.name, (note,))
+
+
+def _stored(node: Assembly, pag: PAG, store: MeshStore, faults: list[Diagnostic]) -> Assembly:
+    """A node whose mesh, if it has one, is in the store."""
+    if node.inputs:
+        return node
+    if not any(p.name in SHAPED - {"pos"} for p in node.parameters):
+        message = f"'{node.label}' has no shape: where it is follows from the tree alone"
+        hint = "give it a mesh, a box, a cylinder or a sphere, and its pos"
+        faults.append(Diagnostic("MissingPart", message, node.position, hint))
+        return node
+    mesh = node.parameter("mesh")
+    if mesh is None:
+        return node
+    name = PurePosixPath(str(mesh))
+    try:
+        content = read_bytes(Path(pag.folder) / name, MESH)
+    except OSError as error:
+        message = f"cannot read '{mesh}': {error.strerror}"
+        faults.append(Diagnostic("BadMesh", message, node.position, ANEW))
+        return node
+    stored = store.add(name.stem, name.suffix.lower(), content)
+    return replace(
+        node,
+        parameters=tuple(
+            Parameter("mesh", stored, p.position) if p.name == "mesh" else p
+            for p in node.parameters
+        ),
+    )
+
+
+def _refuse_keep(asked: SourceOptions, why: str) -> None:
+    if asked.keep or asked.replan:
+        hint = "--keep and --replan are for a PAG, or --keep for an LDraw model"
+        raise InputError(Diagnostic("Usage", why, None, hint))
+
+
+def _kinds(parts: tuple[PlacedPart, ...]) -> str:
+    """How many parts of how many kinds there are."""
+    counts = Counter(part.kind for part in parts)
+    several = [f"{count} like {kind}" for kind, count in counts.most_common() if count > 1]
+    shown = ", ".join(several[:SHOWN]) + ", ..." * (len(several) > SHOWN)
+    alike = f" ({shown})" if several else ", no two alike"
+    return f"{len(parts)} parts of {len(counts)} kind{'s' * (len(counts) > 1)}{alike}"
+
+
+def _twins(parts: tuple[PlacedPart, ...], found: Alike) -> list[str]:
+    return [
+        f"'{parts[one].label}' and '{parts[other].label}' are mirror images: two kinds"
+        for one, other in found.twins[:SHOWN]
+    ]
+
+
+def _kept(made: Imported, labels: tuple[str, ...]) -> tuple[Kept, ...]:
+    """The sub-trees to be kept; one inside another is part of that. Raises InputError
+    (UndefinedLabel, Usage)."""
+    pag, faults, found = made.pag, [], {}
+    for label in dict.fromkeys(labels):
+        if label not in pag.by_label:
+            hint = did_you_mean(label, [n.label for n in pag.nodes if n.inputs], "sub-assemblies")
+            message = f"--keep: {quoted(label)} is not defined"
+            faults.append(Diagnostic("UndefinedLabel", message, None, hint))
+        elif label == pag.root:
+            message = f"--keep: {quoted(label)} is the product: nothing is left to plan"
+            faults.append(Diagnostic("Usage", message, None, "keep sub-assemblies of it"))
+        else:
+            found[label] = tuple(PAG(label, pag.nodes).postorder())
+    if faults:
+        raise InputError(faults)
+    inside = {node.label for nodes in found.values() for node in nodes[:-1]}
+    return tuple(
+        Kept(label, tuple(n.label for n in nodes if not n.inputs), nodes)
+        for label, nodes in found.items()
+        if label not in inside and len(nodes) > 1
+    )
+
+
+def placed(
+    pag: PAG, files: Mapping[str, bytes]
+) -> tuple[tuple[PlacedPart, ...], tuple[Diagnostic, ...]]:
+    """The parts of a PAG, each as a kind of its own, and what there is to warn about. Raises
+    InputError (BadMesh, BadValue)."""
+    product = product_geometry(pag, files)
+    parts = []
+    for node in pag.parts():
+        solid = product.solids[node.label]
+        parts.append(PlacedPart(node.label, *surface(solid), node.label, solid, node))
+    return tuple(parts), (*product.warnings, *_hulls(parts))
+
+
+def _hulls(parts: Sequence[PlacedPart]) -> list[Diagnostic]:
+    """A warning for each closed mesh whose hull stands for it though it is not convex: what goes
+    into it, or through it, seems to overlap with it."""
+    found = {}
+    for part in parts:
+        file = str(part.node.parameter("mesh"))
+        if file not in found and hull_stands(part.solid.mesh):
+            message = f"{file} is not convex; its convex hull stands for it"
+            hint = AS_BODIES if can_decompose() else DECOMPOSE
+            many = f"meshes are not convex: their convex hulls stand for them ({hint})"
+            found[file] = Diagnostic("BadMesh", message, part.node.position, hint, many)
+    return list(found.values())
+
+
+def surface(solid: Solid) -> tuple[Array, Indices]:
+    """The surface of a solid in place: vertices (n, 3) [m] and faces (m, 3). That of a round one is
+    the polytope around it."""
+    if solid.mesh is None:
+        mesh = hull_mesh(solid.label, solid.pieces[0])
+        return mesh.vertices, mesh.faces
+    turn = rotation(solid.quaternion)
+    return solid.mesh.vertices @ turn.T + solid.position, np.asarray(solid.mesh.faces)
