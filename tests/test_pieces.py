@@ -281,25 +281,6 @@ def test_what_else_is_closed_is_decomposed_once(
     assert len(list(cache.iterdir())) == 1
 
 
-def test_a_damaged_cache_is_made_again(tmp_path: Path, library: list[int], cache: Path) -> None:
-    tube = trimesh.creation.annulus(0.05, 0.1, 0.1)
-    solid_of(tmp_path, tube)
-    (kept,) = cache.iterdir()
-    whole = kept.read_bytes()
-    for content in (b"", b"rubbish", whole[:-40], whole.replace(b"fortran", b"f0rtran")):
-        kept.write_bytes(content)
-        shutil.rmtree(cache.parent / "meshes")
-        assert len(solid_of(tmp_path, tube).pieces) == 2
-        assert kept.read_bytes() == whole
-    assert len(library) == 5
-
-
-def test_a_cache_that_cannot_be_written_is_no_error(tmp_path: Path, library: list[int]) -> None:
-    (tmp_path / "cache").write_text("a file where the folder should be")
-    tube = trimesh.creation.annulus(0.05, 0.1, 0.1)
-    assert len(solid_of(tmp_path, tube).pieces) == 2
-
-
 def test_a_library_that_fails_leaves_the_hull(
     tmp_path: Path, library: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -12,8 +12,8 @@ from factory.importing.bill import BillReader
 from factory.importing.document import read_json, read_yaml
 from factory.importing.draft import DraftNode, ImportFaults
 from factory.importing.labels import file_stem
-from factory.importing.ldraw import read_ldraw
-from factory.importing.mesh_files import MeshFolder, MeshStore
+from factory.importing.ldraw.model import read_ldraw
+from factory.importing.mesh_files import MeshStore
 from factory.importing.part_maker import PartMaker
 from factory.importing.tree_file import TreeReader
 from factory.lang.operations import signature
@@ -108,8 +108,7 @@ def _drafts(
         message = f"{quoted(file.name)} is nothing that can be imported"
         raise InputError(Diagnostic("BadFile", message, None, hint))
     source = source_of(read_text(file), str(file))
-    meshes = MeshFolder(options.meshes or file.parent, store, faults)
-    parts = PartMaker(meshes, options.unit, faults)
+    parts = PartMaker(options.meshes or file.parent, store, options.unit, faults)
     if kind in BILL:
         return BillReader(source, parts, faults).read(file.stem)
     operations = {name: signature(template) for name, template in templates.items()}

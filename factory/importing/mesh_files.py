@@ -6,14 +6,7 @@ from collections.abc import Iterable
 from hashlib import sha256
 from pathlib import Path, PurePosixPath
 
-from factory.geometry.mesh_file import ANEW, UnreadableMesh
-from factory.geometry.mesh_reader import read_mesh
-from factory.importing.draft import ImportFaults
 from factory.importing.labels import file_stem
-from factory.lang.operations import MESHES
-from factory.lang.source import near_file, quoted
-from factory.support.errors import Position
-from factory.support.files import MESH, read_bytes
 
 
 def path_inside(name: str) -> PurePosixPath | None:
@@ -56,43 +49,3 @@ class MeshStore:
             self._names[key] = path = f"{self.folder}/{stem}{suffix}"
             self.files[path] = content
         return self._names[key]
-
-
-class MeshFolder:
-    """The folder that the meshes of a tree or a bill are in. Each is read once, and put in the
-    store."""
-
-    def __init__(self, folder: Path, store: MeshStore, faults: ImportFaults) -> None:
-        self.folder, self.store, self.faults = folder, store, faults
-        self.found: dict[str, str | None] = {}
-
-    def path(self, name: str, position: Position) -> str | None:
-        """Where a mesh is in the output; None where something is wrong with it, which is noted for
-        each place that names it (BadPath, UnknownMesh, BadMesh)."""
-        if self.found.get(name) is None:
-            self.found[name] = self._fetch(name, position)
-        return self.found[name]
-
-    def _fetch(self, name: str, position: Position) -> str | None:
-        inside = path_inside(name)
-        if inside is None:
-            message = f"{quoted(name)} leads out of the folder of the meshes"
-            hint = "put the mesh in that folder, or name another by --meshes DIR"
-            self.faults.add("BadPath", message, position, hint)
-            return None
-        named = inside.suffix.lower() in MESHES
-        suffixes = ([""] if named else []) + list(MESHES)
-        path = first_file(self.folder / f"{inside}{suffix}" for suffix in suffixes)
-        if path is None:
-            message = f"there is no mesh {quoted(name)} in {quoted(str(self.folder))}"
-            wanted = str(inside) if named else f"{inside}{MESHES[1]}"
-            hint = near_file(str(self.folder), wanted) or "--meshes DIR names another folder"
-            self.faults.add("UnknownMesh", message, position, hint)
-            return None
-        content = read_bytes(path, MESH)
-        try:
-            read_mesh(content, path.suffix.lower())
-        except UnreadableMesh as error:
-            self.faults.add("BadMesh", f"cannot read {quoted(name)}: {error}", position, ANEW)
-            return None
-        return self.store.add(str(inside.with_suffix("")), path.suffix.lower(), content)

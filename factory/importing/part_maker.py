@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
+from factory.geometry.mesh_file import ANEW, UnreadableMesh
+from factory.geometry.mesh_reader import read_mesh
 from factory.importing.draft import ImportFaults
-from factory.importing.mesh_files import MeshFolder
+from factory.importing.mesh_files import MeshStore, first_file, path_inside
 from factory.importing.places import Placement
-from factory.lang.source import quoted
+from factory.lang.operations import MESHES
+from factory.lang.source import near_file, quoted
 from factory.lang.values import GEOMETRY, SHAPES
 from factory.problem.pag import Parameter, Value
 from factory.support.errors import Position
+from factory.support.files import MESH, read_bytes
 
 LENGTHS = tuple(name for name, kind in GEOMETRY.items() if kind.long)
 """Parameters in the unit of the file."""
@@ -19,11 +24,14 @@ LENGTHS = tuple(name for name, kind in GEOMETRY.items() if kind.long)
 
 @dataclass(slots=True)
 class PartMaker:
-    """`unit`: the length that 1 stands for in the file and its meshes [m]."""
+    """Makes parts of a tree or a bill. `folder`: that of its meshes, each of which is read once and
+    put in the `store`; `unit`: the length that 1 stands for in the file and its meshes [m]."""
 
-    meshes: MeshFolder
+    folder: Path
+    store: MeshStore
     unit: float
     faults: ImportFaults
+    meshes: dict[str, str | None] = field(default_factory=dict)
     there: dict[tuple[Parameter, ...], list[Position]] = field(default_factory=dict)
 
     def parameters(
@@ -37,7 +45,7 @@ class PartMaker:
             self.faults.add("BadValue", message, position, f"keep one of {', '.join(SHAPES)}")
         metres = self.metres(given)
         if "mesh" in given:
-            path = self.meshes.path(str(given["mesh"]), position)
+            path = self._mesh(str(given["mesh"]), position)
             metres |= {"mesh": path or ""}
             if self.unit != 1:
                 metres.setdefault("scale", self.unit)
@@ -45,7 +53,7 @@ class PartMaker:
         stands = place.parameters(metres) if placed else []
         first = [Parameter(name, metres.pop(name)) for name in shapes]
         rest = [Parameter(name, metres[name]) for name in metres if name not in ("pos", "quat")]
-        if self.meshes.found.get(str(given.get("mesh"))):
+        if self.meshes.get(str(given.get("mesh"))):
             self.there.setdefault((*first, *stands), []).append(position)
         return (*first, *stands, *rest)
 
@@ -65,3 +73,34 @@ class PartMaker:
             elif self.unit != 1 and isinstance(value, float):
                 made[name] = value * self.unit
         return made
+
+    def _mesh(self, name: str, position: Position) -> str | None:
+        """The path of a mesh in the output; None where something is wrong with it, which is noted
+        for each place that names it (BadPath, UnknownMesh, BadMesh)."""
+        if self.meshes.get(name) is None:
+            self.meshes[name] = self._fetch(name, position)
+        return self.meshes[name]
+
+    def _fetch(self, name: str, position: Position) -> str | None:
+        inside = path_inside(name)
+        if inside is None:
+            message = f"{quoted(name)} leads out of the folder of the meshes"
+            hint = "put the mesh in that folder, or name another by --meshes DIR"
+            self.faults.add("BadPath", message, position, hint)
+            return None
+        named = inside.suffix.lower() in MESHES
+        suffixes = ([""] if named else []) + list(MESHES)
+        path = first_file(self.folder / f"{inside}{suffix}" for suffix in suffixes)
+        if path is None:
+            message = f"there is no mesh {quoted(name)} in {quoted(str(self.folder))}"
+            wanted = str(inside) if named else f"{inside}{MESHES[1]}"
+            hint = near_file(str(self.folder), wanted) or "--meshes DIR names another folder"
+            self.faults.add("UnknownMesh", message, position, hint)
+            return None
+        content = read_bytes(path, MESH)
+        try:
+            read_mesh(content, path.suffix.lower())
+        except UnreadableMesh as error:
+            self.faults.add("BadMesh", f"cannot read {quoted(name)}: {error}", position, ANEW)
+            return None
+        return self.store.add(str(inside.with_suffix("")), path.suffix.lower(), content)

@@ -90,6 +90,11 @@ class Blocking:
             accepted |= np.outer(*both) | np.outer(*both[::-1])
         return replace(self, locks=self.locks & ~accepted)
 
+    def hangs(self, members: Sequence[int]) -> bool:
+        """Whether units are connected by contacts."""
+        touch = self.touch[np.ix_(members, members)]
+        return int(connected_components(touch, directed=False)[0]) <= 1
+
     def least(self, one: int, other: int) -> tuple[float, int, int]:
         """Of the six ways of a unit past another that on which they get least deep into each
         other: how deep [m], the axis, and the side, +1 or -1, to which the first goes out."""

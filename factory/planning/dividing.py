@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
 from factory.geometry.meshes import Array
 from factory.planning.blocking import CLASHES, DEEPER, LOCKED, Blocking
@@ -50,10 +49,9 @@ class Divider:
             return None
         share = sets.sum(axis=1) / len(units)
         worth = even * np.abs(share - 0.5) + 0.15 * random.random(len(sets))
-        touch = self.found.touch[np.ix_(units, units)]
         best, chosen = np.inf, 0
         for n in np.lexsort((worth, prices))[:TRIED].tolist():
-            price = prices[n] + sum(self._unsound(units, touch, s) for s in (sets[n], ~sets[n]))
+            price = prices[n] + sum(self._unsound(units[s].tolist()) for s in (sets[n], ~sets[n]))
             if price < best:
                 best, chosen = price, n
             if price <= prices[n]:
@@ -63,12 +61,11 @@ class Divider:
             one, other = other, one
         return Division(one, other, float(best))
 
-    def _unsound(self, units: NDArray[np.int64], touch: Sets, members: NDArray[np.bool_]) -> float:
+    def _unsound(self, members: list[int]) -> float:
         """The price of a side that is in pieces, or would tip over."""
         feet = self.found.feet
-        several = feet is not None and members.sum() > 1
-        tips = several and bool(feet.joined(units[members].tolist()).tips[0])  # type: ignore[union-attr]
-        return APART * _pieces(touch, members) + TIPS * tips
+        tips = feet is not None and len(members) > 1 and bool(feet.joined(members).tips[0])
+        return APART * (not self.found.hangs(members)) + TIPS * tips
 
     def _candidates(
         self, units: NDArray[np.int64], axes: tuple[int, ...], random: np.random.Generator
@@ -127,8 +124,3 @@ def _prices(levels: NDArray[np.int8], sets: Sets) -> Array:
         meets = sets.astype(np.float32) @ (levels >= level).astype(np.float32)
         found[((meets > 0) & ~sets).any(axis=1)] = price
     return found
-
-
-def _pieces(touch: Sets, members: NDArray[np.bool_]) -> bool:
-    """Whether some units are in pieces."""
-    return int(connected_components(touch[np.ix_(members, members)], directed=False)[0]) > 1

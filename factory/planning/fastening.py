@@ -143,7 +143,7 @@ class Fastening:
             at = np.ix_([screw], units) if side > 0 else np.ix_(units, [screw])
             if not self.found.locks[axis][at].any():
                 level = int(self.found.levels[axis][at].max())
-                return Join(tuple(sorted(units)), (screw,), (axis, side), level, lowered, True)
+                return Join(tuple(sorted(units)), (screw,), (axis, side), level, lowered)
         return None
 
     def _passes(self, screw: int, place: _Place) -> bool:

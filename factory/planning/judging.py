@@ -23,16 +23,14 @@ PRICES = {CLASHES: BLOCKED, LOCKED: PASSES, DEEPER: LOOSE}
 @dataclass(frozen=True, slots=True)
 class Join:
     """Two groups of units that come together: `come` goes out along `direction` of the product, so
-    comes in against it. `level`: the worst in its way (`blocking`). `room`: the least room [m] on
-    that way, infinite where nothing comes near. `lowered`: whether it comes along the vertical.
-    `onto`: whether the robot of the pile takes it."""
+    comes in against it. `level`: the worst in its way (`blocking`). `lowered`: whether it comes
+    along the vertical."""
 
     pile: Units
     come: Units
     direction: Direction
     level: int
     lowered: bool
-    onto: bool
 
 
 @dataclass(frozen=True)
@@ -73,7 +71,7 @@ class Judge:
         walk = _Walk(self)
         members, held = walk.made(tree, ROOT_AXIS)
         walk.seconds.append(held + float(self.expected.delivering(self.size(members))))
-        joins, apart = tuple(walk.joins), walk.apart - (not self.hangs(members))
+        joins, apart = tuple(walk.joins), walk.apart - (not self.found.hangs(members))
         tips = walk.tips - self.tips(members)
         found = joins, apart, walk.relays, max(walk.seconds), walk.robots, walk.sizes, tips
         return Judged(tree, self.stance, *found)
@@ -91,13 +89,6 @@ class Judge:
         (a, b), (c, d) = ((low[list(side)].min(), high[list(side)].max()) for side in (come, pile))
         return np.asarray(min(d - a, b - c))
 
-    def hangs(self, members: Units) -> bool:
-        """Whether some units hang together."""
-        from scipy.sparse.csgraph import connected_components
-
-        touch = self.found.touch[np.ix_(members, members)]
-        return int(connected_components(touch, directed=False)[0]) == 1
-
     def tips(self, members: Units) -> bool:
         """Whether some units would tip over where they stand."""
         feet = self.found.feet
@@ -110,14 +101,14 @@ class Judge:
         ways.append((self.stance.axes[2], self.stance.up, True))
         if not onto and self.found.base not in pile:
             ways.append((self.stance.axes[2], -self.stance.up, True))
-        found = [self._way(pile, come, way, onto) for way in ways]
+        found = [self._way(pile, come, way) for way in ways]
         return min(found, key=lambda join: (join.level, join.lowered))
 
-    def _way(self, pile: Units, come: Units, way: tuple[int, int, bool], onto: bool) -> Join:
+    def _way(self, pile: Units, come: Units, way: tuple[int, int, bool]) -> Join:
         axis, side, lowered = way
         at = np.ix_(come, pile) if side > 0 else np.ix_(pile, come)
         level = int(self.found.levels[axis][at].max())
-        return Join(pile, come, (axis, side), level, lowered, onto)
+        return Join(pile, come, (axis, side), level, lowered)
 
 
 @dataclass
@@ -160,7 +151,7 @@ class _Walk:
                 time += float(expected.lift(self.judge.stroke(come, pile)))
             self.joins.append(join)
             pile = tuple(sorted((*pile, *come)))
-            self.apart += not self.judge.hangs(pile)
+            self.apart += not self.judge.found.hangs(pile)
             self.tips += self.judge.tips(pile)
             self.sizes += float(self.judge.size(pile))
         return pile, time

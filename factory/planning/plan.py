@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 
+from factory.compiler.expanding import expand
+from factory.compiler.mating.mating import matings
 from factory.geometry.meshes import Array
+from factory.geometry.product import product_geometry
 from factory.layout.durations import Pace
 from factory.pipeline import Project, all_templates
 from factory.planning.blocking import CLASHES, DEEPER, LOCKED, SCRAPES, Blocking, blocking, rooms
@@ -16,15 +20,16 @@ from factory.planning.estimate import Expected
 from factory.planning.fastening import fastened, fasteners, renumbered
 from factory.planning.hulls import Drawn, refuse_hidden
 from factory.planning.judging import Join, Judged
-from factory.planning.kept import KeptPrices
 from factory.planning.laying import LaidOut, Layouts
 from factory.planning.parts import InPlace
 from factory.planning.posing import Pose, along, posed, said, screwing, toppling
 from factory.planning.searching import Aim, Budget, Sought, Trees, trees, usual_seconds
-from factory.planning.stance import stances
+from factory.planning.stance import ROOT_AXIS, Stance, stances
 from factory.planning.standing import feet
+from factory.planning.subsets import BLOCKED
 from factory.planning.turning import only
-from factory.planning.writing import Tree, screws_in
+from factory.planning.writing import Tree, planned_product, screws_in
+from factory.problem.pag import PAG
 from factory.problem.template import Template
 from factory.support.errors import Diagnostic, InputError, did_you_mean
 from factory.support.settings import Settings
@@ -175,7 +180,7 @@ def _planned(pose: Pose, asked: PlanOptions, budget: Budget) -> Planned:
     def sought_for(screws: tuple[int, ...]) -> Trees:
         rest = [n for n in range(len(found)) if n not in screws]
         others = found.grouped([[n] for n in rest]) if screws else found
-        given = KeptPrices(only(source, others.labels), templates)
+        given = _kept_prices(only(source, others.labels), templates)
         task = Sought(others, expected, given, asked.aim, budget, told, stances(pose.up))
         return driven(trees(task), rest)
 
@@ -203,6 +208,33 @@ def _planned(pose: Pose, asked: PlanOptions, budget: Budget) -> Planned:
     best = layouts.best(sought.all, asked.aim, budget, said)
     asked.told("measuring the room on ways", 1, None, "")
     return _result(pose, best, sought.optimal, laid[0])
+
+
+def _kept_prices(source: InPlace, templates: Mapping[str, Template]) -> Callable[[Stance], Array]:
+    """The prices (2, n) of a source's units by stance, if the inputs of each come along x, or y, of
+    the floor. Sub-trees that are kept have operations that may be blocked along one axis, or on one
+    side, and not on another; all other units cost nothing."""
+    kept = {keep.label: keep for keep in source.kept}
+    labels = [label for label, _ in source.units()]
+
+    @cache
+    def price(label: str, stance: Stance) -> float:
+        parts = tuple(part for part in source.parts if part.label in kept[label].parts)
+        alone = replace(source, parts=parts, kept=(kept[label],))
+        pag = PAG(label, planned_product(alone, label, stance.rotation).pag.nodes)
+        judged = matings(expand(pag, templates), product_geometry(pag, source.files))
+        return BLOCKED * len(judged.of_kind("blocked"))
+
+    def prices(stance: Stance) -> Array:
+        x, y, z = stance.axes
+        table = np.zeros((2, len(labels)))
+        for number, label in enumerate(labels):
+            if label in kept:
+                table[ROOT_AXIS, number] = price(label, stance)
+                table[1 - ROOT_AXIS, number] = price(label, Stance((y, x, z), stance.up))
+        return table
+
+    return prices
 
 
 def _screws(source: InPlace, found: Blocking, asked: PlanOptions) -> tuple[int, ...]:

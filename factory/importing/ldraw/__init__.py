@@ -3,7 +3,3 @@
 After the LDraw file format 1.0.2, the MPD and the BFC language extensions, https://www.ldraw.org/
 article/218.html. Lengths there are LDU of 0.4 mm, and -y is up.
 """
-
-from factory.importing.ldraw.model import read_ldraw
-
-__all__ = ["read_ldraw"]

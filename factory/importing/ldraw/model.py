@@ -12,8 +12,13 @@ import numpy as np
 
 from factory.geometry.meshes import Array
 from factory.importing.draft import MATE, MOST_NODES, PART, DraftNode, ImportFaults, too_many
-from factory.importing.ldraw.colours import INHERITED, direct_colour
-from factory.importing.ldraw.lines import LDrawFile, Reference, key_of
+from factory.importing.ldraw.lines import (
+    INHERITED,
+    LDrawFile,
+    Reference,
+    direct_colour,
+    key_of,
+)
 from factory.importing.ldraw.shapes import LDU, LIBRARY, UPRIGHT, Shapes, matrix, mesh_of
 from factory.importing.ldraw.shelf import Shelf, children_first
 from factory.importing.mesh_files import MeshStore

@@ -6,8 +6,13 @@ from collections.abc import Callable, Container, Iterable, Iterator, Set
 from pathlib import Path
 
 from factory.importing.draft import ImportFaults
-from factory.importing.ldraw.colours import common_colours
-from factory.importing.ldraw.lines import LDrawFile, Reference, key_of, read_lines
+from factory.importing.ldraw.lines import (
+    LDrawFile,
+    Reference,
+    common_colours,
+    key_of,
+    read_lines,
+)
 from factory.importing.mesh_files import first_file, path_inside
 from factory.lang.source import quoted, read_text, source_of
 
