@@ -184,15 +184,15 @@ def two_sided() -> trimesh.Trimesh:
 
 TUBE = trimesh.creation.annulus(0.05, 0.1, 0.1, sections=24).volume
 MENDED: tuple[tuple[Callable[[], trimesh.Trimesh], str, float], ...] = (
-    (to_and_fro, "was wound to and fro", TUBE),
+    (to_and_fro, "had triangles of inconsistent orientation", TUBE),
     (inside_out, "was inside out", TUBE),
     (one_of_two_inside_out, "was inside out", TUBE + EDGE**3),
     (half_inside_out, "was inside out", 2 * EDGE**3),
     (wire_inside_out, "was inside out", 3 * EDGE * 4e-8),
-    (with_a_hole, "was open by slivers or small holes", TUBE),
-    (with_a_sliver, "was open by slivers or small holes", EDGE**3),
-    (cracked, "was open by cracks", TUBE),
-    (two_sided, "had triangles twice", EDGE**3),
+    (with_a_hole, "had slivers or small holes", TUBE),
+    (with_a_sliver, "had slivers or small holes", EDGE**3),
+    (cracked, "had cracks", TUBE),
+    (two_sided, "had duplicate triangles", EDGE**3),
 )
 
 
@@ -207,7 +207,7 @@ def test_what_is_nearly_closed_is_mended(
     content = mesh.export(file_type=kind, **({"digits": 12} if kind == "obj" else {}))
     found = product(tmp_path, f"m.{kind}", content)
     (warning,) = found.warnings
-    assert warning.message == f"m.{kind} {was}; it is mended" and not warning.hint
+    assert warning.message == f"m.{kind} {was}; it was repaired" and not warning.hint
     solid = found.solids["p"]
     assert solid.mass == pytest.approx(1000 * volume, rel=1e-4)
     assert solid.mesh is not None
@@ -230,7 +230,7 @@ def test_bodies_that_touch_are_turned_one_by_one(tmp_path: Path) -> None:
     found = product(tmp_path, "m.obj", ring.export(file_type="obj", digits=12))
     assert len(found.solids["p"].pieces) == 24
     assert found.mass == pytest.approx(1000 * whole, rel=1e-6)
-    assert [w.message for w in found.warnings] == ["m.obj was inside out; it is mended"]
+    assert [w.message for w in found.warnings] == ["m.obj was inside out; it was repaired"]
 
 
 def test_a_cavity_stays_one(tmp_path: Path) -> None:
@@ -296,8 +296,8 @@ FAULTS = (
         "v 0 0 1\nf 1 1\n",
         "line 2 has no face: 'f 1 2 3' takes three vertices or more, by number",
     ),
-    ("m.obj", "v 0 0 1\nf 1 1 0\n", "line 2 has a face with a vertex that is not there: 0"),
-    ("m.obj", "v 0 0 1\nf 1 1 -2\n", "line 2 has a face with a vertex that is not there: -2"),
+    ("m.obj", "v 0 0 1\nf 1 1 0\n", "line 2 has a face with a vertex that does not exist: 0"),
+    ("m.obj", "v 0 0 1\nf 1 1 -2\n", "line 2 has a face with a vertex that does not exist: -2"),
     ("m.obj", "v 0 0 1\nf 1 1 7\n", "a face has the vertex 7, but there are 1"),
     ("m.stl", "no mesh", f"it has no triangles; it should be {EXPECTED['.stl']}"),
     ("m.stl", b"\xff" * 90, f"it is not {EXPECTED['.stl']}"),
@@ -360,7 +360,7 @@ SENTENCES = (
     "it has no triangles; it should be ",
     "it is not a",
     "it has vertices that are not finite",
-    "a triangle has a vertex that is not there",
+    "a triangle refers to a vertex that does not exist",
     "a face has the vertex ",
     "line ",
 )

@@ -17,7 +17,7 @@ from factory.support.errors import Diagnostic
 OPENED, TURNED = 4, 2
 LINES = [
     "BadMesh warning: 4 meshes are open: their convex hulls are used; list: -v",
-    "BadMesh warning: 2 meshes were mended: closed, or turned outwards; list: -v",
+    "BadMesh warning: 2 meshes were repaired: closed, or turned outwards; list: -v",
 ]
 COMMANDS = (
     ("check",),
@@ -85,7 +85,7 @@ def test_the_list_is_shown_if_asked_for(run: Terminal, pag: Path, tmp_path: Path
     for _ in range(2):
         done = run("build", pag, "--mjcf", tmp_path / "m.xml", "-v")
         assert done.err.count("is open (not watertight); its convex hull is used") == OPENED
-        assert done.err.count("was inside out; it is mended") == TURNED
+        assert done.err.count("was inside out; it was repaired") == TURNED
     assert run("build", pag, "--mjcf", tmp_path / "m.xml").err.splitlines() == LINES
 
 

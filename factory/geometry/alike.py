@@ -1,9 +1,9 @@
-"""Parts of the same shape: the rigid motion that takes one to the other, if there is one.
+"""Parts of the same shape: the rigid motion that maps one to the other, if there is one.
 
-Shapes are compared by their vertices and their surface, so copies of one mesh are recognised, in
-any place, however their vertices and triangles are numbered; one shape cut into triangles in two
-ways with other vertices is two shapes. A mirror is no rigid motion: mirrored twins are two kinds,
-unless the shape is its own mirror image.
+Shapes are compared by their vertices and their surface. Copies of one mesh are recognised in any
+place, however their vertices and triangles are numbered; one shape with two different sets of
+vertices counts as two shapes. A mirror image is another kind, unless the shape is its own mirror
+image.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ import numpy as np
 from factory.geometry.meshes import Array, Indices
 
 CLOSE, DIGITS = 2e-5, 1e-6
-"""Vertices are in one place that are nearer than the first share of the shape's size, or than the
-second of its distance from the origin, where files have seven digits."""
+"""The tolerance for equal vertices: the first share of the shape's size, or the second share of its
+distance from the origin (files have seven digits), whichever is greater."""
 
 MOST_TRIES = 20_000
-"""The most pairs of vertices that two others are compared with."""
+"""The most pairs of vertices that are compared with the two anchors."""
 
 SAMPLE = 12
-"""So many vertices are compared before all are."""
+"""The number of vertices that are compared before all are."""
 
 
 @dataclass(frozen=True)
 class PartShape:
-    """The surface of a part in place: vertices (n, 3) of which each is used, faces (m, 3)."""
+    """The surface of a part in place: vertices (n, 3), all of which are used, and faces (m, 3)."""
 
     vertices: Array = field(repr=False)
     faces: Indices = field(repr=False)
@@ -41,7 +41,7 @@ class PartShape:
 
     @cached_property
     def slack(self) -> float:
-        """How far apart two vertices may be that are one."""
+        """The tolerance for equal vertices."""
         return max(CLOSE * self.size, DIGITS * float(np.abs(self.vertices).max()))
 
     @cached_property
@@ -51,7 +51,7 @@ class PartShape:
 
     @cached_property
     def spokes(self) -> Array:
-        """The vertices from the middle (n, 3)."""
+        """The vertices relative to the middle (n, 3)."""
         return self.vertices - self.middle
 
     @cached_property
@@ -61,8 +61,8 @@ class PartShape:
 
     @cached_property
     def surface(self) -> tuple[float, Array, Array]:
-        """Area, first (3,) and second moment (3, 3) of the surface about the middle: integrals,
-        which do not depend on how it is cut into triangles."""
+        """The area, first (3,) and second moment (3, 3) of the surface about the middle; they do
+        not depend on the triangulation."""
         corners = self.spokes[self.faces]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         area, total = np.linalg.norm(normal, axis=1) / 2, corners.sum(axis=1)
@@ -85,8 +85,8 @@ class RigidMotion:
 
 @dataclass(frozen=True, slots=True)
 class Alike:
-    """The kind of each shape, by the index of the first shape of that kind, and the motion that
-    takes the first to it. `twins` are pairs of kinds that are mirror images of each other."""
+    """The kind of each shape, as the index of the first shape of that kind, and the motion that
+    maps the first to it. `twins`: the pairs of kinds that are mirror images of each other."""
 
     kinds: tuple[int, ...]
     motions: tuple[RigidMotion, ...]
@@ -95,7 +95,7 @@ class Alike:
 
 @np.errstate(all="ignore")
 def shape_of(vertices: Array, faces: Indices) -> PartShape:
-    """The shape of a mesh in which vertices in one place may be several, and some unused."""
+    """The shape of a mesh that may have duplicate and unused vertices."""
     import trimesh
 
     body = trimesh.Trimesh(vertices, faces, process=False)
@@ -105,14 +105,14 @@ def shape_of(vertices: Array, faces: Indices) -> PartShape:
 
 
 def alike(shapes: Sequence[PartShape]) -> Alike:
-    """The kinds of shapes, in the order of the first of each."""
+    """The kinds of shapes, in the order of their first members."""
     firsts: dict[int, list[int]] = {}
     kinds: list[int] = []
     motions: list[RigidMotion] = []
     for index, shape in enumerate(shapes):
         same = firsts.setdefault(len(shape.vertices), [])
-        found = ((first, motion_between(shapes[first], shape)) for first in same)
-        kind, motion = next(((k, m) for k, m in found if m is not None), (index, RigidMotion()))
+        matches = ((first, motion_between(shapes[first], shape)) for first in same)
+        kind, motion = next(((k, m) for k, m in matches if m is not None), (index, RigidMotion()))
         if kind == index:
             same.append(index)
         kinds.append(kind)
@@ -128,7 +128,7 @@ def alike(shapes: Sequence[PartShape]) -> Alike:
 
 
 def motion_between(one: PartShape, other: PartShape) -> RigidMotion | None:
-    """The rigid motion that takes one shape to another; None where there is none."""
+    """The rigid motion that maps one shape to another; None if there is none."""
     slack = max(one.slack, other.slack)
     if len(one.vertices) != len(other.vertices) or not _may_fit(one, other, slack):
         return None
@@ -139,7 +139,7 @@ def motion_between(one: PartShape, other: PartShape) -> RigidMotion | None:
 
 
 def _may_fit(one: PartShape, other: PartShape, slack: float) -> bool:
-    """Whether what no motion changes is the same."""
+    """Whether the invariants of rigid motions agree."""
     if np.abs(np.sort(one.radii) - np.sort(other.radii)).max() > slack:
         return False
     area, reach = one.surface[0], 8 * slack * max(one.size, slack) * len(one.faces) ** 0.5
@@ -149,24 +149,25 @@ def _may_fit(one: PartShape, other: PartShape, slack: float) -> bool:
 
 
 def _searched(one: PartShape, other: PartShape, slack: float) -> RigidMotion | None:
-    """The motion found by trying pairs of vertices of the other shape for two of the one: with the
-    middles they say how it is turned, and two that stand at rare distances have few candidates."""
+    """The motion found by matching two anchors of one shape with pairs of vertices of the other:
+    with the middles they determine the rotation, and anchors at rare distances have few
+    candidates."""
     from scipy.spatial import cKDTree
 
     first, second = _anchors(one, slack)
-    given, tree = one.spokes[[first, second]], cKDTree(other.spokes)
+    anchors, tree = one.spokes[[first, second]], cKDTree(other.spokes)
     near = np.flatnonzero(np.abs(other.radii - one.radii[first]) <= 2 * slack)
     far = np.flatnonzero(np.abs(other.radii - one.radii[second]) <= 2 * slack)
-    span, tries = float(np.linalg.norm(given[0] - given[1])), 0
+    span, tries = float(np.linalg.norm(anchors[0] - anchors[1])), 0
     sample = one.spokes[np.linspace(0, len(one.spokes) - 1, SAMPLE).astype(int)]
-    loose = slack * max(1.0, one.size / _lever(given))
+    loose = slack * max(1.0, one.size / _lever(anchors))
     for start in near:
         gaps = np.linalg.norm(other.spokes[far] - other.spokes[start], axis=1)
         for end in far[np.abs(gaps - span) <= 4 * slack]:
             tries += 1
             if tries > MOST_TRIES:
                 return None
-            turn = _frame(other.spokes[[start, end]]) @ _frame(given).T
+            turn = _frame(other.spokes[[start, end]]) @ _frame(anchors).T
             if tree.query(sample @ turn.T)[0].max() > 8 * loose:
                 continue
             gap, order = tree.query(one.spokes @ turn.T)
@@ -178,7 +179,8 @@ def _searched(one: PartShape, other: PartShape, slack: float) -> RigidMotion | N
 
 
 def _anchors(shape: PartShape, slack: float) -> tuple[int, int]:
-    """Two vertices, not in line with the middle, of which few others are as far from it."""
+    """Two anchors: vertices that are not collinear with the middle and share their distance from it
+    with few others."""
     order = np.sort(shape.radii)
     count = np.searchsorted(order, shape.radii + 2 * slack, "right")
     count = count - np.searchsorted(order, shape.radii - 2 * slack)
@@ -191,7 +193,7 @@ def _anchors(shape: PartShape, slack: float) -> tuple[int, int]:
 
 
 def _lever(pair: Array) -> float:
-    """How far the second of two vectors (2, 3) is from the line of the first."""
+    """The distance of the second of two vectors (2, 3) from the line of the first."""
     return float(np.linalg.norm(np.cross(*pair)) / max(float(np.linalg.norm(pair[0])), 1e-30))
 
 
@@ -204,7 +206,7 @@ def _frame(pair: Array) -> Array:
 
 
 def _fitted(one: PartShape, other: PartShape, order: Indices, slack: float) -> RigidMotion | None:
-    """The motion that fits vertex i to vertex order[i] best, if it fits the surfaces too."""
+    """The best motion that maps vertex i to vertex order[i], if it maps the surfaces too."""
     turn = _turn(one.spokes, other.spokes[order])
     if np.abs(one.spokes @ turn.T - other.spokes[order]).max() > slack:
         return None
@@ -217,7 +219,7 @@ def _fitted(one: PartShape, other: PartShape, order: Indices, slack: float) -> R
 
 
 def _turn(one: Array, other: Array) -> Array:
-    """The rotation (3, 3) that takes vectors (n, 3) nearest to others (Kabsch)."""
+    """The rotation (3, 3) that maps vectors (n, 3) best to others (Kabsch algorithm)."""
     left, _, right = np.linalg.svd(other.T @ one)
     sign = np.sign(np.linalg.det(left @ right)) or 1.0
     return np.asarray(left @ np.diag([1.0, 1.0, sign]) @ right)

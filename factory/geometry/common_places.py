@@ -1,7 +1,7 @@
-"""Where one suction pad takes several parts, one after the other: on the top of each.
+"""Places at which one suction pad takes several parts one after the other, on the top of each.
 
-A part leaves sideways from under a pad on its top, and what hangs with its top at the height of
-other pads, which are up, is below them.
+A part leaves sideways from under the pad on its top. A part that hangs with its top at the height
+of other pads, which are raised, is below them.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from factory.geometry.solids import Solid
 from factory.geometry.suction import EVEN, NARROWEST, SHARE, WIDEST, Corner, drawn_triangles
 
 SPACED = 24
-"""Along each side of what parts cover in plan so many places are looked at, evenly spaced; those at
-the sides of parts; and those in the middle between two of these that follow each other."""
+"""The number of evenly spaced candidates along each side of the area of the parts; further
+candidates are at the sides of parts, and midway between two adjacent ones."""
 
 APART = 5e-4
-"""Pads are at least so far from each other [m]."""
+"""The least gap between pads [m]."""
 
 RIM = 1e-6
-"""A pad touches what is no further from its rim [m]."""
+"""The tolerance at the rim of a pad [m]."""
 
 FLAT = 1e-12
-"""A triangle of less than half this area in plan is none [m²]."""
+"""Triangles with less than half this area in plan are ignored [m²]."""
 
 Rectangle = tuple[Corner, Corner]
 """The least and the greatest corner of a rectangle in plan, (2,) each [m]."""
@@ -35,9 +35,9 @@ Rectangle = tuple[Corner, Corner]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Top:
-    """What of a part is level with its highest point, in plan: `triangles` (n, 3, 2), or where it
-    is nowhere flat there `edges` (k, 2, 2), which may be points; from `low` to `high` (2,) the part
-    itself; its `centre` of mass (2,) [m]."""
+    """The top of a part in plan: the `triangles` (n, 3, 2) that are level with its highest point
+    or, if there are none, the `edges` (k, 2, 2), which may be points; the box of the part from
+    `low` to `high` (2,), and its `centre` of mass (2,) [m]."""
 
     triangles: Array = field(repr=False)
     edges: Array = field(repr=False)
@@ -47,7 +47,7 @@ class Top:
 
     @classmethod
     def of(cls, solid: Solid, by: Corner) -> Top:
-        """That of a part that is moved in plan (2,) [m]."""
+        """The top of a part that is displaced in plan (2,) [m]."""
         every = drawn_triangles(solid)
         level = every[:, :, 2] >= every[:, :, 2].max() - EVEN
         plan = every[:, :, :2] + by
@@ -63,13 +63,13 @@ class Top:
         return cls(plan[flat], edges, low, high, centre)
 
     def takes(self, places: Array, radius: float) -> NDArray[np.bool_]:
-        """Whether a pad with its middle at places (n, 2) is on this top and stands out over no side
-        of the part. What is flat is under its middle."""
+        """Whether pads with their middles at places (n, 2) are on this top, level under the middle,
+        and do not protrude from the box of the part."""
         within = (places - radius >= self.low) & (places + radius <= self.high)
-        found = np.asarray(within.all(axis=1))
+        takes = np.asarray(within.all(axis=1))
         on = self._over if len(self.triangles) else self._beside
-        found[found] = on(places[found], radius)
-        return found
+        takes[takes] = on(places[takes], radius)
+        return takes
 
     def _over(self, places: Array, _: float) -> NDArray[np.bool_]:
         """Whether places are within one of the triangles."""
@@ -94,7 +94,8 @@ class Top:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CommonPlace:
-    """The middle of a pad in plan (2,), its radius [m], and the parts that it takes, by number."""
+    """The middle of a pad in plan (2,), its radius [m], and the indices of the parts that it
+    takes."""
 
     at: Corner
     radius: float
@@ -102,38 +103,38 @@ class CommonPlace:
 
 
 def common_places(tops: Sequence[Top], taken: Rectangle) -> list[CommonPlace]:
-    """As few places as found, a pad's breadth apart and out of the rectangle that is `taken`, at
-    one of which each part can be taken; of as many those of the largest pads. Nothing where there
-    are none."""
+    """As few places as possible at which each part can be taken by some pad; pads do not overlap
+    each other or the rectangle that is `taken`. Among equals, the larger pads. Empty if there are
+    none."""
     sizes = np.array([top.high - top.low for top in tops])
     widest = max(min(WIDEST, SHARE * float(sizes.min())), NARROWEST)
-    found = (_chosen(tops, taken, radius) for radius in (widest, widest / 2, widest / 4))
-    return min((places for places in found if places), key=len, default=[])
+    choices = (_chosen(tops, taken, radius) for radius in (widest, widest / 2, widest / 4))
+    return min((places for places in choices if places), key=len, default=[])
 
 
 def _chosen(tops: Sequence[Top], taken: Rectangle, radius: float) -> list[CommonPlace]:
-    """Places of pads with a radius: each takes as many of the parts that are left as any can, as
-    near to their centres of mass as can be."""
+    """Places of pads with a radius, chosen greedily: each takes as many of the remaining parts as
+    possible, as near to their centres of mass as possible."""
     places = _looked_at(tops, radius)
     free = ((places + radius <= taken[0]) | (places - radius >= taken[1])).any(axis=1)
     places = places[free]
     takes = np.array([top.takes(places, radius) for top in tops])
     off = np.array([np.linalg.norm(places - top.centre, axis=1) for top in tops])
-    left, found = np.ones(len(tops), bool), list[CommonPlace]()
+    left, chosen_places = np.ones(len(tops), bool), list[CommonPlace]()
     while left.any() and takes.size:
         count = (takes & left[:, None]).sum(axis=0)
         best = int(np.lexsort(((off * (takes & left[:, None])).sum(axis=0), -count))[0])
         if not count[best]:
             return []
         chosen = np.flatnonzero(takes[:, best] & left)
-        found.append(CommonPlace(places[best], radius, tuple(chosen.tolist())))
+        chosen_places.append(CommonPlace(places[best], radius, tuple(chosen.tolist())))
         left[chosen] = False
         takes[:, np.linalg.norm(places - places[best], axis=1) < 2 * radius + APART] = False
-    return [] if left.any() else found
+    return [] if left.any() else chosen_places
 
 
 def _looked_at(tops: Sequence[Top], radius: float) -> Array:
-    """Places (n, 2) that are looked at for pads of a radius."""
+    """Candidate places (n, 2) for pads of a radius."""
     axes = []
     for axis in (0, 1):
         ends = [top.low[axis] + radius for top in tops] + [top.high[axis] - radius for top in tops]

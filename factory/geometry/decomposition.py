@@ -1,10 +1,10 @@
-"""A mesh that is not convex, as convex bodies that collide in its place.
+"""Decomposition of a mesh that is not convex into convex bodies, which collide in its place.
 
-What is open, or convex but for a fiftieth of its hull, keeps its hull. A mesh of several closed
-convex bodies (a plate with a hole, written as wedges that touch) is exactly these bodies. What else
-is closed is decomposed by CoACD, body by body, where that is installed (the extra `decompose`),
-else it has its hull. A body is decomposed in the frame of its own sides, so however it is turned.
-The results are kept in the user's cache, and serve for the same shape wherever it is.
+A mesh that is open, or fills 98 % of its hull, is represented by its hull. A mesh of several closed
+convex bodies (a plate with a hole, written as wedges that touch) is exactly these bodies. Other
+closed meshes are decomposed by CoACD, body by body, if it is installed (the extra `decompose`);
+otherwise the hull is used. A body is decomposed in the frame of its own sides, so the result does
+not depend on its orientation. Results are cached, and reused for the same shape in any place.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from factory.support.environment import environment
 from factory.support.version import release
 
 FOLDER = "pieces"
-"""Where decompositions are kept, in the user's cache."""
+"""The folder of decompositions in the user's cache."""
 
 FULL = 0.98
-"""A closed mesh that fills more than this share of its hull collides as its hull."""
+"""A closed mesh that fills more than this share of its hull is represented by it."""
 
 CONCAVITY, SLENDER = (0.02, 0.05), 0.1
-"""How far, at most, CoACD lets a body differ from its mesh (its `threshold`), in about half the
-longest edge of the mesh's box: between these, and no more than the last of the middle edge."""
+"""Bounds on the deviation that CoACD allows (its `threshold`), in units of about half the longest
+edge of the mesh's box, and the bound relative to the middle edge."""
 
 PARAMETERS = {
     "mcts_iterations": 30,
@@ -39,16 +39,16 @@ PARAMETERS = {
     "preprocess_resolution": 30,
     "seed": 0,
 }
-"""What else CoACD is called with: it tries fewer cuts than it does by itself, and has a third of
-the triangles where it puts a mesh that intersects itself on a grid."""
+"""Other arguments of CoACD: fewer cuts are tried than by default, and the grid for a mesh that
+intersects itself has a third of the triangles."""
 
 SAME_AREA, EXACT = 1e-4, 2e-6
-"""Areas that differ by less than the first share may be of one shape, of which no vertex is off by
-more than the second share of its size."""
+"""Two shapes may be equal if their areas differ by less than the first share, and are if no vertex
+is off by more than the second share of the size."""
 
 ALONG, LEVEL = 0.1, 1e-6
-"""A body stands along the axes of its file of whose surface the first share does; a side lies along
-an axis whose normal has a cosine to it that is off 1 by less than the second."""
+"""A body is aligned with the axes of its file if the first share of its surface is; a side is if
+the cosine of its normal and an axis differs from 1 by less than the second."""
 
 AS_DRAWN = np.eye(3)
 """The axes of a file."""
@@ -56,11 +56,11 @@ AS_DRAWN = np.eye(3)
 LOADING = Lock()
 
 SLIVER = 1e-6
-"""A body of less than this share of the mesh's volume is left out: the engine refuses flat ones."""
+"""Bodies below this share of the mesh's volume are omitted: the engine refuses flat ones."""
 
 
 def in_pieces(mesh: Mesh) -> Mesh:
-    """The mesh with its convex bodies, where it is found to have several."""
+    """The mesh with its convex bodies, if it has several."""
     if not is_closed(mesh.faces) or _fills(mesh, 1 - FLATNESS):
         return mesh
     bodies = closed_bodies(mesh.vertices, mesh.faces)
@@ -81,40 +81,40 @@ def can_decompose() -> bool:
 
 
 def _fills(mesh: Mesh, share: float) -> bool:
-    """Whether a mesh is at least such a share of its hull, or bounds no volume."""
+    """Whether a mesh fills at least such a share of its hull, or bounds no volume."""
     return mesh.share >= share or mesh.share <= 0
 
 
 def _decomposed(mesh: Mesh) -> tuple[Array, ...]:
-    """The bodies that CoACD makes of a mesh, from the cache if it did so before; the mesh itself
-    where it is convex, or CoACD fails."""
+    """The bodies that CoACD makes of a mesh, or has made before (from the cache); the mesh itself
+    if it is convex, or CoACD fails."""
     if _fills(mesh, FULL):
         return (mesh.vertices,)
     shape = shape_of(mesh.vertices, mesh.faces)
-    found = _kept(shape)
-    if found is None:
+    pieces = _kept(shape)
+    if pieces is None:
         axes = own_axes(mesh)
         turned = replace(mesh, vertices=mesh.vertices @ axes.T) if axes is not AS_DRAWN else mesh
-        found = _run_coacd(turned)
+        pieces = _run_coacd(turned)
         if axes is not AS_DRAWN:
-            found = tuple(piece @ axes for piece in found)
-        arrays = {"vertices": shape.vertices, "faces": shape.faces, **packed(found)}
+            pieces = tuple(piece @ axes for piece in pieces)
+        arrays = {"vertices": shape.vertices, "faces": shape.faces, **packed(pieces)}
         store_arrays(FOLDER, _names(shape)[0], arrays)
-    return found or (mesh.vertices,)
+    return pieces or (mesh.vertices,)
 
 
 def _names(shape: PartShape) -> tuple[str, ...]:
-    """The names under which a shape may be kept; the first is its own. What they depend on is the
-    same wherever it is, but for the last digits of its area."""
+    """The names of the cache entries that may hold a shape, its own first. They do not depend on
+    the place of the shape, except for rounding of its area."""
     sizes = len(shape.vertices), len(shape.faces)
     step = np.log(shape.surface[0]) / SAME_AREA
-    given = release("coacd"), sorted(PARAMETERS.items()), CONCAVITY, SLENDER, SLIVER, sizes
+    settings = release("coacd"), sorted(PARAMETERS.items()), CONCAVITY, SLENDER, SLIVER, sizes
     numbers = dict.fromkeys(int(np.floor(step + off)) for off in (0.0, -0.01, 0.01))
-    return tuple(digest(*given, number) for number in numbers)
+    return tuple(digest(*settings, number) for number in numbers)
 
 
 def _kept(shape: PartShape) -> tuple[Array, ...] | None:
-    """The bodies that were found of a shape, here or elsewhere, moved with it; None for none."""
+    """The cached bodies of a shape, moved to its place; None if there are none."""
     for name in _names(shape):
         kept = load_arrays(FOLDER, name)
         if kept is None:
@@ -129,15 +129,15 @@ def _kept(shape: PartShape) -> tuple[Array, ...] | None:
 
 
 def _off(points: Array, shape: PartShape) -> float:
-    """How far points are from the vertices of a shape at most [m]."""
+    """The greatest distance of points from the vertices of a shape [m]."""
     from scipy.spatial import cKDTree
 
     return float(cKDTree(shape.vertices).query(points)[0].max())
 
 
 def own_axes(mesh: Mesh) -> Array:
-    """The axes (3, 3) of a body's own frame, as rows: the normals of its largest sides. Those of
-    its file, where a share of ALONG of its surface lies along them."""
+    """The axes (3, 3) of a body's own frame, as rows: the normals of its largest sides; the axes of
+    its file if a share of ALONG of its surface is aligned with them."""
     normals = normals_of(mesh.vertices, mesh.faces)
     areas = np.linalg.norm(normals, axis=1)
     normals /= np.maximum(areas, 1e-300)[:, None]
@@ -156,7 +156,7 @@ def own_axes(mesh: Mesh) -> Array:
 
 
 def _largest(normals: Array, areas: Array) -> Array:
-    """The normal (3,) that, with its opposite, has the largest area."""
+    """The normal (3,) of the largest area, opposite ones counted together."""
     ends = normals * np.sign(normals @ np.array([1.0, 1.1, 1.21]))[:, None]
     _, group = np.unique(np.round(ends, 4), axis=0, return_inverse=True)
     most = group == np.bincount(group.ravel(), areas).argmax()
@@ -165,11 +165,11 @@ def _largest(normals: Array, areas: Array) -> Array:
 
 
 def _run_coacd(mesh: Mesh) -> tuple[Array, ...]:
-    """The bodies that CoACD makes of a mesh, without slivers; none where it fails. Where it would
-    leave one, as of a plate with a shallow groove, it may differ from the mesh by the least."""
+    """The bodies that CoACD makes of a mesh, without slivers; empty if it fails. If the result
+    would be one body, as of a plate with a shallow groove, the finest threshold is used."""
     coarse, least = _threshold(mesh), CONCAVITY[0]
-    found = _cut(mesh, coarse)
-    return _cut(mesh, least) if len(found) == 1 and least < coarse else found
+    pieces = _cut(mesh, coarse)
+    return _cut(mesh, least) if len(pieces) == 1 and least < coarse else pieces
 
 
 def _cut(mesh: Mesh, threshold: float) -> tuple[Array, ...]:
@@ -177,8 +177,8 @@ def _cut(mesh: Mesh, threshold: float) -> tuple[Array, ...]:
 
     try:
         coacd = _library()
-        given = coacd.Mesh(mesh.vertices, mesh.faces)
-        bodies = coacd.run_coacd(given, threshold=threshold, **PARAMETERS)
+        source = coacd.Mesh(mesh.vertices, mesh.faces)
+        bodies = coacd.run_coacd(source, threshold=threshold, **PARAMETERS)
         hulls = [trimesh.convex.convex_hull(np.asarray(vertices, float)) for vertices, _ in bodies]
     except Exception:  # CoACD raises anything on a strange mesh
         return ()
@@ -187,14 +187,14 @@ def _cut(mesh: Mesh, threshold: float) -> tuple[Array, ...]:
 
 
 def _threshold(mesh: Mesh) -> float:
-    """How far a body may differ from the mesh, as CoACD counts it."""
+    """The threshold of CoACD for a mesh."""
     _, middle, longest = np.sort(np.ptp(mesh.vertices, axis=0))
     return float(np.clip(SLENDER * middle / longest, *CONCAVITY))
 
 
 def _library() -> Any:
-    """CoACD with one thread a mesh: with several its bodies come, and are merged, in the order in
-    which threads happen to end. OpenMP reads the number of threads when the library is loaded."""
+    """CoACD with one thread per mesh: with several, the order of the bodies, and so their merging,
+    depends on the scheduling. OpenMP reads the number of threads when the library is loaded."""
     with LOADING, environment("OMP_NUM_THREADS", "1"):
         import coacd
 

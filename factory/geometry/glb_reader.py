@@ -1,7 +1,7 @@
 """GLB files (binary glTF 2.0) as triangles, with names, places and colours.
 
-Every count and offset is checked against the bytes that are there, and against MOST, before memory
-is taken for it: a file of a kilobyte may announce what takes gigabytes.
+Every count and offset is checked against the size of the file, and against MOST, before memory is
+allocated: a file of a kilobyte may declare gigabytes.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from factory.geometry.meshes import Array, Indices
 from factory.geometry.solids import rotation
 
 MOST = 10_000_000
-"""The most numbers of an accessor, and the most triangles of all bodies where they stand."""
+"""The most numbers of an accessor, and the most triangles of all placed bodies."""
 
 TEXT = 32 << 20
-"""The most bytes of the part of a file that is JSON."""
+"""The largest JSON chunk [bytes]."""
 
 NESTED = 500
-"""So deep, at most, nodes are nested."""
+"""The greatest nesting depth of nodes."""
 
 TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-"""The types of numbers, by `componentType`."""
+"""Number types by `componentType`."""
 
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
-"""How many numbers an element has."""
+"""Numbers per element."""
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
 """The modes of primitives that have triangles."""
@@ -48,8 +48,8 @@ Triangles = tuple[Array, Indices]
 
 @dataclass(frozen=True, slots=True)
 class GlbBody:
-    """A mesh at a node: the names of both, "" for none; its primitives where they stand, in the
-    file's unit, and the colour of each as it is written, None for none."""
+    """A mesh at a node: the names of node and mesh, "" for none; its primitives in place, in the
+    file's unit, and the colour of each as written, None for none."""
 
     names: tuple[str, str]
     bodies: tuple[Triangles, ...] = field(repr=False)
@@ -58,7 +58,7 @@ class GlbBody:
 
 @dataclass(frozen=True, slots=True)
 class _Shape:
-    """A mesh of the file in its own frame: primitives that have triangles, and their colours."""
+    """A mesh in its own frame: the primitives that have triangles, and their colours."""
 
     name: str
     bodies: tuple[Triangles, ...]
@@ -67,10 +67,10 @@ class _Shape:
 
 @np.errstate(all="ignore")
 def read_glb(content: bytes) -> list[GlbBody]:
-    """The bodies of a GLB file, a body a node that has triangles, in the order of the scene. Raises
+    """The bodies of a GLB file, one per node that has triangles, in the order of the scene. Raises
     UnreadableMesh."""
     glb = _Glb(*_chunks(content))
-    found, total = [], 0
+    bodies, total = [], 0
     for node, matrix in glb.nodes():
         shape = glb.shape(node["mesh"])
         total += sum(len(faces) for _, faces in shape.bodies)
@@ -78,18 +78,18 @@ def read_glb(content: bytes) -> list[GlbBody]:
             raise _broken(f"its nodes have more than {MOST} triangles together")
         if shape.bodies:
             placed = tuple(moved_by(matrix, *body) for body in shape.bodies)
-            found.append(GlbBody((_name(node), shape.name), placed, shape.colours))
-    return found
+            bodies.append(GlbBody((_name(node), shape.name), placed, shape.colours))
+    return bodies
 
 
 def moved_by(matrix: Matrix, vertices: Array, faces: Indices) -> Triangles:
-    """Triangles after an affine map (4, 4), turned outwards still if it mirrors them."""
+    """Triangles after an affine map (4, 4), still oriented outwards if it mirrors them."""
     flips = bool(np.linalg.det(matrix[:3, :3]) < 0)
     return vertices @ matrix[:3, :3].T + matrix[:3, 3], faces[:, ::-1] if flips else faces
 
 
 def _chunks(content: bytes) -> tuple[Object, bytes]:
-    """The JSON of a file, and its bytes of arrays."""
+    """The JSON document and the binary chunk of a file."""
     if content[:4] != b"glTF" or len(content) < 20:
         raise _broken()
     if struct.unpack_from("<I", content, 4)[0] != 2:
@@ -99,7 +99,7 @@ def _chunks(content: bytes) -> tuple[Object, bytes]:
     while at + 8 <= len(content):
         size, kind = struct.unpack_from("<I4s", content, at)
         if at + 8 + size > len(content):
-            raise _broken(f"{at + 8 + size} bytes are announced, {len(content)} are there")
+            raise _broken(f"{at + 8 + size} bytes are declared, {len(content)} are there")
         parts.setdefault(kind, content[at + 8 : at + 8 + size])
         at += 8 + size
     text = parts.get(b"JSON", b"")
@@ -110,7 +110,7 @@ def _chunks(content: bytes) -> tuple[Object, bytes]:
     except (ValueError, RecursionError):
         raise _broken("its first chunk is not JSON") from None
     if not isinstance(document, dict):
-        raise _broken("its JSON is no object")
+        raise _broken("its JSON is not an object")
     return document, parts.get(b"BIN\0", b"")
 
 
@@ -126,12 +126,12 @@ def _name(entry: Object) -> str:
 def _whole(value: object, what: str, most: int = MOST) -> int:
     """A whole number from 0."""
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= most:
-        raise _broken(f"{what} is no whole number from 0 to {most}")
+        raise _broken(f"{what} is not a whole number from 0 to {most}")
     return value
 
 
 def _numbers(value: object, count: int, what: str) -> Array:
-    """So many finite numbers."""
+    """A given number of finite numbers."""
     good = isinstance(value, list) and len(value) == count
     if good and all(isinstance(x, int | float) and abs(x) < 1e30 for x in value):  # type: ignore[attr-defined]
         return np.array(value, float)
@@ -139,7 +139,7 @@ def _numbers(value: object, count: int, what: str) -> Array:
 
 
 class _Glb:
-    """A document, its arrays, and the meshes that were read of it."""
+    """A document, its binary chunk, and the meshes that were read."""
 
     def __init__(self, document: Object, arrays: bytes) -> None:
         self.document, self.arrays = document, arrays
@@ -150,25 +150,25 @@ class _Glb:
                 raise _broken(f"its triangles are compressed ({str(name)[:40]})")
 
     def entry(self, kind: str, number: object) -> Object:
-        """One of the document's nodes, meshes, accessors and the like."""
+        """An element of one of the document's lists, such as nodes, meshes or accessors."""
         every = self.document.get(kind)
         many = len(every) if isinstance(every, list) else 0
         if type(number) is not int or not 0 <= number < many:
-            raise _broken(f"it names one of its {kind} that is not there")
-        found = every[number]  # type: ignore[index]
-        if not isinstance(found, dict):
-            raise _broken(f"one of its {kind} is no object")
-        return found
+            raise _broken(f"it names one of its {kind} that does not exist")
+        entry = every[number]  # type: ignore[index]
+        if not isinstance(entry, dict):
+            raise _broken(f"one of its {kind} is not an object")
+        return entry
 
     def listed(self, entry: Object, key: str) -> list[Any]:
-        """A list in an entry, empty where there is none."""
-        found = entry.get(key, [])
-        if not isinstance(found, list):
-            raise _broken(f"'{key}' is no list")
-        return found
+        """A list in an entry; empty if it is missing."""
+        values = entry.get(key, [])
+        if not isinstance(values, list):
+            raise _broken(f"'{key}' is not a list")
+        return values
 
     def nodes(self) -> Iterator[tuple[Object, Matrix]]:
-        """The nodes with a mesh, parents first, and where they stand (4, 4)."""
+        """The nodes with a mesh, parents first, and their placements (4, 4)."""
         stack = [(number, np.eye(4), 1) for number in reversed(self._roots())]
         seen: set[int] = set()
         while stack:
@@ -186,7 +186,7 @@ class _Glb:
             stack += [(child, matrix, depth + 1) for child in reversed(below)]
 
     def _roots(self) -> list[Any]:
-        """The nodes of the scene that is shown; where there is none, those below no other."""
+        """The root nodes of the default scene; without scenes, the nodes that are no children."""
         if self.document.get("scenes"):
             scene = self.entry("scenes", self.document.get("scene", 0))
             return self.listed(scene, "nodes")
@@ -207,14 +207,14 @@ class _Glb:
         return self._shapes[number]  # type: ignore[index]
 
     def _read(self, mesh: Object) -> _Shape:
-        found = []
+        primitives = []
         for primitive in self.listed(mesh, "primitives"):
             if not isinstance(primitive, dict):
-                raise _broken("one of its primitives is no object")
+                raise _broken("one of its primitives is not an object")
             body = self._triangles(primitive)
             if len(body[1]):
-                found.append((body, self._colour(primitive)))
-        return _Shape(_name(mesh), tuple(b for b, _ in found), tuple(c for _, c in found))
+                primitives.append((body, self._colour(primitive)))
+        return _Shape(_name(mesh), tuple(b for b, _ in primitives), tuple(c for _, c in primitives))
 
     def _triangles(self, primitive: Object) -> Triangles:
         mode, attributes = primitive.get("mode", TRIANGLES), primitive.get("attributes")
@@ -225,17 +225,17 @@ class _Glb:
         if "indices" in primitive:
             order = self.accessor(primitive["indices"], 1).ravel()
             if order.dtype.kind != "u":
-                raise _broken("its indices are no whole numbers")
+                raise _broken("its indices are not whole numbers")
             order = order.astype(np.int64)
         else:
             order = np.arange(len(vertices))
         faces = _faces(order, mode)
         if len(faces) and not faces.max() < len(vertices):
-            raise _broken("a triangle has a vertex that is not there")
+            raise _broken("a triangle refers to a vertex that does not exist")
         return vertices, faces
 
     def _colour(self, primitive: Object) -> Colour:
-        """The colour of a primitive's material, None where it states none."""
+        """The colour of a primitive's material; None if it states none."""
         if "material" not in primitive:
             return None
         surface = self.entry("materials", primitive["material"]).get("pbrMetallicRoughness")
@@ -252,33 +252,33 @@ class _Glb:
             raise _broken("an accessor has a type that it may not have here")
         count = _whole(entry.get("count"), "the count of an accessor", MOST // width)
         if "bufferView" in entry:
-            found = self._viewed(entry, count, np.dtype(kind), width)
+            numbers = self._viewed(entry, count, np.dtype(kind), width)
         else:
-            found = np.zeros((count, width), kind)
+            numbers = np.zeros((count, width), kind)
         if "sparse" in entry:
-            found = self._sparse(entry["sparse"], found.copy())
-        if entry.get("normalized") is True and found.dtype.kind in "iu":
-            found = np.maximum(found / float(np.iinfo(found.dtype).max), -1.0)
-        return found
+            numbers = self._sparse(entry["sparse"], numbers.copy())
+        if entry.get("normalized") is True and numbers.dtype.kind in "iu":
+            numbers = np.maximum(numbers / float(np.iinfo(numbers.dtype).max), -1.0)
+        return numbers
 
-    def _sparse(self, entry: object, found: NDArray[Any]) -> NDArray[Any]:
-        """An array in which some rows are replaced."""
+    def _sparse(self, entry: object, numbers: NDArray[Any]) -> NDArray[Any]:
+        """An array with some rows replaced."""
         parts = [entry.get(key) for key in ("indices", "values")] if isinstance(entry, dict) else []
         if not all(isinstance(part, dict) for part in parts) or not isinstance(entry, dict):
             raise _broken("a sparse accessor has no indices, or no values")
-        count = _whole(entry.get("count"), "the count of a sparse accessor", len(found))
+        count = _whole(entry.get("count"), "the count of a sparse accessor", len(numbers))
         at, values = parts
         kind = TYPES.get(at.get("componentType", 0))  # type: ignore[union-attr]
         if kind is None or "u" not in kind:
-            raise _broken("the indices of a sparse accessor are no whole numbers")
+            raise _broken("the indices of a sparse accessor are not whole numbers")
         rows = self._viewed(at, count, np.dtype(kind), 1).ravel()  # type: ignore[arg-type]
-        if len(rows) and not rows.max() < len(found):
-            raise _broken("a sparse accessor has a row that is not there")
-        found[rows] = self._viewed(values, count, found.dtype, found.shape[1])  # type: ignore[arg-type]
-        return found
+        if len(rows) and not rows.max() < len(numbers):
+            raise _broken("a sparse accessor has a row that does not exist")
+        numbers[rows] = self._viewed(values, count, numbers.dtype, numbers.shape[1])  # type: ignore[arg-type]
+        return numbers
 
     def _viewed(self, entry: Object, count: int, kind: np.dtype[Any], width: int) -> NDArray[Any]:
-        """Numbers (count, width) out of the file's bytes."""
+        """Numbers (count, width) from the binary chunk."""
         view = self.entry("bufferViews", entry.get("bufferView"))
         buffer = self.entry("buffers", view.get("buffer"))
         if view.get("buffer") != 0 or "uri" in buffer:
@@ -296,25 +296,25 @@ class _Glb:
 
 
 def _placed(node: Object) -> Matrix:
-    """Where a node stands in its parent (4, 4)."""
+    """The placement (4, 4) of a node in its parent."""
     if "matrix" in node:
         return _numbers(node["matrix"], 16, "a matrix").reshape(4, 4).T
-    found = np.eye(4)
+    matrix = np.eye(4)
     if "rotation" in node:
         x, y, z, w = _numbers(node["rotation"], 4, "a rotation")
         length = float(np.linalg.norm((x, y, z, w)))
         if length < 1e-6:
             raise _broken("a rotation is not a unit quaternion")
-        found[:3, :3] = rotation(np.array([w, x, y, z]) / length)
+        matrix[:3, :3] = rotation(np.array([w, x, y, z]) / length)
     if "scale" in node:
-        found[:3, :3] *= _numbers(node["scale"], 3, "a scale")
+        matrix[:3, :3] *= _numbers(node["scale"], 3, "a scale")
     if "translation" in node:
-        found[:3, 3] = _numbers(node["translation"], 3, "a translation")
-    return found
+        matrix[:3, 3] = _numbers(node["translation"], 3, "a translation")
+    return matrix
 
 
 def _faces(order: Indices, mode: int) -> Indices:
-    """Triangles (m, 3) of vertices in the order of a primitive."""
+    """The triangles (m, 3) of a primitive's vertices."""
     if mode == TRIANGLES:
         return order[: len(order) // 3 * 3].reshape(-1, 3)
     if len(order) < 3:

@@ -1,5 +1,5 @@
-"""Numbers of a product's geometry that lead too far: what is refused, what is warned about, and
-where they are written."""
+"""Limits on a product's geometry: what is refused, what gets a warning, and the positions of the
+numbers."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from factory.problem.pag import PAG, Assembly
 from factory.support.errors import Diagnostic, Position
 
 SMALLEST, FURTHEST, HEAVIEST = 5e-9, 1e4, 1e12
-"""A part of a smaller half length, or beyond this distance [m] or mass [kg], is refused: the engine
-cannot compute with it."""
+"""Parts with a smaller half length, or beyond this distance [m] or mass [kg], are refused: the
+engine cannot compute with them."""
 
 LONGEST, SHORTEST = 5.0, 0.005
 """A product outside these lengths [m] gets a warning."""
@@ -24,7 +24,7 @@ SHAPES = ("box", "cylinder", "sphere", "mesh")
 
 
 def beyond(node: Assembly, solid: Solid) -> Diagnostic | None:
-    """What is wrong with a part whose numbers, each fine in itself, lead too far."""
+    """The fault of a part whose numbers, each valid by itself, exceed a limit together."""
     reach = float(np.max(np.abs([solid.low, solid.high])))
     if not reach <= FURTHEST:
         is_away = not 2 * float(np.max(np.abs(solid.position))) < reach
@@ -38,20 +38,22 @@ def beyond(node: Assembly, solid: Solid) -> Diagnostic | None:
 
 
 def too_far(node: Assembly, *names: str) -> Diagnostic:
-    """A part is out of reach because of the first of these parameters that it has."""
+    """The fault of a part that is out of reach because of the first of these parameters that it
+    has."""
     message = f"'{node.label}' reaches further than {FURTHEST:g} m from the origin"
     hint = f"{METRES}: check pos, scale and the shape"
     return Diagnostic("BadValue", message, value_position(node, *names), hint)
 
 
 def value_position(node: Assembly, *names: str) -> Position | None:
-    """Where the value of the first of these parameters is that the part has; else its label."""
-    found = {p.name: p.position for p in node.parameters}
-    return next((found[name] for name in names if name in found), node.position)
+    """The position of the first of these parameters that the part has; otherwise that of its
+    label."""
+    positions = {p.name: p.position for p in node.parameters}
+    return next((positions[name] for name in names if name in positions), node.position)
 
 
 def size_warnings(pag: PAG, low: Array, high: Array) -> list[Diagnostic]:
-    """The warning about a product that is very long or very short."""
+    """The warning about a product that is implausibly long or short."""
     longest = float((high - low).max())
     if SHORTEST <= longest <= LONGEST:
         return []

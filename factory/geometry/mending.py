@@ -1,4 +1,5 @@
-"""Meshes that bound no volume, closed and turned outwards where little is missing."""
+"""Repair of meshes that bound no volume: small gaps are closed, and triangles are oriented
+outwards."""
 
 from __future__ import annotations
 
@@ -14,34 +15,34 @@ if TYPE_CHECKING:
     import trimesh
 
 GAP = 1e-5
-"""Where a mesh is open, vertices are one that are nearer than about this share of its longest
-edge."""
+"""In an open mesh, vertices closer than about this share of the longest edge are merged."""
 
 HOLES, SLIVERS = 0.05, 0.001
-"""Holes with three or four corners are filled if that takes no more than the first share of a
-mesh's surface, others if no more than the second: the rim of a large hole says little about what
-should be in it."""
+"""Holes with three or four corners are filled if that adds no more than the first share of the
+surface, others if it adds no more than the second: the rim of a large hole says little about its
+interior."""
 
 HOLLOW = 1e-6
-"""A mesh bounds no volume that is meant, as a sheet with two sides or bodies that cancel each
-other, if it is thinner than this share of its size: its volume over its surface. A wire is not."""
+"""A mesh bounds no intended volume, like a sheet with two sides or bodies that cancel each other,
+if its volume divided by its surface is less than this share of its size. A wire is not that
+thin."""
 
-FILLED = "was open by slivers or small holes"
+FILLED = "had slivers or small holes"
 
 
 def mended(vertices: Array, faces: Indices) -> tuple[Array, Indices, str]:
-    """A mesh that bounds a volume, and what was wrong with the one given. This is "", and the mesh
-    that given, where nothing was wrong, or where it takes more than a mend. The box of a mesh stays
-    as it is."""
+    """A mesh that bounds a volume, and the defect of the given one. The defect is "", and the mesh
+    the given one, if nothing was wrong, or if it cannot be repaired. The box of the mesh does not
+    change."""
     mesh = _body(vertices, faces)
     turned = _outwards(mesh)
     if turned is not None:
         return vertices, turned, "was inside out" if (turned != faces).any() else ""
     for step, was in (
-        (_weld, "was open by cracks"),
-        (_drop_twins, "had triangles twice"),
+        (_weld, "had cracks"),
+        (_drop_twins, "had duplicate triangles"),
         (_fill, FILLED),
-        (_wind, "was wound to and fro"),
+        (_wind, "had triangles of inconsistent orientation"),
     ):
         step(mesh)
         turned = _outwards(mesh)
@@ -58,7 +59,7 @@ def _body(vertices: Array, faces: Indices) -> trimesh.Trimesh:
 
 
 def _weld(mesh: trimesh.Trimesh) -> None:
-    """Make one of vertices that are next to each other."""
+    """Merge vertices that are next to each other."""
     step = GAP * float(np.ptp(mesh.vertices, axis=0).max())
     mesh.merge_vertices(digits_vertex=int(np.ceil(-np.log10(step))))
     faces = np.asarray(mesh.faces)
@@ -66,14 +67,14 @@ def _weld(mesh: trimesh.Trimesh) -> None:
 
 
 def _drop_twins(mesh: trimesh.Trimesh) -> None:
-    """Keep one of the triangles that have the same corners."""
+    """Remove duplicate triangles."""
     mesh.update_faces(mesh.unique_faces())
 
 
 def _fill(mesh: trimesh.Trimesh) -> None:
-    """Close holes that are small. They are found in a mesh of the same triangles whose vertices are
-    anywhere: trimesh adds none that is flat, and those close a side that has a vertex more than the
-    next."""
+    """Close small holes. They are found in a mesh of the same triangles with random vertices,
+    because trimesh adds no flat triangles, and flat ones close a side that has one vertex more than
+    its neighbour."""
     from trimesh import repair
 
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
@@ -87,7 +88,7 @@ def _fill(mesh: trimesh.Trimesh) -> None:
 
 
 def _wind(mesh: trimesh.Trimesh) -> None:
-    """Turn triangles to agree with their neighbours."""
+    """Make the orientation of triangles consistent."""
     from trimesh import repair
 
     if mesh.is_watertight:
@@ -95,9 +96,9 @@ def _wind(mesh: trimesh.Trimesh) -> None:
 
 
 def _outwards(mesh: trimesh.Trimesh) -> Indices | None:
-    """The faces of a closed mesh, turned where a body is inside out; None where it is open, or
-    bounds too little. What is in the box of another body may be a cavity: it is turned with that
-    body alone."""
+    """The faces of a closed mesh, reoriented where a body is inside out; None if it is open, or
+    bounds too little. A body inside the box of another may be a cavity: it is reoriented only with
+    that body."""
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
     if not is_closed(faces):
         return None

@@ -1,4 +1,4 @@
-"""The triangles of a mesh file, by the bodies that it keeps apart, and why a file has none."""
+"""The triangles of a mesh file, separated by bodies, and the reason why a file has none."""
 
 from __future__ import annotations
 
@@ -19,26 +19,25 @@ EXPECTED = {
     ".3mf": "a 3MF file (a ZIP archive with 3D/3dmodel.model)",
     ".step": "a STEP file (ISO 10303-21, which begins with 'ISO-10303-21;', with solids in it)",
 }
-"""What a file of a suffix should hold."""
+"""A description of each file format."""
 
 ANEW = "export it again as .obj, .stl, .ply or .glb with triangles"
-"""The way out of a file that cannot be read."""
+"""The hint for a file that cannot be read."""
 
 
 class UnreadableMesh(Exception):
-    """Why a file is no mesh, as a sentence about the file: "it has no triangles"."""
+    """The reason why a file is not a mesh, as a sentence about the file: "it has no triangles"."""
 
 
 @dataclass(frozen=True, slots=True)
 class MeshFile:
-    """The triangles of a file, by the bodies that it keeps apart: vertices (n, 3) and faces (m, 3)
-    of each, in the file's unit."""
+    """The triangles of a file by body: vertices (n, 3) and faces (m, 3) of each, in the file's
+    unit."""
 
     bodies: tuple[tuple[Array, Indices], ...] = field(repr=False)
 
     def merged(self) -> tuple[Array, Indices]:
-        """All triangles, with one vertex at a place; those with fewer than three corners are left
-        out, if any others are there."""
+        """All triangles, with vertices merged; degenerate triangles are omitted, unless all are."""
         return _merged(*joined(self.bodies))
 
     def areas(self) -> Array:
@@ -52,16 +51,16 @@ def areas_of(vertices: Array, faces: Indices) -> Array:
 
 
 def checked(bodies: Iterable[tuple[Array, Indices]], suffix: str) -> MeshFile:
-    """The bodies that have triangles. Raises UnreadableMesh where none has, or one is broken."""
-    found = [(vertices, faces) for vertices, faces in bodies if len(faces)]
-    if not found:
+    """The bodies that have triangles. Raises UnreadableMesh if none has, or one is invalid."""
+    meshes = [(vertices, faces) for vertices, faces in bodies if len(faces)]
+    if not meshes:
         raise UnreadableMesh(f"it has no triangles; it should be {EXPECTED[suffix]}")
-    for vertices, faces in found:
+    for vertices, faces in meshes:
         if not 0 <= faces.min() <= faces.max() < len(vertices):
-            raise UnreadableMesh("a triangle has a vertex that is not there")
+            raise UnreadableMesh("a triangle refers to a vertex that does not exist")
         if not np.isfinite(vertices[faces]).all():
             raise UnreadableMesh("it has vertices that are not finite (nan or inf)")
-    return MeshFile(tuple(found))
+    return MeshFile(tuple(meshes))
 
 
 def obj_of(vertices: Array, faces: Indices, comment: str) -> bytes:
@@ -78,6 +77,6 @@ def _merged(vertices: Array, faces: Indices) -> tuple[Array, Indices]:
 
     body = trimesh.Trimesh(vertices, faces, process=False)
     body.merge_vertices()
-    found = np.asarray(body.faces)
-    whole = (found != np.roll(found, 1, axis=1)).all(axis=1)
-    return np.asarray(body.vertices), found[whole] if whole.any() else found
+    merged = np.asarray(body.faces)
+    whole = (merged != np.roll(merged, 1, axis=1)).all(axis=1)
+    return np.asarray(body.vertices), merged[whole] if whole.any() else merged

@@ -1,8 +1,8 @@
 """Mesh files as triangles.
 
-STL, PLY and OFF are read with trimesh. Of an OBJ the corners and faces alone are read: normals,
-texture and materials would split a vertex at every seam. What is wrong with a file is a sentence
-about the file, whatever a library says of it.
+STL, PLY and OFF are read with trimesh. Of an OBJ file only vertices and faces are read: normals,
+texture and materials would split a vertex at every seam. An error is a sentence about the file,
+whatever message a library gives.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
     import trimesh
 
 EMPTY_STL = 84
-"""Bytes of a binary STL file without triangles."""
+"""The size of a binary STL file without triangles [bytes]."""
 
 LINE = 100_000
-"""The most characters of a line of an OBJ file: a face that needs more is no polygon."""
+"""The longest line of an OBJ file [characters]: a longer face is not a polygon."""
 
 
 def read_mesh(content: bytes, suffix: str) -> MeshFile:
@@ -42,7 +42,7 @@ def read_mesh(content: bytes, suffix: str) -> MeshFile:
 
 
 def _by_trimesh(content: bytes, suffix: str) -> list[tuple[Array, Indices]]:
-    """The bodies of a file that trimesh reads, where they stand."""
+    """The bodies of a file that trimesh reads, in place."""
     bodies = _loaded(content, suffix)
     if suffix == ".stl" and not bodies and len(content) != EMPTY_STL and not _is_text(content):
         raise UnreadableMesh(f"it is not {EXPECTED[suffix]}")
@@ -58,7 +58,7 @@ def _is_text(content: bytes) -> bool:
 
 
 def _loaded(content: bytes, suffix: str) -> list[trimesh.Trimesh]:
-    """The meshes that trimesh finds, without a word. Raises UnreadableMesh."""
+    """The meshes that trimesh reads, without its warnings. Raises UnreadableMesh."""
     import trimesh
 
     logger, level = logging.getLogger("trimesh"), logging.getLogger("trimesh").level
@@ -69,7 +69,7 @@ def _loaded(content: bytes, suffix: str) -> list[trimesh.Trimesh]:
             scene = trimesh.load_scene(io.BytesIO(content), file_type=suffix[1:], process=False)
             return [body for body in scene.dump() if isinstance(body, trimesh.Trimesh)]
     except MemoryError:
-        raise UnreadableMesh("reading it takes more memory than there is") from None
+        raise UnreadableMesh("there is not enough memory to read it") from None
     except Exception as error:  # trimesh's readers raise anything on a broken file
         raise UnreadableMesh(f"it is not {EXPECTED[suffix]}") from error
     finally:
@@ -77,8 +77,8 @@ def _loaded(content: bytes, suffix: str) -> list[trimesh.Trimesh]:
 
 
 def _obj(content: bytes) -> tuple[Array, Indices]:
-    """The vertices and triangles of an OBJ file; a face of more corners is a fan of triangles.
-    Raises UnreadableMesh with the line that is wrong."""
+    """The vertices and triangles of an OBJ file; a face with more corners becomes a fan of
+    triangles. Raises UnreadableMesh with the invalid line."""
     vertices: list[tuple[float, ...]] = []
     faces: list[tuple[int, ...]] = []
     text = content.decode("utf-8", "replace").replace("\\\r\n", " ").replace("\\\n", " ")
@@ -113,17 +113,17 @@ def _vertex(words: list[str], line: int) -> tuple[float, ...]:
 
 
 def _corners(words: list[str], line: int, count: int) -> list[int]:
-    """The vertices of a face, from 0, given `count` of them so far: -1 is the last of these. What
-    follows a slash is about texture and normals."""
+    """The vertices of a face, from 0, after `count` vertices: -1 is the last of these. Texture and
+    normals after a slash are ignored."""
     try:
-        given = [int(word.partition("/")[0]) for word in words]
+        numbers = [int(word.partition("/")[0]) for word in words]
     except ValueError:
-        given = []
-    if len(given) < 3:
+        numbers = []
+    if len(numbers) < 3:
         message = f"line {line} has no face: 'f 1 2 3' takes three vertices or more, by number"
         raise UnreadableMesh(message)
-    found = [n - 1 if n > 0 else n + count for n in given]
-    if 0 in given or min(found) < 0:
-        wrong = next(n for n, at in zip(given, found, strict=True) if n == 0 or at < 0)
-        raise UnreadableMesh(f"line {line} has a face with a vertex that is not there: {wrong}")
-    return found
+    corners = [n - 1 if n > 0 else n + count for n in numbers]
+    if 0 in numbers or min(corners) < 0:
+        wrong = next(n for n, at in zip(numbers, corners, strict=True) if n == 0 or at < 0)
+        raise UnreadableMesh(f"line {line} has a face with a vertex that does not exist: {wrong}")
+    return corners

@@ -23,20 +23,20 @@ LEAST_BOX = 1e-12
 """A mesh in a smaller box [m³] has no volume for the engine."""
 
 LEAST_MASS, LEAST_INERTIA = 1e-9, 1e-12
-"""Bodies have at least this mass [kg] and principal moments [kg m²], or the engine refuses them."""
+"""The least mass [kg] and principal moments [kg m²] that the engine accepts."""
 
 TOO_FAR = 1e-5
-"""Pieces of a mesh that reach no further out of it count as reaching to its surface [m]."""
+"""Pieces that protrude from their mesh by no more than this are accurate [m]."""
 
 MARGIN = 1e-8
-"""Any two principal moments exceed the third by this share of it, or digits that an MJCF leaves out
-may turn a sheet or a rod into what cannot be a body."""
+"""The share by which the sum of any two principal moments exceeds the third, so that rounding in
+the MJCF does not turn the inertia of a sheet or a rod into an impossible one."""
 
 
 @dataclass(frozen=True)
 class Mesh:
-    """A triangle mesh in metres, in its own frame: vertices (n, 3), faces (m, 3). `pieces` are the
-    vertices (k, 3) of the convex bodies that collide in its place; none where its hull does."""
+    """A triangle mesh in metres, in its own frame: vertices (n, 3), faces (m, 3). `pieces`: the
+    vertices (k, 3) of the convex bodies that collide in its place; empty if its hull does."""
 
     name: str
     vertices: Array = field(repr=False)
@@ -45,13 +45,13 @@ class Mesh:
 
     @cached_property
     def hull(self) -> Hull:
-        """Its convex hull, computed once: that of a fine mesh takes as long as all the rest."""
+        """The convex hull, computed once: that of a fine mesh takes as long as everything else."""
         return hull_of(self.vertices)
 
     @cached_property
     def reach(self) -> float:
-        """How far its pieces reach out of its box [m]: more than nothing where what makes them puts
-        a mesh that intersects itself on a grid."""
+        """The distance by which the pieces protrude from the box of the mesh [m]: positive if CoACD
+        has put a mesh that intersects itself on a grid."""
         if not self.pieces:
             return 0.0
         points = np.concatenate(self.pieces)
@@ -61,7 +61,8 @@ class Mesh:
 
     @cached_property
     def share(self) -> float:
-        """The volume of a closed mesh in that of its hull; not above 0 where it bounds none."""
+        """The volume of a closed mesh as a share of that of its hull; not positive if it bounds
+        none."""
         return volume_of(self.vertices, self.faces) / self.hull.volume
 
 
@@ -74,12 +75,12 @@ class Hull:
 
 
 def hull_of(points: Array) -> Hull:
-    """The convex hull of points (n, 3). Raises QhullError where they lie in a plane."""
+    """The convex hull of points (n, 3). Raises QhullError if they are coplanar."""
     from scipy.spatial import ConvexHull
 
-    found, box = ConvexHull(points, qhull_options="QbB Pp Qt"), np.ptp(points, axis=0)
-    volume = float(found.volume * box.prod())  # Qhull has scaled the points to a unit cube
-    return Hull(points[np.sort(found.vertices)], volume)
+    hull, box = ConvexHull(points, qhull_options="QbB Pp Qt"), np.ptp(points, axis=0)
+    volume = float(hull.volume * box.prod())  # Qhull has scaled the points to a unit cube
+    return Hull(points[np.sort(hull.vertices)], volume)
 
 
 def normals_of(vertices: Array, faces: Indices) -> Array:
@@ -89,15 +90,15 @@ def normals_of(vertices: Array, faces: Indices) -> Array:
 
 
 def volume_of(vertices: Array, faces: Indices) -> float:
-    """The volume inside a closed mesh, negative where it is inside out."""
+    """The volume of a closed mesh; negative if it is inside out."""
     a, b, c = (vertices[faces[:, corner]] - vertices.mean(axis=0) for corner in range(3))
     return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
 
 
 @dataclass(frozen=True, slots=True)
 class Remark:
-    """What is to be said of a mesh: "is flat; its box is used instead"; `many`: how several are
-    counted, "meshes are flat: ..."; a `hint` what would change it, "" for none."""
+    """A remark on a mesh: "is flat; its box is used instead"; `many`: the text for several meshes,
+    "meshes are flat: ..."; `hint`: how to avoid it, "" for none."""
 
     text: str
     many: str
@@ -106,7 +107,7 @@ class Remark:
 
 @dataclass(frozen=True, slots=True)
 class MassProperties:
-    """A mesh, what there is to say of it, and its mass properties for unit density."""
+    """A mesh, a remark on it, and its mass properties for unit density."""
 
     mesh: Mesh
     remark: Remark | None
@@ -139,12 +140,12 @@ HOLLOW = Remark(
 
 
 def mend_remark(was: str) -> Remark:
-    """That a mesh was mended."""
-    return Remark(f"{was}; it is mended", "meshes were mended: closed, or turned outwards")
+    """The remark on a mesh that was repaired."""
+    return Remark(f"{was}; it was repaired", "meshes were repaired: closed, or turned outwards")
 
 
 def too_far_remark(reach: float) -> Remark:
-    """That the bodies which collide for a mesh are larger than it."""
+    """The remark on a mesh whose colliding bodies are larger than it."""
     return Remark(
         f"intersects itself: the bodies that collide for it reach {1000 * reach:.2g} mm too far",
         "meshes intersect themselves: the bodies that collide for them reach too far",
@@ -153,7 +154,7 @@ def too_far_remark(reach: float) -> Remark:
 
 
 def usable(name: str, vertices: Array, faces: Indices) -> tuple[Mesh, Remark | None]:
-    """A mesh that the engine accepts, and why it is not the one given (None if it is)."""
+    """A mesh that the engine accepts, and a remark if it is not the given one."""
     for axes in (np.eye(3), _principal_axes(vertices)):
         low, high = (vertices @ axes.T).min(axis=0), (vertices @ axes.T).max(axis=0)
         if _is_flat(high - low):
@@ -171,7 +172,7 @@ def usable(name: str, vertices: Array, faces: Indices) -> tuple[Mesh, Remark | N
 
 
 def _principal_axes(vertices: Array) -> Array:
-    """The axes (3, 3) of a mesh's own frame, as rows: a flat one has no extent along the first."""
+    """The axes (3, 3) of a mesh's own frame, as rows; a flat mesh has no extent along the first."""
     spread = vertices - vertices.mean(axis=0)
     axes = np.linalg.eigh(spread.T @ spread)[1].T
     return np.asarray(axes if np.linalg.det(axes) > 0 else -axes)
@@ -182,7 +183,7 @@ def _is_flat(extent: Array) -> bool:
 
 
 def _box_mesh(name: str, low: Array, high: Array, axes: Array) -> Mesh:
-    """The box low, high (3,) along `axes` as a mesh, thick enough for the engine."""
+    """The box from low to high (3,) along `axes` as a mesh, thick enough for the engine."""
     import trimesh
 
     extent = high - low
@@ -199,7 +200,7 @@ def hull_mesh(name: str, points: Array) -> Mesh:
 
 
 def _coarse_hull(name: str, vertices: Array) -> Mesh:
-    """The convex hull, of the vertices moved to a grid if it has too many faces itself."""
+    """The convex hull; if it has too many faces, that of the vertices rounded to a grid."""
     hull = hull_mesh(name, vertices)
     if len(hull.faces) <= MOST_FACES:
         return hull
@@ -208,8 +209,8 @@ def _coarse_hull(name: str, vertices: Array) -> Mesh:
 
 
 def is_closed(faces: Indices) -> bool:
-    """Whether triangles (m, 3) close what they bound: every edge is passed as often to as fro. So
-    do bodies that share faces, edges or corners."""
+    """Whether triangles (m, 3) form a closed surface: every edge occurs equally often in both
+    directions. This also holds for bodies that share faces, edges or corners."""
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     edge = np.minimum(start, end) * (faces.max(initial=0) + 1) + np.maximum(start, end)
     _, inverse = np.unique(edge, return_inverse=True)
@@ -217,9 +218,9 @@ def is_closed(faces: Indices) -> bool:
 
 
 def measured(mesh: Mesh, remark: Remark | None = None) -> MassProperties:
-    """Volume, centre of mass, inertia for unit density, vertices of the hull. A mesh that is open,
-    or bounds no volume, has those of its convex hull. Where its pieces reach too far out of it, the
-    hull is theirs, as they collide."""
+    """The volume, centre of mass, inertia for unit density, and hull vertices. A mesh that is open,
+    or bounds no volume, has those of its convex hull. If its pieces protrude too far, the hull is
+    that of the pieces, which collide."""
     import trimesh
 
     body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
@@ -242,7 +243,7 @@ def measured(mesh: Mesh, remark: Remark | None = None) -> MassProperties:
 
 
 def _body_or_hull(body: trimesh.Trimesh) -> Iterator[trimesh.Trimesh]:
-    """A body, its hull and the box of that, each computed when it is asked for."""
+    """A body, its hull and the box of that, each computed on demand."""
     yield body
     yield body.convex_hull
     yield body.convex_hull.bounding_box
@@ -256,9 +257,9 @@ def is_inertia(matrix: Array) -> bool:
 
 
 def sound(inertia: Array) -> Array:
-    """An inertia (3, 3) with moments that the engine accepts. Where one is too small, or as large
-    as the others together, all are made larger by the same, so that it remains one of a body. What
-    is not finite stays as it is."""
+    """An inertia (3, 3) with moments that the engine accepts. If one is too small, or as large as
+    the other two together, the same amount is added to all, so that a body can have it. Infinite
+    values are unchanged."""
     if not np.isfinite(inertia).all():
         return inertia
     low, middle, high = np.linalg.eigvalsh(inertia)

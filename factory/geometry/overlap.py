@@ -1,17 +1,17 @@
-"""Solids as drawn, and how two of them overlap: exact, by booleans of their surfaces.
+"""The overlap of two solids as drawn: exact, by boolean operations on their surfaces.
 
-The convex bodies that collide for a part (`pieces`) may be larger than it is drawn: the hull of a
-plate closes its holes. Here a part is the volume that its own surface bounds. The *depth* of an
-overlap of A and B is the least distance by which one of the two must be eroded, all of its surface
-receding by it, so that they are apart: 0.4 mm for a peg of 40.8 mm in a hole of 40 mm, the radius
-of a pin in a plate that has no hole for it. It is attained in the common volume,
+The convex bodies that collide for a part (`pieces`) may be larger than the part as drawn: the hull
+of a plate closes its holes. Here a part is the volume that its own surface bounds. The *depth* of
+an overlap of A and B is the least distance by which one of the two must be eroded so that they are
+disjoint: 0.4 mm for a peg of 40.8 mm in a hole of 40 mm, the radius of a pin in a plate that has no
+hole for it. It is attained in the common volume,
 
     depth = min over S in {A, B} of max over p in A ∩ B of |p, ∂S|,
 
-and is looked for at the corners of the common volume and along chords that are normal to its faces.
+and is sampled at the corners of the common volume and along chords that are normal to its faces.
 
-The volume that A sweeps as it is shifted by v is A and the prisms over its triangles that face v.
-They are taken as one body that may overlap itself: it is solid wherever A comes, on the whole way.
+The volume that A sweeps when it is shifted by v is the union of A and the prisms over its triangles
+that face v. They form one body that may overlap itself: it is solid wherever A passes.
 """
 
 from __future__ import annotations
@@ -27,31 +27,31 @@ from factory.geometry.pieces import closed_bodies
 from factory.geometry.solids import Solid, rotation
 
 ROUND = 5e-6
-"""A round body is drawn as a polytope that differs from it by no more than this [m]."""
+"""The largest deviation of the polytope that represents a round body [m]."""
 
 SIDES = (24, 1024)
-"""The fewest and the most sides of the polygon that stands for a circle."""
+"""The fewest and the most sides of the polygon that represents a circle."""
 
 FACING = 1e-9
-"""A triangle whose normal has this cosine or less with a shift slides along itself."""
+"""Triangles with a cosine of at most this between normal and shift slide along themselves."""
 
 SAMPLES = 128
-"""The most corners, and the most chords, of a common volume at which its depth is looked for."""
+"""The most corners, and the most chords, of a common volume at which its depth is sampled."""
 
 LEAST = 1e-15
-"""Less in common than this [m³] is rounding: a millionth of a cubic millimetre."""
+"""Smaller common volumes are rounding errors [m³]: a millionth of a cubic millimetre."""
 
 BEYOND = 1e-9
-"""A chord is followed from this far behind the face that it begins at [m]."""
+"""The distance behind its face at which a chord begins [m]."""
 
 CHUNK = 400_000
-"""The most distances of a point from a triangle that are computed at a time."""
+"""The most distances between points and triangles that are computed at a time."""
 
 
 @dataclass(frozen=True, slots=True)
 class Common:
-    """The volume [m³] that two solids have in common, and its depth [m]; both 0 where they are
-    apart. `deepest` (3,): a point of it at that depth."""
+    """The common volume [m³] of two solids, and its depth [m]; both 0 if they are disjoint.
+    `deepest` (3,): a point at that depth."""
 
     volume: float
     depth: float
@@ -59,16 +59,16 @@ class Common:
 
 
 APART = Common(0.0, 0.0)
-"""Of two solids that have nothing in common."""
+"""The result for disjoint solids."""
 
 
 _DRAWN: dict[int, Any] = {}
-"""The volumes of the solids that there are, by identity."""
+"""The volumes of existing solids, by identity."""
 
 
 def drawn(solid: Solid) -> Any:
     """The volume that a part's surface bounds, as a `manifold3d.Manifold` in the frame of the
-    finished product, made once; None for a mesh that bounds none."""
+    finished product, computed once; None for a mesh that bounds none."""
     key = id(solid)
     if key not in _DRAWN:
         _DRAWN[key] = _made(solid)
@@ -104,8 +104,8 @@ def _sides(radius: float) -> int:
 
 
 def _bounded(vertices: Array, faces: Indices) -> Any:
-    """What a closed mesh bounds; None where its triangles bound no volume. Bodies of it that share
-    an edge are told apart, and joined."""
+    """The volume that a closed mesh bounds; None if it bounds none. Its bodies that share an edge
+    are separated, then united."""
     from manifold3d import Error, Manifold, OpType
 
     whole = _surface(vertices, faces)
@@ -126,7 +126,7 @@ def _surface(vertices: Array, faces: Indices) -> Any:
 
 
 def swept(body: Any, shift: Array) -> Any:
-    """The volume that a body sweeps as it is shifted by `shift` (3,) [m]."""
+    """The volume that a body sweeps when it is shifted by `shift` (3,) [m]."""
     from manifold3d import Error, Manifold
 
     mesh = body.to_mesh64()
@@ -157,7 +157,7 @@ def swept(body: Any, shift: Array) -> Any:
 
 
 def _merged(mesh: Any) -> tuple[Array, Indices]:
-    """The vertices (n, 3) and faces (m, 3) of the engine's mesh, its vertices merged."""
+    """The vertices (n, 3) and faces (m, 3) of a manifold mesh, with vertices merged."""
     vertices = np.asarray(mesh.vert_properties)[:, :3]
     target = np.arange(len(vertices))
     target[np.asarray(mesh.merge_from_vert, np.int64)] = np.asarray(mesh.merge_to_vert, np.int64)
@@ -165,21 +165,21 @@ def _merged(mesh: Any) -> tuple[Array, Indices]:
 
 
 def common(one: Any, other: Any, both: bool = True, samples: int = SAMPLES) -> Common:
-    """What two bodies have in common. `both`: the depth is the lesser of the two erosions; else it
-    is that of the `other`. With few `samples` the depth is a lower bound, found sooner."""
+    """The overlap of two bodies. `both`: the depth is the lesser of the two erosions; otherwise
+    that of the `other`. With few `samples` the depth is a lower bound, computed faster."""
     shared = one ^ other
     volume = float(shared.volume())
     if shared.is_empty() or volume <= LEAST:
         return APART
     points = _within(shared, samples)
     bodies = (one, other) if both else (other,)
-    found = min((_distances(points, body, shared) for body in bodies), key=np.max)
-    return Common(volume, float(found.max()), points[found.argmax()])
+    depths = min((_distances(points, body, shared) for body in bodies), key=np.max)
+    return Common(volume, float(depths.max()), points[depths.argmax()])
 
 
 def _within(shared: Any, samples: int) -> Array:
-    """Points (n, 3) of a volume: corners, and both ends and the middle of chords that begin in the
-    middle of a triangle, the larger triangles first. Few triangles are divided."""
+    """Sample points (n, 3) of a volume: corners, and the ends and middles of chords from the
+    centres of triangles, the larger triangles first. A volume with few triangles is subdivided."""
     fine = max(1, int(np.sqrt(samples / shared.num_tri())))
     vertices, faces = _merged(shared.refine(fine).to_mesh64())
     a, b, c = (vertices[faces[:, corner]] for corner in range(3))
@@ -198,8 +198,8 @@ def _within(shared: Any, samples: int) -> Array:
 
 
 def _distances(points: Array, body: Any, shared: Any) -> Array:
-    """The distances (n,) [m] of points from the surface of a body, no more than the longest edge
-    of the box round the common volume."""
+    """The distances (n,) [m] of points from the surface of a body, at most the longest edge of the
+    box of the common volume."""
     vertices, faces = _merged(body.to_mesh64())
     box = np.array(shared.bounding_box()).reshape(2, 3)
     most = float((box[1] - box[0]).max())
@@ -207,29 +207,29 @@ def _distances(points: Array, body: Any, shared: Any) -> Array:
     near = (corners.max(axis=1) >= box[0] - most).all(axis=1)
     near &= (corners.min(axis=1) <= box[1] + most).all(axis=1)
     triangles = corners[near]
-    found = np.full(len(points), most)
+    distances = np.full(len(points), most)
     step = max(1, CHUNK // max(1, len(triangles)))
     for first in range(0, len(points) if len(triangles) else 0, step):
         rows = slice(first, first + step)
-        found[rows] = np.minimum(most, _to_triangles(points[rows], triangles))
-    return found
+        distances[rows] = np.minimum(most, _to_triangles(points[rows], triangles))
+    return distances
 
 
 def _to_triangles(points: Array, triangles: Array) -> Array:
-    """The distance (n,) of each point from the nearest of triangles (m, 3, 3), sought among those
-    whose balls come as near as the nearest middle of one."""
+    """The distance (n,) of each point from the nearest of triangles (m, 3, 3). Candidates are the
+    triangles whose bounding balls are as near as the nearest centre."""
     middles = triangles.mean(axis=1)
     balls = np.linalg.norm(triangles - middles[:, None], axis=2).max(axis=1)
     squared = (points**2).sum(axis=1)[:, None] + (middles**2).sum(axis=1)
     apart = np.sqrt(np.maximum(squared - 2 * points @ middles.T, 0.0))
     row, column = np.nonzero(apart - balls <= apart.min(axis=1)[:, None] + BEYOND)
-    found = np.full(len(points), np.inf)
-    np.minimum.at(found, row, _to_each(points[row], triangles[column]))
-    return found
+    distances = np.full(len(points), np.inf)
+    np.minimum.at(distances, row, _to_each(points[row], triangles[column]))
+    return distances
 
 
 def _to_each(points: Array, triangles: Array) -> Array:
-    """The distance (n,) of each point from the triangle (n, 3, 3) beside it."""
+    """The distance (n,) of each point from its own triangle (n, 3, 3)."""
     edges = np.roll(triangles, -1, axis=1) - triangles
     normals = np.cross(edges[:, 0], -edges[:, 2])
     area = np.einsum("ij,ij->i", normals, normals)

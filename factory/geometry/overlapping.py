@@ -1,5 +1,4 @@
-"""Which parts of a finished product overlap, by how much, as they are drawn, and whether that is
-allowed."""
+"""Overlaps of the parts of a finished product as drawn, and whether they are allowed."""
 
 from __future__ import annotations
 
@@ -16,13 +15,13 @@ from factory.problem.pag import ROUNDING, AllowedOverlap, most_allowed
 from factory.support.errors import Diagnostic
 
 SILENT = 2e-5
-"""What overlaps by no more than this is rounding, or how precisely a drawing was made [m]."""
+"""Smaller overlaps are rounding, or the accuracy of a drawing [m]."""
 
 EVERYWHERE = 5e-4
-"""So deep do parts of a drawing without fits overlap [m]."""
+"""The depth of overlaps in a drawing without fits [m]."""
 
 NAMED = 6
-"""So many pairs are named that are allowed."""
+"""The most allowed pairs that are named."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,58 +36,59 @@ class Overlapping:
         return f"{self.one} and {self.other} overlap by {1e3 * self.depth:.2f} mm when finished"
 
     def fault(self, allowed: Sequence[AllowedOverlap]) -> Diagnostic | None:
-        """What is said of them unless it is allowed (Overlap)."""
+        """The fault (Overlap), unless the overlap is allowed."""
         most = most_allowed(allowed, self.one, self.other)
         if self.depth <= most + ROUNDING:
             return None
         words = f"{self}, and {1e3 * most:.2f} mm is allowed" if most else str(self)
-        hint = f"mend the drawing or, if it is meant, allow it: --allow {self.one}:{self.other}"
+        option = f"--allow {self.one}:{self.other}"
+        hint = f"correct the drawing or, if the overlap is intended, allow it: {option}"
         return Diagnostic("Overlap", words, None, hint)
 
 
 @dataclass(frozen=True, slots=True)
 class DrawnOverlaps:
     """The `pairs` of parts that overlap, the deepest first, and the parts that are `open`: their
-    meshes bound no volume, so that what they overlap is not known."""
+    meshes bound no volume, so their overlaps are unknown."""
 
     pairs: tuple[Overlapping, ...] = ()
     open: tuple[str, ...] = ()
 
     def faults(self, allowed: Sequence[AllowedOverlap]) -> tuple[Diagnostic, ...]:
-        """What is said of the pairs that are not allowed."""
-        found = (pair.fault(allowed) for pair in self.pairs)
-        return tuple(fault for fault in found if fault is not None)
+        """The faults of the pairs that are not allowed."""
+        faults = (pair.fault(allowed) for pair in self.pairs)
+        return tuple(fault for fault in faults if fault is not None)
 
     def notes(self, allowed: Sequence[AllowedOverlap]) -> list[str]:
-        """What is used of what is allowed, in words: pairs that are named one by one, all others
+        """Notes on allowed overlaps: pairs that are allowed by name one by one, all others
         together."""
-        said, every = list[Overlapping](), list[Overlapping]()
+        named_pairs, other_pairs = list[Overlapping](), list[Overlapping]()
         for pair in self.pairs:
             if pair.fault(allowed) is None:
                 named = any(a.parts and a.covers(pair.one, pair.other) for a in allowed)
-                (said if named else every).append(pair)
-        words = [f"{pair}, which is allowed" for pair in said[:NAMED]]
-        if more := len(said[NAMED:]):
+                (named_pairs if named else other_pairs).append(pair)
+        words = [f"{pair}, which is allowed" for pair in named_pairs[:NAMED]]
+        if more := len(named_pairs[NAMED:]):
             words.append(f"{more} more pairs of parts overlap, which is allowed")
-        if every:
+        if other_pairs:
             most = max(a.depth for a in allowed if not a.parts)
             count = "a pair of parts overlaps"
-            if len(every) > 1:
-                count = f"{len(every)} pairs of parts overlap"
-            deepest = f"{1e3 * every[0].depth:.2f} mm when finished"
+            if len(other_pairs) > 1:
+                count = f"{len(other_pairs)} pairs of parts overlap"
+            deepest = f"{1e3 * other_pairs[0].depth:.2f} mm when finished"
             words.append(f"{count} by up to {deepest}; {1e3 * most:g} mm is allowed everywhere")
         if self.open:
             parts = "a part has" if len(self.open) == 1 else f"{len(self.open)} parts have"
-            words.append(f"{parts} an open mesh: what these overlap is not judged")
+            words.append(f"{parts} an open mesh: overlaps with it are not checked")
         return words
 
 
 _KNOWN: dict[int, DrawnOverlaps] = {}
-"""The overlaps of products that there are, by identity."""
+"""The overlaps of existing products, by identity."""
 
 
 def overlaps_of(product: Product) -> DrawnOverlaps:
-    """The overlaps of all parts of a product, found once."""
+    """The overlaps of all parts of a product, computed once."""
     key = id(product)
     if key not in _KNOWN:
         _KNOWN[key] = _found(product)
@@ -97,17 +97,17 @@ def overlaps_of(product: Product) -> DrawnOverlaps:
 
 
 def everywhere(product: Product) -> tuple[AllowedOverlap, ...]:
-    """What a drawing without fits needs, such as one of LDraw: that any two of its parts overlap by
-    up to 0.5 mm. Nothing where none do."""
+    """The allowance for a drawing without fits, such as an LDraw model: any two parts may overlap
+    by up to 0.5 mm. Empty if no overlap needs it."""
     needed = any(pair.depth <= EVERYWHERE for pair in overlaps_of(product).pairs)
     return (AllowedOverlap(EVERYWHERE),) if needed else ()
 
 
-def within(found: DrawnOverlaps, parts: Collection[str]) -> DrawnOverlaps:
-    """The overlaps of some parts."""
+def within(overlaps: DrawnOverlaps, parts: Collection[str]) -> DrawnOverlaps:
+    """The overlaps between some parts."""
     return DrawnOverlaps(
-        tuple(pair for pair in found.pairs if pair.one in parts and pair.other in parts),
-        tuple(part for part in found.open if part in parts),
+        tuple(pair for pair in overlaps.pairs if pair.one in parts and pair.other in parts),
+        tuple(part for part in overlaps.open if part in parts),
     )
 
 

@@ -1,10 +1,10 @@
-"""The convex bodies that a part is made of, as the engine collides them.
+"""The convex bodies that represent a part in collisions.
 
-A box has its eight corners. A cylinder and a sphere have a polytope *around* them, so that what is
-clear of the polytope is clear of the body; it reaches at most ROUND [m] too far, or, where that
-would take too many corners, 0.0075 % of the radius of a cylinder and 0.46 % of that of a sphere. A
-mesh has its convex hull, unless it is found to be made of several bodies: see `closed_bodies` here
-and `factory.geometry.decomposition`.
+A box has its eight corners. A cylinder and a sphere have a *circumscribed* polytope: what is clear
+of the polytope is clear of the body. It protrudes by at most ROUND [m] or, if that would take too
+many corners, by 0.0075 % of the radius of a cylinder and 0.46 % of that of a sphere. A mesh has its
+convex hull, unless it consists of several bodies: see `closed_bodies` here and
+`factory.geometry.decomposition`.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from factory.geometry.meshes import Array, Indices, hull_of
 from factory.geometry.touching import as_they_come, bodies, connected
 
 ROUND = 5e-6
-"""How far the polytope round a round body may reach outside it [m]."""
+"""The tolerated protrusion of the polytope round a round body [m]."""
 
 SIDES = (16, 256)
 """Fewest and most sides of the prism round a cylinder."""
 
 FREQUENCIES = (4, 6, 8)
-"""Into how many parts the edges of an icosahedron are divided for a sphere."""
+"""The number of parts into which the edges of an icosahedron are divided for a sphere."""
 
 MOST_PIECES = 512
-"""A mesh of more bodies has its hull."""
+"""A mesh of more bodies is represented by its hull."""
 
 FLATNESS = 1e-4
-"""A body whose volume is less than that of its hull by no more than this share of it is convex."""
+"""A body is convex if its volume is less than that of its hull by no more than this share."""
 
 
 def box_piece(half: Array) -> Array:
@@ -41,8 +41,7 @@ def box_piece(half: Array) -> Array:
 
 
 def cylinder_piece(radius: float, half: float) -> Array:
-    """The corners (2 n, 3) of a prism round an upright cylinder about the origin; the middles of
-    its sides touch it."""
+    """The corners (2 n, 3) of a prism circumscribed about an upright cylinder at the origin."""
     least, most = SIDES
     needed = np.pi / np.arccos(radius / (radius + ROUND))
     sides = int(np.clip(8 * np.ceil(needed / 8), least, most))
@@ -53,7 +52,7 @@ def cylinder_piece(radius: float, half: float) -> Array:
 
 
 def sphere_piece(radius: float) -> Array:
-    """The corners (n, 3) of a polytope round a sphere about the origin; its faces do not cut it."""
+    """The corners (n, 3) of a polytope circumscribed about a sphere at the origin."""
     for frequency in FREQUENCIES:
         corners, error = _ball(frequency)
         if error * radius <= ROUND:
@@ -63,8 +62,8 @@ def sphere_piece(radius: float) -> Array:
 
 @lru_cache
 def _ball(frequency: int) -> tuple[Array, float]:
-    """A polytope round the unit sphere, and how far it reaches outside: an icosahedron whose faces
-    are divided and blown up."""
+    """A polytope circumscribed about the unit sphere, and its protrusion: an icosahedron with
+    divided faces, projected onto the sphere and scaled."""
     golden = (1 + 5**0.5) / 2
     corners = np.array(
         [np.roll((0.0, a, b * golden), k) for k in range(3) for a in (-1, 1) for b in (-1, 1)]
@@ -97,39 +96,39 @@ def _unit(vector: Array) -> Array:
 
 
 def components(count: int, faces: Indices) -> Indices:
-    """The number of the connected part that each face (m, 3) of `count` vertices is of, in the
-    order of their first triangle: triangles that use a vertex in common are connected."""
+    """The number of the connected component of each face (m, 3) of `count` vertices, in the order
+    of their first triangles. Triangles that share a vertex are connected."""
     pairs = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
     return as_they_come(connected(pairs, count)[faces[:, 0]])
 
 
-def _split(vertices: Array, faces: Indices, number: Indices) -> list[tuple[Array, Indices]]:
-    """The parts that the faces of a mesh are numbered by, as vertices (n, 3) and faces (m, 3)
+def submeshes(vertices: Array, faces: Indices, number: Indices) -> list[tuple[Array, Indices]]:
+    """The submeshes by which the faces of a mesh are numbered, as vertices (n, 3) and faces (m, 3)
     each."""
     order, ends = np.argsort(number, kind="stable"), np.cumsum(np.bincount(number))
-    found = []
+    meshes = []
     for mine in np.split(faces[order], ends[:-1]):
         used, inverse = np.unique(mine, return_inverse=True)
-        found.append((vertices[used], inverse.reshape(-1, 3)))
-    return found
+        meshes.append((vertices[used], inverse.reshape(-1, 3)))
+    return meshes
 
 
 def joined(bodies: Sequence[tuple[Array, Indices]]) -> tuple[Array, Indices]:
-    """Bodies as one mesh, that share no vertex."""
+    """Bodies as one mesh, without common vertices."""
     starts = np.cumsum([0, *(len(vertices) for vertices, _ in bodies)])
     faces = [faces + start for (_, faces), start in zip(bodies, starts, strict=False)]
     return np.concatenate([vertices for vertices, _ in bodies]), np.concatenate(faces)
 
 
 def closed_bodies(vertices: Array, faces: Indices) -> list[tuple[Array, Indices]]:
-    """The bodies of a closed mesh, told apart where they touch; none where they are more than
+    """The bodies of a closed mesh, separated where they touch; empty if there are more than
     MOST_PIECES."""
     number = bodies(vertices, faces)
-    return _split(vertices, faces, number) if number.max(initial=0) < MOST_PIECES else []
+    return submeshes(vertices, faces, number) if number.max(initial=0) < MOST_PIECES else []
 
 
 def is_convex(vertices: Array, faces: Indices) -> bool:
-    """Whether a mesh bounds a convex body, its triangles turned outwards."""
+    """Whether a mesh bounds a convex body, with its triangles oriented outwards."""
     import trimesh
 
     body = trimesh.Trimesh(vertices, faces, process=False)

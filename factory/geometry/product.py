@@ -1,9 +1,9 @@
 """The geometry of a product: a solid for each part, in the frame of the finished product.
 
-Shapes written in the PAG are taken as they are; meshes are read from their files, and mended where
-they bound no volume but nearly do; parts with no geometry get a box in a cubic lattice of at most
-0.2 m. A mesh that the engine cannot use, or that stays open, falls back to its convex hull or its
-box, with a warning that names it.
+Shapes written in the PAG are taken as they are; meshes are read from their files, and repaired if
+they nearly bound a volume; parts without geometry get a box in a cubic lattice of at most 0.2 m. A
+mesh that the engine cannot use, or that remains open, is replaced by its convex hull or its box,
+with a warning that names it.
 """
 
 from __future__ import annotations
@@ -50,18 +50,18 @@ from factory.support.interruption import side_by_side
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """What is left `to_do` for a mesh whose file is read; `sizes` that are the same wherever it is
-    (how many vertices and faces, and the logarithm of its area), None where it is known."""
+    """The work `to_do` for a mesh whose file is read. `sizes`: invariants of its shape (numbers of
+    vertices and faces, logarithm of its area); None if the result is known."""
 
     to_do: Callable[[], MassProperties | Diagnostic]
     sizes: tuple[float, ...] | None = None
 
 
 FOLDER = "meshes"
-"""Where measured meshes are kept, in the user's cache."""
+"""The folder of measured meshes in the user's cache."""
 
 PACKAGES = ("trimesh", "numpy", "scipy", "coacd")
-"""What reads, measures and decomposes meshes."""
+"""Packages that read, measure and decompose meshes."""
 
 LATTICE = 0.2
 """Longest edge of the lattice of parts with no geometry [m]."""
@@ -72,15 +72,15 @@ CELL = 0.06
 
 @np.errstate(all="ignore")
 def product_geometry(pag: PAG, files: Mapping[str, bytes] = MappingProxyType({})) -> Product:
-    """The solids of all parts. Meshes are looked for in `files`, contents by path, before the
-    folder of the PAG. Raises InputError where a mesh cannot be read (BadMesh), or a part is too
-    large, too far away or too heavy for any engine (BadValue)."""
+    """The solids of all parts. Meshes are looked up in `files`, contents by path, before the folder
+    of the PAG. Raises InputError if a mesh cannot be read (BadMesh), or a part is too large, too
+    far away or too heavy for the engine (BadValue)."""
     reader = _Reader(Path(pag.folder), files)
     leaves = [node for node in pag.postorder() if not node.inputs]
     plain = [node for node in leaves if not _has_shape(node)]
     reader.read([node for node in leaves if node.parameter("mesh") is not None])
-    found = {n.label: reader.solid(n, i) for i, n in enumerate(leaves) if _has_shape(n)}
-    solids = {label: solid for label, solid in found.items() if solid is not None}
+    shaped = {n.label: reader.solid(n, i) for i, n in enumerate(leaves) if _has_shape(n)}
+    solids = {label: solid for label, solid in shaped.items() if solid is not None}
     lift = max((float(solid.high[2]) for solid in solids.values()), default=0.0)
     cells = _lattice(len(plain))
     for number, node in enumerate(plain):
@@ -107,7 +107,8 @@ def _lattice(count: int) -> tuple[int, float]:
 
 
 def _box_in_lattice(node: Assembly, number: int, cells: tuple[int, float], lift: float) -> Solid:
-    """A box in the cell `number` of a path that goes to and fro, so neighbours stay neighbours."""
+    """A box in the cell `number` of a path that winds through the lattice, so that neighbours in
+    number are neighbours in space."""
     edge, cell = cells
     layer, rest = divmod(number, edge * edge)
     row, column = divmod(rest, edge)
@@ -122,7 +123,7 @@ def _box_in_lattice(node: Assembly, number: int, cells: tuple[int, float], lift:
 
 
 class _Reader:
-    """Reads shapes, collecting errors, and warnings by file; a mesh file is read once."""
+    """Reads shapes, and collects errors, and warnings by file. A mesh file is read once."""
 
     def __init__(self, folder: Path, files: Mapping[str, bytes]) -> None:
         self.folder, self.files = folder, files
@@ -131,28 +132,32 @@ class _Reader:
         self._meshes: dict[tuple[str, float], MassProperties | Diagnostic] = {}
 
     def read(self, nodes: list[Assembly]) -> None:
-        """Read the meshes of these parts, and mend, decompose and measure them side by side."""
+        """Read the meshes of these parts; repair, decompose and measure them in parallel."""
         first: dict[tuple[str, float], Assembly] = {}
         for node in nodes:
             first.setdefault(_file(node), node)
         opened = {file: self._opened(node) for file, node in first.items()}
         works = dict(opened.values())
-        found: dict[str, MassProperties | Diagnostic] = {}
+        prepared: dict[str, MassProperties | Diagnostic] = {}
         for keys in _rounds(works):
-            found.update(zip(keys, side_by_side([works[key].to_do for key in keys]), strict=True))
+            prepared.update(
+                zip(keys, side_by_side([works[key].to_do for key in keys]), strict=True)
+            )
         for number, (file, (key, _)) in enumerate(opened.items()):
-            self._meshes[file] = _named(found[key], f"m{number}")
+            self._meshes[file] = _named(prepared[key], f"m{number}")
 
     def solid(self, node: Assembly, number: int) -> Solid | None:
-        """The solid of a part, None where there is an error."""
+        """The solid of a part; None after an error."""
         place = np.array(node.parameter("pos", (0.0, 0.0, 0.0)), float)
         quaternion = np.array(node.parameter("quat", (1.0, 0.0, 0.0, 0.0)), float)
         quaternion /= np.abs(quaternion).max()
         quaternion /= np.linalg.norm(quaternion)
         kind = next(name for name in SHAPES if node.parameter(name) is not None)
         if kind == "mesh":
-            found = self._mesh(node)
-            return None if found is None else from_mesh(node, found, place, quaternion, number)
+            prepared = self._mesh(node)
+            return (
+                None if prepared is None else from_mesh(node, prepared, place, quaternion, number)
+            )
         size = _half(kind, np.atleast_1d(np.array(node.parameter(kind), float)))
         if SMALLEST <= size.min() <= size.max() <= FURTHEST:
             return primitive(node, kind, size, place, quaternion, number)
@@ -162,25 +167,27 @@ class _Reader:
         return None
 
     def _mesh(self, node: Assembly) -> MassProperties | None:
-        """The mesh of a part as it can be used, None where there is an error."""
-        found, position = self._meshes[_file(node)], value_position(node, "mesh")
-        if isinstance(found, Diagnostic):
-            if found not in self.errors:
-                self.errors.append(found)
+        """The usable mesh of a part; None after an error."""
+        prepared, position = self._meshes[_file(node)], value_position(node, "mesh")
+        if isinstance(prepared, Diagnostic):
+            if prepared not in self.errors:
+                self.errors.append(prepared)
             return None
-        if found.remark:
-            path, said = _file(node)[0], found.remark
-            warning = Diagnostic("BadMesh", f"{path} {said.text}", position, said.hint, said.many)
-            self.warnings.setdefault((path, said.text), warning)
-        return found
+        if prepared.remark:
+            path, remark = _file(node)[0], prepared.remark
+            warning = Diagnostic(
+                "BadMesh", f"{path} {remark.text}", position, remark.hint, remark.many
+            )
+            self.warnings.setdefault((path, remark.text), warning)
+        return prepared
 
     def _content(self, path: str) -> bytes:
-        given = self.files.get(path)
-        return read_bytes(self.folder / path, MESH) if given is None else given
+        content = self.files.get(path)
+        return read_bytes(self.folder / path, MESH) if content is None else content
 
     def _opened(self, node: Assembly) -> tuple[str, Work]:
-        """What is left to do for a part's mesh once its file is read, and what that depends on:
-        files with one content are measured once."""
+        """The cache key of a part's mesh, and the work that is left after its file is read: files
+        with equal content are measured once."""
         path, scale = _file(node)
         try:
             content, suffix = self._content(path), Path(path).suffix.lower()
@@ -203,8 +210,8 @@ class _Reader:
 
 
 def _rounds(works: Mapping[str, Work]) -> Iterator[list[str]]:
-    """The keys of works, those first that are the first of their shape, as far as sizes tell: what
-    is found of them serves for others, whichever thread is faster."""
+    """The keys of works in rounds, the first of each shape (as far as sizes tell) before the
+    others, so that its result is reused for them, whichever thread is faster."""
     left = list(works)
     while left:
         shapes = {works[key].sizes or key: key for key in reversed(left)}
@@ -213,10 +220,10 @@ def _rounds(works: Mapping[str, Work]) -> Iterator[list[str]]:
         left = [key for key in left if key not in first]
 
 
-def _named(found: MassProperties | Diagnostic, name: str) -> MassProperties | Diagnostic:
-    if isinstance(found, Diagnostic):
-        return found
-    return replace(found, mesh=replace(found.mesh, name=name))
+def _named(prepared: MassProperties | Diagnostic, name: str) -> MassProperties | Diagnostic:
+    if isinstance(prepared, Diagnostic):
+        return prepared
+    return replace(prepared, mesh=replace(prepared.mesh, name=name))
 
 
 def _file(node: Assembly) -> tuple[str, float]:
@@ -226,35 +233,35 @@ def _file(node: Assembly) -> tuple[str, float]:
 
 @np.errstate(all="ignore")
 def _finished(key: str, vertices: Array, faces: Indices) -> MassProperties:
-    """The mesh of a file, its vertices in one place made one, as the engine can use it; it is kept
-    under a key. Its name is "" here: a product names its meshes itself."""
+    """The mesh of a file, with vertices merged, as the engine can use it; it is cached under a key.
+    Its name is "" here: a product names its meshes itself."""
     mesh, remark = usable("", vertices, faces)
     if remark is None:
         vertices, faces, was = mended(mesh.vertices, mesh.faces)
         remark = mend_remark(was) if was else None
         mesh = in_pieces(Mesh(mesh.name, vertices, faces))
-    found = measured(mesh, remark)
-    _keep(key, found)
-    return found
+    prepared = measured(mesh, remark)
+    _keep(key, prepared)
+    return prepared
 
 
-def _keep(key: str, found: MassProperties) -> None:
-    remark, mesh = found.remark, found.mesh
+def _keep(key: str, prepared: MassProperties) -> None:
+    remark, mesh = prepared.remark, prepared.mesh
     arrays = {
         "vertices": mesh.vertices,
         "faces": mesh.faces,
         "remark": np.array([remark.text, remark.many, remark.hint] if remark else [], str),
-        "volume": np.array(found.volume),
-        "centre": found.centre,
-        "inertia": found.inertia,
-        "hull": found.hull,
+        "volume": np.array(prepared.volume),
+        "centre": prepared.centre,
+        "inertia": prepared.inertia,
+        "hull": prepared.hull,
         **packed(mesh.pieces),
     }
     store_arrays(FOLDER, key, arrays)
 
 
 def _kept(key: str) -> MassProperties | None:
-    """What `_finished` found before, in this process or another; None where nothing is kept."""
+    """The cached result of `_finished`; None if there is none."""
     kept = load_arrays(FOLDER, key)
     if kept is None:
         return None
@@ -264,8 +271,8 @@ def _kept(key: str) -> MassProperties | None:
     return MassProperties(mesh, remark, volume, centre, inertia, kept["hull"])
 
 
-def _half(kind: str, given: Array) -> Array:
-    """Full lengths as the PAG writes them, to the half lengths of MJCF."""
+def _half(kind: str, lengths: Array) -> Array:
+    """Half lengths, as MJCF has them, of the full lengths in the PAG."""
     if kind == "cylinder":
-        return np.array([given[0], given[1] / 2])
-    return given / 2 if kind == "box" else given
+        return np.array([lengths[0], lengths[1] / 2])
+    return lengths / 2 if kind == "box" else lengths

@@ -1,7 +1,7 @@
-"""The sight of a camera: as near as it can be with a set of points inside the frame.
+"""The position of a camera: as near as possible with a set of points inside the frame.
 
-For a direction of sight and an aspect ratio that position has a closed form, so what is looked at
-fills a picture of any shape."""
+For a direction of sight and an aspect ratio it has a closed form, so the subject fills a picture of
+any shape."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 FIELD = 24.0
-"""Angle of view across the shorter side of a picture [degrees]: narrow, for little perspective."""
+"""The angle of view across the shorter side of a picture [degrees]: narrow, for little
+perspective."""
 
 
 @dataclass(frozen=True, slots=True)
 class Framing:
-    """What of a picture may be used: `aspect` = width / height, and the margins as fractions of
+    """The usable area of a picture: `aspect` = width / height, and the margins as fractions of the
     height; `field`: the angle of view across the shorter side [degrees]."""
 
     aspect: float
@@ -32,8 +33,8 @@ class Framing:
 @dataclass(frozen=True, slots=True)
 class View:
     """A camera: its `position` (3,), its `axes` (3, 3) right, up and ahead, the tangents of half
-    its angles of view, the `distance` to the middle of what it looks at, and half the depth of that
-    [m]."""
+    its angles of view, the `distance` to the middle of the subject, and half the extent of the
+    subject along the line of sight (`depth`) [m]."""
 
     position: Array
     axes: Array
@@ -44,27 +45,28 @@ class View:
 
     @property
     def range(self) -> tuple[float, float]:
-        """From where to where something is drawn [m]: tightly, or shadows get speckles. Twice as
-        far as the floor at the upper edge of the picture, since the sky is drawn nearer than the
-        far end."""
+        """The near and far clipping distances [m]: tight, because otherwise shadows get speckles.
+        The far one is twice the distance of the floor at the upper edge of the picture, because the
+        sky is drawn nearer than the far end."""
         far = float(self.position[2]) / max(self.dip, 0.06)
         near = max(0.1 * self.distance, 0.7 * (self.distance - self.depth))
         return near, 2 * max(far, self.distance + self.depth)
 
     @property
     def dip(self) -> float:
-        """How steeply the upper edge of the picture looks down: its descent on a way of 1 ahead."""
+        """The downward slope of the line of sight at the upper edge of the picture."""
         return float(-self.axes[2][2] - self.tall * self.axes[1][2])
 
     @property
     def has_sky(self) -> bool:
-        """Whether the end of the floor may be seen, which is 20 times as large as the factory."""
+        """Whether the end of the floor, which is 20 times as large as the factory, may be
+        visible."""
         return self.dip < 0.3
 
 
 def towards(azimuth: float, elevation: float) -> Array:
-    """Axes (3, 3), rows right, up and ahead, of a camera that stands at an azimuth and an elevation
-    [degrees] from what it looks at."""
+    """The axes (3, 3), rows right, up and ahead, of a camera at an azimuth and an elevation
+    [degrees] from its subject."""
     a, e = radians(azimuth), radians(elevation)
     right = (-sin(a), cos(a), 0.0)
     up = (-sin(e) * cos(a), -sin(e) * sin(a), cos(e))
@@ -75,8 +77,8 @@ def towards(azimuth: float, elevation: float) -> Array:
 def fit(points: Array, axes: Array, framing: Framing) -> View:
     """The nearest view along `axes` that has all points (n, 3) in the frame.
 
-    The positions (a, c) from which points (r, f) are seen between two rays of tangents s and t are
-    a wedge, -(f - c) s <= r - a <= (f - c) t, that opens backwards from its tip."""
+    The positions (a, c) from which points (r, f) are between two rays of tangents s and t form a
+    wedge, -(f - c) s <= r - a <= (f - c) t, that opens backwards from its tip."""
     tall, side, low, high = tangents(framing)
     r, u, f = axes @ points.T
     wedges = [
@@ -91,7 +93,7 @@ def fit(points: Array, axes: Array, framing: Framing) -> View:
 
 
 def tangents(framing: Framing) -> tuple[float, float, float, float]:
-    """Tangents of half the angle of view upwards, and of what may be used of it beside, below and
+    """The tangents of half the angle of view upwards, and of its usable part beside, below and
     above."""
     tall = tan(radians(framing.field / 2)) / min(1.0, framing.aspect)
     side = tall * (framing.aspect - 2 * framing.beside)

@@ -29,19 +29,18 @@ PALETTE = (
     (0.240, 0.42, 0.74),
     (0.500, 0.50, 0.56),
 )
-"""Hue, saturation and value of parts with no colour of their own; later rounds turn the hue."""
+"""Hue, saturation and value of parts without a colour; further rounds shift the hue."""
 
 
 @dataclass(frozen=True, slots=True, weakref_slot=True)
 class Solid:
-    """A part as a solid. Arrays are in the frame of the finished product unless said otherwise.
+    """A part as a solid. Arrays are in the frame of the finished product unless stated otherwise.
 
-    `kind` is box, cylinder, sphere or mesh; `size` its half lengths as MJCF writes them [m];
-    `position` (3,) and `quaternion` (4,) place it; `mass` [kg], `centre` (3,) of mass, `inertia`
-    (3, 3) about it [kg m²]; `low`, `high` (3,) its bounding box; `corners` (n, 3): points of its
-    surface whose displacement tells that of the whole; `pieces`: the vertices (n, 3) of the convex
-    bodies it is made of, as the engine collides them (`factory.geometry.pieces` states how
-    exactly): one for most.
+    `kind` is box, cylinder, sphere or mesh; `size` its half lengths as in MJCF [m]; `position` (3,)
+    and `quaternion` (4,) place it; `mass` [kg], `centre` (3,) of mass, `inertia` (3, 3) about it
+    [kg m²]; `low`, `high` (3,) its bounding box; `corners` (n, 3): surface points whose
+    displacements bound that of the whole; `pieces`: the vertices (n, 3) of the convex bodies that
+    represent it in collisions (`factory.geometry.pieces` states how exactly): one for most.
     """
 
     label: str
@@ -62,8 +61,7 @@ class Solid:
 
 @dataclass(frozen=True)
 class Product:
-    """The solids of a product's parts by label, its bounding box and what there is to warn
-    about."""
+    """The solids of a product's parts by label, its bounding box, and warnings."""
 
     solids: Mapping[str, Solid]
     low: Array
@@ -80,7 +78,7 @@ class Product:
 
     @property
     def mass(self) -> float:
-        """[kg]"""
+        """The total mass [kg]."""
         return float(sum(solid.mass for solid in self.solids.values()))
 
 
@@ -126,12 +124,12 @@ def primitive(
 
 
 def from_mesh(
-    node: Assembly, found: MassProperties, place: Array, quaternion: Array, number: int
+    node: Assembly, properties: MassProperties, place: Array, quaternion: Array, number: int
 ) -> Solid:
     """A mesh as the solid of a part."""
     turn = rotation(quaternion)
-    mass = _mass(node, found.volume)
-    corners = found.hull @ turn.T + place
+    mass = _mass(node, properties.volume)
+    corners = properties.hull @ turn.T + place
     return Solid(
         node.label,
         "mesh",
@@ -139,14 +137,14 @@ def from_mesh(
         place,
         quaternion,
         mass,
-        turn @ found.centre + place,
-        sound(turn @ (found.inertia * mass / found.volume) @ turn.T),
+        turn @ properties.centre + place,
+        sound(turn @ (properties.inertia * mass / properties.volume) @ turn.T),
         corners.min(axis=0),
         corners.max(axis=0),
         colour(node, number),
-        found.mesh,
+        properties.mesh,
         corners,
-        tuple(piece @ turn.T + place for piece in found.mesh.pieces) or (corners,),
+        tuple(piece @ turn.T + place for piece in properties.mesh.pieces) or (corners,),
     )
 
 
@@ -158,10 +156,10 @@ def _mass(node: Assembly, volume: float) -> float:
 
 
 def colour(node: Assembly, number: int) -> tuple[float, ...]:
-    """The colour written in the PAG, else one of a sequence in which neighbours differ."""
-    given = node.parameter("rgba")
-    if isinstance(given, tuple):
-        return given
+    """The colour in the PAG, else one of a sequence in which neighbours differ."""
+    rgba = node.parameter("rgba")
+    if isinstance(rgba, tuple):
+        return rgba
     round_, index = divmod(number, len(PALETTE))
     hue, saturation, value = PALETTE[index]
     red, green, blue = colorsys.hsv_to_rgb((hue + 0.045 * round_) % 1.0, saturation, value)

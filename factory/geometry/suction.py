@@ -1,8 +1,8 @@
-"""Where a suction pad takes a part from above: on its upper surface, as near as can be to the
-vertical through its centre of mass.
+"""The place of a suction pad on a part: on its upper surface, as near as possible to the vertical
+through its centre of mass.
 
-A part leaves sideways from under its pad. So nothing of it that comes by under the pad is higher
-than the place where the pad is.
+A part leaves sideways from under its pad, so no point of it that passes under the pad may be higher
+than the pad's place.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from factory.geometry.meshes import Array
 from factory.geometry.solids import Solid, rotation
 
 GAP = 1e-4
-"""A pad is this much above what it takes [m]."""
+"""The gap between a pad and the part [m]."""
 
 WIDEST = 0.008
 """Radius of the largest pad [m]."""
@@ -24,13 +24,13 @@ NARROWEST = 1e-5
 """Radius of the smallest [m]."""
 
 SHARE = 0.25
-"""Radius of a pad as a share of the part's least extent in plan, where that is less."""
+"""The largest radius of a pad as a share of the part's least extent in plan."""
 
 PLACES = 9
-"""So many places along each side of a part are looked at."""
+"""The number of candidate places along each side of a part."""
 
 EVEN = GAP / 2
-"""What is higher by less is not higher [m]."""
+"""The tolerance for equal heights [m]."""
 
 Corner = Array
 """A corner of a rectangle in plan (2,) [m]."""
@@ -47,10 +47,10 @@ class PadPlace:
 def pad_place(
     solid: Solid, heading: tuple[float, float], taken: tuple[Corner, Corner] | None = None
 ) -> PadPlace:
-    """The place on a part for a pad from under which the part leaves with a heading, a direction
-    of the world along an axis; it stays out of the rectangle that is `taken`, and is smaller where
-    it has to be. Of places that are alike the one nearest to the centre of mass; best is one under
-    whose middle there is something, too."""
+    """The place of a pad on a part that leaves with a heading, a horizontal direction along an
+    axis. The pad stays out of the rectangle that is `taken`, and is smaller if necessary. Among
+    equal places the one nearest to the centre of mass is chosen; places with material under the
+    middle are preferred."""
     low, high, ahead = solid.low[:2], solid.high[:2], np.array(heading)
     widest = max(min(WIDEST, SHARE * float((high - low).min())), NARROWEST)
     faces, drawn = _pieces(solid), drawn_triangles(solid)
@@ -82,7 +82,8 @@ def pad_place(
 
 
 def _grid(solid: Solid, radius: float) -> Array:
-    """Middles (n, 2) of pads within a part in plan, the nearest to its centre of mass first."""
+    """Candidate middles (n, 2) of pads within a part in plan, the nearest to its centre of mass
+    first."""
     low, high = solid.low[:2], solid.high[:2]
     room = np.maximum((high - low) / 2 - radius, 0.0)
     shares = np.linspace(-1.0, 1.0, PLACES)
@@ -98,14 +99,14 @@ def _at(place: Corner, top: float, radius: float) -> PadPlace:
 
 
 def height_in(triangles: Array, low: Corner, high: Corner) -> float:
-    """The greatest height of triangles (n, 3, 3) over a rectangle in plan, -inf where there is
-    none: over a corner of it, at one of theirs, or where an edge crosses a side."""
+    """The greatest height of triangles (n, 3, 3) over a rectangle in plan, -inf if there are none:
+    at the corners of the rectangle, at theirs, and where edges cross its sides."""
     kept = (triangles[:, :, :2].min(axis=1) <= high) & (triangles[:, :, :2].max(axis=1) >= low)
-    found = triangles[kept.all(axis=1)]
-    if not len(found):
+    near = triangles[kept.all(axis=1)]
+    if not len(near):
         return -np.inf
-    points = [found.reshape(-1, 3), _over_corners(found, low, high)]
-    begin, way = found.reshape(-1, 3), (np.roll(found, -1, axis=1) - found).reshape(-1, 3)
+    points = [near.reshape(-1, 3), _over_corners(near, low, high)]
+    begin, way = near.reshape(-1, 3), (np.roll(near, -1, axis=1) - near).reshape(-1, 3)
     for axis in (0, 1):
         for side in (low[axis], high[axis]):
             with np.errstate(divide="ignore", invalid="ignore"):
@@ -125,7 +126,7 @@ def _over_corners(triangles: Array, low: Corner, high: Corner) -> Array:
     area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
     flat = np.abs(area) > 1e-18
     a, u, v, area = a[flat], u[flat], v[flat], area[flat]
-    found = []
+    points = []
     for x in (low[0], high[0]):
         for y in (low[1], high[1]):
             dx, dy = x - a[:, 0], y - a[:, 1]
@@ -133,18 +134,18 @@ def _over_corners(triangles: Array, low: Corner, high: Corner) -> Array:
             t = (u[:, 0] * dy - u[:, 1] * dx) / area
             over = (s >= 0) & (t >= 0) & (s + t <= 1)
             z = (a[:, 2] + s * u[:, 2] + t * v[:, 2])[over]
-            found.append(np.column_stack([np.full(len(z), x), np.full(len(z), y), z]))
-    return np.concatenate(found)
+            points.append(np.column_stack([np.full(len(z), x), np.full(len(z), y), z]))
+    return np.concatenate(points)
 
 
 def _pieces(solid: Solid) -> Array:
-    """The triangles (n, 3, 3) of what collides."""
+    """The triangles (n, 3, 3) of the convex bodies of a part."""
     return np.concatenate([_hull(piece) for piece in solid.pieces])
 
 
 def _hull(points: Array) -> Array:
-    """The triangles (n, 3, 3) of the convex hull of points (k, 3); of what is too thin for that the
-    two that are its box from above."""
+    """The triangles (n, 3, 3) of the convex hull of points (k, 3); if they are coplanar, the two
+    triangles of the top of their box."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:
@@ -157,7 +158,7 @@ def _hull(points: Array) -> Array:
 
 
 def drawn_triangles(solid: Solid) -> Array:
-    """The triangles (n, 3, 3) of what is drawn."""
+    """The triangles (n, 3, 3) of a part as drawn."""
     if solid.mesh is None:
         return _pieces(solid)
     vertices = solid.mesh.vertices @ rotation(solid.quaternion).T + solid.position

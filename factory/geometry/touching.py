@@ -1,8 +1,8 @@
-"""The bodies of a closed mesh, told apart where they touch.
+"""The bodies of a closed mesh, separated where they touch.
 
-Bodies that share a side have four or more triangles at its edges once their vertices are one, as in
-every STL file. Round such an edge the space is cut into wedges, solid and empty by turns: the two
-triangles that bound one solid wedge are of one body.
+Bodies that share a side have four or more triangles at its edges once their vertices are merged, as
+in every STL file. Around such an edge, solid and empty wedges alternate: the two triangles that
+bound one solid wedge belong to one body.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ from factory.geometry.meshes import Array, Indices
 Mask = NDArray[np.bool_]
 
 SAME = 1e-4
-"""Triangles round an edge whose angles differ by no more lie on each other [rad]."""
+"""Triangles round an edge whose angles differ by no more than this coincide [rad]."""
 
 
 def bodies(vertices: Array, faces: Indices) -> Indices:
-    """The number of the body that each triangle (m, 3) of a closed mesh bounds, turned outwards, in
-    the order of their first triangle. Triangles are of one body where an edge joins them: the two
-    at an edge, or those on both sides of a solid wedge where there are more."""
+    """The number of the body that each triangle (m, 3) of a closed mesh bounds, in the order of
+    their first triangles; the triangles are oriented outwards. An edge joins two triangles into one
+    body: the two at the edge, or, if there are more, those on both sides of a solid wedge."""
     return as_they_come(connected(_pairs(vertices, faces), len(faces)))
 
 
 def connected(pairs: Indices, count: int) -> Indices:
-    """A number (count,) for the connected part that each of `count` things is of, some pairs (n, 2)
-    of which are connected."""
+    """The number (count,) of the connected component of each of `count` items, given connected
+    pairs (n, 2)."""
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -36,31 +36,31 @@ def connected(pairs: Indices, count: int) -> Indices:
 
 
 def as_they_come(labels: Indices) -> Indices:
-    """Labels (n,) as numbers from 0, in the order of their first places."""
+    """Labels (n,) renumbered from 0, in the order of their first occurrences."""
     _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
     return np.asarray(np.argsort(np.argsort(first))[inverse])
 
 
 def _pairs(vertices: Array, faces: Indices) -> Indices:
-    """The triangles (n, 2) that an edge joins, two by two."""
+    """The pairs (n, 2) of triangles that an edge joins."""
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     low, high = np.minimum(start, end), np.maximum(start, end)
     order = np.lexsort((start < end, high, low))
     edge = np.flatnonzero(np.diff(low[order], prepend=-1) | np.diff(high[order], prepend=-1))
     count = np.diff(edge, append=len(order))
     plain = edge[count == 2]
-    found = [np.column_stack([order[plain], order[plain + 1]]) // 3]
+    pairs = [np.column_stack([order[plain], order[plain + 1]]) // 3]
     for first, many in zip(edge[count > 2], count[count > 2], strict=True):
         sides = order[first : first + many]
-        found.append(_wedges(vertices, faces, sides, start[sides] < end[sides]))
-    return np.concatenate(found)
+        pairs.append(_wedges(vertices, faces, sides, start[sides] < end[sides]))
+    return np.concatenate(pairs)
 
 
 def _wedges(vertices: Array, faces: Indices, sides: Indices, ends: Mask) -> Indices:
-    """The triangles (n, 2) that bound the solid wedges round one edge, given where their sides of
-    it are in the faces written in a row. Seen against the edge's direction a wedge goes
-    anticlockwise from a triangle that passes the edge backwards to one (`ends`) that passes it
-    forwards; where two lie on each other a wedge ends before the next begins."""
+    """The pairs (n, 2) of triangles that bound the solid wedges round one edge. `sides`: the
+    indices of their sides at the edge in the flattened faces. Seen against the edge's direction, a
+    wedge goes anticlockwise from a triangle that traverses the edge backwards to one (`ends`) that
+    traverses it forwards; where two coincide, one wedge ends before the next begins."""
     triangle, corner = np.divmod(sides, 3)
     a, b = faces[triangle, corner], faces[triangle, (corner + 1) % 3]
     origin, along = vertices[min(a[0], b[0])], vertices[max(a[0], b[0])]
