@@ -234,26 +234,26 @@ def test_what_stands_around_a_model_is_left_out(bring: Importer) -> None:
         ),
         (
             f"1 4 0 0 0 {PLAIN} ..\\..\\a.dat",
-            ["1:29 BadPath '..\\..\\a.dat' leads out of the model's folder and the library"],
+            ["1:29 BadPath '..\\..\\a.dat' is outside the model's folder and the library"],
         ),
         (
             f"1 4 0 0 0 {PLAIN} /etc/passwd",
-            ["1:29 BadPath '/etc/passwd' leads out of the model's folder and the library"],
+            ["1:29 BadPath '/etc/passwd' is outside the model's folder and the library"],
         ),
         (
             f"1 4 0 0 0 1 0 0 0 1 0 0 0 0 tile.dat\n{TILE}",
-            ["1:29 BadValue the matrix of 'tile.dat' makes it flat"],
+            ["1:29 BadValue the matrix of 'tile.dat' is singular: the part would be flat"],
         ),
-        (f"1 4 0 0 0 {PLAIN} m.ldr", ["1:29 CyclicModel the model 'm.ldr' is made of itself"]),
+        (f"1 4 0 0 0 {PLAIN} m.ldr", ["1:29 CyclicModel the model 'm.ldr' contains itself"]),
         (
             f"1 4 0 0 0 {PLAIN} n.ldr\n0 FILE n.ldr\n1 4 0 0 0 {PLAIN} o.ldr\n0 FILE o.ldr\n"
             f"1 4 0 0 0 {PLAIN} n.ldr",
-            ["5:29 CyclicModel the model 'n.ldr' is made of itself"],
+            ["5:29 CyclicModel the model 'n.ldr' contains itself"],
         ),
         (
             f"1 4 0 0 0 {PLAIN} a.dat\n0 FILE a.dat\n1 4 0 0 0 {PLAIN} b.dat\n0 FILE b.dat\n"
             f"1 4 0 0 0 {PLAIN} a.dat",
-            ["5:29 CyclicModel 'a.dat' is made of itself"],
+            ["5:29 CyclicModel 'a.dat' contains itself"],
         ),
         (
             f"1 4 0 0 0 {PLAIN} a.dat\n0 FILE a.dat\n1 4 0 0 0 {PLAIN} stud.dat",
@@ -269,12 +269,12 @@ def test_what_stands_around_a_model_is_left_out(bring: Importer) -> None:
         ),
         (
             f"0 FILE m.ldr\n1 4 0 0 0 {PLAIN} tile.dat\n{TILE}0 FILE Tile.dat",
-            ["8:1 DuplicateLabel the file 'Tile.dat' is there twice, first in line 3"],
+            ["8:1 DuplicateLabel the file 'Tile.dat' appears twice, first in line 3"],
         ),
         ("0 FILE", ["1:1 Syntax 0 FILE has no name"]),
         (
             f"1 4 0 0 0 {PLAIN} tile.dat\n1 1 0 0 0 {PLAIN} TILE.dat\n{TILE}",
-            ["2:29 UsedTwice 'tile.dat' is where line 1 has put it already"],
+            ["2:29 UsedTwice 'tile.dat' is where line 1 already places it"],
         ),
         (b"0 Brick\n0 Author: M\xfcller", ["2:12 Syntax byte 0xfc is not UTF-8 text"]),
     ],
@@ -395,13 +395,13 @@ def test_a_folder_with_one_tree(bring: Importer, run: Terminal) -> None:
         ("", ["1:1 Syntax the text ends too early"]),
         ('{"part": true', ["1:14 Syntax the text ends too early"]),
         ('{"part": true,}', ["1:15 Syntax '}' is not expected here"]),
-        ('{"a": nan}', ["1:7 Syntax 'nan}' is no JSON"]),
+        ('{"a": nan}', ["1:7 Syntax 'nan}' is not JSON"]),
         ("3", ["1:1 Syntax a node is an object or the name of a mesh, not 3"]),
         ("{}", ["1:1 EmptyNode 't' is empty: it has neither children nor a part"]),
         ('{"children": []}', ["1:1 EmptyNode 't' is empty: it has no children"]),
         (
             '{"children": [{"name": "frame", "children": {}}, "leg"]}',
-            ["1:24 EmptyNode 'frame' is empty: its children are no list"],
+            ["1:24 EmptyNode 'frame' is empty: its children are not a list"],
         ),
         ('{"childrn": ["leg"]}', ["1:2 UnknownParameter a part has no key 'childrn'"]),
         (
@@ -413,7 +413,7 @@ def test_a_folder_with_one_tree(bring: Importer, run: Terminal) -> None:
         ),
         (
             '{"children": ["leg.obj", {"children": ["leg", {"part": "leg", "at": [1, 1, 1]}]}]}',
-            ["1:40 UsedTwice the mesh 'leg.obj' is where this line has put it already"],
+            ["1:40 UsedTwice the mesh 'leg.obj' is where this line already places it"],
         ),
         (
             '{"children": [{"name": "a", "part": true},\n {"name": "a", "part": true}]}',
@@ -422,7 +422,7 @@ def test_a_folder_with_one_tree(bring: Importer, run: Terminal) -> None:
         (
             '{"children": ["../leg.obj", "C:/leg.obj", "/leg.obj"]}',
             [
-                f"1:{at} BadPath '{name}' leads out of the folder of the meshes"
+                f"1:{at} BadPath '{name}' is outside the folder of the meshes"
                 for at, name in ((15, "../leg.obj"), (29, "C:/leg.obj"), (43, "/leg.obj"))
             ],
         ),
@@ -436,7 +436,10 @@ def test_a_folder_with_one_tree(bring: Importer, run: Terminal) -> None:
                 )
             ],
         ),
-        ('{"part": 1, "children": ["leg"]}', ["1:2 UnknownParameter a sub-assembly is no part"]),
+        (
+            '{"part": 1, "children": ["leg"]}',
+            ["1:2 UnknownParameter 'part' is a key of parts, not of sub-assemblies"],
+        ),
         ('{"part": 3}', ["1:10 BadValue 'part' takes the name of a mesh file, or true, not 3"]),
         ('{"part": "leg", "part": "leg"}', ["1:17 BadValue 'part' is given twice"]),
         ('{"part": true, "at": [0, 1e999]}', ["1:22 BadValue 'at' takes 3 numbers, not [0, inf]"]),
@@ -550,23 +553,23 @@ def test_a_bill_with_numbers(bring: Importer) -> None:
         ),
         (
             "level,name\n0,a\n2,b\n1,c\nx,d",
-            ["3:1 BadLevel level 2 comes after level 0", "5:1 BadLevel 'x' is no level"],
+            ["3:1 BadLevel level 2 comes after level 0", "5:1 BadLevel 'x' is not a level"],
         ),
         ("level,name\n1,a\n0,b", ["3:1 BadLevel level 0 is above that of the first row"]),
-        ("level,name\nx,p\n0,a\n1,b", ["2:1 BadLevel 'x' is no level"]),
+        ("level,name\nx,p\n0,a\n1,b", ["2:1 BadLevel 'x' is not a level"]),
         (
             "name,item\na,1\nb,1.1\nc,1.1\nd,2.1\ne,3-1",
             [
-                "4:3 BadLevel number 1.1 is there twice, first in line 3",
+                "4:3 BadLevel number 1.1 appears twice, first in line 3",
                 "5:3 BadLevel number 2.1 has no row 2 above it",
-                "6:3 BadLevel '3-1' is no number like 1.2",
+                "6:3 BadLevel '3-1' is not a number like 1.2",
             ],
         ),
-        ("level,name\n0,a\n1,", ["3:3 MissingPart the row names no part"]),
+        ("level,name\n0,a\n1,", ["3:3 MissingPart the row has neither a name nor a mesh"]),
         (
             "level,name,qty\n0,a,1\n1,b,0\n1,c,two\n1,d,1e9\n1,e,1.5",
             [
-                f"{line}:5 BadValue the quantity '{text}' is no whole number from 1 to 10000"
+                f"{line}:5 BadValue the quantity '{text}' is not a whole number from 1 to 10000"
                 for line, text in ((3, "0"), (4, "two"), (5, "1e9"), (6, "1.5"))
             ],
         ),
@@ -581,11 +584,11 @@ def test_a_bill_with_numbers(bring: Importer) -> None:
         (
             "level,name,mesh,quantity\n0,a,,\n1,leg,leg.obj,3",
             [
-                "3:7 UsedTwice the mesh 'leg.obj' is where this line has put it already",
+                "3:7 UsedTwice the mesh 'leg.obj' is where this line already places it",
             ],
         ),
         ("level,name,mass\n0,a,-1", ["2:5 BadValue 'mass' takes a positive number, not '-1'"]),
-        ('level,name\n0,"a', ["2:1 Syntax no CSV: unexpected end of data"]),
+        ('level,name\n0,"a', ["2:1 Syntax invalid CSV: unexpected end of data"]),
         ("level,level,name\n0,0,a", ["1:7 BadValue there are two columns 'level'"]),
         (b"level,name\n0,Sch\xe4ft", ["2:6 Syntax byte 0xe4 is not UTF-8 text"]),
     ],

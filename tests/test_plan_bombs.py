@@ -139,7 +139,7 @@ from factory.geometry.mesh_file import UnreadableMesh
 for name in sys.argv[1:]:
     path = Path(name)
     try:
-        print(path.name, len(read_scene(path.read_bytes(), path.suffix).found), "bodies")
+        print(path.name, len(read_scene(path.read_bytes(), path.suffix).bodies), "bodies")
     except UnreadableMesh as error:
         print(path.name, error)
 """
@@ -159,7 +159,7 @@ def test_what_announces_gigabytes_is_refused_within_little_memory(tmp_path: Path
 
 def test_few_triangles_at_many_places_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     content = glb(lambda d: d.update(nodes=[{"mesh": 0}] * 30))
-    assert len(read_scene(content, ".glb").found) == 30
+    assert len(read_scene(content, ".glb").bodies) == 30
     monkeypatch.setattr(glb_reader, "MOST", 100)
     with pytest.raises(UnreadableMesh, match="more than 100 triangles together"):
         read_scene(content, ".glb")
@@ -198,7 +198,7 @@ def test_a_3mf_file_places_objects_within_objects() -> None:
     plate = '<item objectid="2" transform="2 0 0 0 2 0 0 0 2 0 0 1"/><item objectid="1"/>'
     found = read_scene(threemf(moved, plate), ".3mf")
     assert found.by == "the 3MF file states inch"
-    low = [body.mesh.bodies[0][0].min(axis=0) / 0.0254 for body in found.found]
+    low = [body.mesh.bodies[0][0].min(axis=0) / 0.0254 for body in found.bodies]
     assert low[0] == pytest.approx((20, 0, 1)) and low[1] == pytest.approx((0, 0, 0))
 
 

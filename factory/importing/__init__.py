@@ -1,7 +1,7 @@
-"""Products from elsewhere: LDraw models, trees of meshes, bills of materials, made into PAGs.
+"""Import of products: LDraw models, trees of meshes, bills of materials, scene files, loose meshes.
 
 Each reader makes drafts of a file; `assembling` makes the PAG of them. No file is written here: an
-`Imported` holds the contents of all, by their names in the output folder.
+`Imported` holds the contents of all files by their path in the output folder.
 """
 
 from factory.importing.importer import Imported, Options, import_product

@@ -1,4 +1,4 @@
-"""From drafts to a PAG: labels, and operations with as many inputs as they take."""
+"""From drafts to a PAG: labels, and operations with the number of inputs that they take."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ Mates = Literal["many", "chain"]
 def assemble(drafts: Sequence[DraftNode], faults: ImportFaults, mates: Mates = "many") -> PAG:
     """The PAG of drafts, of which the first is the product; sub-assemblies first, then parts.
 
-    A mate of one input is that input. Raises InputError (DuplicateLabel) where two nodes have the
-    same kept name.
+    A mate of one input is replaced by that input. Raises InputError (DuplicateLabel) if two nodes
+    have the same kept name.
     """
     order = postorder(drafts)
     made = [i for i in order if not (drafts[i].operation == MATE and len(drafts[i].inputs) == 1)]
@@ -54,7 +54,8 @@ def _refuse_twice(drafts: Sequence[DraftNode], made: Sequence[int], faults: Impo
 
 
 def _chain(label: str, inputs: list[str], labels: Labeller) -> list[Assembly]:
-    """Mates of two inputs; each label but the last counts the inputs that are together."""
+    """Mates of two inputs each; the labels but the last one end in the number of inputs joined so
+    far."""
     piles = [inputs[0], *(labels.within(label, n) for n in range(2, len(inputs))), label]
     steps = zip(pairwise(piles), inputs[1:], strict=True)
     return [Assembly(made, MATE, (pile, new)) for (pile, made), new in steps]

@@ -1,4 +1,4 @@
-"""Bills of materials, as spreadsheets export them: CSV with a header, to drafts."""
+"""Bills of materials, as spreadsheets export them (CSV with a header), to drafts."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ COLUMNS = {
     "mass": ("mass", "mass [kg]", "weight"),
     "density": ("density",),
 }
-"""The columns that are read, and the headers that they may have, the likeliest first."""
+"""The columns that are read, each with its possible headers, the likeliest first."""
 
 EXAMPLE = "level,name,quantity,mesh,x,y,z"
 
 
 @dataclass(slots=True)
 class BillRow:
-    """A line of the bill: cells by column, and the place of each; `parent`: the index of the row
-    that it is a part of, -1 for none."""
+    """A row of the bill: its cells and their positions by column. `parent`: the index of the row
+    that it belongs to, -1 for none."""
 
     cells: dict[str, str]
     places: dict[str, Position]
@@ -49,7 +49,7 @@ class BillRow:
     quantity: int = 1
 
     def at(self, column: str) -> Position:
-        """Where a column's cell is."""
+        """The position of a column's cell."""
         return self.places.get(column, self.position)
 
 
@@ -71,9 +71,9 @@ class BillTable:
         self.header = Header({}, {})
 
     def rows(self) -> list[BillRow]:
-        """Every row below the header. Raises InputError where the text is no CSV, or the header
-        lacks a column (Syntax, BadLevel, MissingPart)."""
-        found = []
+        """All rows below the header. Raises InputError if the text is not CSV, or the header lacks
+        a column (Syntax, BadLevel, MissingPart)."""
+        rows = []
         for cells, at in self._lines():
             starts = self._starts(at.text)
             if not self.header.columns:
@@ -81,19 +81,19 @@ class BillTable:
                 continue
             columns = self.header.columns.items()
             row = {name: cells[i].strip() for name, i in columns if i < len(cells)}
-            found.append(BillRow(row, {name: _place(at, starts, i) for name, i in columns}, at))
-        return found
+            rows.append(BillRow(row, {name: _place(at, starts, i) for name, i in columns}, at))
+        return rows
 
     def _lines(self) -> Iterator[tuple[list[str], Position]]:
-        """The cells of each line that is not empty, and where it starts."""
+        """The cells of each non-empty line, and its position."""
         reader = csv.reader(self.source.text.split("\n"), delimiter=self.delimiter, strict=True)
         while True:
             line = reader.line_num + 1
             try:
                 cells = next(reader, None)
             except csv.Error as error:
-                hint = "cells are divided by commas; one with a comma in it is in double quotes"
-                fault = Diagnostic("Syntax", f"no CSV: {error}", self._line(line), hint)
+                hint = "cells are separated by commas; a cell with a comma is in double quotes"
+                fault = Diagnostic("Syntax", f"invalid CSV: {error}", self._line(line), hint)
                 raise InputError(fault) from None
             if cells is None:
                 return
@@ -105,7 +105,7 @@ class BillTable:
         return Position(self.source.file, line, 1, self.source.lines[line - 1])
 
     def _starts(self, line: str) -> list[int]:
-        """Where each cell of a line starts, from 0; a cell in quotes may have delimiters in it."""
+        """The start of each cell of a line, from 0; a quoted cell may contain delimiters."""
         starts, quotes = [0], False
         for index, character in enumerate(line):
             quotes ^= character == '"'
@@ -114,19 +114,19 @@ class BillTable:
         return starts
 
     def _read_header(self, cells: list[str], at: Position, starts: list[int]) -> Header:
-        known = {header: name for name, headers in COLUMNS.items() for header in headers}
+        column_of = {header: name for name, headers in COLUMNS.items() for header in headers}
         titles: list[str] = []
         columns: dict[str, int] = {}
         units: dict[str, float] = {}
         for index, cell in enumerate(cells):
             title = cell.strip().lower()
             unit = re.fullmatch(r"([xyz])\s*[\[(]?(m|cm|mm|in)[\])]?", title)
-            name = unit[1] if unit else known.get(title)
+            name = unit[1] if unit else column_of.get(title)
             if unit:
                 units[unit[1]] = UNITS[unit[2]]
             if name in columns and title in titles:
                 message = f"there are two columns {quoted(cell.strip())}"
-                hint = "rename the one that is not meant"
+                hint = "rename one of them"
                 self.faults.add("BadValue", message, _place(at, starts, index), hint)
             elif name and (name not in columns or _rank(title) < _rank(titles[columns[name]])):
                 columns[name] = index
@@ -182,14 +182,14 @@ class BillReader:
         return drafts
 
     def _level_parents(self, rows: list[BillRow]) -> None:
-        """Levels 0, 1, 2: the parent of a row is the last one before it that is one level above."""
+        """Levels 0, 1, 2: the parent of a row is the last row before it at the level above."""
         above: list[tuple[int, int]] = []
         top: int | None = None
         for index, row in enumerate(rows):
             text = _level(row)
             if not re.fullmatch(r"[0-9]{1,9}", text):
                 hint = "levels are 0, 1, 2, or numbers like 1, 1.1, 1.2"
-                self._bad_level(row, f"{quoted(text)} is no level", hint)
+                self._bad_level(row, f"{quoted(text)} is not a level", hint)
                 continue
             level = int(text)
             top = level if top is None else top
@@ -212,10 +212,12 @@ class BillReader:
             text = _level(row).rstrip(".")
             above = text.rpartition(".")[0]
             if not re.fullmatch(r"[0-9]+(\.[0-9]+)*", text):
-                self._bad_level(row, f"{quoted(text)} is no number like 1.2", "as in 1, 1.1, 1.2")
+                self._bad_level(
+                    row, f"{quoted(text)} is not a number like 1.2", "as in 1, 1.1, 1.2"
+                )
             elif text in seen:
                 line = rows[seen[text]].position.line
-                message = f"number {text} is there twice, first in line {line}"
+                message = f"number {text} appears twice, first in line {line}"
                 hint = "give each row its own; spreadsheets make 1.10 into 1.1: write it as text"
                 self._bad_level(row, message, hint)
             elif above and above not in seen:
@@ -230,19 +232,21 @@ class BillReader:
 
     def _check(self, row: BillRow) -> None:
         if not row.cells.get("name") and not row.cells.get("mesh"):
-            hint = "write its name, or its mesh"
-            self.faults.add("MissingPart", "the row names no part", row.at("name"), hint)
+            hint = "write the name of the part, or its mesh"
+            self.faults.add(
+                "MissingPart", "the row has neither a name nor a mesh", row.at("name"), hint
+            )
         text = row.cells.get("quantity", "") or "1"
         value = _number(text)
         if value is None or value != int(value) or not 1 <= value <= MOST_COPIES:
-            message = f"the quantity {quoted(text)} is no whole number from 1 to {MOST_COPIES}"
-            hint = "how many go into one of the row above it"
+            message = f"the quantity {quoted(text)} is not a whole number from 1 to {MOST_COPIES}"
+            hint = "how many of it one unit of the parent row has"
             self.faults.add("BadValue", message, row.at("quantity"), hint)
         else:
             row.quantity = int(value)
 
     def _expand(self, rows: list[BillRow], name: str) -> list[DraftNode]:
-        """A draft for each copy of each row, below one for the product."""
+        """A draft for each copy of each row, below the draft of the product."""
         below: dict[int, list[int]] = {}
         for index, row in enumerate(rows):
             below.setdefault(row.parent, []).append(index)
@@ -265,18 +269,18 @@ class BillReader:
         name = row.cells.get("name") or mesh_name(mesh)
         if is_group:
             return DraftNode(name, row.at("name"), MATE)
-        given: dict[str, Value] = {"mesh": mesh} if mesh else {}
+        values: dict[str, Value] = {"mesh": mesh} if mesh else {}
         if any(row.cells.get(axis) for axis in "xyz"):
-            given["pos"] = tuple(self._length(row, axis) for axis in "xyz")
+            values["pos"] = tuple(self._length(row, axis) for axis in "xyz")
         for column in ("mass", "density"):
             value = self._value(row, column)
             if value is not None:
-                given[column] = value
-        made = self.parts.parameters(given, Placement(), row.at("mesh"))
-        return DraftNode(name, row.at("name"), PART, [], made)
+                values[column] = value
+        parameters = self.parts.parameters(values, Placement(), row.at("mesh"))
+        return DraftNode(name, row.at("name"), PART, [], parameters)
 
     def _length(self, row: BillRow, axis: str) -> float:
-        """A length of a row, from the unit of its column to that of the bill."""
+        """A length of a row, converted from the unit of its column to that of the bill."""
         value = self._value(row, axis) or 0.0
         unit = self.table.header.units.get(axis)
         return value if unit is None else round(value * unit / self.parts.unit, 12)
@@ -297,5 +301,5 @@ def _level(row: BillRow) -> str:
 
 
 def _number(text: str) -> float | None:
-    """A number, with a decimal comma too."""
+    """A number, which may have a decimal comma."""
     return number(text.replace(",", "."))

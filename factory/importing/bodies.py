@@ -1,4 +1,4 @@
-"""Bodies as a file has them: triangles in place, name, colour; and the unit of their lengths."""
+"""Bodies of a file: triangles in place, names, colours, and the unit of length."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from factory.geometry.glb_reader import Colour
 from factory.geometry.mesh_file import MeshFile, areas_of
 from factory.geometry.meshes import Array, is_closed, volume_of
-from factory.geometry.pieces import MOST_PIECES, components
+from factory.geometry.pieces import MOST_PIECES, components, submeshes
 from factory.geometry.touching import bodies as shells
 from factory.lang.source import quoted
 from factory.lang.words import UNITS as LENGTHS
@@ -21,23 +21,24 @@ UNITS = {**LENGTHS, "ldu": 0.0004}
 """Units of length [m]; `ldu` is that of LDraw."""
 
 LIKELY = 2.5
-"""A product is no longer than this [m] where its format states the unit, which not every program
-heeds."""
+"""The greatest plausible length of a product [m], where the format of the file fixes the unit: not
+every program respects it."""
 
 DOUBTFUL, SHEET = (1.0, 30.0), (0.1, 2.0)
-"""A product may be so long in metres, centimetres and inches alike, between the two; one that is
-longer may be in either of the latter, too, where the median part is as thin as SHEET."""
+"""The range of lengths in which a product may be in metres, centimetres or inches alike. A longer
+product may still be in the latter two if the thickness of its median part is within SHEET."""
 
 
 MOST_PARTS = 5000
-"""A plan has tables of all pairs of parts: of so many they take a gigabyte."""
+"""The most parts of a plan, which has tables of all pairs of parts: for so many they take a
+gigabyte."""
 
 
 @dataclass(frozen=True, slots=True)
 class FileBody:
-    """A part of a file: its triangles where they are in the product, in the file's unit. `name` is
-    "" where the file has none; `colour` None likewise. `colours`: those of the bodies of its mesh,
-    none where they are not known."""
+    """A part of a file: its triangles at their place in the product, in the file's unit. `name` is
+    "" and `colour` None if the file has none. `colours`: those of the bodies of its mesh; empty if
+    unknown."""
 
     name: str
     mesh: MeshFile = field(repr=False)
@@ -53,10 +54,10 @@ class FileBody:
 
 @dataclass(frozen=True, slots=True)
 class Bodies:
-    """The bodies of a source. `unit` is the one that it states, "" for none; `by` says which rule
-    states it; `sure`: whether this very file does."""
+    """The bodies of a source. `unit`: the unit of length that is stated, "" for none; `by`: the
+    rule that states it; `sure`: whether this file itself states it."""
 
-    found: tuple[FileBody, ...]
+    bodies: tuple[FileBody, ...]
     unit: str = ""
     by: str = ""
     sure: bool = False
@@ -64,7 +65,7 @@ class Bodies:
 
 
 def check_count(path: Path, labels: Sequence[str], what: str = "parts") -> None:
-    """Raises InputError for a source with no part, or one (TooFewParts), or with more than can be
+    """Raises InputError if a source has no part or only one (TooFewParts), or more than can be
     planned (TooLarge)."""
     if len(labels) > MOST_PARTS:
         message = f"{quoted(path.name)} has {len(labels)} {what}; at most {MOST_PARTS} are planned"
@@ -87,13 +88,13 @@ def box_of(body: FileBody) -> tuple[Array, Array]:
 
 
 def unit_of(bodies: Bodies, asked: str | None) -> tuple[float, str]:
-    """The unit of lengths [m], and in words how it is known: asked for, stated by the file, or
-    guessed: metres, or millimetres where metres make a product too long. Raises
-    InputError (Unit) where several units are as likely."""
-    low, high = (np.array(ends) for ends in zip(*map(box_of, bodies.found), strict=True))
+    """The unit of length [m], and a note on its origin: given by the user, stated by the file, or
+    guessed (metres, or millimetres if metres would make the product too long). Raises InputError
+    (Unit) if several units are plausible."""
+    low, high = (np.array(ends) for ends in zip(*map(box_of, bodies.bodies), strict=True))
     length = float((high.max(axis=0) - low.min(axis=0)).max())
     if asked:
-        return UNITS[asked], f"lengths are in {asked}, as asked for: {_long(length, asked)}"
+        return UNITS[asked], f"lengths are in {asked}, as given by --unit: {_long(length, asked)}"
     if bodies.unit and (bodies.sure or length * UNITS[bodies.unit] <= LIKELY):
         return UNITS[bodies.unit], f"lengths are in {bodies.unit}: {bodies.by}"
     why = (
@@ -107,10 +108,10 @@ def unit_of(bodies: Bodies, asked: str | None) -> tuple[float, str]:
     ):
         ways = ", ".join(f"{length * UNITS[unit]:.3g} m in {unit}" for unit in ("m", "cm", "mm"))
         message = (
-            f"the unit of lengths is not known: {why}; the product is {length:.4g} units long, "
+            f"the unit of length is unknown: {why}; the product is {length:.4g} units long, "
             f"{ways}, {length * UNITS['in']:.3g} m in inches"
         )
-        raise InputError(Diagnostic("Unit", message, None, "--unit m, cm, mm or in says it"))
+        raise InputError(Diagnostic("Unit", message, None, "give it with --unit m, cm, mm or in"))
     unit = "m" if length <= DOUBTFUL[0] else "mm"
     return UNITS[unit], f"lengths are taken as {unit}: {why}; {_long(length, unit)} (--unit)"
 
@@ -120,16 +121,16 @@ def _long(length: float, unit: str) -> str:
 
 
 def most_of(areas: Array, colours: Sequence[Colour]) -> Colour:
-    """The colour of most of a surface: of each of its areas one."""
-    found: dict[Colour, float] = {}
+    """The colour of the largest total area; each area has one."""
+    total: dict[Colour, float] = {}
     for area, colour in zip(areas.tolist(), colours, strict=True):
-        found[colour] = found.get(colour, 0.0) + area
-    return max(found, key=found.__getitem__)
+        total[colour] = total.get(colour, 0.0) + area
+    return max(total, key=total.__getitem__)
 
 
 def solids_of(body: FileBody) -> tuple[FileBody, ...]:
-    """The solids of a body, told apart where they touch, each with its cavities and in the colour
-    of most of it; the body itself where it is one, or is not closed."""
+    """The solids of a body, separated where they touch, each with its cavities and in its
+    predominant colour; the body itself if it is one solid, or is not closed."""
     vertices, faces = body.mesh.merged()
     if not is_closed(faces):
         return (body,)
@@ -146,18 +147,18 @@ def solids_of(body: FileBody) -> tuple[FileBody, ...]:
         near = outer[around.all(axis=1)]
         of[n] = min(near if len(near) else outer, key=volume.__getitem__)
     areas, paint = areas_of(vertices, faces), np.repeat(-1, len(faces))
-    sizes = [len(own) for _, own in body.mesh.bodies]
+    sizes = [len(triangles) for _, triangles in body.mesh.bodies]
     if body.colours and sum(sizes) == len(faces):
         paint = np.repeat(np.arange(len(sizes)), sizes)
-    found = []
+    solids = []
     for index, solid in enumerate(outer.tolist(), 1):
-        mine = of[number] == solid
-        used, corners = np.unique(faces[mine], return_inverse=True)
-        shades = [body.colour if n < 0 else body.colours[n] for n in paint[mine].tolist()]
+        chosen = of[number] == solid
+        used, corners = np.unique(faces[chosen], return_inverse=True)
+        shades = [body.colour if n < 0 else body.colours[n] for n in paint[chosen].tolist()]
         mesh = MeshFile(((vertices[used], corners.reshape(-1, 3)),))
         name = body.name and f"{body.name}-{index}"
-        found.append(FileBody(name, mesh, most_of(areas[mine], shades)))
-    return tuple(found)
+        solids.append(FileBody(name, mesh, most_of(areas[chosen], shades)))
+    return tuple(solids)
 
 
 def _box(points: Array) -> Array:
@@ -165,14 +166,12 @@ def _box(points: Array) -> Array:
 
 
 def apart(body: FileBody) -> tuple[FileBody, ...]:
-    """The connected components of a body, each as one; the body itself where it is one."""
+    """The connected components of a body; the body itself if it is connected."""
     vertices, faces = body.mesh.merged()
     number = components(len(vertices), faces)
     if number.max() == 0:
         return (body,)
-    found = []
-    for index in range(int(number.max()) + 1):
-        used, corners = np.unique(faces[number == index], return_inverse=True)
-        mesh = MeshFile(((vertices[used], corners.reshape(-1, 3)),))
-        found.append(FileBody(f"{body.name}-{index + 1}", mesh, body.colour))
-    return tuple(found)
+    return tuple(
+        FileBody(f"{body.name}-{index}", MeshFile((mesh,)), body.colour)
+        for index, mesh in enumerate(submeshes(vertices, faces, number), 1)
+    )

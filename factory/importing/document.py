@@ -1,6 +1,7 @@
-"""Nested documents, JSON or YAML, with the place of every value in its text.
+"""Nested documents, JSON or YAML, with the position of every value in the text.
 
-The usual loaders know no places and recurse; a document here may nest as deep as it likes.
+The usual loaders keep no positions and are recursive; a document here may be nested arbitrarily
+deep.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from factory.support.extras import optional
 Kind = Literal["object", "list", "text", "number", "boolean", "null"]
 
 NAMES = {"object": "an object", "list": "a list"}
-"""Kinds in words."""
+"""Names of kinds in messages."""
 
 GRAMMAR = r"""
 ?start: value
@@ -41,19 +42,19 @@ JSON_HINT = "JSON has objects { }, lists [ ], texts in double quotes, numbers, t
 YAML_HINT = "one YAML document of mappings, sequences and scalars"
 
 DEEPEST = 1_000
-"""The most values of YAML within one another: libyaml takes quadratic time in their number, and
-from version 0.2.6 on refuses more itself."""
+"""The greatest nesting depth of YAML: libyaml takes time quadratic in it, and from version 0.2.6 on
+refuses greater depths itself."""
 TOO_DEEP = f"more than {DEEPEST} values are nested here"
 
 YAML_WORDS = {"true": True, "false": False, "null": None, "~": None, "": None}
-"""Plain scalars of YAML that are neither a number, as the PAG language writes it, nor a text."""
+"""Plain YAML scalars that are neither a number of the PAG language nor a text."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class DocumentNode:
-    """A value where it stands. `content`: pairs of key and value of an object, the values of a
-    list, else a str, float, bool or None. Values may nest without end, so they are not compared
-    or printed."""
+    """A value with its position. `content`: the pairs of key and value of an object, the values of
+    a list, else a str, float, bool or None. Values may be nested arbitrarily deep, so they are not
+    compared or printed."""
 
     kind: Kind
     content: Any
@@ -61,7 +62,7 @@ class DocumentNode:
 
     @property
     def words(self) -> str:
-        """What it is, for a message."""
+        """The value in the words of a message."""
         if self.kind == "text":
             return quoted(self.content)
         if self.kind == "number":
@@ -75,24 +76,24 @@ def read_json(source: Source) -> DocumentNode:
     """The value of a JSON text. Raises InputError (Syntax) at the first fault."""
     parser = Lark(GRAMMAR, parser="lalr", transformer=_JsonNodes(source))
     try:
-        found: Any = parser.parse(source.text)
+        root: Any = parser.parse(source.text)
     except UnexpectedInput as error:
         line, column = error.line, error.column
         if isinstance(error, UnexpectedToken) and error.token.type != "$END":
             message = f"{quoted(str(error.token))} is not expected here"
         elif isinstance(error, UnexpectedCharacters):
             start = error.pos_in_stream or 0
-            message = f"{quoted(source.text[start : start + 20])} is no JSON"
+            message = f"{quoted(source.text[start : start + 20])} is not JSON"
         else:
             message = "the text ends too early"
             line, column = len(source.lines), len(source.lines[-1]) + 1
         raise _syntax_error(source, line, column, message, JSON_HINT) from None
-    return found  # type: ignore[no-any-return]
+    return root  # type: ignore[no-any-return]
 
 
 @v_args(inline=True)
 class _JsonNodes(Transformer[Token, DocumentNode]):
-    """Makes values while the text is parsed, so nothing recurses."""
+    """Builds values during parsing, without recursion."""
 
     def __init__(self, source: Source) -> None:
         super().__init__()
@@ -121,7 +122,7 @@ class _JsonNodes(Transformer[Token, DocumentNode]):
 
 def read_yaml(source: Source) -> DocumentNode:
     """The value of a YAML text, from the events of PyYAML. Raises InputError (Syntax) at the first
-    fault, MissingError where PyYAML is not installed."""
+    fault, and MissingError if PyYAML is not installed."""
     yaml = optional("yaml", "PyYAML", "reading YAML", "yaml", "write the tree as JSON")
     nodes = _YamlNodes(source)
     try:
@@ -143,7 +144,7 @@ def read_yaml(source: Source) -> DocumentNode:
 
 
 class _YamlNodes:
-    """Puts values together; those that are not complete are on a stack."""
+    """Assembles values from events; incomplete ones are on a stack."""
 
     def __init__(self, source: Source) -> None:
         self.source = source
@@ -152,7 +153,7 @@ class _YamlNodes:
         self.anchors: dict[str, DocumentNode] = {}
 
     def take(self, kind: str, event: Any) -> None:
-        """Go on by one event."""
+        """Process one event."""
         if kind in ("MappingStartEvent", "SequenceStartEvent"):
             self._check_tag(event)
             if len(self.open) == DEEPEST:
@@ -189,7 +190,7 @@ class _YamlNodes:
 
     def _check_tag(self, event: Any) -> None:
         if event.tag not in (None, "!", "tag:yaml.org,2002:str"):
-            raise self._error(event, f"the tag {quoted(event.tag)} means nothing here")
+            raise self._error(event, f"the tag {quoted(event.tag)} is not supported")
 
     def _at(self, event: Any) -> Position:
         line, column = event.start_mark.line, event.start_mark.column
@@ -206,7 +207,7 @@ def _constant(content: bool | None, at: Position) -> DocumentNode:
 
 
 def _syntax_error(source: Source, line: int, column: int, message: str, hint: str) -> InputError:
-    """The refusal of a document that cannot be read on from here (counted from 1)."""
+    """The error of a document that cannot be parsed beyond this line and column (from 1)."""
     line = min(max(line, 1), len(source.lines))
     at = Position(source.file, line, max(column, 1), source.lines[line - 1])
     return InputError(Diagnostic("Syntax", message, at, hint))

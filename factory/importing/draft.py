@@ -1,4 +1,5 @@
-"""A product as a file describes it, before it is a PAG: nodes with the indices of their inputs."""
+"""A product as its file describes it, before it is a PAG: nodes with the indices of their
+inputs."""
 
 from __future__ import annotations
 
@@ -14,14 +15,14 @@ MOST_NODES = 100_000
 """The most parts and sub-assemblies of a product; a larger file is a mistake, or an attack."""
 
 SHOWN = 20
-"""The most errors of one product that are told."""
+"""The most errors of one product that are reported."""
 
 
 @dataclass(slots=True)
 class DraftNode:
-    """A part or sub-assembly. `inputs` are indices in the list of drafts, of which the first is the
-    product; a part has none. `name` is that in the file, "" for none; a `kept` name is a label that
-    the user has chosen, so no other node may have it."""
+    """A part or sub-assembly. `inputs`: indices in the list of drafts, of which the first is the
+    product; empty for a part. `name`: that in the file, "" for none; a `kept` name is a label
+    chosen by the user, which no other node may have."""
 
     name: str
     position: Position
@@ -37,7 +38,7 @@ class DraftNode:
 
 @dataclass(slots=True)
 class ImportFaults:
-    """The errors found in one product's files, and the warnings."""
+    """The errors and warnings of one product's files."""
 
     diagnostics: list[Diagnostic] = field(default_factory=list)
     warnings: list[Diagnostic] = field(default_factory=list)
@@ -47,8 +48,7 @@ class ImportFaults:
         self.diagnostics.append(Diagnostic(code, message, position, hint))
 
     def warn(self, code: str, message: str, position: Position, hint: str, many: str) -> None:
-        """Note something that does not keep the product from being made; `many`: how several are
-        counted."""
+        """Note a warning; `many`: the text for several of its kind."""
         self.warnings.append(Diagnostic(code, message, position, hint, many))
 
     def check_used_once(self, what: str, places: Iterable[Position]) -> None:
@@ -56,38 +56,38 @@ class ImportFaults:
         first, *others = sorted(places, key=_key)
         for position in others:
             where = f"line {first.line}" if first.line != position.line else "this line"
-            message = f"{what} is where {where} has put it already"
-            hint = "a part is used once: give each a place of its own, or remove one"
+            message = f"{what} is where {where} already places it"
+            hint = "give each copy its own place, or remove one"
             self.add("UsedTwice", message, position, hint)
 
     def raise_if_any(self) -> None:
-        """Raise one InputError with the first errors found, if there is any; errors that differ in
-        their places alone are one."""
-        found: dict[tuple[str, str], list[Diagnostic]] = {}
+        """Raise one InputError with the first errors, if there are any. Errors that differ only in
+        their positions are merged."""
+        groups: dict[tuple[str, str], list[Diagnostic]] = {}
         for diagnostic in sorted(self.diagnostics, key=lambda d: _key(d.position)):
-            found.setdefault((diagnostic.code, diagnostic.message), []).append(diagnostic)
-        told = [_once(alike) for alike in found.values()]
-        if len(told) > SHOWN:
-            message = f"and {len(told) - SHOWN} more errors"
-            told = [*told[:SHOWN], Diagnostic(told[-1].code, message)]
-        if told:
-            raise InputError(told)
+            groups.setdefault((diagnostic.code, diagnostic.message), []).append(diagnostic)
+        errors = [_once(alike) for alike in groups.values()]
+        if len(errors) > SHOWN:
+            message = f"and {len(errors) - SHOWN} more errors"
+            errors = [*errors[:SHOWN], Diagnostic(errors[-1].code, message)]
+        if errors:
+            raise InputError(errors)
 
 
 def _once(alike: list[Diagnostic]) -> Diagnostic:
-    """The first of several diagnostics that say the same."""
+    """The first of several equal diagnostics, with the number of others."""
     places = len({d.position for d in alike}) - 1
     more = f" (and in {places} more place{'s' * (places > 1)})" if places else ""
     return replace(alike[0], message=alike[0].message + more)
 
 
 def _key(at: Position | None) -> tuple[str, int, int]:
-    """The order of places: by file, line and column."""
+    """The sort key of a position: file, line and column."""
     return (at.file, at.line, at.column) if at else ("", 0, 0)
 
 
 def postorder(drafts: Sequence[DraftNode]) -> list[int]:
-    """The indices of all nodes that the first is made of, each after its inputs."""
+    """The indices of all nodes below the first, each after its inputs."""
     order, stack = [], [(0, False)]
     while stack:
         index, expanded = stack.pop()
@@ -100,7 +100,7 @@ def postorder(drafts: Sequence[DraftNode]) -> list[int]:
 
 
 def too_many(position: Position) -> InputError:
-    """The refusal of a product that is too large."""
+    """The error of a product that is too large."""
     message = f"the product has more than {MOST_NODES} parts and sub-assemblies"
     hint = "import its sub-assemblies one by one"
     return InputError(Diagnostic("TooLarge", message, position, hint))

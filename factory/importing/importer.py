@@ -1,4 +1,4 @@
-"""From a file to an `Imported`: the choice of the reader, and the files to be written."""
+"""Import of a product: the choice of the reader, and the files to be written."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ KINDS = (*LDRAW[:2], *JSON, *YAML, *BILL)
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """`library`: an LDraw parts library; `boxes`: parts whose shape is missing become boxes;
-    `meshes`: where a tree's meshes are, else beside it; `unit`: the length that 1 stands for in a
-    tree or a bill and in its meshes [m]; `mates`: how more than two inputs are mated."""
+    """`library`: an LDraw parts library; `boxes`: whether parts without a known shape become boxes;
+    `meshes`: the folder of a tree's meshes, None for the tree's own folder; `unit`: the unit of
+    length of a tree or a bill and its meshes [m]; `mates`: how three or more inputs are mated."""
 
     library: Path | None = None
     boxes: bool = False
@@ -69,7 +69,7 @@ def import_product(
     path: Path, templates: Mapping[str, Template], options: Options | None = None
 ) -> Imported:
     """The product in a file, or in a folder with one tree or bill. Nothing is written. Raises
-    InputError with every fault found."""
+    InputError with every fault."""
     options = options or Options()
     file = _file(path)
     faults = ImportFaults()
@@ -83,7 +83,7 @@ def import_product(
 
 
 def _allowing(pag: PAG, files: Mapping[str, bytes]) -> PAG:
-    """An LDraw model whose parts may overlap everywhere by as much as such drawings need."""
+    """An LDraw model in which parts may overlap as much as drawings without fits do."""
     from factory.geometry.overlapping import everywhere
     from factory.geometry.product import product_geometry
 
@@ -105,7 +105,7 @@ def _drafts(
         return read_ldraw(file, options.library, options.boxes, store, faults)
     if kind not in KINDS:
         hint = did_you_mean(kind, KINDS, "endings of files")
-        message = f"{quoted(file.name)} is nothing that can be imported"
+        message = f"{quoted(file.name)} is not a file that can be imported"
         raise InputError(Diagnostic("BadFile", message, None, hint))
     source = source_of(read_text(file), str(file))
     parts = PartMaker(options.meshes or file.parent, store, options.unit, faults)
@@ -117,15 +117,19 @@ def _drafts(
 
 
 def _file(path: Path) -> Path:
-    """The file itself; of a folder, the one tree or bill in it."""
+    """The file itself, or the one tree or bill in a folder."""
     if not path.is_dir():
         return path
-    found = sorted(p for p in path.iterdir() if p.suffix.lower() in KINDS and p.is_file())
-    if len(found) == 1:
-        return found[0]
-    named = ", ".join(p.name for p in found[:5])
-    message = f"the folder {quoted(str(path))} has {named or 'no tree of its meshes'}"
-    hint = "name one of them" if found else "say how they go together: a tree.json or a bill.csv"
+    files = sorted(p for p in path.iterdir() if p.suffix.lower() in KINDS and p.is_file())
+    if len(files) == 1:
+        return files[0]
+    named = ", ".join(p.name for p in files[:5])
+    message = f"the folder {quoted(str(path))} has {named or 'neither a tree nor a bill'}"
+    hint = (
+        "name one of them"
+        if files
+        else "add a tree.json or a bill.csv: how the meshes are assembled"
+    )
     raise InputError(Diagnostic("BadFile", message, None, hint))
 
 

@@ -15,7 +15,7 @@ _LONGEST = 80
 
 
 def label_of(name: str) -> str:
-    """The label most like a name: other characters become `-`; "" if nothing is left.
+    """The label that resembles a name most: other characters become `-`; "" if nothing remains.
 
     >>> label_of("Left wing (2x4).ldr")
     'Left-wing-2x4-.ldr'
@@ -36,8 +36,8 @@ def file_stem(name: str) -> str:
 
 
 class Labeller:
-    """Gives every node a label of its own: a kept name unchanged, a name of several nodes with a
-    number, and `part1`, `sub1` without a name."""
+    """Assigns a unique label to every node: kept names are unchanged, names of several nodes are
+    numbered, nodes without a name become `part1`, `sub1`."""
 
     def __init__(self, drafts: Sequence[DraftNode], order: Iterable[int]) -> None:
         self.drafts = drafts
@@ -65,7 +65,7 @@ class Labeller:
         return label
 
     def within(self, label: str, number: int) -> str:
-        """The label of the first `number` inputs of `label`, mated."""
+        """The label of the first `number` inputs of `label` when they are mated."""
         name = f"{label}.{number}"
         if name in self.taken:
             return self._numbered(f"{name}-")

@@ -27,14 +27,14 @@ from factory.support.order import natural
 
 
 def bodies_in(path: Path) -> Bodies:
-    """The bodies of a folder, a part a file, or of a file. Raises InputError (BadFile, BadMesh)
-    with every file that cannot be read."""
+    """The bodies of a folder, one part per file, or of a single file. Raises InputError (BadFile,
+    BadMesh) with every file that cannot be read."""
     if not path.is_dir():
         faults: list[Diagnostic] = []
-        found = _read(path, faults)
-        if found is None:
+        bodies = _read(path, faults)
+        if bodies is None:
             raise InputError(faults)
-        return found
+        return bodies
     return _folder(path)
 
 
@@ -43,31 +43,31 @@ def _folder(folder: Path) -> Bodies:
     files = [p for p in seen if p.suffix.lower() in (*MESHES, *SCENES) and not p.is_dir()]
     files.sort(key=lambda path: natural(path.name))
     faults: list[Diagnostic] = []
-    found = [made for path in files if (made := _read(path, faults, whole=True)) is not None]
+    sources = [source for path in files if (source := _read(path, faults, whole=True)) is not None]
     if faults:
         raise InputError(faults)
-    check_count(folder, [path.stem for path in files], "files of meshes")
+    check_count(folder, [path.stem for path in files], "mesh files")
     left = [p.name for p in seen if p not in files]
-    notes = [f"{len(files)} files of meshes, a part each"]
+    notes = [f"{len(files)} mesh files, one part each"]
     if left:
         shown = ", ".join(left[:5]) + ", ..." * (len(left) > 5)
-        notes.append(f"{len(left)} in the folder are no meshes, and left out: {shown}")
-    units = {made.unit for made in found}
-    one = found[0] if len(units) == 1 else Bodies(())
-    notes += [note for made in found for note in made.notes]
-    every = tuple(body for made in found for body in made.found)
+        notes.append(f"{len(left)} files in the folder are not meshes and are ignored: {shown}")
+    units = {source.unit for source in sources}
+    one = sources[0] if len(units) == 1 else Bodies(())
+    notes += [note for source in sources for note in source.notes]
+    every = tuple(body for source in sources for body in source.bodies)
     return Bodies(every, one.unit, one.by, one.sure, tuple(notes))
 
 
 def _read(path: Path, faults: list[Diagnostic], whole: bool = False) -> Bodies | None:
-    """The bodies of a file; None after a fault. `whole`: all as one."""
+    """The bodies of a file; None after a fault. `whole`: all bodies as one."""
     suffix = path.suffix.lower()
     try:
         content = read_bytes(path, MESH)
         if whole or suffix in MESHES:
             return read_one(path, content)
         made = read_scene(content, suffix)
-        return replace(made, notes=(f"{len(made.found)} bodies in {path.name}", *made.notes))
+        return replace(made, notes=(f"{len(made.bodies)} bodies in {path.name}", *made.notes))
     except (OSError, UnreadableMesh) as error:
         why = error.strerror if isinstance(error, OSError) else error
         message = f"cannot read {quoted(path.name)}: {why}"
@@ -77,31 +77,31 @@ def _read(path: Path, faults: list[Diagnostic], whole: bool = False) -> Bodies |
 
 
 def loose_product(path: Path, bodies: Bodies, unit: str | None) -> Imported:
-    """The product of loose bodies: a mesh a kind, and where each part of the kind is. A single body
-    of several pieces is taken to pieces."""
+    """The product of loose bodies: one mesh per kind, and the place of each part. A single body is
+    split into its connected components."""
     notes = list(bodies.notes)
-    if len(bodies.found) == 1 and len(pieces := apart(bodies.found[0])) > 1:
-        bodies = replace(bodies, found=pieces)
-        notes.append(f"one body of {len(pieces)} pieces that share no corner: a part each")
-    check_count(path, [body.name for body in bodies.found], "bodies")
-    metres, said = unit_of(bodies, unit)
+    if len(bodies.bodies) == 1 and len(pieces := apart(bodies.bodies[0])) > 1:
+        bodies = replace(bodies, bodies=pieces)
+        notes.append(f"one body of {len(pieces)} disconnected pieces: one part each")
+    check_count(path, [body.name for body in bodies.bodies], "bodies")
+    metres, unit_note = unit_of(bodies, unit)
     name = file_stem(path.resolve().name if path.is_dir() else path.stem)
-    pag, meshes = _assembled(name, path, bodies.found, metres)
-    return Imported(name, pag, meshes, path.name, (*notes, said), has_tree=False)
+    pag, meshes = _assembled(name, path, bodies.bodies, metres)
+    return Imported(name, pag, meshes, path.name, (*notes, unit_note), has_tree=False)
 
 
 def _assembled(
     name: str, path: Path, bodies: tuple[FileBody, ...], unit: float
 ) -> tuple[PAG, dict[str, bytes]]:
-    """The PAG that mates all bodies at once, and its mesh files. Parts of a kind without a colour
-    have the same."""
+    """The PAG that mates all bodies at once, and its mesh files. Parts of one kind that have no
+    colour get the same one."""
     here, store = Position(str(path), 1, 1), MeshStore("meshes")
     drafts = [DraftNode(name, here, inputs=list(range(1, len(bodies) + 1)))]
     shapes = [shape_of(*_scaled(body.mesh.merged(), unit)) for body in bodies]
-    found, origins, meshes = alike(shapes), dict[int, Array](), dict[int, str]()
-    numbers = {kind: number for number, kind in enumerate(dict.fromkeys(found.kinds))}
+    kinds, origins, meshes = alike(shapes), dict[int, Array](), dict[int, str]()
+    numbers = {kind: number for number, kind in enumerate(dict.fromkeys(kinds.kinds))}
     for index, body in enumerate(bodies):
-        kind, motion = found.kinds[index], found.motions[index]
+        kind, motion = kinds.kinds[index], kinds.motions[index]
         if kind == index:
             low, high = shapes[index].vertices.min(axis=0), shapes[index].vertices.max(axis=0)
             origins[kind] = np.round((low + high) / 2, 6)
@@ -121,7 +121,7 @@ def _scaled(mesh: tuple[Array, Indices], unit: float) -> tuple[Array, Indices]:
 
 
 def _name(body: FileBody, index: int) -> str:
-    """A name that begins with a letter: that of the body, or its number."""
+    """A name that begins with a letter, from that of the body or its number."""
     label = label_of(body.name)
     if not label:
         return f"part{index + 1}"

@@ -1,4 +1,4 @@
-"""Mesh files of an imported product: where they are found, and what they are called when copied."""
+"""Mesh files of an imported product: the search for them, and their names in the output."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from factory.importing.labels import file_stem
 
 
 def path_inside(name: str) -> PurePosixPath | None:
-    """The relative path that a name in a file stands for; None where it leads out of its folder."""
+    """The relative path of a name in a file; None if it leads out of its folder."""
     inside = PurePosixPath(name.replace("\\", "/"))
     if inside.is_absolute() or ".." in inside.parts or ":" in name or "\0" in name:
         return None
@@ -29,8 +29,8 @@ def first_file(paths: Iterable[Path]) -> Path | None:
 
 
 class MeshStore:
-    """The mesh files to be written: contents by path in the output folder. Equal ones are there
-    once, under names that stay in their folder."""
+    """The mesh files to be written: contents by path in the output folder. Equal contents are
+    stored once, under names that stay in their folder."""
 
     def __init__(self, folder: str) -> None:
         self.folder = folder
@@ -39,7 +39,7 @@ class MeshStore:
         self._taken: set[str] = set()
 
     def add(self, name: str, suffix: str, content: bytes) -> str:
-        """The path of a mesh with this content, called as nearly as can be `name`."""
+        """The path of a mesh with this content, named as similar to `name` as possible."""
         stem, digest = file_stem(name), sha256(content).hexdigest()
         key = (digest, suffix)
         if key not in self._names:

@@ -24,8 +24,8 @@ LENGTHS = tuple(name for name, kind in GEOMETRY.items() if kind.long)
 
 @dataclass(slots=True)
 class PartMaker:
-    """Makes parts of a tree or a bill. `folder`: that of its meshes, each of which is read once and
-    put in the `store`; `unit`: the length that 1 stands for in the file and its meshes [m]."""
+    """Makes parts of a tree or a bill. `folder`: the folder of its meshes, each of which is read
+    once and added to the `store`; `unit`: the unit of length of the file and its meshes [m]."""
 
     folder: Path
     store: MeshStore
@@ -35,48 +35,48 @@ class PartMaker:
     there: dict[tuple[Parameter, ...], list[Position]] = field(default_factory=dict)
 
     def parameters(
-        self, given: Mapping[str, Value], place: Placement, position: Position
+        self, values: Mapping[str, Value], place: Placement, position: Position
     ) -> tuple[Parameter, ...]:
-        """The parameters of a part in a frame; its mesh is fetched, its lengths are in metres. Two
-        shapes and an unknown mesh are noted."""
-        shapes = [name for name in SHAPES if name in given]
+        """The parameters of a part in a frame, with its mesh fetched and lengths in metres. Two
+        shapes, and an unknown mesh, are noted as faults."""
+        shapes = [name for name in SHAPES if name in values]
         if len(shapes) > 1:
             message = f"a part has one shape, but '{shapes[0]}' and '{shapes[1]}' are given"
             self.faults.add("BadValue", message, position, f"keep one of {', '.join(SHAPES)}")
-        metres = self.metres(given)
-        if "mesh" in given:
-            path = self._mesh(str(given["mesh"]), position)
+        metres = self.metres(values)
+        if "mesh" in values:
+            path = self._mesh(str(values["mesh"]), position)
             metres |= {"mesh": path or ""}
             if self.unit != 1:
                 metres.setdefault("scale", self.unit)
-        placed = shapes or "pos" in given or "quat" in given
+        placed = shapes or "pos" in values or "quat" in values
         stands = place.parameters(metres) if placed else []
         first = [Parameter(name, metres.pop(name)) for name in shapes]
         rest = [Parameter(name, metres[name]) for name in metres if name not in ("pos", "quat")]
-        if self.meshes.get(str(given.get("mesh"))):
+        if self.meshes.get(str(values.get("mesh"))):
             self.there.setdefault((*first, *stands), []).append(position)
         return (*first, *stands, *rest)
 
     def check_places(self) -> None:
-        """Note each mesh in the place of an equal one (UsedTwice)."""
+        """Note each mesh that is in the place of an equal one (UsedTwice)."""
         for (mesh, *_), positions in self.there.items():
             name = quoted(str(mesh.value).partition("/")[2])
             self.faults.check_used_once(f"the mesh {name}", positions)
 
-    def metres(self, given: Mapping[str, Value]) -> dict[str, Value]:
+    def metres(self, values: Mapping[str, Value]) -> dict[str, Value]:
         """These parameters with lengths in metres."""
-        made = dict(given)
+        converted = dict(values)
         for name in LENGTHS:
-            value = given.get(name)
+            value = values.get(name)
             if self.unit != 1 and isinstance(value, tuple):
-                made[name] = tuple(x * self.unit for x in value)
+                converted[name] = tuple(x * self.unit for x in value)
             elif self.unit != 1 and isinstance(value, float):
-                made[name] = value * self.unit
-        return made
+                converted[name] = value * self.unit
+        return converted
 
     def _mesh(self, name: str, position: Position) -> str | None:
-        """The path of a mesh in the output; None where something is wrong with it, which is noted
-        for each place that names it (BadPath, UnknownMesh, BadMesh)."""
+        """The path of a mesh in the output; None if it cannot be used, which is noted for each
+        position that names it (BadPath, UnknownMesh, BadMesh)."""
         if self.meshes.get(name) is None:
             self.meshes[name] = self._fetch(name, position)
         return self.meshes[name]
@@ -84,7 +84,7 @@ class PartMaker:
     def _fetch(self, name: str, position: Position) -> str | None:
         inside = path_inside(name)
         if inside is None:
-            message = f"{quoted(name)} leads out of the folder of the meshes"
+            message = f"{quoted(name)} is outside the folder of the meshes"
             hint = "put the mesh in that folder, or name another by --meshes DIR"
             self.faults.add("BadPath", message, position, hint)
             return None

@@ -17,32 +17,34 @@ UNTURNED = (1.0, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placement:
-    """A frame in the product: a vertex v in it stands at turn · v + at [m]."""
+    """A frame in the product: a vertex v of it is at turn · v + at [m]. `moved`: whether it differs
+    from that of the product."""
 
     turn: Array = field(default_factory=lambda: np.eye(3))
     at: Array = field(default_factory=lambda: np.zeros(3))
     moved: bool = False
 
-    def inside(self, given: Mapping[str, Value]) -> Placement:
-        """The frame at `pos` [m], turned by `quat`, in this one; this one without either."""
-        if not given.keys() & {"pos", "quat"}:
+    def inside(self, values: Mapping[str, Value]) -> Placement:
+        """The frame at `pos` [m], rotated by `quat`, in this frame; this frame if both are
+        missing."""
+        if not values.keys() & {"pos", "quat"}:
             return self
-        there = self.turn @ np.array(given.get("pos", (0.0, 0.0, 0.0))) + self.at
-        unit = np.array(given.get("quat", UNTURNED))
+        there = self.turn @ np.array(values.get("pos", (0.0, 0.0, 0.0))) + self.at
+        unit = np.array(values.get("quat", UNTURNED))
         unit /= np.abs(unit).max()
         return Placement(self.turn @ rotation(unit / np.linalg.norm(unit)), there, True)
 
-    def parameters(self, given: Mapping[str, Value]) -> list[Parameter]:
-        """`pos` and `quat` of a part in this frame; unchanged where that is the product's."""
+    def parameters(self, values: Mapping[str, Value]) -> list[Parameter]:
+        """`pos` and `quat` of a part in this frame; unchanged if the frame is the product's."""
         if self.moved:
-            whole = self.inside(given)
+            whole = self.inside(values)
             turn = quaternion(whole.turn)
-            given = {"pos": rounded(whole.at)} | ({} if turn == UNTURNED else {"quat": turn})
-        return [Parameter(name, given[name]) for name in ("pos", "quat") if name in given]
+            values = {"pos": rounded(whole.at)} | ({} if turn == UNTURNED else {"quat": turn})
+        return [Parameter(name, values[name]) for name in ("pos", "quat") if name in values]
 
 
 def rounded(numbers: Array) -> tuple[float, ...]:
-    """Numbers to nine decimals: a nanometre."""
+    """Numbers rounded to nine decimals: to a nanometre."""
     return tuple(float(x) for x in np.round(numbers, 9) + 0.0)
 
 

@@ -1,8 +1,8 @@
-"""Scene files: GLB, 3MF and STEP with a body, or several, in each part.
+"""Scene files: GLB, 3MF and STEP, in which each part has one or more bodies.
 
-OpenCASCADE (cascadio) converts STEP to triangles in a process of its own. A file that makes it
-fail, or take all memory, ends only that process; what it prints is not shown; and a signal is
-handled at once.
+OpenCASCADE (cascadio) converts STEP to triangles in a separate process. A file that makes it crash,
+or use up all memory, ends only that process; its output is not shown; and signals are handled at
+once.
 """
 
 from __future__ import annotations
@@ -24,30 +24,29 @@ from factory.support.extras import optional
 from factory.support.files import MESH, read_bytes
 
 STEP, SCENES = (".step", ".stp"), (".glb", ".3mf", ".step", ".stp")
-"""Endings of files whose bodies have names."""
+"""Suffixes of files whose bodies have names."""
 
 MESHES = (".obj", ".stl", ".ply", ".off")
-"""Endings of files with one body."""
+"""Suffixes of files with one body."""
 
 STATED = {
     ".glb": ("m", "a GLB file is in metres by its standard", False),
     ".step": ("m", "a STEP file states its unit", True),
 }
-"""The unit of what is made of a file, the rule that says so, and whether the file says so
-itself."""
+"""The unit of length by format, the rule that states it, and whether the file itself does."""
 
 NAMELESS = re.compile(
     r"(?i)(|=>.*|\W*\d*\W*|(nauo|node|mesh|object|geometry|solid|body|group|component|world)"
     r"[ _.\-]*\d*|[0-9a-f\-]{16,})"
 )
-"""Names that programs make up."""
+"""Names that programs generate."""
 
 SHOWN = 6
-"""So many parts of several bodies are named."""
+"""The most parts of several bodies that a note names."""
 
 
 MEMORY = 8 << 30
-"""The most address space of the process [bytes]."""
+"""The limit of the address space of the process [bytes]."""
 
 CONVERT = f"""
 import resource, sys
@@ -62,22 +61,22 @@ BEGIN = b"ISO-10303-21"
 
 
 def read_scene(content: bytes, suffix: str) -> Bodies:
-    """The bodies of a file with this ending, lower case, by their names; the solids of a component
-    of a STEP file are a body each. Raises UnreadableMesh, and MissingError where the package is
-    missing that reads it."""
+    """The named bodies of a file with this suffix, in lower case; each solid of a STEP component is
+    a body. Raises UnreadableMesh, and MissingError if the package that reads the format is
+    missing."""
     kind = ".step" if suffix in STEP else suffix
     if not content.strip():
         raise UnreadableMesh("it is empty")
     if kind == ".3mf":
-        found, unit = threemf_file.read_3mf(content)
+        meshes, unit = threemf_file.read_3mf(content)
         metres = threemf_file.UNITS.get(unit)
         if metres is None:
             raise UnreadableMesh(f"it states a unit that 3MF does not have: {unit[:20]}")
-        bodies = [_body(body, kind, metres) for body in _few(found)]
+        bodies = [_body(body, kind, metres) for body in _few(meshes)]
         stated = "m", f"the 3MF file states {unit}", True
     else:
-        found = (read_step if kind == ".step" else read_glb)(content)
-        bodies = [_body(body, kind) for body in _few(found)]
+        meshes = (read_step if kind == ".step" else read_glb)(content)
+        bodies = [_body(body, kind) for body in _few(meshes)]
         stated = STATED[kind]
     if not bodies:
         checked((), kind)
@@ -85,7 +84,7 @@ def read_scene(content: bytes, suffix: str) -> Bodies:
         return Bodies(tuple(bodies), *stated, _merged(bodies))
     parts = [solids_of(body) for body in bodies]
     notes = [
-        f"component '{body.name}' has {len(solids)} solids: a part each"
+        f"component '{body.name}' has {len(solids)} solids: one part each"
         for body, solids in zip(bodies, parts, strict=True)
         if len(solids) > 1
     ]
@@ -94,48 +93,47 @@ def read_scene(content: bytes, suffix: str) -> Bodies:
 
 
 def _few(bodies: list[GlbBody]) -> list[GlbBody]:
-    """The same bodies, if they are no more than can be planned."""
+    """The bodies, if they are no more than can be planned."""
     if len(bodies) > MOST_PARTS:
         raise UnreadableMesh(f"it has {len(bodies)} bodies; at most {MOST_PARTS} are planned")
     return bodies
 
 
 def _body(body: GlbBody, suffix: str, unit: float = 1.0) -> FileBody:
-    """A body of a file, in another unit."""
+    """A body of a file, scaled by a unit."""
     name = next((name for name in body.names if not NAMELESS.fullmatch(name)), "")
     mesh = checked([(vertices * unit, faces) for vertices, faces in body.bodies], suffix)
     return FileBody(name, mesh, most_of(mesh.areas(), body.colours), body.colours)
 
 
 def _merged(bodies: Sequence[FileBody]) -> tuple[str, ...]:
-    """That bodies which a file keeps together are one part each, in words; none where it keeps
-    none."""
+    """A note on the bodies that the file groups into one part; empty if there are none."""
     counts = [(body.name, count) for body in bodies if (count := len(solids_of(body))) > 1]
     if not counts:
         return ()
     shown = [f"'{name}' of {count}" for name, count in counts]
-    return (f"bodies that the file keeps together are one part: {listing(shown, SHOWN)}",)
+    return (f"bodies grouped in the file are one part: {listing(shown, SHOWN)}",)
 
 
 def read_one(path: Path, content: bytes) -> Bodies:
-    """The bodies of a file as one body, named after the file. Raises UnreadableMesh."""
+    """All bodies of a file as one body, named after the file. Raises UnreadableMesh."""
     suffix = path.suffix.lower()
     if suffix in MESHES:
         return Bodies((FileBody(path.stem, read_mesh(content, suffix)),))
     scene = read_scene(content, suffix)
-    every = tuple(body for found in scene.found for body in found.mesh.bodies)
-    colours = {found.colour for found in scene.found}
+    meshes = tuple(body for part in scene.bodies for body in part.mesh.bodies)
+    colours = {part.colour for part in scene.bodies}
     colour = colours.pop() if len(colours) == 1 else None
-    many = len(scene.found)
-    notes = (f"{path.name} has {many} bodies: one part, as each file is",) * (many > 1)
+    many = len(scene.bodies)
+    notes = (f"{path.name} has {many} bodies: one part, as each file of a folder",) * (many > 1)
     return Bodies(
-        (FileBody(path.stem, MeshFile(every), colour),), scene.unit, scene.by, scene.sure, notes
+        (FileBody(path.stem, MeshFile(meshes), colour),), scene.unit, scene.by, scene.sure, notes
     )
 
 
 def read_step(content: bytes) -> list[GlbBody]:
-    """The components of a STEP file that have faces, in metres, in the colours that it states.
-    Raises UnreadableMesh, and MissingError without cascadio."""
+    """The components of a STEP file that have faces, in metres, with the colours that the file
+    states. Raises UnreadableMesh, and MissingError without cascadio."""
     optional("cascadio", "cascadio", "reading STEP", "step", "export it as GLB or 3MF")
     if BEGIN not in content[:4096]:
         raise UnreadableMesh(f"it is not {EXPECTED['.step']}")
@@ -160,7 +158,7 @@ def read_step(content: bytes) -> list[GlbBody]:
 
 
 def _stated(linear: Colour) -> Colour:
-    """A colour as STEP states it: glTF has its light in its place (IEC 61966-2-1)."""
+    """A colour as STEP states it, in sRGB; glTF has linear values (IEC 61966-2-1)."""
     if linear is None:
         return None
     light = [12.92 * x if x <= 0.0031308 else 1.055 * x ** (1 / 2.4) - 0.055 for x in linear[:3]]

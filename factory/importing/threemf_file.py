@@ -1,7 +1,7 @@
-"""3MF files as bodies: a ZIP archive of XML, read as a stream.
+"""3MF files as bodies: a ZIP archive of XML, parsed as a stream.
 
-What an archive unpacks to, how many objects it places and how many triangles they have is bounded
-before memory is taken for it: each object may place others twice, forty deep.
+The size of the unpacked archive and the numbers of placed objects and triangles are bounded before
+memory is allocated: each object may place others twice, forty deep.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ UNITS = {
 """The units that a 3MF file may state [m]."""
 
 PLACES = 100_000
-"""The most places of objects, those of objects within objects counted."""
+"""The most placed objects, nested ones included."""
 
 NESTED = 100
-"""So deep, at most, objects are within objects."""
+"""The greatest nesting depth of objects."""
 
 ROOT = "3d/3dmodel.model"
 
@@ -44,16 +44,16 @@ ZIP_FAULTS = (
     *(zipfile.BadZipFile, zlib.error, struct.error, EOFError, OSError),
     *(NotImplementedError, OverflowError, RuntimeError, ValueError),
 )
-"""What zipfile raises of an archive that is none, damaged, or locked."""
+"""Exceptions of zipfile for an archive that is invalid, damaged, or encrypted."""
 
 Matrix = NDArray[np.float64]
 Key = tuple[str, str]
-"""The file in the archive that an object is in, lower case, and its id there."""
+"""The file of an object in the archive, in lower case, and the object's id in it."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Placed:
-    """An object at a place in another one, or on the plate; `name` "" for that of the object."""
+    """An object placed in another one, or on the plate; `name` "" for that of the object."""
 
     key: Key
     matrix: Matrix
@@ -71,7 +71,7 @@ class _Object:
 
 
 def read_3mf(content: bytes) -> tuple[list[GlbBody], str]:
-    """The meshes that the plate of a 3MF file places, a body each, in its unit; and that unit.
+    """The meshes on the plate of a 3MF file, one body each, in the file's unit; and that unit.
     Raises UnreadableMesh."""
     files = _files(content)
     root = next((name for name in files if name.endswith(ROOT)), None)
@@ -96,7 +96,7 @@ def _files(content: bytes) -> dict[str, bytes]:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             models = [i for i in archive.infolist() if i.filename.lower().endswith(".model")]
             if sum(info.file_size for info in models) > MESH:
-                raise UnreadableMesh(f"it unpacks to more than {MESH // MIB} MiB, the most")
+                raise UnreadableMesh(f"it unpacks to more than {MESH // MIB} MiB, the limit")
             return {i.filename.lower().strip("/"): archive.read(i) for i in models}
     except ZIP_FAULTS:
         raise _broken() from None
@@ -111,7 +111,7 @@ class _Model:
         self.open: _Object | None = None
 
     def read(self, text: bytes) -> None:
-        """Read its objects, and what is on the plate."""
+        """Read the objects, and the items on the plate."""
         parser = expat.ParserCreate()
         parser.StartElementHandler = self._start
         parser.StartDoctypeDeclHandler = self._doctype
@@ -123,52 +123,52 @@ class _Model:
     def _doctype(self, *_: object) -> None:
         raise _broken("a document type declaration is not accepted")
 
-    def _start(self, tag: str, said: Mapping[str, str]) -> None:
+    def _start(self, tag: str, attributes: Mapping[str, str]) -> None:
         tag = tag.rpartition(":")[2]
         if tag == "vertex" and self.open is not None:
-            self.open.vertices.extend(_floats([said.get(k, "") for k in "xyz"]))
+            self.open.vertices.extend(_floats([attributes.get(k, "") for k in "xyz"]))
         elif tag == "triangle" and self.open is not None:
-            self.open.corners.extend(_indices([said.get(k, "") for k in ("v1", "v2", "v3")]))
+            self.open.corners.extend(_indices([attributes.get(k, "") for k in ("v1", "v2", "v3")]))
         elif tag == "object":
-            self.open = _Object(said.get("name", ""))
-            self.objects[self.file, said.get("id", "")] = self.open
+            self.open = _Object(attributes.get("name", ""))
+            self.objects[self.file, attributes.get("id", "")] = self.open
         elif tag == "component" and self.open is not None:
-            self.open.places.append(self._placed(said))
+            self.open.places.append(self._placed(attributes))
         elif tag == "item":
-            self.plate.append(self._placed(said))
+            self.plate.append(self._placed(attributes))
         elif tag == "model":
-            self.unit = said.get("unit", self.unit)
+            self.unit = attributes.get("unit", self.unit)
 
-    def _placed(self, said: Mapping[str, str]) -> _Placed:
-        path = next((v for k, v in said.items() if k.rpartition(":")[2] == "path"), self.file)
+    def _placed(self, attributes: Mapping[str, str]) -> _Placed:
+        path = next((v for k, v in attributes.items() if k.rpartition(":")[2] == "path"), self.file)
         matrix = np.eye(4)
-        if "transform" in said:
-            rows = np.array(_floats(said["transform"].split()))
+        if "transform" in attributes:
+            rows = np.array(_floats(attributes["transform"].split()))
             if rows.size != 12:
                 raise _broken("a transform is not 12 numbers")
             matrix[:3] = rows.reshape(4, 3).T
-        key = path.lower().strip("/"), said.get("objectid", "")
-        return _Placed(key, matrix, said.get("partnumber", ""))
+        key = path.lower().strip("/"), attributes.get("objectid", "")
+        return _Placed(key, matrix, attributes.get("partnumber", ""))
 
 
 def _floats(words: list[str]) -> list[float]:
     try:
         return [float(word) for word in words]
     except ValueError:
-        raise _broken("a coordinate is no number") from None
+        raise _broken("a coordinate is not a number") from None
 
 
 def _indices(words: list[str]) -> list[int]:
     if all(word.isascii() and word.isdigit() and len(word) < 10 for word in words):
         return [int(word) for word in words]
-    raise _broken("a triangle names no vertex by its number")
+    raise _broken("a triangle refers to a vertex by something other than a number")
 
 
 @np.errstate(all="ignore")
 def _bodies(plate: list[_Placed], objects: Mapping[Key, _Object]) -> list[GlbBody]:
-    """A body for each mesh that is reached from the plate, in the order of the file."""
+    """A body for each mesh that is placed on the plate, in the order of the file."""
     stack = [(place, np.eye(4), 1) for place in reversed(plate)]
-    found, seen, triangles = [], 0, 0
+    bodies, seen, triangles = [], 0, 0
     while stack:
         place, above, depth = stack.pop()
         entry, seen = objects.get(place.key), seen + 1
@@ -187,5 +187,5 @@ def _bodies(plate: list[_Placed], objects: Mapping[Key, _Object]) -> list[GlbBod
             vertices = np.array(entry.vertices).reshape(-1, 3)
             faces = np.array(entry.corners, np.int64).reshape(-1, 3)
             body = moved_by(matrix, vertices, faces)
-            found.append(GlbBody((place.name, entry.name), (body,), (None,)))
-    return found
+            bodies.append(GlbBody((place.name, entry.name), (body,), (None,)))
+    return bodies

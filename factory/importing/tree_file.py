@@ -58,7 +58,7 @@ class TreeReader:
     def _node(
         self, node: Node, draft: DraftNode, place: Placement
     ) -> tuple[tuple[Node, ...], Placement]:
-        """Complete a draft; gives its children and their frame."""
+        """Complete a draft. Returns the children and their frame."""
         if node.kind == "text":
             self._part({"part": node}, draft, place)
             return (), place
@@ -81,20 +81,21 @@ class TreeReader:
         """The values of a node by their keys; unknown and repeated keys are noted."""
         fields: dict[str, Node] = {}
         for key, value in node.content:
-            known = {"mesh": "part", "pos": "at"}.get(str(key.content), str(key.content))
-            if known in LEAF and known not in keys:
-                message, hint = "a sub-assembly is no part", "make the part one of its children"
+            name = {"mesh": "part", "pos": "at"}.get(str(key.content), str(key.content))
+            if name in LEAF and name not in keys:
+                message = f"{quoted(name)} is a key of parts, not of sub-assemblies"
+                hint = "make the part one of its children"
                 self.faults.add("UnknownParameter", message, key.position, hint)
-            elif known not in keys:
-                hint = did_you_mean(known, list(keys), "keys")
+            elif name not in keys:
+                hint = did_you_mean(name, list(keys), "keys")
                 what = "a sub-assembly" if "children" in keys else "a part"
-                message = f"{what} has no key {quoted(known)}"
+                message = f"{what} has no key {quoted(name)}"
                 self.faults.add("UnknownParameter", message, key.position, hint)
-            elif known in fields:
-                message = f"{quoted(known)} is given twice"
+            elif name in fields:
+                message = f"{quoted(name)} is given twice"
                 self.faults.add("BadValue", message, key.position, "remove one of the two")
             else:
-                fields[known] = value
+                fields[name] = value
         return fields
 
     def _name(self, fields: dict[str, Node], draft: DraftNode) -> None:
@@ -119,7 +120,7 @@ class TreeReader:
         children = fields.get("children")
         if children is None or children.kind != "list" or not children.content:
             none = children is None or children.kind in ("list", "null")
-            self._empty(draft, "it has no children" if none else "its children are no list")
+            self._empty(draft, "it has no children" if none else "its children are not a list")
             return (), place
         stands = {name: node for name, node in fields.items() if name in ("at", "quat")}
         inside = place.inside(self.parts.metres(self._geometry(stands)))
@@ -133,21 +134,21 @@ class TreeReader:
             self.faults.add("BadValue", message, node.position, 'for example "operation": "glue"')
             return
         name = MATE if node is None else str(node.content)
-        found = self.operations.get(name)
+        operation = self.operations.get(name)
         at = draft.position if node is None else node.position
-        if found is None or found.inputs == 0 or name == "dropoff":
+        if operation is None or operation.inputs == 0 or name == "dropoff":
             usable = [o.name for o in self.operations.values() if o.inputs and o.name != "dropoff"]
             hint = did_you_mean(name, sorted(usable), "operations")
             message = f"there is no operation {quoted(name)} on sub-assemblies"
             self.faults.add("UnknownOperation", message, at, hint)
             return
-        few, many = count < found.inputs and name != MATE, count > found.inputs
-        if few or (many and not found.further):
-            message = f"{quoted(name)} takes {found.takes}, not {count}"
+        few, many = count < operation.inputs and name != MATE, count > operation.inputs
+        if few or (many and not operation.further):
+            message = f"{quoted(name)} takes {operation.takes}, not {count}"
             hint = "mate the children in a node of their own first"
             self.faults.add("WrongInputs", message, at, hint)
         draft.operation = name
-        draft.parameters = self._parameters(fields.get("parameters"), found)
+        draft.parameters = self._parameters(fields.get("parameters"), operation)
 
     def _parameters(self, node: Node | None, operation: Signature) -> tuple[Parameter, ...]:
         made: list[Parameter] = []
@@ -162,33 +163,33 @@ class TreeReader:
                     hint = did_you_mean(str(key.content), list(operation.parameters), "parameters")
                     message = f"{quoted(operation.name)} has no parameter {key.words}"
                     self.faults.add("UnknownParameter", message, key.position, hint)
-                elif (found := self._value(str(key.content), kind, value)) is not None:
-                    made.append(Parameter(key.content, found))
+                elif (content := self._value(str(key.content), kind, value)) is not None:
+                    made.append(Parameter(key.content, content))
         return tuple(made)
 
     def _part(self, fields: dict[str, Node], draft: DraftNode, place: Placement) -> None:
         draft.operation = PART
         part = fields.pop("part", None)
-        given: dict[str, Value] = {}
+        values: dict[str, Value] = {}
         if part is not None and part.kind == "text":
-            given["mesh"] = part.content
+            values["mesh"] = part.content
             draft.name = draft.name or mesh_name(part.content)
         elif part is not None and not (part.kind == "boolean" and part.content):
             message = f"'part' takes the name of a mesh file, or true, not {part.words}"
             self.faults.add("BadValue", message, part.position, f"for example {EXAMPLE}")
-        given |= self._geometry(fields)
+        values |= self._geometry(fields)
         at = draft.position if part is None else part.position
-        draft.parameters = self.parts.parameters(given, place, at)
+        draft.parameters = self.parts.parameters(values, place, at)
 
     def _geometry(self, fields: dict[str, Node]) -> dict[str, Value]:
-        """The values of parameters of a part's geometry or of a sub-assembly's place."""
-        given: dict[str, Value] = {}
+        """The geometry parameters of a part, or the place of a sub-assembly."""
+        values: dict[str, Value] = {}
         for name, node in fields.items():
             of = "pos" if name == "at" else name
             value = self._value(name, GEOMETRY[of], node)
             if value is not None:
-                given[of] = value
-        return given
+                values[of] = value
+        return values
 
     def _value(self, name: str, kind: Kind, node: Node) -> Value | None:
         """The value of a parameter; None after a fault."""
@@ -196,9 +197,9 @@ class TreeReader:
             return str(node.content)
         numbers = (node,) if node.kind == "number" else node.content
         if (node.kind == "list") == (kind.length > 1) and node.kind in ("list", "number"):
-            found = tuple(n.content for n in numbers if n.kind == "number")
-            if len(found) == len(numbers) and kind.fits(found):
-                return found if kind.length > 1 else found[0]
+            content = tuple(n.content for n in numbers if n.kind == "number")
+            if len(content) == len(numbers) and kind.fits(content):
+                return content if kind.length > 1 else content[0]
         message = f"{quoted(name)} takes {kind.wanted}, not {_shown(node)}"
         listed = kind.example.replace("( ", "[").replace(" )", "]")
         self.faults.add("BadValue", message, node.position, f'for example "{name}": {listed}')

@@ -43,8 +43,8 @@ _PART = re.compile(r"(Unofficial_)?(Part|Subpart|Primitive|8_Primitive|48_Primit
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """A line of type 1: a file placed by x y z and a matrix a..i [LDU] in a colour; `inverted`:
-    with its surfaces inside out."""
+    """A line of type 1: a file placed by x y z and a matrix a..i [LDU], with a colour. `inverted`:
+    whether its surfaces are inside out."""
 
     colour: int
     place: tuple[float, ...]
@@ -55,8 +55,8 @@ class Reference:
 
 @dataclass(slots=True)
 class LDrawFile:
-    """One file, or one `0 FILE` of several: references by building step, its own triangles (nine
-    numbers each [LDU], seen counterclockwise), colours that it defines."""
+    """A file, or one `0 FILE` section of a file: references by building step, its own triangles
+    (nine numbers each [LDU], counterclockwise), and the colours that it defines."""
 
     name: str
     position: Position
@@ -71,19 +71,19 @@ class LDrawFile:
 
     @property
     def is_part(self) -> bool:
-        """Whether it is the shape of a part, not a model made of parts."""
+        """Whether the file is the shape of a part, not a model made of parts."""
         if self.declared:
             return self.declared == "part"
         return self.name.lower().endswith(".dat") or (bool(self.triangles) and not any(self.steps))
 
 
 def key_of(name: str) -> str:
-    """The key of a file name: names that differ in case or slashes are the same."""
+    """The key of a file name, independent of case and slashes."""
     return name.replace("\\", "/").strip().lower()
 
 
 def read_lines(source: Source, name: str, faults: ImportFaults) -> list[LDrawFile]:
-    """The files in a text, the main one first; what is wrong goes to `faults`."""
+    """The files in a text, the main one first; errors go to `faults`."""
     reader = _Reader(source, name, faults)
     for line, text in enumerate(source.lines, 1):
         reader.line(line, text)
@@ -91,7 +91,7 @@ def read_lines(source: Source, name: str, faults: ImportFaults) -> list[LDrawFil
 
 
 class _Reader:
-    """Reads line by line; winding and inversion hold for the lines that follow."""
+    """Reads line by line; winding and inversion apply to the following lines."""
 
     def __init__(self, source: Source, name: str, faults: ImportFaults) -> None:
         self.file, self.faults = source.file, faults
@@ -135,13 +135,13 @@ class _Reader:
                 self._colour(self.current, words)
 
     def _open(self, name: str, at: Position) -> None:
-        """Everything from here on is another file."""
+        """Begin another file."""
         self.clockwise = self.inverted = False
         if not self.opened and not (self.files[0].triangles or any(self.files[0].steps)):
             self.files = []
         first = self.opened.setdefault(key_of(name), at)
         if first is not at:
-            message = f"the file {quoted(name)} is there twice, first in line {first.line}"
+            message = f"the file {quoted(name)} appears twice, first in line {first.line}"
             self.faults.add("DuplicateLabel", message, at, "give each 0 FILE a name of its own")
         self.current = LDrawFile(name, at)
         self.files.append(self.current)
@@ -170,10 +170,10 @@ class _Reader:
             hint = f"write: {corners} COLOUR, then x y z of each of {corners} corners"
             self.faults.add("Syntax", f"{message}; here are {len(words) - 1}", at, hint)
             return
-        found = self._numbers(words[2 : 2 + 3 * corners], at)
-        if found is None:
+        numbers = self._numbers(words[2 : 2 + 3 * corners], at)
+        if numbers is None:
             return
-        points = [found[n : n + 3] for n in range(0, len(found), 3)]
+        points = [numbers[n : n + 3] for n in range(0, len(numbers), 3)]
         if self.clockwise:
             points.reverse()
         for n in range(2, corners):
@@ -200,12 +200,12 @@ class _Reader:
         return code
 
     def _colour(self, file: LDrawFile, words: list[str]) -> None:
-        """`0 !COLOUR Red CODE 4 VALUE #B40000 EDGE #333333 ALPHA 128`; what is broken is no
-        colour."""
-        given = dict(pairwise(words))
-        code = _integer(given.get("CODE", ""))
-        alpha = _integer(given.get("ALPHA", "255"))
-        value = re.fullmatch(r"(?:#|0x)([0-9A-Fa-f]{6})", given.get("VALUE", ""))
+        """`0 !COLOUR Red CODE 4 VALUE #B40000 EDGE #333333 ALPHA 128`; an invalid definition is
+        ignored."""
+        settings = dict(pairwise(words))
+        code = _integer(settings.get("CODE", ""))
+        alpha = _integer(settings.get("ALPHA", "255"))
+        value = re.fullmatch(r"(?:#|0x)([0-9A-Fa-f]{6})", settings.get("VALUE", ""))
         if code is not None and value and alpha is not None:
             file.colours[code] = rgba_of(int(value[1], 16), min(alpha, 255))
 
@@ -224,15 +224,15 @@ def rgba_of(rgb: int, alpha: int = 255) -> tuple[float, float, float, float]:
 
 def common_colours() -> Colours:
     """The colours that models use without a library."""
-    found: Colours = {}
+    colours: Colours = {}
     for words, alpha in ((_COMMON.split(), 255), (_CLEAR.split(), 128)):
         for code, value in zip(words[::2], words[1::2], strict=True):
-            found[int(code)] = rgba_of(int(value, 16), alpha)
-    return found
+            colours[int(code)] = rgba_of(int(value, 16), alpha)
+    return colours
 
 
 def direct_colour(code: int) -> tuple[float, float, float, float] | None:
-    """The colour of a code 0x2RRGGBB, or 0x3RRGGBB, which is half clear."""
+    """The colour of a code 0x2RRGGBB, or of 0x3RRGGBB, which is half transparent."""
     if code >> 24 not in (2, 3):
         return None
     return rgba_of(code & 0xFFFFFF, 255 if code < _DIRECT + 0x1000000 else 128)

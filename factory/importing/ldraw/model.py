@@ -31,17 +31,17 @@ DENSITY = 1050.0
 """Density of ABS [kg/m³]."""
 
 BRICK = (0.008, 0.008, 0.0096)
-"""The box that stands for a part of unknown shape: a brick with one stud [m]."""
+"""The size of the box for a part of unknown shape: a brick with one stud [m]."""
 
 TURNED = 1e-3
-"""A matrix this close to a rotation is one: files are written with three digits and more."""
+"""The tolerance for a rotation matrix: files are written with at least three digits."""
 
 Colour = tuple[float, float, float, float] | None
 
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """The frame of a model in the product [LDU], and the colour of its parts without one."""
+    """The frame of a model in the product [LDU], and the colour that its parts inherit."""
 
     turn: Array
     at: Array
@@ -51,8 +51,8 @@ class _Place:
 def read_ldraw(
     path: Path, library: Path | None, boxes: bool, store: MeshStore, faults: ImportFaults
 ) -> list[DraftNode]:
-    """The drafts of a model, its main file first. Parts whose shape is nowhere are an error
-    (MissingPart), or with `boxes` a box. Raises InputError with every fault found."""
+    """The drafts of a model, its main file first. A part without a known shape is an error
+    (MissingPart), or a box with `boxes`. Raises InputError with every fault."""
     shelf = Shelf(path, library, faults)
     reader = _ModelReader(shelf, Shapes(shelf), boxes, store, faults)
     faults.raise_if_any()
@@ -74,7 +74,7 @@ class _ModelReader:
         self.greys: set[int] = set()
 
     def survey(self) -> None:
-        """Check every model once: none is missing, empty, made of itself or too large."""
+        """Check every model once: none may be missing, empty, too large, or contain itself."""
         size: dict[int, int] = {}
         for model in children_first(self.shelf.main, self._models_in, size):
             entries = [self.shelf.find(reference) for reference in model.references]
@@ -88,28 +88,28 @@ class _ModelReader:
             hint = "a model places parts and other models by lines of type 1"
             self.faults.add("EmptyNode", message, model.position, hint)
         if model.triangles:
-            message = f"{quoted(model.name)} has surfaces of its own, which are left out"
+            message = f"{quoted(model.name)} has surfaces of its own, which are ignored"
             hint = "only parts have shapes: put them in a 0 FILE of their own, ending in .dat"
-            many = "models have surfaces of their own, which are left out"
+            many = "models have surfaces of their own, which are ignored"
             self.faults.warn("BadMesh", message, model.position, hint, many)
-        found = []
+        models = []
         for reference in model.references:
             below = self.shelf.find(reference)
             if below is not None and id(below) in path:
-                message = f"the model {quoted(reference.file)} is made of itself"
+                message = f"the model {quoted(reference.file)} contains itself"
                 hint = "remove this line, or the one that leads here"
                 self.faults.add("CyclicModel", message, reference.position, hint)
             elif below is not None and not below.is_part:
-                found.append(below)
+                models.append(below)
             else:
                 self._check_part(reference, below)
-        return found
+        return models
 
     def _check_part(self, reference: Reference, file: LDrawFile | None) -> None:
         if abs(np.linalg.det(matrix(reference))) < 1e-9:
-            message = f"the matrix of {quoted(reference.file)} makes it flat"
+            message = f"the matrix of {quoted(reference.file)} is singular: the part would be flat"
             self.faults.add(
-                "BadValue", message, reference.position, "1 0 0 0 1 0 0 0 1 turns nothing"
+                "BadValue", message, reference.position, "the identity is 1 0 0 0 1 0 0 0 1"
             )
         if self.boxes:
             return
@@ -143,7 +143,8 @@ class _ModelReader:
     def _enter(
         self, reference: Reference, place: _Place, drafts: list[DraftNode]
     ) -> tuple[int, tuple[LDrawFile | None, _Place]]:
-        """Add the draft of a line; gives its index, and the model that the line places, if any."""
+        """Add the draft of a line. Returns its index, and the model that the line places, if
+        any."""
         turn = place.turn @ matrix(reference)
         at = place.turn @ np.array(reference.place[:3]) + place.at
         colour = place.colour if reference.colour in INHERITED else reference.colour
@@ -166,17 +167,17 @@ class _ModelReader:
         turn = UPRIGHT @ place.turn @ UPRIGHT.T
         rigid = np.abs(turn @ turn.T - np.eye(3)).max() < TURNED and np.linalg.det(turn) > 0
         mesh = self._mesh(reference, file, np.eye(3) if rigid else place.turn)
-        found = [Parameter("mesh", mesh) if mesh else Parameter("box", BRICK)]
+        parameters = [Parameter("mesh", mesh) if mesh else Parameter("box", BRICK)]
         at = UPRIGHT @ place.at * LDU
         if not mesh:
             at = at - turn @ np.array([0.0, 0.0, BRICK[2] / 2])
-        found += Placement(turn if rigid else np.eye(3), at, moved=True).parameters({})
-        found.append(Parameter("density", DENSITY))
+        parameters += Placement(turn if rigid else np.eye(3), at, moved=True).parameters({})
+        parameters.append(Parameter("density", DENSITY))
         rgba = self._rgba(place.colour, reference)
-        return (*found, Parameter("rgba", rgba)) if rgba else tuple(found)
+        return (*parameters, Parameter("rgba", rgba)) if rgba else tuple(parameters)
 
     def _mesh(self, reference: Reference, file: LDrawFile | None, turn: Array) -> str:
-        """The path of a part's mesh; "" where it has none."""
+        """The path of a part's mesh; "" if it has none."""
         triangles = self.shapes.of(file) if file is not None else None
         if file is None or triangles is None or isinstance(triangles, Diagnostic):
             return ""
@@ -193,15 +194,15 @@ class _ModelReader:
     def _rgba(self, code: int, reference: Reference) -> Colour:
         if code in INHERITED:
             return None
-        known = self.shelf.colours.get(code) or direct_colour(code)
-        if known is None and code not in self.greys:
+        rgba = self.shelf.colours.get(code) or direct_colour(code)
+        if rgba is None and code not in self.greys:
             self.greys.add(code)
-            message = f"colour {code} is not known: the part gets one of the factory's"
+            message = f"colour {code} is unknown: the part gets a default colour"
             hint = "a library's LDConfig.ldr defines colours, or a line 0 !COLOUR"
-            many = "colours are not known: parts get one of the factory's"
+            many = "colours are unknown: parts get default colours"
             position = replace(reference.position, column=3)
             self.faults.warn("UnknownColour", message, position, hint, many)
-        return known
+        return rgba
 
 
 def _name(file: LDrawFile) -> str:

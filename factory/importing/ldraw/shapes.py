@@ -1,4 +1,4 @@
-"""The shapes of LDraw parts: triangles of a file and of all that it refers to."""
+"""The shapes of LDraw parts: the triangles of a file and of all files that it refers to."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ UPRIGHT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """From LDraw's axes, -y up, to the factory's, z up."""
 
 MOST_TRIANGLES = 1_000_000
-"""The most triangles of a part: files within files multiply them."""
+"""The most triangles of a part: nested files multiply them."""
 
 LIBRARY = "--library DIR names a parts library (or LDRAWDIR does); --boxes does without"
 """The hint where a part file is missing."""
@@ -32,32 +32,32 @@ def matrix(reference: Reference) -> Array:
 
 
 class Shapes:
-    """Triangles (n, 3, 3) of files [LDU], each made once, or the error that prevents them."""
+    """The triangles (n, 3, 3) of files [LDU], computed once each, or the error that prevents it."""
 
     def __init__(self, shelf: Shelf) -> None:
         self.shelf = shelf
-        self.found: dict[int, Array | Diagnostic] = {}
+        self.triangles: dict[int, Array | Diagnostic] = {}
 
     def of(self, file: LDrawFile) -> Array | Diagnostic:
         """The triangles of a part, or the error that prevents them."""
-        for current in children_first(file, self._below, self.found):
-            if id(current) not in self.found:
+        for current in children_first(file, self._below, self.triangles):
+            if id(current) not in self.triangles:
                 self._join(current)
-        return self.found[id(file)]
+        return self.triangles[id(file)]
 
     def _below(self, file: LDrawFile, path: Set[int]) -> list[LDrawFile]:
-        found = []
+        files = []
         for reference in file.references:
             below = self.shelf.find(reference)
             if below is not None and id(below) in path:
-                message = f"{quoted(reference.file)} is made of itself"
+                message = f"{quoted(reference.file)} contains itself"
                 self._lacks(file, "CyclicModel", message, reference, "remove the line")
             elif below is not None:
-                found.append(below)
-        return found
+                files.append(below)
+        return files
 
     def _lacks(self, file: LDrawFile, code: str, message: str, at: Reference, hint: str) -> None:
-        self.found.setdefault(id(file), Diagnostic(code, message, at.position, hint))
+        self.triangles.setdefault(id(file), Diagnostic(code, message, at.position, hint))
 
     def _join(self, file: LDrawFile) -> None:
         """The triangles of a file whose sub-files are done."""
@@ -68,9 +68,9 @@ class Shapes:
                 message = f"there is no part file {quoted(reference.file)}"
                 self._lacks(file, "MissingPart", message, reference, LIBRARY)
                 return
-            triangles = self.found[id(below)]
+            triangles = self.triangles[id(below)]
             if isinstance(triangles, Diagnostic):
-                self.found[id(file)] = triangles
+                self.triangles[id(file)] = triangles
                 return
             count += len(triangles)
             if count > MOST_TRIANGLES:
@@ -78,11 +78,11 @@ class Shapes:
                 self._lacks(file, "TooLarge", message, reference, "use a simpler part")
                 return
             pieces.append(_placed(triangles, reference))
-        self.found[id(file)] = np.concatenate(pieces)
+        self.triangles[id(file)] = np.concatenate(pieces)
 
 
 def _placed(triangles: Array, reference: Reference) -> Array:
-    """Triangles as a reference places them; a mirror reverses their corners."""
+    """Triangles as a reference places them; a mirror reverses the order of their corners."""
     turn = matrix(reference)
     moved = triangles @ turn.T + np.array(reference.place[:3])
     inside_out = reference.inverted != (np.linalg.det(turn) < 0)
@@ -90,7 +90,7 @@ def _placed(triangles: Array, reference: Reference) -> Array:
 
 
 def mesh_of(triangles: Array, turn: Array) -> bytes | None:
-    """An OBJ file [m], z up, of triangles [LDU] that `turn` has turned; None if it is empty."""
+    """An OBJ file [m], z up, of triangles [LDU] transformed by `turn`; None if it is empty."""
     import trimesh
 
     corners = triangles @ turn.T @ UPRIGHT.T * LDU

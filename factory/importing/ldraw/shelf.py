@@ -21,7 +21,7 @@ ROOMS = ("parts", "p", "models", "unofficial/parts", "unofficial/p")
 
 
 class Shelf:
-    """The files that a model can refer to, each read once, at the first reference."""
+    """The files that a model refers to, each read once, at the first reference."""
 
     def __init__(self, path: Path, library: Path | None, faults: ImportFaults) -> None:
         self.library, self.faults = library, faults
@@ -37,8 +37,8 @@ class Shelf:
             self.colours |= file.colours if file else {}
 
     def find(self, reference: Reference) -> LDrawFile | None:
-        """The file that a line refers to; None if there is none. A name that leads out of the
-        folders is noted as a fault (BadPath)."""
+        """The file that a line refers to; None if there is none. A name outside the folders is
+        noted as a fault (BadPath)."""
         key = key_of(reference.file)
         if key not in self.files:
             self.files[key] = self._search(reference)
@@ -47,7 +47,7 @@ class Shelf:
     def _search(self, reference: Reference) -> LDrawFile | None:
         inside = path_inside(reference.file)
         if inside is None:
-            message = f"{quoted(reference.file)} leads out of the model's folder and the library"
+            message = f"{quoted(reference.file)} is outside the model's folder and the library"
             self.faults.add("BadPath", message, reference.position, "name a file in one of them")
             self.refused.add(key_of(reference.file))
             return None
@@ -67,9 +67,9 @@ def children_first(
     below: Callable[[LDrawFile, Set[int]], Iterable[LDrawFile]],
     done: Container[int],
 ) -> Iterator[LDrawFile]:
-    """Every file that `below` leads to from the root, after those that it leads to itself; without
-    recursion. `below` is given the ids of the files on the way down, none of which may come again;
-    files whose ids are `done` are left out."""
+    """All files that `below` leads to from the root, each after the files below it; without
+    recursion. `below` is called with the ids of the files on the way down, which must not occur
+    again. Files whose ids are `done` are skipped."""
     stack, path = [(root, False)], set[int]()
     while stack:
         file, expanded = stack.pop()
@@ -79,4 +79,4 @@ def children_first(
         elif id(file) not in done:
             path.add(id(file))
             stack.append((file, True))
-            stack += [(found, False) for found in below(file, path)]
+            stack += [(child, False) for child in below(file, path)]
