@@ -131,7 +131,7 @@ def moved(parts: Parts, factor: float, flat: bool = False) -> dict[str, trimesh.
 def test_groups_that_touch_nothing_are_refused(tmp_path: Path, parts: Parts) -> None:
     code, message = refused(tmp_path, parts)
     assert code == "NotInPlace"
-    assert "groups that touch none of the others" in message
+    assert "groups that do not touch each other" in message
 
 
 def test_a_folder_gives_the_product_its_whole_name(tmp_path: Path) -> None:

@@ -189,7 +189,7 @@ def test_clashes_that_are_allowed_make_a_chain_possible(tmp_path: Path) -> None:
     found = plan(source(tmp_path, CHAIN), allowed)
     assert isinstance(found, Planned)
     assert sum(join.blocked for join in found.operations) >= 1
-    with pytest.raises(InputError, match=r"nothing that is planned is called 'tow'"):
+    with pytest.raises(InputError, match=r"there is no part or kept sub-assembly 'tow'"):
         plan(source(tmp_path, CHAIN), PlanOptions(lay_out=False, allow=("tow",)))
 
 

@@ -167,7 +167,7 @@ def test_one_mesh_of_several_pieces_is_taken_to_pieces(tmp_path: Path) -> None:
 def test_the_steps_of_an_ldraw_model_are_thrown_away() -> None:
     source = read_source(ROOT / "examples" / "cart.mpd", TEMPLATES)
     assert len(source.parts) == 10
-    assert "its 5 steps are thrown away" in source.notes[0]
+    assert "its 5 steps are discarded" in source.notes[0]
     assert source.tree is not None
 
 
@@ -302,7 +302,7 @@ def test_two_parts_in_one_place_are_told(terminal: Terminal, tmp_path: Path) -> 
     meshes = {**table(), "leg 5": table()["leg 2"]}
     error = refused(terminal, folder_of(tmp_path / "parts", meshes))
     assert error["code"] == "UsedTwice"
-    assert "'leg-5' is where 'leg-2' is" in error["message"]
+    assert "'leg-5' has the shape and the place of 'leg-2'" in error["message"]
 
 
 def test_a_part_far_away_is_told(terminal: Terminal, tmp_path: Path) -> None:
@@ -354,7 +354,7 @@ def test_an_open_mesh_is_mended_and_that_is_said(terminal: Terminal, tmp_path: P
         *("-o", tmp_path / "out", "--no-look", "--json"),
     )
     assert done.status == 0
-    assert any("it is mended" in warning["message"] for warning in done.json["warnings"])
+    assert any("it was repaired" in warning["message"] for warning in done.json["warnings"])
 
 
 def test_a_hull_that_stands_for_a_mesh_is_told(

@@ -128,5 +128,5 @@ def test_all_others_come_onto_the_base(base: str, tmp_path: Path) -> None:
     made = [join for join in found.operations if base in (*join.pile, *join.come)]
     assert made and all(base in join.pile for join in made)
     assert all(join.direction[2] > 0 for join in made if join.lowered)
-    with pytest.raises(InputError, match=r"nothing that is planned is called 'plat'"):
+    with pytest.raises(InputError, match=r"there is no part or kept sub-assembly 'plat'"):
         plan(model_source(tmp_path, jig()), PlanOptions(lay_out=False, base="plat"))

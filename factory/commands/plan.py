@@ -176,7 +176,7 @@ def _sought(
     limit = asked.seconds or usual_seconds(len(found.units()))
     with (
         Interruption(False, lambda: print(STOPPING, file=sys.stderr)) as stop,
-        StepBar("looking for a tree", out.silent, limit) as bar,
+        StepBar("searching for a tree", out.silent, limit) as bar,
     ):
 
         def told(what: str, done: int, total: int | None, words: str) -> None:

@@ -1,10 +1,10 @@
-"""Which parts are in the way of which, along each axis over the whole way out, and which touch.
+"""Directional blocking graphs: which parts block which along each axis, and which touch.
 
-A part i that goes out along +axis past j, both where they are in the finished product, is *in the
-way* of it as `check` would find (`compiler/mating/`): the same bodies, depths and tolerance. The
-pairs of an axis are a directional blocking graph (Wilson and Latombe, *Geometric Reasoning about
-Mechanical Assembly*, 1994), here one for an infinite translation, so what is free in it comes all
-the way. The graph of the opposite direction is its transpose.
+A part i that leaves along +axis past j, both in the finished product, is *blocked* by j as `check`
+would find (`compiler/mating/`): with the same bodies, depths and tolerance. The pairs of an axis
+are a directional blocking graph (Wilson and Latombe, *Geometric Reasoning about Mechanical
+Assembly*, 1994) for an infinite translation, so a part that is free in it can be removed
+completely. The graph of the opposite direction is its transpose.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ from factory.planning.parts import InPlace
 from factory.planning.standing import Feet
 
 FREE, SCRAPES, DEEPER, LOCKED, CLASHES = range(5)
-"""How much one part is in another's way: not at all; they scrape, or stay drawn into each other;
-parts that were drawn into each other get a little deeper; they pass through each other, which
-`check` leaves out; they pass through each other and are apart in the end, which `check` calls
-blocked. From LOCKED on, parts interlock."""
+"""Levels of blocking: none; the parts scrape, or stay drawn into each other; parts that were drawn
+into each other get a little deeper; they pass through each other, which `check` leaves out; parts
+that are apart in the end pass through each other, which `check` calls blocked. From LOCKED on,
+parts interlock."""
 
 TIMES, SLACK = 2.0, 3e-4
-"""Parts of which hulls alone are known, and drawn into each other, interlock if on the way they get
-deeper than so many times what they were, and so much [m]."""
+"""Parts that are drawn into each other and known only by their hulls interlock if they get deeper
+on the way than so many times their depth when finished, plus SLACK [m]."""
 
 NEAR = 5e-4
-"""Parts no further apart than this [m] touch; where that leaves the product in several pieces,
-the nearest parts of those touch as well."""
+"""Parts no further apart than this [m] touch. If the product is then not connected, the nearest
+parts of its components touch as well."""
 
 WIDER = 2.0
-"""Pieces are brought together by gaps that grow by this factor."""
+"""The growth factor of the gap by which components are connected."""
 
 AXES = range(3)
 """x, y and z of the product."""
@@ -53,13 +53,12 @@ AXES = range(3)
 class Blocking:
     """The blocking graphs of the units of a plan, by their `labels`.
 
-    `levels` (3, n, n): how much j is in the way of i that goes out along +x, +y or +z; what goes
-    the other way has the transpose. `locks` (3, n, n): whether it may not go out past j. `touch`
-    (n, n): which units touch. `low`, `high` (n, 3): their boxes [m]. `depths` (3, n, n): how deep
-    the first gets into the second [m], none where that is not known. `hidden`: the parts of two
-    units that overlap when finished, as far as the hull of an open mesh shows, the deepest first.
-    `feet`: what units stand on, None where it does not matter whether sub-assemblies tip. `base`:
-    the unit onto which all others come, -1 for none.
+    `levels` (3, n, n): how much j blocks i that leaves along +x, +y or +z; the opposite direction
+    has the transpose. `locks` (3, n, n): whether j prevents i from leaving. `touch` (n, n): which
+    units touch. `low`, `high` (n, 3): their boxes [m]. `depths` (3, n, n): how deep i gets into j
+    [m]; empty if unknown. `hidden`: the parts of two units that overlap in the finished product
+    according to the hull of an open mesh, the deepest first. `feet`: what units stand on; None if
+    tipping does not matter. `base`: the unit onto which all others come, -1 for none.
     """
 
     labels: tuple[str, ...]
@@ -81,8 +80,8 @@ class Blocking:
         return len(self.labels)
 
     def allowing(self, allowed: Sequence[str]) -> Blocking:
-        """The same, where it is accepted that units with these labels pass through whatever there
-        is, or two (`a:b`) through each other."""
+        """The same graphs if units with these labels may pass through all others, or two (`a:b`)
+        through each other."""
         free = np.isin(self.labels, allowed)
         accepted = free[:, None] | free
         for one, _, other in (name.partition(":") for name in allowed if ":" in name):
@@ -96,15 +95,16 @@ class Blocking:
         return int(connected_components(touch, directed=False)[0]) <= 1
 
     def least(self, one: int, other: int) -> tuple[float, int, int]:
-        """Of the six ways of a unit past another that on which they get least deep into each
-        other: how deep [m], the axis, and the side, +1 or -1, to which the first goes out."""
+        """The direction in which a unit gets least deep into another: the depth [m], the axis, and
+        the side, +1 or -1, to which the first leaves."""
         sides = ((+1, one, other), (-1, other, one))
         return min(
             (float(self.depths[axis, i, j]), axis, side) for axis in AXES for side, i, j in sides
         )
 
     def grouped(self, groups: Sequence[Sequence[int]]) -> Blocking:
-        """The same of groups of units, each joined already; each is named after its first."""
+        """The graphs of groups of units that are already joined; each is named after its first
+        unit."""
         count = len(groups)
         member = np.zeros((count, len(self)), bool)
         for number, group in enumerate(groups):
@@ -116,12 +116,12 @@ class Blocking:
             rows = np.maximum.reduceat(table[..., order, :][..., order], starts, axis=-2)
             return np.asarray(np.maximum.reduceat(rows, starts, axis=-1))
 
-        own = np.eye(count, dtype=bool)
+        itself = np.eye(count, dtype=bool)
         based = [number for number, group in enumerate(groups) if self.base in group]
         return Blocking(
             tuple(self.labels[group[0]] for group in groups),
-            np.where(own, FREE, most(self.levels)).astype(np.int8),
-            most(self.locks) & ~own,
+            np.where(itself, FREE, most(self.levels)).astype(np.int8),
+            most(self.locks) & ~itself,
             most(self.touch),
             np.minimum.reduceat(self.low[order], starts),
             np.maximum.reduceat(self.high[order], starts),
@@ -131,35 +131,35 @@ class Blocking:
 
 
 def blocking(source: InPlace) -> Blocking:
-    """The blocking graphs of a source's units. Near linear in the bodies, except where very many
-    lie behind one another."""
+    """The blocking graphs of a source's units. Almost linear in the number of bodies, unless very
+    many lie behind one another."""
     units = source.units()
-    finder, found, unit = _bodies(source)
+    finder, convex, unit = _bodies(source)
     count = len(units)
     levels, depths = np.zeros((3, count, count), np.int8), np.zeros((3, count, count))
     for axis in AXES:
         overlaps = finder.along(axis, np.ones(1, bool))
         _enter(overlaps, unit, levels[axis], depths[axis])
     bounds = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
-    np.minimum.at(bounds[0], unit[found.part], found.low)
-    np.maximum.at(bounds[1], unit[found.part], found.high)
+    np.minimum.at(bounds[0], unit[convex.part], convex.low)
+    np.maximum.at(bounds[1], unit[convex.part], convex.high)
     labels = tuple(label for label, _ in units)
-    touch = _touching(finder, found, unit, count)
+    touch = _touching(finder, convex, unit, count)
     hidden = _hidden(overlaps, unit, [part.label for _, members in units for part in members])
     return Blocking(labels, levels, levels >= LOCKED, touch, *bounds, depths, hidden)
 
 
 def rooms(source: InPlace, axis: int) -> Array:
-    """The least room (n, n) [m] between units on the way of the first out along an axis past the
-    second, less than 0 where they overlap; infinite where it is more than AMPLE."""
+    """The least clearance (n, n) [m] between units while the first leaves along an axis past the
+    second: negative where they overlap, infinite where it exceeds AMPLE."""
     finder, _, unit = _bodies(source)
     count = len(source.units())
     room = np.full((count, count), np.inf)
-    moving, standing, found = finder.rooms(axis, AMPLE)
+    moving, standing, least = finder.rooms(axis, AMPLE)
     one, other = unit[moving], unit[standing]
     for column, at in enumerate(((other, one), (one, other))):
         apart = one != other
-        np.minimum.at(room, (at[0][apart], at[1][apart]), found[apart, column])
+        np.minimum.at(room, (at[0][apart], at[1][apart]), least[apart, column])
     return np.where(room >= AMPLE, np.inf, room)
 
 
@@ -170,36 +170,38 @@ def _bodies(source: InPlace) -> tuple[Finder, ConvexBodies, Ints]:
     unit = np.repeat(np.arange(len(units)), [len(members) for _, members in units])
     low = np.min([solid.low for solid in solids.values()], axis=0)
     high = np.max([solid.high for solid in solids.values()], axis=0)
-    found = bodies(Product(solids, low, high), list(solids))
-    return Finder(found, _one_meeting(tuple(solids))), found, unit
+    convex = bodies(Product(solids, low, high), list(solids))
+    return Finder(convex, _one_meeting(tuple(solids))), convex, unit
 
 
 def _one_meeting(parts: tuple[str, ...]) -> Meetings:
-    """All parts meet all others at once."""
+    """A single meeting of all parts."""
     meeting = Meeting("", (), 0, 0, 0, len(parts), either=True)
     return Meetings(parts, (meeting,), np.zeros(len(parts) - 1, np.int64), np.zeros(1, np.int64))
 
 
-def _hidden(found: Overlaps, unit: Ints, labels: Sequence[str]) -> tuple[Drawn, ...]:
-    """The parts of two units of which hulls alone show that they overlap when finished: those that
-    do are found along any axis."""
-    finished = found.depths.finished
-    drawn_in = found.rough & (finished > TOLERANCE) & (unit[found.one] != unit[found.other])
+def _hidden(overlaps: Overlaps, unit: Ints, labels: Sequence[str]) -> tuple[Drawn, ...]:
+    """The parts of two units that overlap in the finished product according to hulls alone; any
+    axis shows them."""
+    finished = overlaps.depths.finished
+    drawn_in = (
+        overlaps.rough & (finished > TOLERANCE) & (unit[overlaps.one] != unit[overlaps.other])
+    )
     rows = np.flatnonzero(drawn_in)[np.argsort(-finished[drawn_in], kind="stable")]
-    one, other = (array[rows].tolist() for array in (found.one, found.other))
+    one, other = (array[rows].tolist() for array in (overlaps.one, overlaps.other))
     pairs = zip(one, other, finished[rows].tolist(), strict=True)
     return tuple(Drawn(labels[one], labels[other], depth) for one, other, depth in pairs)
 
 
-def _enter(found: Overlaps, unit: Ints, levels: NDArray[np.int8], deep: Array) -> None:
-    """Enters what is in the way along an axis. The later part of a pair comes from the lower side,
-    so goes out there, and the earlier one goes to the upper side; or the other way about."""
-    one, other, depths = unit[found.one], unit[found.other], found.depths
+def _enter(overlaps: Overlaps, unit: Ints, levels: NDArray[np.int8], deep: Array) -> None:
+    """Enter the overlaps along an axis. The later part of a pair leaves to the lower side and the
+    earlier one to the upper side, or the other way round."""
+    one, other, depths = unit[overlaps.one], unit[overlaps.other], overlaps.depths
     slack = TIMES * depths.finished[:, None] + SLACK
     level = np.where(depths.faulty, SCRAPES, FREE)
-    level[found.deeper] = DEEPER
-    level[found.deeper & (depths.path > slack)] = LOCKED
-    level[found.clashing] = CLASHES
+    level[overlaps.deeper] = DEEPER
+    level[overlaps.deeper & (depths.path > slack)] = LOCKED
+    level[overlaps.clashing] = CLASHES
     for column, (moving, standing) in enumerate(((one, other), (other, one))):
         apart = moving != standing
         at = moving[apart], standing[apart]
@@ -207,10 +209,10 @@ def _enter(found: Overlaps, unit: Ints, levels: NDArray[np.int8], deep: Array) -
         np.maximum.at(deep, at, depths.path[apart, column])
 
 
-def _touching(finder: Finder, found: ConvexBodies, unit: Ints, count: int) -> NDArray[np.bool_]:
-    """Which units touch: those near each other, then those that bring pieces together."""
+def _touching(finder: Finder, convex: ConvexBodies, unit: Ints, count: int) -> NDArray[np.bool_]:
+    """Which units touch: those that are near each other, then those that connect components."""
     touch = np.eye(count, dtype=bool)
-    gap, furthest = NEAR, float((found.high.max(axis=0) - found.low.min(axis=0)).max())
+    gap, furthest = NEAR, float((convex.high.max(axis=0) - convex.low.min(axis=0)).max())
     while count > 1 and gap < 2 * furthest:
         one, other = finder.near(gap)
         near = np.zeros((count, count), bool)

@@ -1,4 +1,4 @@
-"""Ways to divide many units in two: closed sets of the blocking graphs that hang together."""
+"""Divisions of many units in two: connected closed sets of the blocking graphs."""
 
 from __future__ import annotations
 
@@ -16,16 +16,15 @@ from factory.planning.subsets import APART, BLOCKED, LOOSE, PASSES, TIPS
 Sets = NDArray[np.bool_]
 
 SEEDS = 6
-"""From so many units sets are grown along each direction."""
+"""The number of units from which sets are grown along each direction."""
 
 TRIED = 40
-"""Of so many of the most promising divisions it is found out whether both sides hang together."""
+"""The number of most promising divisions whose sides are tested for connectedness."""
 
 
 @dataclass(frozen=True, slots=True)
 class Division:
-    """Two sides of some units, the one onto which all others come first, and what dividing them
-    costs."""
+    """Two sides of some units, the one with the base first, and the price of dividing them."""
 
     one: Units
     other: Units
@@ -36,13 +35,13 @@ class Division:
 class Divider:
     """Divides units by the blocking graphs of a product."""
 
-    found: Blocking
+    graphs: Blocking
 
     def best(
         self, members: Units, axes: tuple[int, ...], random: np.random.Generator, even: float = 1.0
     ) -> Division | None:
-        """The division along one of some axes that costs least, and of those one that is about
-        `even`: 0 does not mind; None where the graphs of all these axes hold the units together."""
+        """The division of least price along one of some axes; among equals, the more `even` one is
+        preferred (0: no preference). None if the units interlock along all these axes."""
         units = np.array(members)
         sets, prices = self._candidates(units, axes, random)
         if not len(sets):
@@ -57,25 +56,25 @@ class Divider:
             if price <= prices[n]:
                 break
         one, other = (tuple(units[s].tolist()) for s in (sets[chosen], ~sets[chosen]))
-        if self.found.base in other:
+        if self.graphs.base in other:
             one, other = other, one
         return Division(one, other, float(best))
 
     def _unsound(self, members: list[int]) -> float:
         """The price of a side that is in pieces, or would tip over."""
-        feet = self.found.feet
+        feet = self.graphs.feet
         tips = feet is not None and len(members) > 1 and bool(feet.joined(members).tips[0])
-        return APART * (not self.found.hangs(members)) + TIPS * tips
+        return APART * (not self.graphs.hangs(members)) + TIPS * tips
 
     def _candidates(
         self, units: NDArray[np.int64], axes: tuple[int, ...], random: np.random.Generator
     ) -> tuple[Sets, Array]:
-        """Closed sets (k, n) and the prices (k,) of taking each out."""
+        """Closed sets (k, n) and the prices (k,) of removing each."""
         here = np.ix_(units, units)
-        touch, found = self.found.touch[here], dict[bytes, tuple[NDArray[np.bool_], float]]()
+        touch, cheapest = self.graphs.touch[here], dict[bytes, tuple[NDArray[np.bool_], float]]()
         for axis in axes:
             for turned in (False, True):
-                locks, levels = self.found.locks[axis][here], self.found.levels[axis][here]
+                locks, levels = self.graphs.locks[axis][here], self.graphs.levels[axis][here]
                 if turned:
                     locks, levels = locks.T, levels.T
                 needs = _reached(locks)
@@ -83,16 +82,16 @@ class Divider:
                 sets = sets[~sets.all(axis=1)]
                 for row, price in zip(sets, _prices(levels, sets).tolist(), strict=True):
                     key = (row if row[0] else ~row).tobytes()
-                    if key not in found or price < found[key][1]:
-                        found[key] = row, price
-        rows = [row for row, _ in found.values()]
-        return np.array(rows), np.array([price for _, price in found.values()])
+                    if key not in cheapest or price < cheapest[key][1]:
+                        cheapest[key] = row, price
+        rows = [row for row, _ in cheapest.values()]
+        return np.array(rows), np.array([price for _, price in cheapest.values()])
 
     def _grown(
         self, needs: Sets, touch: Sets, random: np.random.Generator
     ) -> Iterator[NDArray[np.bool_]]:
-        """Closed sets that grow from some units, by one that touches what there is and what that
-        needs."""
+        """Closed sets that grow from some units, each time by a unit that touches the set, and by
+        the units that block it."""
         count = len(needs)
         weight = needs.sum(axis=1) + random.random(count)
         for seed in random.permutation(count)[:SEEDS].tolist():
@@ -107,8 +106,8 @@ class Divider:
 
 
 def _reached(locks: NDArray[np.bool_]) -> Sets:
-    """What each unit needs to go out (n, n): itself, what is in its way, what is in the way of
-    that."""
+    """The units that must leave with each unit (n, n): itself, those that lock it, those that lock
+    these."""
     reach = (locks | np.eye(len(locks), dtype=bool)).astype(np.float32)
     while True:
         further = (reach @ reach > 0).astype(np.float32)
@@ -118,9 +117,9 @@ def _reached(locks: NDArray[np.bool_]) -> Sets:
 
 
 def _prices(levels: NDArray[np.int8], sets: Sets) -> Array:
-    """What it costs that each of some sets goes out (k,)."""
-    found = np.zeros(len(sets))
+    """The prices (k,) of removing each of some sets."""
+    prices = np.zeros(len(sets))
     for level, price in ((DEEPER, LOOSE), (LOCKED, PASSES), (CLASHES, BLOCKED)):
         meets = sets.astype(np.float32) @ (levels >= level).astype(np.float32)
-        found[((meets > 0) & ~sets).any(axis=1)] = price
-    return found
+        prices[((meets > 0) & ~sets).any(axis=1)] = price
+    return prices

@@ -1,5 +1,5 @@
-"""What a tree is expected to cost before anything is laid out: cycles from the sizes of what robots
-carry. Layouts decide among the best trees."""
+"""Expected cycle times of a tree before it is laid out, from the sizes of what robots carry.
+Layouts decide among the best trees."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from factory.layout.durations import Pace
 from factory.plant.approaches import MARGIN
 
 STATION = 0.06
-"""What lies on a guidepath beside a sub-assembly, from one station to the next [m]."""
+"""The distance between two stations on a guidepath beyond the size of a sub-assembly [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,17 +28,17 @@ class Expected:
         return np.where(way < speed**2 / acceleration, short, way / speed + speed / acceleration)
 
     def delivering(self, size: Array) -> Array:
-        """The way out and back of a robot that delivers something of this size."""
+        """The time of a robot to deliver something of this size and return."""
         return 2 * self.rest(size + STATION) + self.pace.lost
 
     def stop(self, size: Array) -> Array:
-        """What a carrier spends to take something of this size."""
+        """The time of a carrier to take something of this size."""
         return self.rest(size + STATION) + self.pace.lost
 
     def step(self, size: Array) -> Array:
-        """What it spends to go on to the next station besides."""
+        """The additional time to move on to the next station."""
         return (size + STATION) / self.pace.speed
 
     def lift(self, stroke: Array) -> Array:
-        """What it waits for something that is lowered so far over what stands."""
+        """The waiting time while a part is lowered by a stroke."""
         return self.rest(np.maximum(stroke, 0.0) + MARGIN)

@@ -1,16 +1,16 @@
-"""The best tree of a few units, proved: an AND/OR search of all that hangs together.
+"""The optimal assembly tree of a few units: an AND/OR search over all connected subsets.
 
 A state is a subset of the units and an axis of the floor, along which its inputs come; its choices
-are the ways to divide it in two that its blocking graphs leave open (closed sets of one of them),
-its successors both sides. All states are solved, smaller ones first, so what is found is optimal:
+are the divisions in two that its blocking graphs permit (closed sets of one of the graphs), its
+successors both sides. All states are solved, smaller ones first, so the result is optimal:
 
-1. `tables`: the least price (clashes that were accepted, parts drawn into each other, relays), and
-   of those the least cycle time. Only joins that a third robot takes are needed for it: a join on
-   the robot of a pile has the same motions, and makes that robot's cycle longer.
-2. `Best`: within these, and a bound on the cycle time, the fewest robots (a pile that stays with
-   its robot saves one), then the smallest sub-assemblies.
+1. `tables`: the least price (accepted clashes, parts drawn into each other, relays), then the least
+   cycle time. Only joins that a third robot takes are considered: a join on the robot of a pile has
+   the same motions, and lengthens that robot's cycle.
+2. `Best`: among the trees of least price within a bound on the cycle time, the fewest robots (a
+   pile that stays on its robot saves one), then the smallest sub-assemblies.
 
-A robot that takes over what another has made turns the axis (`relay`).
+A robot that takes over a sub-assembly from another changes its axis (`relay`).
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ RELAY = 1.0
 """The price of a relay."""
 
 LONG = 1e4
-"""Cycles are shorter than this [s]: prices count so many times as much."""
+"""Weight of the price against the cycle time: cycles are shorter than this [s]."""
 
 ROBOT = 100.0
-"""A robot counts so many metres of the sizes of sub-assemblies."""
+"""Weight of a robot against the sizes of sub-assemblies [m]."""
 
 STOPS = 4
-"""A carrier under a bound takes at most so many more than two inputs."""
+"""The most inputs beyond two that a carrier takes if the cycle is bounded."""
 
 Late = Callable[[], bool]
-"""Whether a search is to end."""
+"""Tells whether a search must end."""
 
 Leaf = Callable[[int, int], Any]
 """The tree of a unit whose own inputs come along an axis."""
@@ -50,25 +50,25 @@ one robot takes one after the other."""
 
 
 class TooLate(Exception):
-    """A search ended before it had proved anything."""
+    """A search ran out of time before it had a proof."""
 
 
 def never() -> bool:
-    """It is never late."""
+    """A search without a time limit."""
     return False
 
 
 @dataclass(frozen=True)
 class TreeTask:
     """Units whose best trees are wanted: tables of their `subsets`, what stands upright (`axis`,
-    and `up`, +1 or -1), `given` (2, n): the price of each unit if its own inputs come along either
-    horizontal axis; `apart`: whether sub-assemblies may be in pieces, at a price."""
+    and `up`, +1 or -1); `unit_prices` (2, n): the price of each unit if its own inputs come along
+    either horizontal axis; `apart`: whether sub-assemblies may be in pieces, at a price."""
 
     subsets: Subsets
     expected: Expected
     axis: int = 2
     up: int = +1
-    given: Array | None = field(default=None, repr=False)
+    unit_prices: Array | None = field(default=None, repr=False)
     apart: bool = False
 
     @property
@@ -79,18 +79,18 @@ class TreeTask:
 
     @cached_property
     def leg(self) -> Array:
-        """How long each subset is at most on the floor (s,) [m]."""
+        """The longer horizontal extent of each subset (s,) [m]."""
         return np.maximum(*(self.subsets.extent(axis) for axis in self.level))
 
     @cached_property
     def delivering(self) -> Array:
-        """What delivering each subset takes (s,) [s]."""
+        """The time to deliver each subset (s,) [s]."""
         return self.expected.delivering(self.leg)
 
     def divisions(self, whole: int) -> tuple[Masks, Masks, Array]:
-        """How a subset can be divided: both sides (k,), and the least prices (k, 3) along the first
-        and second horizontal axis, whoever goes, and upright. The unit onto which all others come
-        is on the first side, which is not lowered then."""
+        """The divisions of a subset: both sides (k,), and the least prices (k, 3) along the first
+        and second horizontal axis, whichever side moves, and along the vertical. The base is on the
+        first side, which is then not lowered."""
         one = splits(whole)
         other = whole ^ one
         swapped = self.subsets.based[other]
@@ -98,7 +98,7 @@ class TreeTask:
         if not self.apart:
             hangs = self.subsets.hangs[one] & self.subsets.hangs[other]
             one, other = one[hangs], other[hangs]
-        found = np.stack(
+        prices = np.stack(
             [
                 np.minimum(*(self.subsets.price(axis, side, one, other) for side in (0, 1)))
                 for axis in (*self.level, self.axis)
@@ -106,12 +106,12 @@ class TreeTask:
             axis=-1,
         )
         if self.subsets.based[whole]:
-            found[:, 2] = self.subsets.price(self.axis, 0 if self.up > 0 else 1, other, one)
-        open_ = np.isfinite(found).any(axis=1)
-        return one[open_], other[open_], found[open_]
+            prices[:, 2] = self.subsets.price(self.axis, 0 if self.up > 0 else 1, other, one)
+        open_ = np.isfinite(prices).any(axis=1)
+        return one[open_], other[open_], prices[open_]
 
     def strokes(self, one: Masks, other: Masks) -> Array:
-        """How far the side that needs less is lowered (k,) [m]."""
+        """The stroke by which the side that needs the shorter one is lowered (k,) [m]."""
         low, high = self.subsets.low[self.axis], self.subsets.high[self.axis]
         return np.asarray(np.minimum(high[other] - low[one], high[one] - low[other]))
 
@@ -144,7 +144,7 @@ def tables(task: TreeTask, late: Late = never) -> Tables:
     size = 1 << task.subsets.count
     price, time = np.full((2, size), np.inf), np.zeros((2, size))
     units = 1 << np.arange(task.subsets.count)
-    price[:, units] = 0.0 if task.given is None else task.given
+    price[:, units] = 0.0 if task.unit_prices is None else task.unit_prices
     time[:, units] = task.expected.pace.lost + task.delivering[units]
     stop = task.expected.stop(task.leg)
     for whole in task.subassemblies():
@@ -176,11 +176,11 @@ def _relayed(whole: int, price: Array, time: Array) -> None:
 
 class Best:
     """The best trees of a task within a `bound` on cycles [s]: least price, then fewest robots,
-    each worth ROBOT [m], and smallest sub-assemblies; with None as a bound no robot stays with a
+    each worth ROBOT [m], and smallest sub-assemblies. If the bound is None, no robot stays with a
     pile. Raises TooLate once it is `late`.
 
-    `piles` (stops, 2, s): the worth of what a robot holds that has taken so many inputs beyond two;
-    `made` (2, s): of what is delivered.
+    `piles` (stops, 2, s): the worth of a pile on a robot that has taken so many inputs beyond two;
+    `made` (2, s): the worth of a sub-assembly that is delivered.
     """
 
     def __init__(self, task: TreeTask, bound: float | None = np.inf, late: Late = never) -> None:
@@ -190,8 +190,8 @@ class Best:
         self.piles = np.full((self.stops, 2, size), np.inf)
         self.made = np.full((2, size), np.inf)
         units = 1 << np.arange(task.subsets.count)
-        given = np.zeros((2, len(units))) if task.given is None else task.given
-        self.made[:, units] = given * LONG**2 + ROBOT
+        prices = np.zeros((2, len(units))) if task.unit_prices is None else task.unit_prices
+        self.made[:, units] = prices * LONG**2 + ROBOT
         self.stop = task.expected.stop(task.leg)
         self.step = task.expected.step(task.leg)
         for whole in task.subassemblies():
@@ -215,19 +215,20 @@ class Best:
     def _options(
         self, whole: int, axis: int, stops: int, divisions: tuple[Masks, Masks, Array]
     ) -> list[tuple[Array, Masks, Masks, str]]:
-        """The worth of all ways to come to a pile, with both sides (the pile first), and how."""
+        """All ways to form a pile: their worth (less is better), both sides (the pile first), and
+        the operation."""
         one, other, prices = divisions
-        own = self.task.penalty(whole) * LONG**2 + self.task.leg[whole]
-        found = []
+        fixed = self.task.penalty(whole) * LONG**2 + self.task.leg[whole]
+        options = []
         if stops == 0:
-            worth = self._mates(whole, axis, one, other, prices) + own
-            found.append((worth, one, other, "mate"))
+            worth = self._mates(whole, axis, one, other, prices) + fixed
+            options.append((worth, one, other, "mate"))
         if stops > 0 or (self.bound == np.inf and not self.mates):
             sides = ((one, other), (other, one))
             for pile, come in sides[: 1 if self.task.subsets.based[whole] else 2]:
-                worth = self._inserts(whole, axis, stops, pile, come, prices) + own
-                found.append((worth, pile, come, "insert"))
-        return found
+                worth = self._inserts(whole, axis, stops, pile, come, prices) + fixed
+                options.append((worth, pile, come, "insert"))
+        return options
 
     def _mates(self, whole: int, axis: int, one: Masks, other: Masks, prices: Array) -> Array:
         slides = prices[:, axis] <= prices[:, 2]

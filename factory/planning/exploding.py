@@ -1,5 +1,5 @@
-"""The exploded view of a product: how far, and along which way, each input of an operation is taken
-away from the others, so that each part stands free on the way that it comes along."""
+"""The exploded view of a product: the distance and direction by which each input of an operation is
+moved away from the others, so that every part is free on its way in."""
 
 from __future__ import annotations
 
@@ -15,18 +15,19 @@ from factory.plant.approaches import Approach, Kind
 from factory.problem.pag import PAG
 
 ROOM = 0.15
-"""Between what is taken apart there is this share of the product's diagonal."""
+"""The gap between separated inputs, as a share of the product's diagonal."""
 
 
 MOST = 24
-"""So many operations, the last ones, are taken back; what was made before stands together."""
+"""The most operations that are taken back, from the last one; earlier sub-assemblies stay
+together."""
 
 
 @dataclass(frozen=True, slots=True)
 class Withdrawal:
-    """What is done to take an operation back: its `label`, the parts that move, the direction (3,)
-    in which they leave, a unit vector of the product's frame, how far they go [m], and the kind of
-    its approach."""
+    """The inverse of an operation: its `label`, the parts that move, the `direction` (3,) in which
+    they leave, a unit vector in the product's frame, their `distance` [m], and the kind of
+    approach."""
 
     label: str
     moving: tuple[str, ...]
@@ -44,27 +45,27 @@ class Explosion:
     steps: tuple[Withdrawal, ...] = field(repr=False)
 
     def offsets(self, done: float) -> Array:
-        """How far each part is from its place (n, 3) [m], when so many operations are done: 0 is
-        all apart, 2.5 two operations and half of the third."""
+        """The displacements of the parts (n, 3) [m] when a number of operations is done: 0 for all
+        apart, 2.5 for two operations and half of the third."""
         index = {label: number for number, label in enumerate(self.parts)}
-        found = np.zeros((len(self.parts), 3))
+        offsets = np.zeros((len(self.parts), 3))
         for number, step in enumerate(self.steps):
             left = 1.0 - _eased(min(max(done - number, 0.0), 1.0))
             if left > 0:
-                found[[index[label] for label in step.moving]] += (
+                offsets[[index[label] for label in step.moving]] += (
                     left * step.distance * step.direction
                 )
-        return found
+        return offsets
 
 
 def _eased(share: float) -> float:
-    """From 0 to 1, slowly at either end."""
+    """A share from 0 to 1, with zero slope at either end."""
     return share * share * (3 - 2 * share)
 
 
 def explosion(pag: PAG, matings: Matings, product: Product) -> Explosion:
-    """The exploded view of a product whose operations were judged. Each step moves the fewer parts
-    away from the others, as far as their boxes need to be clear of each other along the way."""
+    """The exploded view of a product whose operations were judged. Each step moves the smaller
+    number of parts, as far as their boxes need to be clear of the others along the way."""
     parts = tuple(node.label for node in pag.parts())
     index = {label: number for number, label in enumerate(parts)}
     low = np.array([product.solids[label].low for label in parts])
@@ -72,8 +73,8 @@ def explosion(pag: PAG, matings: Matings, product: Product) -> Explosion:
     room = ROOM * float(np.linalg.norm(product.high - product.low))
     inside: dict[str, list[int]] = {}
     for node in pag.postorder():
-        own = [] if node.inputs else [index[node.label]]
-        inside[node.label] = own + [n for label in node.inputs for n in inside[label]]
+        itself = [] if node.inputs else [index[node.label]]
+        inside[node.label] = itself + [n for label in node.inputs for n in inside[label]]
     steps = []
     for number, mating in enumerate(matings.all, MOST - len(matings.all)):
         *first, last = mating.inputs
@@ -95,7 +96,7 @@ def explosion(pag: PAG, matings: Matings, product: Product) -> Explosion:
 def _moving(
     approach: Approach, last: str, ours: list[int], rest: list[int]
 ) -> tuple[list[int], Array]:
-    """The parts that are moved, and the way in which they leave."""
+    """The parts that are moved, and their direction."""
     direction = np.zeros(3)
     if approach.kind == "lower":
         direction[2] = 1.0
@@ -107,8 +108,8 @@ def _moving(
 def _clear(
     low: Array, high: Array, moving: Sequence[int], others: Sequence[int], direction: Array
 ) -> float:
-    """How far the boxes of what moves go along an axis until they have passed all others that are
-    in their way."""
+    """The distance that the boxes of moving parts travel along an axis until they have passed all
+    others in their way."""
     axis, side = int(np.abs(direction).argmax()), float(direction.sum())
     across = [k for k in range(3) if k != axis]
     needed = 0.0
@@ -118,6 +119,6 @@ def _clear(
         if meets.any():
             ahead = np.asarray(others)[meets]
             reach = high[ahead, axis].max() if side > 0 else -low[ahead, axis].min()
-            own = low[n, axis] if side > 0 else -high[n, axis]
-            needed = max(needed, float(reach - own))
+            edge = low[n, axis] if side > 0 else -high[n, axis]
+            needed = max(needed, float(reach - edge))
     return needed

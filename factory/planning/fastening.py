@@ -1,4 +1,5 @@
-"""Screws: which parts are, and where in a tree they are driven in, after all that they clamp."""
+"""Screws: which parts are screws, and where in a tree they are driven in, after all that they
+clamp."""
 
 from __future__ import annotations
 
@@ -21,17 +22,17 @@ WORDS = re.compile(
     r"(?:^|[^a-z])(?:(?:cap|set|wood|grub)?screws?|bolts?|vis|schrauben?|tornillos?|viti?|"
     r"(?:din|iso|en)[ _-]?\d{3,5}|m\d+(?:[.,]\d+)?x\d+)(?![a-z])"
 )
-"""What the names of screws have in them, in small letters."""
+"""Words in the names of screws, in lower case."""
 
 HEAD, SHANK, SHORT, ROUND = 0.85, 0.75, 0.5, 0.16
-"""A head is what reaches further from the axis than the first share of the widest; a shank no
-further than the second, longer than the head, and than half its width; what is round is as wide as
-deep up to the last."""
+"""Proportions of a bolt. Its head is farther from the axis than HEAD times the largest radius; its
+shank is no farther than SHANK times that radius, longer than the head, and longer than half its
+width. A round part has sides that differ by no more than ROUND."""
 
 
 def fasteners(source: InPlace, named: Sequence[str]) -> tuple[str, ...]:
-    """The units of a source that are screws: those `named`, those whose names say so, and those
-    with a head that is wider than their shank, which is in another part."""
+    """The units of a source that are screws: those that are `named`, those whose name says so, and
+    those with a head that is wider than their shank, which is inside another part."""
     kept = {keep.label for keep in source.kept}
 
     def is_screw(part: PlacedPart) -> bool:
@@ -45,7 +46,7 @@ def fasteners(source: InPlace, named: Sequence[str]) -> tuple[str, ...]:
 
 
 def _is_in_another(point: Array | None, part: PlacedPart, source: InPlace) -> bool:
-    """Whether a point is in the box of another part: an antenna stands in the open."""
+    """Whether a point is inside the box of another part (the shank of an antenna is not)."""
     boxes = ((o.solid.low, o.solid.high) for o in source.parts if o is not part)
     return point is not None and any((a < point).all() and (point < b).all() for a, b in boxes)
 
@@ -56,7 +57,8 @@ def _is_called(part: PlacedPart) -> bool:
 
 
 def _shank(vertices: Array) -> Array | None:
-    """The middle of the shank, if points (n, 3) are those of a bolt along an axis."""
+    """The middle of the shank, if points (n, 3) are those of a bolt along an axis; None
+    otherwise."""
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     for axis in range(3):
         across = np.delete(vertices - (low + high) / 2, axis, axis=1)
@@ -78,7 +80,7 @@ def _shank(vertices: Array) -> Array | None:
 
 @dataclass(frozen=True)
 class _Place:
-    """A sub-assembly of a tree: the way to it from the root, its units, the axis of the floor along
+    """A sub-assembly of a tree: its path from the root, its units, and the axis of the floor along
     which its inputs come."""
 
     path: tuple[int, ...]
@@ -90,7 +92,7 @@ class _Place:
 class Fastening:
     """Places screws in a tree of the other units of a product."""
 
-    found: Blocking
+    graphs: Blocking
     judged: Judged
     up: Stance
     places: list[_Place] = field(default_factory=list)
@@ -114,8 +116,9 @@ class Fastening:
         return units
 
     def drive(self, screw: int, clamped: Sequence[int]) -> bool:
-        """Puts a screw where it is driven into the least that has all that it clamps, if there is
-        a way for it and no later operation meets it; tells whether it is."""
+        """Drive a screw into the smallest sub-assembly that contains all parts that it clamps, if
+        it can get there and no later operation collides with it. Returns whether there is such a
+        place."""
         for place in self.places:
             if set(clamped) <= set(place.units) and self._passes(screw, place):
                 join = self._way(screw, place)
@@ -125,7 +128,7 @@ class Fastening:
         return False
 
     def _with_screws(self, units: Units, path: tuple[int, ...]) -> Units:
-        """Units and the screws that are driven into what is on or below a path."""
+        """Units, and the screws that are driven in at a path or below it."""
         screws = [
             join.come[0]
             for at, joins in self.driven.items()
@@ -135,19 +138,19 @@ class Fastening:
         return (*units, *dict.fromkeys(screws))
 
     def _way(self, screw: int, place: _Place) -> Join | None:
-        """How a screw comes to a place: from above, or else along the axis of its carrier."""
+        """The motion of a screw to a place: from above, or else along the axis of its carrier."""
         units = self._with_screws(place.units, place.path)
         ways: list[tuple[Direction, bool]] = [((self.up.axes[2], self.up.up), True)]
         ways += [((self.up.axes[place.axis], side), False) for side in (+1, -1)]
         for (axis, side), lowered in ways:
             at = np.ix_([screw], units) if side > 0 else np.ix_(units, [screw])
-            if not self.found.locks[axis][at].any():
-                level = int(self.found.levels[axis][at].max())
+            if not self.graphs.locks[axis][at].any():
+                level = int(self.graphs.levels[axis][at].max())
                 return Join(tuple(sorted(units)), (screw,), (axis, side), level, lowered)
         return None
 
     def _passes(self, screw: int, place: _Place) -> bool:
-        """Whether a screw in a place is in nothing's way in all later operations."""
+        """Whether a screw in a place blocks no later operation."""
         for path, number, join in self.joins:
             here = place.path[: len(path)] == path and len(place.path) > len(path)
             child = place.path[len(path)] if here else number + 2
@@ -157,13 +160,13 @@ class Fastening:
             others = self._with_screws(join.pile if comes else join.come, (-1,))
             axis, side = join.direction
             at = np.ix_([screw], others) if comes == (side > 0) else np.ix_(others, [screw])
-            if self.found.locks[axis][at].any():
+            if self.graphs.locks[axis][at].any():
                 return False
         return True
 
     def result(self, dwell: float) -> Judged:
-        """The tree with its screws, each of which takes a robot that brings it, and a driver for
-        `dwell` [s]; equal ones, by their labels, come in a row."""
+        """The tree with its screws. Each takes a robot that brings it, and a driver for `dwell`
+        [s]; screws with equal labels are driven in one after the other."""
         screws = [join for joins in self.driven.values() for join in joins]
         most = max(map(len, self.driven.values()), default=0)
         return replace(
@@ -182,7 +185,7 @@ class Fastening:
 
 
 def renumbered(judged: Judged, units: Sequence[int]) -> Judged:
-    """A judged tree whose units have other numbers."""
+    """A judged tree with renumbered units."""
 
     def tree(old: Tree) -> Tree:
         return units[old] if isinstance(old, int) else tuple(map(tree, old))
@@ -195,15 +198,16 @@ def renumbered(judged: Judged, units: Sequence[int]) -> Judged:
 
 
 def fastened(
-    found: Blocking, judged: Judged, screws: Sequence[int], dwell: float
+    graphs: Blocking, judged: Judged, screws: Sequence[int], dwell: float
 ) -> tuple[Judged, tuple[int, ...]]:
-    """A tree of all units but the screws with these in it, and those that find no place."""
-    work = Fastening(found, judged, judged.stance)
-    others = np.ones(len(found), bool)
+    """A tree of all other units with the screws in it, and the screws for which there is no
+    place."""
+    work = Fastening(graphs, judged, judged.stance)
+    others = np.ones(len(graphs), bool)
     others[list(screws)] = False
     left = tuple(
         screw
         for screw in screws
-        if not work.drive(screw, np.flatnonzero(found.touch[screw] & others).tolist())
+        if not work.drive(screw, np.flatnonzero(graphs.touch[screw] & others).tolist())
     )
     return work.result(dwell), left

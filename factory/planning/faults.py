@@ -24,44 +24,43 @@ from factory.planning.parts import PlacedPart
 from factory.support.errors import Diagnostic, InputError
 
 LARGER = 50.0
-"""A part that is more than this many times as large as the largest other one, or as much smaller
-than the smallest, may be in another unit."""
+"""A part that is more than this many times larger than the largest other part, or smaller than the
+smallest, may be in another unit."""
 
 UNIT, SPREAD = 1000.0, 4.0
-"""It is taken to be, where a thousandth, or a thousand times its size, is among the sizes of the
-others, give or take this factor."""
+"""It is in another unit if its size times, or divided by, UNIT is among the sizes of the others,
+within a factor of SPREAD."""
 
 AWAY = 2.0
-"""Parts are away from each other that have so many times the larger one's size between them."""
+"""Parts are far away if their distance exceeds this multiple of the larger one's size."""
 
 EQUAL = 1e-4
-"""Vertices of two parts are in one place that are nearer than this share of their size."""
+"""The tolerance for vertices in one place, as a share of the part's size."""
 
 
 SHARE, DEPTH, MOST = 0.01, 5e-4, 0.5
-"""Parts are not in place that have more than the first share of the smaller in common and overlap
-by more than so much [m], which is more than a press fit, or have more than the second share of it
-in common."""
+"""Parts are not in place if their common volume exceeds the share MOST of the smaller part, or if
+it exceeds SHARE and they overlap by more than DEPTH [m], which is more than a press fit."""
 
 THIN = 0.25
-"""Of a sheet less is too deep: this share of its thickness."""
+"""In a sheet, this share of its thickness is too deep, if that is less."""
 
 NEAR, NEARLY = 1e-3, (0.05, 0.005)
-"""Parts touch that are no further apart than this [m], or than the first share of the product's
-diagonal where that is less, or than the second share where that is more."""
+"""The largest gap between parts that touch [m], at most the first and at least the second share of
+the product's diagonal."""
 
 NAMED = 6
-"""So many pairs, or groups, are named."""
+"""The most pairs, or groups, that a message names."""
 
-HINT = "--in-place says that they are in place all the same"
+HINT = "--in-place skips this check"
 
 
 def check_places(
     parts: Sequence[PlacedPart], has_tree: bool, unit_is_given: bool
 ) -> list[Diagnostic]:
-    """Raises InputError (UsedTwice, Size, FarAway) with every fault. A unit that is given is taken
-    to be that of all parts. Of a product that has a tree, so that someone has made it, two parts in
-    one place are no fault, but a warning, which is given back."""
+    """Raises InputError (UsedTwice, Size, FarAway) with every fault. If the user gave a unit, it is
+    that of all parts. In a product with a tree, two parts in one place are not a fault but a
+    warning, which is returned."""
     twice = _twice(parts)
     faults = ([] if has_tree else twice) + ([] if unit_is_given else _units(parts))
     raise_if_any(faults or _far(parts))
@@ -89,7 +88,7 @@ def _twice(parts: Sequence[PlacedPart]) -> list[Diagnostic]:
             if np.abs(other.solid.high - part.solid.high).max() > reach:
                 continue
             if cKDTree(other.vertices).query(part.vertices)[0].max() <= reach:
-                message = f"'{part.label}' is where '{other.label}' is already, the same shape"
+                message = f"'{part.label}' has the shape and the place of '{other.label}'"
                 hint = "remove one of the two, or move it to where it belongs"
                 faults.append(Diagnostic("UsedTwice", message, part.node.position, hint))
                 break
@@ -107,14 +106,14 @@ def _units(parts: Sequence[PlacedPart]) -> list[Diagnostic]:
         low, high = others.min() / SPREAD, others.max() * SPREAD
         if size > LARGER * others.max() and low <= size / UNIT <= high:
             much, way = size / others.max(), "in millimetres, and the others in metres"
-            than = f"{much:.0f} times as large as the largest"
+            than = f"{much:.0f} times larger than the largest"
         elif size * LARGER < others.min() and low <= size * UNIT <= high:
             much, way = others.min() / size, "in metres, and the others in millimetres"
-            than = f"{much:.0f} times as small as the smallest"
+            than = f"{much:.0f} times smaller than the smallest"
         else:
             continue
         message = f"'{part.label}' is {than} of the other parts: it may be {way}"
-        hint = "export it in the unit of the others; --unit says that all are in the same"
+        hint = "export it in the unit of the others; --unit sets one unit for all"
         faults.append(Diagnostic("Size", message, part.node.position, hint))
     return faults
 
@@ -136,12 +135,12 @@ def _far(parts: Sequence[PlacedPart]) -> list[Diagnostic]:
     for group in others:
         index = int(group[0])
         away = float(_gaps(low[index], high[index], low[main], high[main]).min())
-        more = f" and {len(group) - 1} more by it" if len(group) > 1 else ""
+        more = f" and {len(group) - 1} more near it" if len(group) > 1 else ""
         message = (
             f"'{parts[index].label}'{more}: {away:.4g} m away from the other parts, "
-            f"which are within {within:.4g} m"
+            f"which span {within:.4g} m"
         )
-        hint = "parts are where they are in the finished product: move it there, or remove it"
+        hint = "move it to its place in the finished product, or remove it"
         faults.append(Diagnostic("FarAway", message, parts[index].node.position, hint))
     return faults
 
@@ -152,7 +151,7 @@ def _gaps(low: Array, high: Array, lows: Array, highs: Array) -> Array:
 
 
 def check_in_place(parts: Sequence[PlacedPart]) -> list[Diagnostic]:
-    """What shows that parts are not in place (NotInPlace), nothing if they are."""
+    """The faults of parts that are not in place (NotInPlace); empty if they are."""
     solids = [part.solid for part in parts]
     bodies = [drawn(solid) for solid in solids]
     faults = _inside(solids, bodies)
@@ -160,8 +159,8 @@ def check_in_place(parts: Sequence[PlacedPart]) -> list[Diagnostic]:
 
 
 def _inside(solids: Sequence[Solid], bodies: Sequence[Any]) -> list[Diagnostic]:
-    """Parts that are one inside another."""
-    found: list[tuple[float, str, str, Common]] = []
+    """Parts that are inside one another."""
+    overlaps: list[tuple[float, str, str, Common]] = []
     for one, other in near_pairs(solids, -DEPTH).tolist():
         if bodies[one] is None or bodies[other] is None:
             continue
@@ -170,16 +169,18 @@ def _inside(solids: Sequence[Solid], bodies: Sequence[Any]) -> list[Diagnostic]:
         share = shared.volume / float(bodies[small].volume())
         thinner = min(2 * bodies[n].volume() / bodies[n].surface_area() for n in (one, other))
         if share > MOST or (share > SHARE and shared.depth > min(DEPTH, THIN * thinner)):
-            found.append((share, solids[small].label, solids[large].label, shared))
-    if not found:
+            overlaps.append((share, solids[small].label, solids[large].label, shared))
+    if not overlaps:
         return []
-    found.sort(key=lambda pair: -pair[0])
+    overlaps.sort(key=lambda pair: -pair[0])
     named = [
         f"{share:.0%} of '{small}' is in '{large}' ({1e3 * shared.depth:.1f} mm deep)"
-        for share, small, large, shared in found
+        for share, small, large, shared in overlaps
     ]
     pairs = (
-        "a pair of parts overlaps" if len(found) == 1 else f"{len(found)} pairs of parts overlap"
+        "a pair of parts overlaps"
+        if len(overlaps) == 1
+        else f"{len(overlaps)} pairs of parts overlap"
     )
     message = f"these parts are not in place: {pairs}: {listing(named, NAMED)}"
     hint = f"export each where it is in the finished product, not about its own origin; {HINT}"
@@ -187,7 +188,7 @@ def _inside(solids: Sequence[Solid], bodies: Sequence[Any]) -> list[Diagnostic]:
 
 
 def _groups(solids: Sequence[Solid], bodies: Sequence[Any]) -> list[Diagnostic]:
-    """Groups of parts that touch none of the others."""
+    """Groups of parts that do not touch each other."""
     low = np.min([solid.low for solid in solids], axis=0)
     high = np.max([solid.high for solid in solids], axis=0)
     size = float(np.linalg.norm(high - low))
@@ -204,7 +205,7 @@ def _groups(solids: Sequence[Solid], bodies: Sequence[Any]) -> list[Diagnostic]:
         label = solids[group.index(first)].label
         named.append(f"'{label}'" + (f" and {count - 1} more" if count > 1 else ""))
     message = (
-        f"these parts are not in place: they are {len(sizes)} groups that touch none of the others "
+        f"these parts are not in place: they are {len(sizes)} groups that do not touch each other "
         f"({1e3 * reach:.1f} mm at least between them): {listing(named, NAMED)}"
     )
     hint = f"a print bed, an exploded view, or a part that is missing? {HINT}"
@@ -214,8 +215,8 @@ def _groups(solids: Sequence[Solid], bodies: Sequence[Any]) -> list[Diagnostic]:
 def _gap(
     solids: Sequence[Solid], bodies: Sequence[Any], one: int, other: int, reach: float
 ) -> float:
-    """How far two parts are apart [m], `reach` for that and more; 0 where the hull of one reaches
-    into that of the other, as of links of a chain. An open mesh is its hull."""
+    """The distance of two parts [m], at most `reach`; 0 if the hull of one overlaps that of the
+    other, as with links of a chain. An open mesh is represented by its hull."""
     from manifold3d import Manifold
 
     hulls = [Manifold.hull_points(solids[n].corners) for n in (one, other)]

@@ -1,9 +1,9 @@
-"""Trees of many units: divided from the top, then bettered piece by piece.
+"""Trees of many units: divided from the top, then improved by local search.
 
-The first tree is found by dividing, always: whatever comes apart is a subset of what comes apart,
-so no choice has to be undone. Then neighbourhoods are solved anew: a join with some of what is
-below it, whose other sub-assemblies are units for the moment, is solved as a small product is
-(`exact`), and taken if the whole tree is worth more.
+The first tree is found by division. Division always succeeds: a subset of units that can be taken
+apart can be taken apart, so no choice has to be undone. Then neighbourhoods are optimised: a join
+and a part of the tree below it, in which the remaining sub-assemblies count as units, is solved as
+a small product is (`exact`), and replaced if the whole tree becomes better.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from factory.planning.stance import ROOT_AXIS, Stance
 from factory.planning.subsets import subsets
 
 SMALL = 8
-"""So many units are solved exactly."""
+"""The number of units that are solved exactly."""
 
 ROUNDS = 3
-"""A tree stays as it is when so many neighbourhoods of each join, on average, gave nothing."""
+"""The search ends after so many neighbourhoods of each join, on average, without improvement."""
 
 
 @dataclass(frozen=True, slots=True)
 class Joined:
-    """Units that are joined already, as a `tree` whose inputs come along an axis of the floor; -1
-    where it does not matter."""
+    """Units that are already joined, as a `tree` whose inputs come along an axis of the floor; -1
+    if any axis will do."""
 
     units: Units
     tree: Tree = field(repr=False)
@@ -42,13 +42,14 @@ class Joined:
 
 @dataclass(frozen=True)
 class Site:
-    """What trees are sought for: a product's blocking, how it stands, and what is expected; `given`
-    (2, n): the price of each unit if its own inputs come along x or y of the floor."""
+    """A planning problem in one stance: the blocking `graphs` of a product and expected times.
+    `unit_prices` (2, n): the price of each unit if its own inputs come along x or y of the
+    floor."""
 
-    found: Blocking
+    graphs: Blocking
     stance: Stance
     expected: Expected
-    given: Array = field(repr=False)
+    unit_prices: Array = field(repr=False)
 
 
 def solved(
@@ -57,11 +58,11 @@ def solved(
     """The best tree of a few groups, whose inputs come along an axis of the floor; sub-assemblies
     are in pieces only where there is no other way. None where no tree has cycles below the bound.
     """
-    stance, few = site.stance, site.found.grouped([group.units for group in groups])
+    stance, few = site.stance, site.graphs.grouped([group.units for group in groups])
     tables = subsets(few)
     horizontal = tuple(sorted(stance.axes[:2]))
     turn = [stance.axes.index(h) for h in horizontal]  # of the floor, for each horizontal axis
-    given = np.array([[_price(site, group, turn[k]) for group in groups] for k in (0, 1)])
+    prices = np.array([[_price(site, group, turn[k]) for group in groups] for k in (0, 1)])
     at = turn.index(axis)
 
     def leaf(unit: int, k: int) -> Tree:
@@ -69,7 +70,7 @@ def solved(
         return group.tree if group.axis in (-1, turn[k]) else (group.tree,)
 
     for apart in (False, True):
-        task = TreeTask(tables, site.expected, stance.axes[2], stance.up, given, apart)
+        task = TreeTask(tables, site.expected, stance.axes[2], stance.up, prices, apart)
         best = Best(task, bound, late)
         if np.isfinite(best.made[at, tables.whole]):
             return best.tree(tables.whole, at, leaf)
@@ -78,13 +79,13 @@ def solved(
 
 def _price(site: Site, group: Joined, axis: int) -> float:
     if len(group.units) == 1:
-        return float(site.given[axis, group.units[0]])
+        return float(site.unit_prices[axis, group.units[0]])
     return 0.0 if group.axis == axis else RELAY
 
 
 def divided(site: Site, random: np.random.Generator, even: float) -> Tree:
     """A tree by dividing from the top, `even` as `Divider.best` says."""
-    divider, stance = Divider(site.found), site.stance
+    divider, stance = Divider(site.graphs), site.stance
 
     def below(members: Units, axis: int) -> Tree:
         if len(members) <= SMALL:
@@ -98,15 +99,15 @@ def divided(site: Site, random: np.random.Generator, even: float) -> Tree:
                 return (tree,) if turned else tree
         raise ValueError("interlocked")
 
-    return below(tuple(range(len(site.found))), ROOT_AXIS)
+    return below(tuple(range(len(site.graphs))), ROOT_AXIS)
 
 
 def bettered(
     site: Site, first: Tree, bound: float, late: Late, random: np.random.Generator
 ) -> Iterator[Judged]:
-    """Trees each of which is worth more than the one before, from a first one on, within a bound on
-    expected cycles [s], until it is late or ROUNDS neighbourhoods of each join gave nothing."""
-    judge = Judge(site.found, site.stance, site.expected)
+    """Ever better trees, from a first one on, within a bound on expected cycles [s], until it is
+    late or ROUNDS neighbourhoods of each join brought no improvement."""
+    judge = Judge(site.graphs, site.stance, site.expected)
     best = judge.judged(first)
     yield best
     idle = 0
@@ -118,18 +119,18 @@ def bettered(
         place = joins[int(random.integers(len(joins)))]
         node, axis = _at(best.tree, place), (ROOT_AXIS + len(place)) % 2
         groups = _groups(node, axis, random)
-        found = solved(site, groups, axis, bound) if len(groups) > 2 else None
+        solution = solved(site, groups, axis, bound) if len(groups) > 2 else None
         idle += 1
-        if found is None or found == node:
+        if solution is None or solution == node:
             continue
-        other = judge.judged(_replaced(best.tree, place, found))
+        other = judge.judged(_replaced(best.tree, place, solution))
         if _worth(other, bound) < _worth(best, bound):
             best, idle = other, 0
             yield best
 
 
 def _worth(judged: Judged, bound: float) -> tuple[float, ...]:
-    """What is better is less."""
+    """The rank of a tree: less is better."""
     over = max(judged.seconds - bound, 0.0)
     return judged.price, round(over, 6), judged.robots, round(judged.sizes, 6)
 
@@ -156,7 +157,7 @@ def _replaced(tree: Tree, place: tuple[int, ...], by: Tree) -> Tree:
 
 
 def _groups(node: Tree, axis: int, random: np.random.Generator) -> list[Joined]:
-    """What is below a join, taken apart further until there are about SMALL groups."""
+    """The sub-assemblies below a join, divided further until there are about SMALL groups."""
     open_ = [(node, axis)]
     while True:
         inner = [n for n, (tree, _) in enumerate(open_) if not isinstance(tree, int)]
@@ -164,10 +165,11 @@ def _groups(node: Tree, axis: int, random: np.random.Generator) -> list[Joined]:
         if not fits:
             break
         chosen = fits[int(random.integers(len(fits)))]
-        tree, own = open_.pop(chosen)
-        open_ += [(below, 1 - own) for below in tree]
+        tree, along = open_.pop(chosen)
+        open_ += [(below, 1 - along) for below in tree]
     return [
-        Joined(units_of(tree), tree, -1 if isinstance(tree, int) else own) for tree, own in open_
+        Joined(units_of(tree), tree, -1 if isinstance(tree, int) else along)
+        for tree, along in open_
     ]
 
 

@@ -1,5 +1,6 @@
-"""Hulls that stand for meshes which bound no volume, and what they hide: a part in a hollow of
-another seems to be drawn into it, so whatever way it takes out, it seems to get no deeper."""
+"""Convex hulls used in place of meshes that bound no volume, and the overlaps that they hide: a
+part in a cavity of another seems to be drawn into it, so it seems to get no deeper on any way
+out."""
 
 from __future__ import annotations
 
@@ -15,16 +16,16 @@ from factory.support.errors import Diagnostic, InputError
 
 EXTRA = "pip install 'klavins-factory[decompose]'"
 
-CLOSE = "close these meshes; --hulls plans with hulls all the same: ways may lead through walls"
+CLOSE = "close these meshes, or accept their hulls with --hulls: paths may then lead through walls"
 
 NAMED = 12
-"""So many parts that a hull overlaps, the deepest first, are named."""
+"""The most parts that a message names, the deepest overlap first."""
 
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """Two parts that overlap in the finished product, as far as a hull of one of them shows, by
-    their labels, and how deep [m]."""
+    """The labels of two parts that overlap in the finished product according to the hull of one of
+    them, and the depth [m]."""
 
     one: str
     other: str
@@ -32,7 +33,7 @@ class Drawn:
 
 
 def hull_stands(mesh: Mesh | None) -> bool:
-    """Whether a hull stands for a closed mesh that is notably less than it."""
+    """Whether a closed mesh that is notably smaller than its hull is represented by the hull."""
     if mesh is None or mesh.pieces or not is_closed(mesh.faces):
         return False
     return 0 < mesh.share < FULL
@@ -40,7 +41,7 @@ def hull_stands(mesh: Mesh | None) -> bool:
 
 def refuse_hidden(source: InPlace, pairs: Sequence[Drawn]) -> None:
     """Raises InputError (Hulls) if there are such pairs, with a diagnostic for each part that is
-    known by its hull alone. A product with a tree is left to its warnings: so `check` takes it."""
+    represented by its hull. A product with a tree only gets warnings, as from `check`."""
     if not pairs or source.tree is not None:
         return
     faults = []

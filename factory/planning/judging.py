@@ -1,4 +1,4 @@
-"""What a tree is worth: each of its joins, how it comes together, and what it all costs."""
+"""The evaluation of a tree: the motion of each of its joins, and what they cost."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from factory.planning.stance import ROOT_AXIS, Stance
 from factory.planning.subsets import APART, BLOCKED, LOOSE, PASSES, TIPS
 
 PRICES = {CLASHES: BLOCKED, LOCKED: PASSES, DEEPER: LOOSE}
-"""What a join costs in which parts are so much in each other's way."""
+"""The price of a join by its level of blocking."""
 
 
 @dataclass(frozen=True, slots=True)
 class Join:
-    """Two groups of units that come together: `come` goes out along `direction` of the product, so
-    comes in against it. `level`: the worst in its way (`blocking`). `lowered`: whether it comes
-    along the vertical."""
+    """Two groups of units that are joined: `come` leaves along `direction` of the product, so it
+    comes in against it. `level`: the worst level of blocking on its way (`blocking`). `lowered`:
+    whether it comes along the vertical."""
 
     pile: Units
     come: Units
@@ -56,64 +56,67 @@ class Judged:
         return joins + APART * self.apart + TIPS * self.tips + RELAY * self.relays
 
     def count(self, level: int) -> int:
-        """How many joins have parts that much in each other's way, or more."""
+        """The number of joins with this level of blocking, or more."""
         return sum(join.level >= level for join in self.joins)
 
 
 class Judge:
     """Judges trees of one product in one stance."""
 
-    def __init__(self, found: Blocking, stance: Stance, expected: Expected) -> None:
-        self.found, self.stance, self.expected = found, stance, expected
+    def __init__(self, graphs: Blocking, stance: Stance, expected: Expected) -> None:
+        self.graphs, self.stance, self.expected = graphs, stance, expected
 
     def judged(self, tree: Tree) -> Judged:
         """The joins of a tree, and what they cost."""
         walk = _Walk(self)
         members, held = walk.made(tree, ROOT_AXIS)
         walk.seconds.append(held + float(self.expected.delivering(self.size(members))))
-        joins, apart = tuple(walk.joins), walk.apart - (not self.found.hangs(members))
+        joins, apart = tuple(walk.joins), walk.apart - (not self.graphs.hangs(members))
         tips = walk.tips - self.tips(members)
-        found = joins, apart, walk.relays, max(walk.seconds), walk.robots, walk.sizes, tips
-        return Judged(tree, self.stance, *found)
+        figures = joins, apart, walk.relays, max(walk.seconds), walk.robots, walk.sizes, tips
+        return Judged(tree, self.stance, *figures)
 
     def size(self, members: Units) -> Array:
-        """How long some units are at most on the floor [m]."""
+        """The longer horizontal extent of some units [m]."""
         level = list(self.stance.axes[:2])
         rows = list(members)
-        extent = self.found.high[rows].max(axis=0) - self.found.low[rows].min(axis=0)
+        extent = self.graphs.high[rows].max(axis=0) - self.graphs.low[rows].min(axis=0)
         return np.asarray(extent[level].max())
 
     def stroke(self, come: Units, pile: Units) -> Array:
-        """How far one of two sides is lowered at least [m]."""
-        low, high = self.found.low[:, self.stance.axes[2]], self.found.high[:, self.stance.axes[2]]
+        """The shorter stroke by which one of two sides can be lowered [m]."""
+        low, high = (
+            self.graphs.low[:, self.stance.axes[2]],
+            self.graphs.high[:, self.stance.axes[2]],
+        )
         (a, b), (c, d) = ((low[list(side)].min(), high[list(side)].max()) for side in (come, pile))
         return np.asarray(min(d - a, b - c))
 
     def tips(self, members: Units) -> bool:
-        """Whether some units would tip over where they stand."""
-        feet = self.found.feet
+        """Whether some units would tip over by themselves."""
+        feet = self.graphs.feet
         return feet is not None and bool(feet.joined(members).tips[0])
 
     def join(self, pile: Units, come: Units, axis: int, onto: bool) -> Join:
-        """How two groups come together along an axis of the floor, or one from above: the least in
-        the way, then sliding."""
+        """How two groups are joined, along an axis of the floor or from above: with the least
+        blocking, and horizontally if that is equal."""
         ways = [(self.stance.axes[axis], side, False) for side in (+1, -1)]
         ways.append((self.stance.axes[2], self.stance.up, True))
-        if not onto and self.found.base not in pile:
+        if not onto and self.graphs.base not in pile:
             ways.append((self.stance.axes[2], -self.stance.up, True))
-        found = [self._way(pile, come, way) for way in ways]
-        return min(found, key=lambda join: (join.level, join.lowered))
+        joins = [self._way(pile, come, way) for way in ways]
+        return min(joins, key=lambda join: (join.level, join.lowered))
 
     def _way(self, pile: Units, come: Units, way: tuple[int, int, bool]) -> Join:
         axis, side, lowered = way
         at = np.ix_(come, pile) if side > 0 else np.ix_(pile, come)
-        level = int(self.found.levels[axis][at].max())
+        level = int(self.graphs.levels[axis][at].max())
         return Join(pile, come, (axis, side), level, lowered)
 
 
 @dataclass
 class _Walk:
-    """What is gathered on the way through a tree."""
+    """The figures that are accumulated on a walk through a tree."""
 
     judge: Judge
     joins: list[Join] = field(default_factory=list)
@@ -125,8 +128,8 @@ class _Walk:
     sizes: float = 0.0
 
     def made(self, tree: Tree, axis: int) -> tuple[Units, float]:
-        """The units of a tree whose inputs come along an axis, and what the robot that holds it
-        has done [s]."""
+        """The units of a tree whose inputs come along an axis, and the time that the robot which
+        holds it has spent [s]."""
         expected = self.judge.expected
         if isinstance(tree, int):
             self.robots += 1
@@ -151,7 +154,7 @@ class _Walk:
                 time += float(expected.lift(self.judge.stroke(come, pile)))
             self.joins.append(join)
             pile = tuple(sorted((*pile, *come)))
-            self.apart += not self.judge.found.hangs(pile)
+            self.apart += not self.judge.graphs.hangs(pile)
             self.tips += self.judge.tips(pile)
             self.sizes += float(self.judge.size(pile))
         return pile, time
@@ -161,7 +164,7 @@ class _Walk:
 
 
 def walk_joins(tree: Tree) -> Iterator[Tree]:
-    """All trees within a tree that join or relay something, inner ones first, in the order of
+    """All sub-trees that join or relay something, inner ones first, in the order of
     `Judged.joins`."""
     if isinstance(tree, int):
         return

@@ -28,13 +28,13 @@ from factory.support.settings import Settings
 from factory.timing.prediction import pace
 
 ALIKE = 0.01
-"""Factories whose figures differ by less than this share are as good as each other."""
+"""Figures that differ by less than this share are equal."""
 
 
 @dataclass(frozen=True)
 class LaidOut:
-    """A judged tree, as a `tree` of labels and as a `project`; `kinds`: how many different
-    sub-assemblies it has."""
+    """A judged tree, as a `tree` of labels and as a `project`; `kinds`: the number of different
+    sub-assemblies."""
 
     judged: Judged
     tree: LabelTree = field(repr=False)
@@ -43,18 +43,18 @@ class LaidOut:
 
     @cached_property
     def blocked(self) -> int:
-        """How many operations `check` finds blocked."""
-        found = self.project.matings
-        return len(found.of_kind("blocked")) if found else 0
+        """The number of operations that `check` calls blocked."""
+        matings = self.project.matings
+        return len(matings.of_kind("blocked")) if matings else 0
 
     @cached_property
     def held(self) -> int:
-        """How many sub-assemblies no hand can hold."""
+        """The number of sub-assemblies that no hand can hold."""
         return len(self.project.no_grips)
 
     @cached_property
     def seconds(self) -> float:
-        """The predicted cycle time [s], infinite where there is no layout."""
+        """The predicted cycle time [s]; infinite if there is no layout."""
         try:
             return pace(self.project.layout, self.project.settings)[0].seconds
         except FactoryError:
@@ -62,20 +62,20 @@ class LaidOut:
 
     @property
     def robots(self) -> int:
-        """How many there are, tools included."""
+        """The number of robots, tools included."""
         return len(self.project.factory.robots)
 
     @cached_property
     def area(self) -> float:
-        """Of the floor [m²]."""
+        """The area of the floor [m²]; infinite if there is no layout."""
         try:
             return float(self.project.layout.area)
         except FactoryError:
             return float("inf")
 
     def rank(self, aim: Aim) -> tuple[float, ...]:
-        """What is better is less: nothing blocked, everything held, what it is for, then fewer
-        kinds of sub-assemblies."""
+        """The rank of a factory, less is better: blocked operations, sub-assemblies that cannot be
+        held, the aim, then the number of kinds of sub-assemblies."""
         aims = {"cycle": self.seconds, "robots": float(self.robots), "floor": self.area}
         order = [aims.pop(aim), *aims.values()]
         rough = [float(np.round(np.log(max(x, 1e-9)) / ALIKE)) for x in order]
@@ -83,7 +83,7 @@ class LaidOut:
 
 
 class Layouts:
-    """The layouts of one source's trees. Its geometry is computed once a stance."""
+    """The layouts of a source's trees. The geometry is computed once per stance."""
 
     def __init__(
         self, source: InPlace, templates: Mapping[str, Template], settings: Settings
@@ -95,7 +95,7 @@ class Layouts:
         self._kinds = {part.label: part.kind for part in source.parts}
 
     def of(self, judged: Judged) -> LaidOut:
-        """A judged tree as a project, which is laid out when it is asked for something."""
+        """A judged tree as a project, which is laid out on demand."""
         tree = self.labelled(judged.tree)
         made = planned_product(self.source, tree, judged.stance.rotation)
         text = next(iter(made.files.values())).decode()
@@ -115,30 +115,30 @@ class Layouts:
         return tuple(self.labelled(below) for below in tree)
 
     def kinds(self, tree: Tree) -> int:
-        """How many different sub-assemblies a tree has, told by the kinds of their units."""
-        found: set[tuple[str, ...]] = set()
+        """The number of different sub-assemblies of a tree, by the kinds of their units."""
+        sets: set[tuple[str, ...]] = set()
 
         def below(tree: Tree) -> tuple[str, ...]:
             if isinstance(tree, int):
                 return (self._kinds.get(self._units[tree], self._units[tree]),)
             parts = (tree.tree, *tree.screws) if isinstance(tree, Screwed) else tree
             kinds = tuple(sorted(kind for one in parts for kind in below(one)))
-            found.add(kinds)
+            sets.add(kinds)
             return kinds
 
         below(tree)
-        return len(found)
+        return len(sets)
 
     def best(
         self,
         trees: Sequence[Judged],
         aim: Aim,
         budget: Budget,
-        told: Callable[[LaidOut], None] = lambda _: None,
+        report: Callable[[LaidOut], None] = lambda _: None,
     ) -> LaidOut:
-        """The best of some trees, as many of which are laid out as there is time for, the first
-        always. The next one is taken to need as long as the longest did. A KeyboardInterrupt ends
-        that of any but the first."""
+        """The best of some trees. As many are laid out as time permits, at least the first; the
+        next one is assumed to take as long as the longest did. A KeyboardInterrupt ends the layout
+        of any but the first."""
         best: LaidOut | None = None
         longest = 0.0
         for judged in trees:
@@ -152,7 +152,7 @@ class Layouts:
                 if best is None:
                     raise
                 break
-            told(best)
+            report(best)
             longest = max(longest, perf_counter() - begin)
         if best is None:
             raise ValueError("there is no tree to lay out")

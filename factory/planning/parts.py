@@ -1,4 +1,4 @@
-"""Parts in place: what a plan is made of, whatever file they come from."""
+"""Parts in place: the input of planning, whatever file they come from."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from factory.support.errors import Diagnostic
 
 @dataclass(frozen=True, slots=True)
 class PlacedPart:
-    """A part where it is in the finished product.
+    """A part at its place in the finished product.
 
-    `vertices` (n, 3) [m] and `faces` (m, 3), turned outwards, are in the frame of the product.
-    Parts of one `kind` are the same shape up to a rigid motion; mirrored twins are two kinds.
-    `solid` has its mass, its box and its convex pieces, in place too; `node` is what the PAG says
-    of it: `atomic` with its mesh or shape, its place, its colour.
+    `vertices` (n, 3) [m] and `faces` (m, 3), oriented outwards, are in the frame of the product.
+    Parts of one `kind` have the same shape up to a rigid motion; mirror images are two kinds.
+    `solid` has its mass, its box and its convex pieces, in place too; `node` is its PAG node:
+    `atomic` with its mesh or shape, its place, its colour.
     """
 
     label: str
@@ -42,8 +42,8 @@ class PlacedPart:
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """A sub-tree that stays as the user wrote it: its `label`, the labels of its `parts`, and its
-    nodes, inputs first, parts among them. For the plan it is one body."""
+    """A sub-tree that is kept as the user wrote it: its `label`, the labels of its `parts`, and its
+    nodes, inputs first, including parts. The planner treats it as one body."""
 
     label: str
     parts: tuple[str, ...]
@@ -54,10 +54,10 @@ class Kept:
 class InPlace:
     """The parts of a product in place, in the order of the source.
 
-    `notes` says in words what was found; `warnings` what may be wrong. `files` are the mesh files
-    that the nodes of the parts name, by path in the output folder. `tree` is the tree that the
-    source came with, None for none: a plan may be compared with it. `allowed`: overlaps of its
-    parts that are meant.
+    `notes` describes what was read; `warnings` what may be wrong. `files` are the mesh files that
+    the nodes of the parts name, by path in the output folder. `tree` is the tree of the source,
+    None if it has none: a plan may be compared with it. `allowed`: overlaps of parts that are
+    intended.
     """
 
     name: str
@@ -73,14 +73,14 @@ class InPlace:
         object.__setattr__(self, "files", MappingProxyType(dict(self.files)))
 
     def units(self) -> tuple[tuple[str, tuple[PlacedPart, ...]], ...]:
-        """What the plan joins, each with its parts: kept sub-trees and all other parts."""
+        """The units of planning, each with its parts: kept sub-trees and all other parts."""
         by_label = {part.label: part for part in self.parts}
         kept = {label: keep for keep in self.kept for label in keep.parts}
-        found: dict[str, tuple[PlacedPart, ...]] = {}
+        units: dict[str, tuple[PlacedPart, ...]] = {}
         for part in self.parts:
             keep = kept.get(part.label)
             if keep is None:
-                found[part.label] = (part,)
+                units[part.label] = (part,)
             else:
-                found.setdefault(keep.label, tuple(by_label[label] for label in keep.parts))
-        return tuple(found.items())
+                units.setdefault(keep.label, tuple(by_label[label] for label in keep.parts))
+        return tuple(units.items())

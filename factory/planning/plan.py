@@ -1,4 +1,4 @@
-"""Plan the assembly of parts in place: from a source to a tree, or a proof that there is none."""
+"""Assembly planning for parts in place: from a source to a tree, or a proof that there is none."""
 
 from __future__ import annotations
 
@@ -35,22 +35,23 @@ from factory.support.errors import Diagnostic, InputError, did_you_mean
 from factory.support.settings import Settings
 
 LAYING = "laying out"
-"""What goes on once there are trees."""
+"""The name of the last stage of planning."""
 
 DWELL = 1.0
-"""How long a driver turns a screw [s], as its template says."""
+"""The time that a driver turns a screw [s], as its template states."""
 
 
 @dataclass(frozen=True)
 class PlanOptions:
-    """`aim`: what the tree is chosen for; `seconds` to search, None for the usual time and proofs
-    that are always ended (`searching`); `allow`: units that may pass through others, or two, `a:b`,
-    through each other; `hulls`: whether hulls may hide what goes into them; `up`: the axis of the
-    file and its side that is up, None for z unless the product tips then; `base`: the unit onto
-    which all others come, "" for any; `screws`: units that are screws besides those that look or
-    are called so, None for no screws at all; `lay_out`: whether layouts decide, or estimates alone;
-    `settings` and `templates` of the factory, None for those shipped; `told` hears what goes on,
-    and how many of how many are done; `stopped` says that the best so far is wanted at once."""
+    """`aim`: the objective; `seconds`: the search time, None for the default time and proofs that
+    are always completed (`searching`); `allow`: units that may pass through others, or two, `a:b`,
+    through each other; `hulls`: whether hulls may hide parts in their cavities; `up`: the axis and
+    side of the file that is up, None for z unless the product tips over; `base`: the unit onto
+    which all others come, "" for any; `screws`: units that are screws besides those that are
+    recognised, None for no screws at all; `lay_out`: whether layouts decide, or estimates alone;
+    `settings` and `templates` of the factory, None for those shipped; `told` is called with the
+    stage, the progress, and a text; `stopped` tells whether the best tree so far is wanted at
+    once."""
 
     aim: Aim = "cycle"
     seconds: float | None = None
@@ -68,10 +69,10 @@ class PlanOptions:
 
 @dataclass(frozen=True, slots=True)
 class PlannedJoin:
-    """An operation of a plan: the units of the pile and those that `come`, the `direction` (3,) in
-    the source's frame in which these leave it, so against which they come; the least room [m] on
-    that way (infinite where nothing is near, less than 0 for parts drawn into each other), whether
-    they are lowered (or the pile is), and whether they pass through each other."""
+    """An operation of a plan: the units of the pile, and those that `come`; the `direction` (3,) in
+    the source's frame in which these would leave; the least `clearance` [m] on that way (infinite
+    if nothing is near, negative for parts drawn into each other); whether they, or the pile, are
+    lowered; and whether they pass through each other."""
 
     pile: tuple[str, ...]
     come: tuple[str, ...]
@@ -83,12 +84,13 @@ class PlannedJoin:
 
 @dataclass(frozen=True, slots=True)
 class PlanFigures:
-    """Of a plan: how many operations, how many of them are `blocked`, have parts pass through each
-    other that were drawn into each other (`through`), get a little deeper (`left_out`), or scrape;
-    how many sub-assemblies are in pieces (`apart`), would tip over (`tips`), are handed over to
-    turn (`relays`), or cannot be held by any hand (`not_held`, None where nothing was laid out);
-    how many trees were laid out; robots; the cycle time that was expected from sizes and that which
-    is predicted [s], and the floor [m²] (None where nothing was laid out)."""
+    """The figures of a plan: the number of operations; of those that are `blocked`, that have parts
+    which were drawn into each other pass through each other (`through`) or get a little deeper
+    (`left_out`), and that scrape; of sub-assemblies that are not connected (`apart`), would tip
+    over (`tips`), are handed over to be turned (`relays`), or cannot be held by any hand
+    (`not_held`, None without layouts); of trees that were laid out; of robots; the cycle time
+    expected from sizes and the predicted one [s], and the floor area [m²] (None without
+    layouts)."""
 
     operations: int
     blocked: int
@@ -108,11 +110,11 @@ class PlanFigures:
 
 @dataclass(frozen=True)
 class Planned:
-    """A tree of labels, as `writing.planned_product` takes it, with the rotation (3, 3) of the
-    product onto the floor, its operations, its figures, the laid-out `project` (None where
-    estimates alone decided); `optimal`: whether it is proved that no tree costs less, by what is
-    in the way and by the expected cycle; `hidden`: where hulls were accepted, the pairs that
-    overlap, though their meshes may not; `notes`: how the product stands, in words."""
+    """A `tree` of labels, as `writing.planned_product` takes it, the rotation (3, 3) of the product
+    onto the floor, the operations and figures, and the laid-out `project` (None if estimates alone
+    decided). `optimal`: whether it is proved that no tree is better in price and expected cycle;
+    `hidden`: the pairs that overlap according to accepted hulls; `notes`: the orientation and other
+    remarks."""
 
     tree: Tree = field(repr=False)
     orientation: Array
@@ -126,9 +128,10 @@ class Planned:
 
 @dataclass(frozen=True)
 class CannotAssemble:
-    """No tree of straight motions along the axes joins the parts: proved by those that interlock.
-    Without `removal`, or where its clashes are accepted (`allow`), the rest can be joined. `needs`:
-    in which other directions (3,) parts with these labels would come apart, each by itself."""
+    """A proof that no tree of straight motions along the axes joins the parts: those that
+    interlock. Without `removal`, or with its clashes accepted (`allow`), the rest can be joined.
+    `needs`: the other directions (3,) in which parts with these labels could be separated, each set
+    by itself."""
 
     interlocks: tuple[Interlock, ...]
     removal: Removal
@@ -136,27 +139,27 @@ class CannotAssemble:
 
 
 def plan(source: InPlace, options: PlanOptions | None = None) -> Planned | CannotAssemble:
-    """The best tree for a source's parts, or why there is none. Raises InputError where `allow`
-    or `base` names nothing that is planned, or the product tips with `up` up (Usage), or where
-    hulls hide what is in the way (Hulls)."""
+    """The best tree for a source's parts, or why there is none. Raises InputError if `allow` or
+    `base` names no unit, or the product tips over with `up` upwards (Usage), or if hulls hide parts
+    in their cavities (Hulls)."""
     asked = options or PlanOptions()
     usual = usual_seconds(len(source.units()))
     budget = Budget(asked.seconds or usual, asked.seconds is not None, stopped=asked.stopped)
-    asked.told("looking for what is in the way", 0, None, "")
-    found = blocking(source)
+    asked.told("computing what blocks what", 0, None, "")
+    graphs = blocking(source)
     named = (*asked.allow, *([asked.base] if asked.base else ()), *(asked.screws or ()))
-    _check_named(named, found)
-    pairs = found.hidden
+    _check_named(named, graphs)
+    pairs = graphs.hidden
     if not asked.hulls:
         refuse_hidden(source, pairs)
-    found = found.allowing(asked.allow)
+    graphs = graphs.allowing(asked.allow)
 
     def graph(source: InPlace) -> Blocking:
         return blocking(source).allowing(asked.allow)
 
-    pose = posed(source, found, asked.up, graph)
+    pose = posed(source, graphs, asked.up, graph)
     if pose.stuck:
-        return CannotAssemble(pose.stuck, removal(found), pose.needs)
+        return CannotAssemble(pose.stuck, removal(graphs), pose.needs)
     planned = _planned(pose, asked, budget)
     notes = (*said(pose, planned.orientation), *toppling(planned.figures.tips))
     notes += screwing(screws_in(planned.tree))
@@ -165,9 +168,9 @@ def plan(source: InPlace, options: PlanOptions | None = None) -> Planned | Canno
 
 def _planned(pose: Pose, asked: PlanOptions, budget: Budget) -> Planned:
     source = pose.source
-    base = pose.found.labels.index(asked.base) if asked.base else -1
+    base = pose.graphs.labels.index(asked.base) if asked.base else -1
     stands = feet([parts for _, parts in source.units()], along(pose.up))
-    found = replace(pose.found, feet=stands, base=base)
+    graphs = replace(pose.graphs, feet=stands, base=base)
     templates = all_templates() if asked.templates is None else asked.templates
     expected = Expected(Pace.of(asked.settings))
     seen = [0]
@@ -175,26 +178,26 @@ def _planned(pose: Pose, asked: PlanOptions, budget: Budget) -> Planned:
     def told(judged: Judged) -> None:
         seen[0] += 1
         words = f"{judged.robots} robots, about {judged.seconds:.1f} s"
-        asked.told("looking for a tree", seen[0], None, words)
+        asked.told("searching for a tree", seen[0], None, words)
 
     def sought_for(screws: tuple[int, ...]) -> Trees:
-        rest = [n for n in range(len(found)) if n not in screws]
-        others = found.grouped([[n] for n in rest]) if screws else found
-        given = _kept_prices(only(source, others.labels), templates)
-        task = Sought(others, expected, given, asked.aim, budget, told, stances(pose.up))
+        rest = [n for n in range(len(graphs)) if n not in screws]
+        others = graphs.grouped([[n] for n in rest]) if screws else graphs
+        prices = _kept_prices(only(source, others.labels), templates)
+        task = Sought(others, expected, prices, asked.aim, budget, told, stances(pose.up))
         return driven(trees(task), rest)
 
     def driven(sought: Trees, rest: list[int]) -> Trees:
-        screws = [n for n in range(len(found)) if n not in rest]
+        screws = [n for n in range(len(graphs)) if n not in rest]
         if not screws:
             return sought
-        made = [fastened(found, renumbered(j, rest), screws, DWELL) for j in sought.all]
+        made = [fastened(graphs, renumbered(j, rest), screws, DWELL) for j in sought.all]
         if all(left for _, left in made):
             lost = min((left for _, left in made), key=len)
             return sought_for(tuple(n for n in screws if n not in lost))
         return Trees(tuple(judged for judged, left in made if not left), optimal=False)
 
-    sought = sought_for(_screws(source, found, asked))
+    sought = sought_for(_screws(source, graphs, asked))
     layouts = Layouts(source, templates, asked.settings)
     if not asked.lay_out:
         return _result(pose, layouts.of(sought.all[0]), sought.optimal, 0)
@@ -206,7 +209,7 @@ def _planned(pose: Pose, asked: PlanOptions, budget: Budget) -> Planned:
         asked.told(LAYING, laid[0], len(sought.all), words)
 
     best = layouts.best(sought.all, asked.aim, budget, said)
-    asked.told("measuring the room on ways", 1, None, "")
+    asked.told("measuring clearances", 1, None, "")
     return _result(pose, best, sought.optimal, laid[0])
 
 
@@ -237,14 +240,14 @@ def _kept_prices(source: InPlace, templates: Mapping[str, Template]) -> Callable
     return prices
 
 
-def _screws(source: InPlace, found: Blocking, asked: PlanOptions) -> tuple[int, ...]:
-    """The units that are screws, equal ones in a row; none where nothing else is left."""
+def _screws(source: InPlace, graphs: Blocking, asked: PlanOptions) -> tuple[int, ...]:
+    """The units that are screws, those of one kind in a row; empty if there are no other units."""
     if asked.screws is None:
         return ()
     kinds = {part.label: part.kind for part in source.parts}
     labels = sorted(fasteners(source, asked.screws), key=lambda label: kinds.get(label, label))
-    numbers = tuple(found.labels.index(label) for label in labels if label != asked.base)
-    return numbers if len(numbers) < len(found) else ()
+    numbers = tuple(graphs.labels.index(label) for label in labels if label != asked.base)
+    return numbers if len(numbers) < len(graphs) else ()
 
 
 def _result(pose: Pose, laid: LaidOut, optimal: bool, layouts: int) -> Planned:
@@ -284,17 +287,17 @@ def _join(join: Join, pose: Pose, room: Array) -> PlannedJoin:
     at = (join.come, join.pile) if side > 0 else (join.pile, join.come)
     least = float(room[np.ix_(*at)].min())
     x, y, z = (float(n) + 0.0 for n in pose.turn.T @ along(join.direction))
-    pile, come = (tuple(pose.found.labels[n] for n in units) for units in (join.pile, join.come))
+    pile, come = (tuple(pose.graphs.labels[n] for n in units) for units in (join.pile, join.come))
     return PlannedJoin(pile, come, (x, y, z), least, join.lowered, join.level >= LOCKED)
 
 
-def _check_named(names: tuple[str, ...], found: Blocking) -> None:
+def _check_named(names: tuple[str, ...], graphs: Blocking) -> None:
     faults = [
-        Diagnostic("Usage", f"nothing that is planned is called '{label}'", None, hint)
+        Diagnostic("Usage", f"there is no part or kept sub-assembly '{label}'", None, hint)
         for name in names
-        for label in (name.split(":", 1) if name not in found.labels else ())
-        if label not in found.labels
-        for hint in [did_you_mean(label, list(found.labels), "labels")]
+        for label in (name.split(":", 1) if name not in graphs.labels else ())
+        if label not in graphs.labels
+        for hint in [did_you_mean(label, list(graphs.labels), "labels")]
     ]
     if faults:
         raise InputError(faults)

@@ -1,5 +1,5 @@
-"""How a product is turned and stood before its tree is sought: as drawn, unless it would tip, or
-its parts come along no axis."""
+"""The pose in which a product is assembled: as drawn, unless it would tip over or its parts come
+along no axis."""
 
 from __future__ import annotations
 
@@ -26,54 +26,59 @@ SIDES = tuple((axis, side) for axis in (2, 0, 1) for side in (+1, -1))
 
 @dataclass(frozen=True)
 class Pose:
-    """A product turned by `turn` (3, 3), the axis and side of the turned one that are `up`, and
-    what is in the way then; `stuck`: what still interlocks; `needs`: the directions (3,) of the
-    file in which parts with these labels would come apart, where no turn has all of these along
-    axes; `tips`: how far its centre of mass is beyond what it stands on [m]."""
+    """A product turned by `turn` (3, 3), with its blocking `graphs`. `up`: the axis and side of the
+    turned product that are upwards; `stuck`: the sets that still interlock; `needs`: the directions
+    (3,) of the file in which parts with these labels could be separated, if no turn brings all of
+    these along axes; `tips`: the distance of the centre of mass outside the support [m]."""
 
     source: InPlace
     turn: Array
     up: Direction
-    found: Blocking = field(repr=False)
+    graphs: Blocking = field(repr=False)
     stuck: tuple[Interlock, ...] = ()
     needs: tuple[tuple[tuple[str, ...], Array], ...] = ()
     tips: float = 0.0
 
 
 def posed(
-    source: InPlace, found: Blocking, up: Direction | None, graph: Callable[[InPlace], Blocking]
+    source: InPlace,
+    graphs: Blocking,
+    up: Direction | None,
+    graphs_of: Callable[[InPlace], Blocking],
 ) -> Pose:
-    """The pose in which a source is planned; `found` is what is in the way as it was drawn, `graph`
-    finds that of others. Raises InputError (Usage) where it tips if `up` is up."""
+    """The pose in which a source is planned. `graphs`: its blocking graphs as it was drawn;
+    `graphs_of` computes those of another pose. Raises InputError (Usage) if the product tips over
+    with `up` upwards."""
     drawn = up or AS_DRAWN
     tips = overhang(source.parts, along(drawn))
     if up is not None and tips > TIPS:
         message = f"the product tips over if {named(up)} is up: {_beyond(tips)}"
         raise InputError(Diagnostic("Usage", message, None, "leave out --up, or choose another"))
-    stuck = interlocks(found)
-    first = Pose(source, np.eye(3), drawn, found, stuck, tips=tips)
+    stuck = interlocks(graphs)
+    first = Pose(source, np.eye(3), drawn, graphs, stuck, tips=tips)
     if not stuck and tips <= TIPS:
         return first
     if not stuck:
         side = min(SIDES, key=lambda side: overhang(source.parts, along(side)))
         if overhang(source.parts, along(side)) <= TIPS:
-            return Pose(source, np.eye(3), side, found)
+            return Pose(source, np.eye(3), side, graphs)
     needs: dict[tuple[str, ...], Array] = {}
     for turn, way in _candidates(source, stuck, along(drawn), up is None):
-        free = [_freed(source, one, turn, graph) for one in stuck]
+        free = [_freed(source, one, turn, graphs_of) for one in stuck]
         for labels in filter(None, free):
             needs.setdefault(labels, way)
         if all(labels == one.labels for labels, one in zip(free, stuck, strict=True)):
-            pose = _in(turned(source, turn), turn, drawn, up is None, graph)
+            pose = _in(turned(source, turn), turn, drawn, up is None, graphs_of)
             if not pose.stuck and pose.tips <= TIPS:
                 return pose
-    return Pose(source, np.eye(3), drawn, found, stuck, tuple(needs.items()), tips)
+    return Pose(source, np.eye(3), drawn, graphs, stuck, tuple(needs.items()), tips)
 
 
 def _candidates(
     source: InPlace, stuck: tuple[Interlock, ...], up: Array, tilted: bool
 ) -> Iterator[tuple[Array, Array]]:
-    """Turns, those about the vertical first."""
+    """Candidate rotations with the directions that they bring along an axis, those about the
+    vertical first."""
     labels = {label for one in stuck for label in one.labels}
     concerned = only(source, labels) if stuck else source
     yield from turns(concerned, up, tilted=False)
@@ -82,10 +87,10 @@ def _candidates(
 
 
 def _freed(
-    source: InPlace, one: Interlock, turn: Array, graph: Callable[[InPlace], Blocking]
+    source: InPlace, one: Interlock, turn: Array, graphs_of: Callable[[InPlace], Blocking]
 ) -> tuple[str, ...]:
-    """Those of parts that interlock which come off the others after a turn."""
-    left = interlocks(graph(turned(only(source, one.labels), turn)))
+    """The interlocked parts that can be separated from the others after a turn."""
+    left = interlocks(graphs_of(turned(only(source, one.labels), turn)))
     held = {label for other in left for label in other.labels}
     return tuple(label for label in one.labels if label not in held)
 
@@ -95,14 +100,14 @@ def _in(
     turn: Array,
     up: Direction,
     free: bool,
-    graph: Callable[[InPlace], Blocking],
+    graphs_of: Callable[[InPlace], Blocking],
 ) -> Pose:
-    """The pose of a turned product: with that axis up that was, unless it tips then and there is a
-    choice (`free`)."""
+    """The pose of a turned product, with the same axis upwards unless it would tip over and another
+    axis may be chosen (`free`)."""
     tips = {side: overhang(source.parts, along(side)) for side in (SIDES if free else (up,))}
     side = up if tips[up] <= TIPS else min(tips, key=tips.__getitem__)
-    found = graph(source)
-    return Pose(source, turn, side, found, interlocks(found), tips=tips[side])
+    graphs = graphs_of(source)
+    return Pose(source, turn, side, graphs, interlocks(graphs), tips=tips[side])
 
 
 def along(direction: Direction) -> Array:
@@ -120,7 +125,7 @@ def in_words(way: Array) -> str:
 
 
 def said(pose: Pose, turn: Array) -> tuple[str, ...]:
-    """What is to be said of how the product stands, turned by `turn` (3, 3) in all."""
+    """A note on the orientation of the product, which is turned by `turn` (3, 3) in total."""
     upright = np.round(turn[2], 9)
     stands = "the product stands as it was drawn, +z up"
     if upright[2] < 1:
@@ -128,21 +133,25 @@ def said(pose: Pose, turn: Array) -> tuple[str, ...]:
     angle = np.degrees(np.arctan2(turn[1, 0], turn[0, 0]))
     if upright[2] == 1 and abs(angle) > 1e-6:
         stands += f", turned by {angle:.4g}° about it"
-    tips = f"; it tips over there, and on each side: {_beyond(pose.tips)}"
+    tips = f"; it tips over on every side: {_beyond(pose.tips)}"
     return (stands + (tips if pose.tips > TIPS else ""),)
 
 
 def screwing(labels: Sequence[str]) -> tuple[str, ...]:
-    """Which parts are driven in as screws, if any are."""
+    """A note on the parts that are driven in as screws, if there are any."""
     some = f"{listing(labels, 12)} {'are driven in as screws' if len(labels) > 1 else 'is a screw'}"
-    return (f"{some}, after what they clamp (--no-screws: as other parts)",) if labels else ()
+    return (
+        (f"{some}, after the parts that they clamp (--no-screws: ordinary parts)",)
+        if labels
+        else ()
+    )
 
 
 def toppling(count: int) -> tuple[str, ...]:
-    """That some sub-assemblies would tip over by themselves, if any do."""
+    """A note on sub-assemblies that would tip over by themselves, if there are any."""
     some = f"{count} sub-assemblies tip" if count > 1 else "a sub-assembly tips"
-    return (f"{some} over where nothing holds it: no tree was found without",) if count else ()
+    return (f"{some} over where nothing holds it: no tree avoids this",) if count else ()
 
 
 def _beyond(far: float) -> str:
-    return f"its centre of mass is {1e3 * far:.1f} mm beyond what it stands on"
+    return f"its centre of mass is {1e3 * far:.1f} mm outside its support"

@@ -1,5 +1,5 @@
-"""The trees that are worth being laid out: of each stance that costs least, for some bounds on the
-expected cycle."""
+"""Candidate trees for layout: for each of the cheapest stances, the best trees within some bounds
+on the expected cycle time."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from factory.planning.stance import ROOT_AXIS, Stance, stances
 from factory.planning.subsets import MOST, Subsets, subsets
 
 Aim = Literal["cycle", "robots", "floor"]
-"""What a tree is chosen for."""
+"""The objective of planning."""
 
 BOUNDS: dict[Aim, tuple[float, ...]] = {
     "cycle": (1.0, 1.4, 1.15, 1.8),
@@ -30,36 +30,36 @@ BOUNDS: dict[Aim, tuple[float, ...]] = {
 """The bounds on expected cycles, as multiples of the least."""
 
 SEVERAL = 3
-"""So many stances, at most, are tried for each bound."""
+"""The most stances that are tried for each bound."""
 
 EVEN = (1.0, 0.3, 0.0)
-"""Many units are divided in about equal halves first, then less evenly."""
+"""How even divisions of many units are preferred to be, in order: 1 for halves, 0 for any."""
 
 PROOF, EACH = 30.0, 0.2
-"""The usual times to search [s]: of up to MOST units, whose trees may be proved; for each of
+"""Default search times [s]: for up to MOST units, whose trees may be proved optimal; per unit for
 more."""
 
 SURE = 12
-"""The trees of so many units are proved, however long it takes, unless the search is stopped or its
-time was asked for."""
+"""The trees of up to so many units are proved optimal, however long that takes, unless the search
+is stopped or has a given time limit."""
 
 GROWN, PROVED = 0.4, 0.6
-"""The shares of the time after which large products grow no more, and proofs are given up: layouts
-need the rest."""
+"""Shares of the time after which the local search ends, and proofs are abandoned: the rest is for
+layouts."""
 
-Given = Callable[[Stance], Array]
+UnitPrices = Callable[[Stance], Array]
 """The price (2, n) of each unit in a stance if its own inputs come along x or y of the floor."""
 
 
 def usual_seconds(units: int) -> float:
-    """How long trees of so many units are sought where nothing else is asked for [s]."""
+    """The default search time for so many units [s]."""
     return PROOF if units <= MOST else EACH * units
 
 
 @dataclass(frozen=True)
 class Budget:
-    """A time to search [s], from when it is made; `asked`: whether it bounds all proofs; `stopped`:
-    whether it is to end at once."""
+    """A time limit [s] that starts when the value is made. `asked`: whether the user gave it, so
+    that it bounds proofs too; `stopped` tells whether the search must end at once."""
 
     seconds: float
     asked: bool = True
@@ -67,60 +67,61 @@ class Budget:
     stopped: Callable[[], bool] = lambda: False
 
     def late(self) -> bool:
-        """Whether all of it is gone."""
+        """Whether the time is used up."""
         return self.stopped() or perf_counter() - self.begin > self.seconds
 
     @property
     def left(self) -> float:
-        """The time that is left [s], 0 where it is to end at once."""
+        """The remaining time [s]; 0 if the search must end at once."""
         return 0.0 if self.late() else self.seconds * (1 - self.gone)
 
     @property
     def gone(self) -> float:
-        """The share that is gone."""
+        """The share of the time that is used up."""
         return (perf_counter() - self.begin) / self.seconds
 
     def share(self, part: float) -> Late:
-        """Tells whether a part of it is gone, from its beginning on."""
+        """A function that tells whether a share of the time, from its start, is used up."""
         return replace(self, seconds=part * self.seconds).late
 
 
 @dataclass(frozen=True)
 class Sought:
-    """What trees are sought for, in some of the `stances`, within a `budget`; `told` hears of each
-    tree."""
+    """A search for trees: the blocking `graphs`, the `stances` to try, the `budget`; `told` is
+    called with each tree."""
 
-    found: Blocking
+    graphs: Blocking
     expected: Expected
-    given: Given
+    unit_prices: UnitPrices
     aim: Aim = "cycle"
     budget: Budget = field(default_factory=lambda: Budget(60.0))
     told: Callable[[Judged], None] = field(default=lambda _: None)
     stances: tuple[Stance, ...] = field(default_factory=stances)
 
     def site(self, stance: Stance) -> Site:
-        """The same in one stance."""
-        return Site(self.found, stance, self.expected, self.given(stance))
+        """The problem in one stance."""
+        return Site(self.graphs, stance, self.expected, self.unit_prices(stance))
 
 
 @dataclass(frozen=True)
 class Trees:
-    """The trees found, the best by estimate first; `optimal`: whether it is proved that none has a
-    lower price, and within the bound of each none has fewer robots or smaller sub-assemblies."""
+    """The trees of least price, the best by estimate first. `optimal`: whether it is proved that no
+    tree has a lower price and that, within the bound of each tree, none has fewer robots or smaller
+    sub-assemblies."""
 
     all: tuple[Judged, ...]
     optimal: bool
 
 
 def trees(sought: Sought) -> Trees:
-    """Trees worth being laid out, at least one."""
+    """Candidate trees for layout, at least one."""
     kept: dict[object, Judged] = {}
     optimal = False
-    few = len(sought.found) <= MOST
-    sure = len(sought.found) <= SURE
+    few = len(sought.graphs) <= MOST
+    sure = len(sought.graphs) <= SURE
 
-    def keep(found: Iterator[Judged]) -> None:
-        for judged in found:
+    def keep(batch: Iterator[Judged]) -> None:
+        for judged in batch:
             sought.told(judged)
             kept.setdefault((judged.tree, judged.stance), judged)
 
@@ -144,7 +145,7 @@ def trees(sought: Sought) -> Trees:
 
 def _proved(sought: Sought, late: Late) -> Iterator[Judged]:
     """The best trees of a small product, in the best stances. Raises TooLate."""
-    table = subsets(sought.found)
+    table = subsets(sought.graphs)
     for apart in (False, True):
         ranks = _ranks(
             sought.stances,
@@ -153,7 +154,7 @@ def _proved(sought: Sought, late: Late) -> Iterator[Judged]:
         )
         if ranks:
             break
-    judges = {stance: Judge(sought.found, stance, sought.expected) for stance, _, _ in ranks}
+    judges = {stance: Judge(sought.graphs, stance, sought.expected) for stance, _, _ in ranks}
     for factor in BOUNDS[sought.aim]:
         for stance, _, seconds in ranks:
             task = _task(sought, table, stance, apart)
@@ -164,36 +165,36 @@ def _proved(sought: Sought, late: Late) -> Iterator[Judged]:
 
 def _task(sought: Sought, table: Subsets, stance: Stance, apart: bool) -> TreeTask:
     level = sorted(stance.axes[:2])
-    given = sought.given(stance)[[stance.axes.index(axis) for axis in level]]
-    return TreeTask(table, sought.expected, stance.axes[2], stance.up, given, apart)
+    prices = sought.unit_prices(stance)[[stance.axes.index(axis) for axis in level]]
+    return TreeTask(table, sought.expected, stance.axes[2], stance.up, prices, apart)
 
 
 def _ranks(
     choice: Sequence[Stance], task_of: Callable[[Stance], TreeTask], late: Late
 ) -> list[tuple[Stance, float, float]]:
-    """The stances to be tried, each with its least price and its least expected cycle [s]."""
-    found: list[tuple[Stance, float, float]] = []
+    """The cheapest stances, each with its least price and its least expected cycle [s]."""
+    ranks: list[tuple[Stance, float, float]] = []
     solved: dict[bytes, tuple[Array, Array]] = {}
     for stance in choice:
         task = task_of(stance)
-        key = bytes([task.axis]) + (b"" if task.given is None else task.given.tobytes())
+        key = bytes([task.axis]) + (b"" if task.unit_prices is None else task.unit_prices.tobytes())
         if key not in solved:
-            known = tables(task, late)
-            solved[key] = known.price[:, -1], known.time[:, -1]
+            solution = tables(task, late)
+            solved[key] = solution.price[:, -1], solution.time[:, -1]
         at = task.level.index(stance.axes[ROOT_AXIS])
         price, time = solved[key]
         if np.isfinite(price[at]):
-            found.append((stance, float(price[at]), float(time[at])))
-    if not found:
+            ranks.append((stance, float(price[at]), float(time[at])))
+    if not ranks:
         return []
-    least = min(price for _, price, _ in found)
-    good = [rank for rank in found if rank[1] == least]
+    least = min(price for _, price, _ in ranks)
+    good = [rank for rank in ranks if rank[1] == least]
     return good[:SEVERAL]
 
 
 def _grown(sought: Sought, share: float) -> Iterator[Judged]:
-    """Better and better trees of a large product, until a share of the time is gone or nothing gets
-    better."""
+    """Ever better trees of a large product, until a share of the time is used up or the search
+    converges."""
     late = sought.budget.share(share)
     random = np.random.default_rng(0)
     first: list[Judged] = []
@@ -201,7 +202,7 @@ def _grown(sought: Sought, share: float) -> Iterator[Judged]:
         for even in EVEN:
             site = sought.site(stance)
             tree = divided(site, random, even)
-            first.append(Judge(sought.found, stance, sought.expected).judged(tree))
+            first.append(Judge(sought.graphs, stance, sought.expected).judged(tree))
             if late() or first[-1].price == 0.0:
                 break
         if late():

@@ -36,17 +36,17 @@ from factory.support.files import MESH, read_bytes
 
 DECOMPOSE = f"{EXTRA}: then it is decomposed into convex bodies"
 
-AS_BODIES = "CoACD finds no bodies in it: write it as closed convex bodies that touch"
+AS_BODIES = "CoACD cannot decompose it: write it as closed convex bodies that touch"
 
 SHOWN = 12
-"""So many kinds of parts are named."""
+"""The most kinds of parts that a note names."""
 
 
 @dataclass(frozen=True, slots=True)
 class SourceOptions:
-    """`unit`: that of lengths, None to be found out; `keep`: labels of sub-trees that stay;
-    `replan`: whether a PAG's tree is thrown away; `library` and `boxes` as for an LDraw import;
-    `in_place`: whether parts are taken to be in place, whatever they look like."""
+    """`unit`: the unit of length, None to determine it; `keep`: labels of sub-trees to keep;
+    `replan`: whether the tree of a PAG is discarded; `library` and `boxes` as for an LDraw import;
+    `in_place`: whether the check that parts are in place is skipped."""
 
     unit: str | None = None
     keep: tuple[str, ...] = ()
@@ -60,25 +60,25 @@ class SourceOptions:
 def read_source(
     path: Path, templates: Mapping[str, Template], options: SourceOptions | None = None
 ) -> InPlace:
-    """The parts of a folder of meshes, of a scene file, of an LDraw model or of a PAG, in place.
-    Nothing is written. Raises InputError with every fault found."""
+    """The parts in place of a folder of meshes, a scene file, an LDraw model or a PAG. Nothing is
+    written. Raises InputError with every fault."""
     asked = options or SourceOptions()
     made = _product(path, templates, asked)
     check_count(path, [node.label for node in made.pag.parts()])
     parts, warnings = placed(made.pag, made.meshes)
-    found = alike([shape_of(part.vertices, part.faces) for part in parts])
-    firsts = zip(parts, found.kinds, strict=True)
+    kinds = alike([shape_of(part.vertices, part.faces) for part in parts])
+    firsts = zip(parts, kinds.kinds, strict=True)
     named = tuple(replace(part, kind=parts[first].label) for part, first in firsts)
     doubtful = check_places(named, made.has_tree, asked.unit is not None)
     if not (made.has_tree or asked.in_place):
         raise_if_any(check_in_place(named))
-    notes = (*made.notes, _kinds(named), *_twins(named, found))
+    notes = (*made.notes, _kinds(named), *_twins(named, kinds))
     kept = _kept(made, asked.keep)
-    said = tuple(f"'{k.label}' stays as it is: {len(k.parts)} parts" for k in kept)
+    kept_notes = tuple(f"'{k.label}' stays as it is: {len(k.parts)} parts" for k in kept)
     warnings = (*made.warnings, *warnings, *doubtful)
     tree = made.pag if made.has_tree else None
     allowed = made.pag.allowed
-    return InPlace(made.name, named, notes + said, kept, made.meshes, tree, warnings, allowed)
+    return InPlace(made.name, named, notes + kept_notes, kept, made.meshes, tree, warnings, allowed)
 
 
 def _product(path: Path, templates: Mapping[str, Template], asked: SourceOptions) -> Imported:
@@ -96,23 +96,23 @@ def _product(path: Path, templates: Mapping[str, Template], asked: SourceOptions
     if suffix in LDRAW:
         made = import_product(path, templates, Options(asked.library, asked.boxes))
         steps = len(made.pag) - sum(1 for _ in made.pag.parts())
-        note = f"an LDraw model (its unit is 0.4 mm); its {steps} steps are thrown away"
+        note = f"an LDraw model (its unit is 0.4 mm); its {steps} steps are discarded"
         return replace(made, notes=(note,))
     if suffix != ".pag":
-        known = (*SCENES, *MESHES, *LDRAW[:2], ".pag")
-        message = f"{quoted(path.name)} is nothing that parts in place can be read from"
-        hint = did_you_mean(suffix, known, "endings")
+        suffixes = (*SCENES, *MESHES, *LDRAW[:2], ".pag")
+        message = f"{quoted(path.name)} is not a source of parts in place"
+        hint = did_you_mean(suffix, suffixes, "endings")
         raise InputError(Diagnostic("BadFile", message, None, hint))
     if not (asked.replan or asked.keep):
         message = f"{quoted(path.name)} has a tree already"
-        hint = "--replan throws it away; --keep LABEL keeps a sub-tree, and plans the rest"
+        hint = "--replan discards it; --keep LABEL keeps a sub-tree and plans the rest"
         raise InputError(Diagnostic("Usage", message, None, hint))
     return _from_pag(path, templates)
 
 
 def _from_pag(path: Path, templates: Mapping[str, Template]) -> Imported:
-    """A PAG. Raises InputError, also for a part that has no shape (MissingPart): where a default
-    box stands follows from the tree."""
+    """A PAG. Raises InputError, also for a part without a shape (MissingPart): the place of its
+    default box depends on the tree."""
     pag = load_pag(path, templates)
     store, faults = MeshStore("meshes"), list[Diagnostic]()
     nodes = tuple(_stored(node, pag, store, faults) for node in pag.nodes)
@@ -121,16 +121,16 @@ def _from_pag(path: Path, templates: Mapping[str, Template]) -> Imported:
     made = replace(pag, nodes=nodes)
     others = Counter(n.operation for n in pag.nodes if n.inputs and n.operation != "mate")
     lost = ", ".join(f"{count} x {name}" for name, count in sorted(others.items()))
-    note = f"a PAG of {len(pag)} labels" + (f"; with its tree go {lost}" if lost else "")
+    note = f"a PAG of {len(pag)} labels" + (f"; its tree is discarded, with {lost}" if lost else "")
     return Imported(file_stem(path.stem), made, store.files, path.name, (note,))
 
 
 def _stored(node: Assembly, pag: PAG, store: MeshStore, faults: list[Diagnostic]) -> Assembly:
-    """A node whose mesh, if it has one, is in the store."""
+    """A node, after its mesh, if it has one, was added to the store."""
     if node.inputs:
         return node
     if not any(p.name in SHAPED - {"pos"} for p in node.parameters):
-        message = f"'{node.label}' has no shape: where it is follows from the tree alone"
+        message = f"'{node.label}' has no shape: its place is known only from the tree"
         hint = "give it a mesh, a box, a cylinder or a sphere, and its pos"
         faults.append(Diagnostic("MissingPart", message, node.position, hint))
         return node
@@ -161,7 +161,7 @@ def _refuse_keep(asked: SourceOptions, why: str) -> None:
 
 
 def _kinds(parts: tuple[PlacedPart, ...]) -> str:
-    """How many parts of how many kinds there are."""
+    """A note on the number of parts and kinds."""
     counts = Counter(part.kind for part in parts)
     several = [f"{count} like {kind}" for kind, count in counts.most_common() if count > 1]
     shown = ", ".join(several[:SHOWN]) + ", ..." * (len(several) > SHOWN)
@@ -169,17 +169,17 @@ def _kinds(parts: tuple[PlacedPart, ...]) -> str:
     return f"{len(parts)} parts of {len(counts)} kind{'s' * (len(counts) > 1)}{alike}"
 
 
-def _twins(parts: tuple[PlacedPart, ...], found: Alike) -> list[str]:
+def _twins(parts: tuple[PlacedPart, ...], kinds: Alike) -> list[str]:
     return [
         f"'{parts[one].label}' and '{parts[other].label}' are mirror images: two kinds"
-        for one, other in found.twins[:SHOWN]
+        for one, other in kinds.twins[:SHOWN]
     ]
 
 
 def _kept(made: Imported, labels: tuple[str, ...]) -> tuple[Kept, ...]:
-    """The sub-trees to be kept; one inside another is part of that. Raises InputError
+    """The sub-trees to be kept; one inside another is part of the outer one. Raises InputError
     (UndefinedLabel, Usage)."""
-    pag, faults, found = made.pag, [], {}
+    pag, faults, sub_trees = made.pag, [], {}
     for label in dict.fromkeys(labels):
         if label not in pag.by_label:
             hint = did_you_mean(label, [n.label for n in pag.nodes if n.inputs], "sub-assemblies")
@@ -189,13 +189,13 @@ def _kept(made: Imported, labels: tuple[str, ...]) -> tuple[Kept, ...]:
             message = f"--keep: {quoted(label)} is the product: nothing is left to plan"
             faults.append(Diagnostic("Usage", message, None, "keep sub-assemblies of it"))
         else:
-            found[label] = tuple(PAG(label, pag.nodes).postorder())
+            sub_trees[label] = tuple(PAG(label, pag.nodes).postorder())
     if faults:
         raise InputError(faults)
-    inside = {node.label for nodes in found.values() for node in nodes[:-1]}
+    inside = {node.label for nodes in sub_trees.values() for node in nodes[:-1]}
     return tuple(
         Kept(label, tuple(n.label for n in nodes if not n.inputs), nodes)
-        for label, nodes in found.items()
+        for label, nodes in sub_trees.items()
         if label not in inside and len(nodes) > 1
     )
 
@@ -203,8 +203,8 @@ def _kept(made: Imported, labels: tuple[str, ...]) -> tuple[Kept, ...]:
 def placed(
     pag: PAG, files: Mapping[str, bytes]
 ) -> tuple[tuple[PlacedPart, ...], tuple[Diagnostic, ...]]:
-    """The parts of a PAG, each as a kind of its own, and what there is to warn about. Raises
-    InputError (BadMesh, BadValue)."""
+    """The parts of a PAG, each as a kind of its own, and warnings. Raises InputError (BadMesh,
+    BadValue)."""
     product = product_geometry(pag, files)
     parts = []
     for node in pag.parts():
@@ -214,22 +214,22 @@ def placed(
 
 
 def _hulls(parts: Sequence[PlacedPart]) -> list[Diagnostic]:
-    """A warning for each closed mesh whose hull stands for it though it is not convex: what goes
-    into it, or through it, seems to overlap with it."""
-    found = {}
+    """A warning for each closed mesh that is not convex and is represented by its hull: parts
+    inside it seem to overlap with it."""
+    warnings = {}
     for part in parts:
         file = str(part.node.parameter("mesh"))
-        if file not in found and hull_stands(part.solid.mesh):
-            message = f"{file} is not convex; its convex hull stands for it"
+        if file not in warnings and hull_stands(part.solid.mesh):
+            message = f"{file} is not convex; its convex hull is used instead"
             hint = AS_BODIES if can_decompose() else DECOMPOSE
-            many = f"meshes are not convex: their convex hulls stand for them ({hint})"
-            found[file] = Diagnostic("BadMesh", message, part.node.position, hint, many)
-    return list(found.values())
+            many = f"meshes are not convex: their convex hulls are used ({hint})"
+            warnings[file] = Diagnostic("BadMesh", message, part.node.position, hint, many)
+    return list(warnings.values())
 
 
 def surface(solid: Solid) -> tuple[Array, Indices]:
-    """The surface of a solid in place: vertices (n, 3) [m] and faces (m, 3). That of a round one is
-    the polytope around it."""
+    """The surface of a solid in place: vertices (n, 3) [m] and faces (m, 3); for a round solid, the
+    polytope around it."""
     if solid.mesh is None:
         mesh = hull_mesh(solid.label, solid.pieces[0])
         return mesh.vertices, mesh.faces

@@ -1,5 +1,5 @@
-"""How a product stands on the floor: which of its axes is upright, and along which its last inputs
-come."""
+"""The orientation of a product on the floor: which of its axes is vertical, and along which axis
+the last inputs come."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class Stance:
 
     @property
     def rotation(self) -> Array:
-        """The rotation (3, 3) from the frame of the product to that of the floor: of the two that
-        there are the one that turns by less."""
+        """The rotation (3, 3) from the frame of the product to that of the floor: the one of two
+        that turns by the smaller angle."""
         turned = [np.zeros((3, 3)) for _ in range(2)]
         for matrix, side in zip(turned, (+1.0, -1.0), strict=True):
             matrix[0, self.axes[0]] = side
@@ -42,10 +42,10 @@ class Stance:
 
 
 def stances(up: tuple[int, int] | None = None) -> tuple[Stance, ...]:
-    """All that differ in which ways are open, or those with an axis and side `up`: of the 24
-    rotations each two that are half a turn about the vertical apart are one. As drawn comes
-    first, the other upright one second."""
-    found = [Stance(axes, up) for axes in permutations(range(3)) for up in (+1, -1)]  # type: ignore[arg-type]
+    """The twelve stances, or those with an axis and side `up`. Of the 24 rotations, two that differ
+    by half a turn about the vertical are one stance. The stance as drawn comes first, the other
+    upright one second."""
+    every = [Stance(axes, up) for axes in permutations(range(3)) for up in (+1, -1)]  # type: ignore[arg-type]
     if up is not None:
-        found = [stance for stance in found if (stance.axes[2], stance.up) == up]
-    return tuple(sorted(found, key=lambda s: (not s.upright, s.axes[2] != 2, -s.up, s.axes)))
+        every = [stance for stance in every if (stance.axes[2], stance.up) == up]
+    return tuple(sorted(every, key=lambda s: (not s.upright, s.axes[2] != 2, -s.up, s.axes)))

@@ -1,4 +1,4 @@
-"""Whether what stands on the floor would tip: its centre of mass beyond what it stands on."""
+"""Stability: a body on the floor tips over if its centre of mass is outside its support."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from factory.geometry.meshes import Array
 from factory.planning.parts import PlacedPart
 
 LEVEL = 5e-4
-"""What is no higher than this above the lowest point [m], or LOW of the height, stands on the
-floor."""
+"""The height above the lowest point [m], or the share LOW of the total height, up to which points
+rest on the floor."""
 
 LOW = 1e-2
 
 TIPS = 1e-5
-"""A centre of mass that is no further outside than this [m] does not tip anything."""
+"""The tolerance of the centre of mass outside the support [m]."""
 
 AROUND = np.linspace(0, 2 * np.pi, 32, endpoint=False)
 ROUND = np.column_stack([np.cos(AROUND), np.sin(AROUND)])
-"""The directions on the floor (32, 2) in which it is asked whether units tip."""
+"""The horizontal directions (32, 2) in which tipping is tested."""
 
 
 @dataclass(frozen=True)
 class Feet:
-    """What units stand on: their `mass` (n,) [kg], their `centre` of mass (n, 2) on the floor, how
-    `low` (n,) they reach, and how far what reaches that low does in each of the directions ROUND
-    (n, 32) [m]."""
+    """The support of units: their `mass` (n,) [kg], their `centre` of mass (n, 2) on the floor,
+    their `low` point (n,), and the `reach` (n, 32) of their lowest points in each of the directions
+    ROUND [m]."""
 
     mass: Array = field(repr=False)
     centre: Array = field(repr=False)
@@ -40,7 +40,7 @@ class Feet:
         return len(self.mass)
 
     def joined(self, members: Sequence[int]) -> Feet:
-        """Some units as one."""
+        """Some units as one body."""
         rows = list(members)
         mass = self.mass[rows].sum()
         centre = self.mass[rows] @ self.centre[rows] / mass
@@ -51,11 +51,11 @@ class Feet:
 
     @property
     def tips(self) -> NDArray[np.bool_]:
-        """Which of them (n,) tip over if they stand by themselves."""
+        """Which units (n,) tip over by themselves."""
         return np.asarray((self.centre @ ROUND.T > self.reach + TIPS).any(axis=1))
 
     def grouped(self, groups: Sequence[Sequence[int]]) -> Feet:
-        """Groups of units, each as one."""
+        """Groups of units, each as one body."""
         made = [self.joined(group) for group in groups]
         tables = ((f.mass for f in made), (f.centre for f in made), (f.low for f in made))
         mass, centre, low = (np.concatenate([*table]) for table in tables)
@@ -79,7 +79,7 @@ class Feet:
 
 
 def feet(units: Sequence[Sequence[PlacedPart]], up: Array) -> Feet:
-    """What units stand on where a direction (3,) of the product is up."""
+    """The support of units if a direction (3,) of the product is up."""
     across = np.linalg.svd(up[None])[2][1:]
     mass, centre, low, reach = [], [], [], []
     for parts in units:
@@ -96,8 +96,8 @@ def feet(units: Sequence[Sequence[PlacedPart]], up: Array) -> Feet:
 
 
 def overhang(parts: Sequence[PlacedPart], up: Array) -> float:
-    """How far the centre of mass of some parts is outside the polygon on which they stand where a
-    direction (3,) of the product is up [m]; less than 0 inside it."""
+    """The distance [m] of the centre of mass of some parts outside their support polygon if a
+    direction (3,) of the product is up; negative inside it."""
     mass = np.array([part.solid.mass for part in parts])
     centre = mass @ np.array([part.solid.centre for part in parts]) / mass.sum()
     points = np.concatenate([part.vertices for part in parts])
@@ -108,7 +108,8 @@ def overhang(parts: Sequence[PlacedPart], up: Array) -> float:
 
 
 def outside(points: Array, at: Array) -> float:
-    """How far a point (2,) is outside the convex hull of points (n, 2) [m]; less than 0 in it."""
+    """The distance [m] of a point (2,) outside the convex hull of points (n, 2); negative inside
+    it."""
     from shapely import MultiPoint, Point
 
     hull, point = MultiPoint(points).convex_hull, Point(at)

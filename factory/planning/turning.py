@@ -1,9 +1,9 @@
-"""Turns of a product under which its parts come along axes: directions that contacts leave open.
+"""Rotations of a product that bring the directions in which its parts can leave along axes.
 
-A robot joins along an axis of the floor. A part that comes along another direction of its file, as
-the tail of a dovetail at 45°, comes along an axis once the whole product is turned. Where parts
-touch with faces of two normals they can slide along both only across these, and from one face alone
-they come off along its normal: these are the directions that are tried.
+A robot joins along an axis of the floor. A part that comes along another direction of its file,
+such as the tail of a dovetail at 45°, comes along an axis once the whole product is turned. The
+candidate directions follow from contacts: parts that touch with faces of two normals can slide only
+across both, and parts that touch with one face separate along its normal.
 """
 
 from __future__ import annotations
@@ -20,16 +20,17 @@ from factory.planning.source import surface
 from factory.planning.writing import planned_product
 
 NEAR = 1e-3
-"""Faces within the box of another part, made larger by this [m], may touch it."""
+"""Faces inside the box of another part, enlarged by this [m], may touch that part."""
 
 NORMALS, WAYS, MOST = 40, 64, 8
-"""So many normals, of the largest faces, directions, and turns, the likeliest, are taken."""
+"""The most normals (of the largest faces), directions, and rotations that are tried, the likeliest
+first."""
 
 SAME = 1e-3
-"""Directions that differ by no more than this are one."""
+"""Directions that differ by no more than this are equal."""
 
 EXACT = 1e-7
-"""A direction is along an axis, or across another, up to this."""
+"""The tolerance for a direction along an axis, or perpendicular to another."""
 
 
 def turned(source: InPlace, turn: Array) -> InPlace:
@@ -45,7 +46,7 @@ def turned(source: InPlace, turn: Array) -> InPlace:
 
 
 def only(source: InPlace, units: Collection[str]) -> InPlace:
-    """A source of some of its units alone."""
+    """A source with only some of its units."""
     kept = tuple(keep for keep in source.kept if keep.label in units)
     inside = {label for name, parts in source.units() if name in units for label in parts_of(parts)}
     parts = tuple(part for part in source.parts if part.label in inside)
@@ -58,16 +59,16 @@ def parts_of(parts: Sequence[PlacedPart]) -> Iterator[str]:
 
 
 def turns(source: InPlace, up: Array, tilted: bool) -> Iterator[tuple[Array, Array]]:
-    """Rotations (3, 3) of a product by which a direction (3,) in which its parts may leave comes to
-    lie along an axis, the likeliest first, and these directions: about the direction `up` (3,), or
-    `tilted`."""
-    found = directions(source.parts)
+    """Rotations (3, 3) of a product, the likeliest first, that bring a direction (3,) in which its
+    parts may leave along an axis, each with that direction: rotations about the direction `up`
+    (3,), or `tilted` ones."""
+    ways = directions(source.parts)
     seen = [np.eye(3)]
-    for way in found:
+    for way in ways:
         along = np.abs(way).max() > 1 - EXACT
         if not tilted and (along or abs(way @ up) > EXACT):
             continue
-        across = [up] if not tilted else [other for other in found if abs(other @ way) < EXACT]
+        across = [up] if not tilted else [other for other in ways if abs(other @ way) < EXACT]
         for other in across[:2]:
             turn = _onto_axes(way, other, up)
             if not any(_same_axes(turn, before) for before in seen):
@@ -78,8 +79,8 @@ def turns(source: InPlace, up: Array, tilted: bool) -> Iterator[tuple[Array, Arr
 
 
 def _onto_axes(way: Array, other: Array, up: Array) -> Array:
-    """The rotation that brings two directions at right angles to axes, that which is most upright
-    to the axis along which `up` is most."""
+    """The rotation that brings two perpendicular directions along axes, the more vertical one along
+    the axis that is nearest to `up`."""
     if abs(other @ up) < abs(way @ up):
         way, other = other, way
     rows = np.array([np.cross(way, other), way, other])
@@ -97,8 +98,8 @@ def _same_axes(one: Array, other: Array) -> bool:
 
 
 def directions(parts: Sequence[PlacedPart]) -> list[Array]:
-    """Unit vectors (3,) in which some parts may leave others, the likeliest first: across two of
-    the normals with which they touch, or along one of them."""
+    """Unit vectors (3,) in which parts may leave others, the likeliest first: perpendicular to two
+    of the contact normals, or along one of them."""
     normals, areas = _normals(parts)
     share = areas / areas.sum()
     crossed = np.cross(normals[:, None], normals[None]).reshape(-1, 3)
@@ -106,14 +107,14 @@ def directions(parts: Sequence[PlacedPart]) -> list[Array]:
     weights = np.outer(share, share).ravel()
     sharp = lengths > 0.1
     ways = np.concatenate([crossed[sharp] / lengths[sharp, None], normals])
-    found, votes = _merged(ways, np.concatenate([weights[sharp], share**2]))
-    return list(found[np.argsort(-votes, kind="stable")][:WAYS])
+    merged, votes = _merged(ways, np.concatenate([weights[sharp], share**2]))
+    return list(merged[np.argsort(-votes, kind="stable")][:WAYS])
 
 
 def _normals(parts: Sequence[PlacedPart]) -> tuple[Array, Array]:
-    """The normals (n, 3) of faces near another part, those of opposite ones being one, and their
-    areas (n,): the largest."""
-    found, sizes = [], []
+    """The normals (n, 3) of the largest faces near another part, opposite ones merged, and their
+    areas (n,)."""
+    normals, sizes = [], []
     for part in parts:
         corners = part.vertices[part.faces]
         normal = normals_of(part.vertices, part.faces)
@@ -126,16 +127,16 @@ def _normals(parts: Sequence[PlacedPart]) -> tuple[Array, Array]:
                     axis=1
                 )
         near &= area > 0
-        found.append(normal[near] / area[near, None])
+        normals.append(normal[near] / area[near, None])
         sizes.append(area[near])
-    merged, areas = _merged(np.concatenate(found), np.concatenate(sizes))
+    merged, areas = _merged(np.concatenate(normals), np.concatenate(sizes))
     largest = np.argsort(-areas, kind="stable")[:NORMALS]
     return merged[largest], areas[largest]
 
 
 def _merged(ways: Array, weights: Array) -> tuple[Array, Array]:
-    """Unit vectors (n, 3), those that are the same or opposite as one, and the sums of their
-    weights; each is the one of most weight of those that it stands for."""
+    """Unit vectors (n, 3) with equal and opposite ones merged into the one of largest weight, and
+    the sums of their weights."""
     first = np.abs(ways) > SAME
     sign = np.sign(np.take_along_axis(ways, first.argmax(axis=1)[:, None], axis=1))
     ways = ways * sign

@@ -118,17 +118,17 @@ def _meant(
     units = {part.label: label for label, parts in source.units() for part in parts}
     pairs = [{*name.split(":")} for name in allow]
     deep: dict[tuple[str, str], float] = {}
-    for found in overlaps_of(product).pairs:
-        if {units[found.one], units[found.other]} in pairs:
-            deep[found.one, found.other] = found.depth
+    for pair in overlaps_of(product).pairs:
+        if {units[pair.one], units[pair.other]} in pairs:
+            deep[pair.one, pair.other] = pair.depth
     judged = matings(expand(pag, templates), product)
     for clash in (clash for mating in judged.all for clash in mating.clashes):
         both = {units[part] for part in clash.parts}
         if both in pairs or both & {*allow}:
-            pair = next((p for p in deep if {*p} == {*clash.parts}), clash.parts)
-            deep[pair] = max(clash.depth, deep.get(pair, 0.0))
-    for pair, depth in deep.items():
-        yield AllowedOverlap(ceil(1e5 * depth) / 1e5, pair)
+            labels = next((p for p in deep if {*p} == {*clash.parts}), clash.parts)
+            deep[labels] = max(clash.depth, deep.get(labels, 0.0))
+    for labels, depth in deep.items():
+        yield AllowedOverlap(ceil(1e5 * depth) / 1e5, labels)
 
 
 def _free(name: str, taken: set[str]) -> str:
@@ -150,7 +150,7 @@ def _turned(node: Assembly, turn: Array) -> Assembly:
     """A part after the product has been turned about the origin."""
     if np.array_equal(turn, np.eye(3)):
         return node
-    given = {p.name: p.value for p in node.parameters}
-    placed = Placement(turn, moved=True).parameters(given)
-    own = [p for p in node.parameters if p.name not in PLACES]
-    return replace(node, parameters=(*own[:1], *placed, *own[1:]))
+    values = {p.name: p.value for p in node.parameters}
+    placed = Placement(turn, moved=True).parameters(values)
+    others = [p for p in node.parameters if p.name not in PLACES]
+    return replace(node, parameters=(*others[:1], *placed, *others[1:]))
