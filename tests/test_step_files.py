@@ -172,7 +172,7 @@ def assert_read(path: Path, drawn: Mapping[str, Part]) -> None:
         if colour is not None:
             assert stated == pytest.approx(colour, abs=2e-3)
     several = {name for name in drawn if name.endswith(("-1", "-1-1")) and name[0] in "pt"}
-    assert any("a part each" in note for note in source.notes) or not several
+    assert any("one part each" in note for note in source.notes) or not several
 
 
 @pytest.mark.parametrize("name", marked(FILES))

@@ -77,7 +77,7 @@ def check_count(path: Path, labels: Sequence[str], what: str = "parts") -> None:
         hint = "export each part as a mesh of its own, or as a body with a name, where it is"
     else:
         message = f"{quoted(path.name)} has no {what}"
-        hint = "a folder of .obj, .stl, .ply, .off, .glb, .3mf or .step files, a part each"
+        hint = "a folder of .obj, .stl, .ply, .off, .glb, .3mf or .step files, one part each"
     raise InputError(Diagnostic("TooFewParts", message, None, hint))
 
 
