@@ -287,25 +287,21 @@ def test_another_sweep_is_refused(tmp_path: Path, run: Terminal, here: None) -> 
     with sqlite3.connect(database) as connection:
         connection.execute("DELETE FROM sweep WHERE key = 'fuse'")
     connection.close()
-    assert "it holds another sweep: fuse is missing there\n" in run(*words, PAPER).err
+    assert "it holds another sweep: fuse is in one of them only\n" in run(*words, PAPER).err
 
 
 @pytest.mark.parametrize("seeds", ["seed=0:3", "units=1"])
-@pytest.mark.parametrize(
-    "statement",
-    ["SELECT count(*)", "PRAGMA application_id", "PRAGMA journal_mode", "BEGIN IMMEDIATE"],
-)
 def test_two_sweeps_may_begin_at_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, statement: str, seeds: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seeds: str
 ) -> None:
-    """At any point at which one reads the new database while the other makes its tables."""
+    """One creates the tables after the other has opened the database."""
     database, recipe = tmp_path / "r.db", recipe_of()
     other = recipe.identity(read_axes([seeds]))
     begun = []
 
     class Late(sqlite3.Connection):
         def execute(self, sql: str, *values: Any) -> sqlite3.Cursor:
-            if sql.startswith(statement) and not begun:
+            if sql == "BEGIN IMMEDIATE" and not begun:
                 begun.append(sql)
                 Store(database, other).close()
             return super().execute(sql, *values)
@@ -329,7 +325,7 @@ def test_files_of_others_are_left_alone(tmp_path: Path, run: Terminal, here: Non
     connection.close()
     before = files_in(tmp_path)
     for path, message in (
-        (text, "file is not a database"),
+        (text, "it cannot be used: file is not a database"),
         (other, "it is the database of another program"),
     ):
         for words in (["-o", path, PAPER, "--vary", "seed=0:2"], [path, "--summary"]):
@@ -346,20 +342,17 @@ def test_files_of_others_are_left_alone(tmp_path: Path, run: Terminal, here: Non
     [
         ("ALTER TABLE runs DROP COLUMN handoffs", "no such column: handoffs"),
         ("DROP TABLE runs", "no such table: runs"),
-        ("DELETE FROM sweep", "it does not say what varies"),
-        ("UPDATE sweep SET value = '3' WHERE key = 'varied'", "it does not say what varies"),
-        ("UPDATE sweep SET value = '[\"x\"]' WHERE key = 'varied'", "it does not say what varies"),
-        ("DELETE FROM sweep WHERE key = 'product'", "it does not say what it is of"),
-        ("UPDATE sweep SET value = '{x' WHERE key = 'wip'", "its 'wip' cannot be read"),
-        ("UPDATE sweep SET value = x'ff' WHERE key = 'wip'", "its 'wip' cannot be read"),
-        (f"UPDATE sweep SET value = '{'[' * 50_000}'", "its 'product' cannot be read"),
-        ("UPDATE runs SET cycle_time_s = 'abc'", "row 1 of its runs is none that a sweep writes"),
-        ("UPDATE runs SET speed = NULL WHERE seed = 1", "row 2 of its runs is none that a sweep"),
-        ("UPDATE runs SET status = 'lost'", "row 1 of its runs is none that a sweep writes"),
+        ("DELETE FROM sweep", "its table 'sweep' cannot be read"),
+        ("UPDATE sweep SET value = '[\"x\"]' WHERE key = 'varied'", "its table 'sweep' cannot be"),
+        ("UPDATE sweep SET value = '{x' WHERE key = 'wip'", "its table 'sweep' cannot be read"),
+        (f"UPDATE sweep SET value = '{'[' * 50_000}'", "its table 'sweep' cannot be read"),
+        ("UPDATE runs SET cycle_time_s = 'abc'", "row 1 of its table 'runs' cannot be read"),
+        ("UPDATE runs SET speed = NULL WHERE seed = 1", "row 2 of its table 'runs' cannot be read"),
+        ("UPDATE runs SET status = 'lost'", "row 1 of its table 'runs' cannot be read"),
         ("UPDATE runs SET point = CAST(x'ff' AS TEXT) WHERE seed = 1", "Could not decode to UTF-8"),
     ],
 )
-def test_a_damaged_database_is_told(
+def test_a_damaged_database_is_refused(
     run: Terminal, tmp_path: Path, here: None, change: str, message: str
 ) -> None:
     """By the summary, and by a sweep that would go on with it."""
@@ -373,8 +366,8 @@ def test_a_damaged_database_is_told(
     for asked in ([database, "--summary"], words):
         refused = run("sweep", *asked)
         assert refused.status == 2
-        told = f"BadFile {database}: it is damaged, or of another version of factory: {message}"
-        assert refused.err.startswith(told)
+        assert refused.err.startswith(f"BadFile {database}: it cannot be used: {message}")
+        assert "if the database is damaged, delete it and run the sweep again" in refused.err
 
 
 def test_bytes_that_are_not_what_they_were(run: Terminal, tmp_path: Path, here: None) -> None:
@@ -569,24 +562,20 @@ def test_a_cluster_survives_the_death_of_a_worker(
 
 
 @pytest.mark.parametrize(
-    ("answer", "said"),
+    ("answer", "message"),
     [
-        (OSError("Stream is closed"), "died, or was lost, as it was asked"),
-        (ModuleNotFoundError("No module named 'factory'"), "lacks factory"),
-        (ValueError("x"), "cannot tell its versions"),
-        ({"mujoco": "1.0"}, "has {'mujoco': '1.0'}, not"),
+        (OSError("Stream is closed"), "cannot report its versions: OSError('Stream is closed')"),
+        ({"mujoco": "1.0"}, "has {'mujoco': '1.0'}, not {"),
     ],
-    ids=["dead", "bare", "broken", "older"],
 )
-def test_a_worker_that_is_not_fit(answer: object, said: str) -> None:
+def test_a_worker_that_is_not_fit(answer: object, message: str) -> None:
     """A worker that dies as it is asked for its versions is not one of another version."""
     from factory.study.sweep.cluster import _check_workers
 
     client: Any = SimpleNamespace(run=lambda *_, **__: {"tcp://w:1": answer})
     with pytest.raises(MissingError) as caught:
         _check_workers(client)
-    assert said in caught.value.diagnostics[0].message
-    assert ("not {" in caught.value.diagnostics[0].message) == isinstance(answer, dict)
+    assert f"the worker at tcp://w:1 {message}" in caught.value.diagnostics[0].message
 
 
 def test_no_scheduler_at_the_address(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

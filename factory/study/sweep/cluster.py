@@ -106,8 +106,8 @@ def _outcome(future: Any, point: Point) -> Outcome:
     from distributed.scheduler import KilledWorker
 
     if future.status == "finished":
-        found: Outcome = future.result()
-        return found
+        outcome: Outcome = future.result()
+        return outcome
     error = future.exception() if future.status == "error" else None
     if isinstance(error, KilledWorker):
         return failed(point, f"Killed the worker died, {error.allowed_failures + 1} times", 1)
@@ -122,20 +122,11 @@ def _check_workers(client: Client) -> None:
     not answer."""
     ours = versions()
     for address, theirs in client.run(versions, on_error="return").items():
-        if theirs != ours:
-            raise MissingError(_unfit(address, theirs, ours))
-
-
-def _unfit(address: str, theirs: object, ours: object) -> Diagnostic:
-    """What is wrong with a worker, by its versions or what was raised as it was asked for them."""
-    same = "install the same klavins-factory there"
-    if isinstance(theirs, ImportError):
-        return Diagnostic("Missing", f"the worker at {address} lacks factory: {theirs}", None, same)
-    if isinstance(theirs, OSError | TimeoutError):  # Dask's errors of closed connections are such
-        message = f"the worker at {address} died, or was lost, as it was asked for its versions"
-        hint = "see what it has printed, start it again and run this again: what is done is kept"
-        return Diagnostic("Missing", f"{message}: {theirs}", None, hint)
-    if isinstance(theirs, Exception):
-        message = f"the worker at {address} cannot tell its versions: {theirs!r}"
-        return Diagnostic("Missing", message, None, same)
-    return Diagnostic("Missing", f"the worker at {address} has {theirs}, not {ours}", None, same)
+        if theirs == ours:
+            continue
+        message = f"the worker at {address} has {theirs}, not {ours}"
+        hint = "install the same klavins-factory there"
+        if isinstance(theirs, Exception):
+            message = f"the worker at {address} cannot report its versions: {theirs!r}"
+            hint += ", start it again and run this again: what is done is kept"
+        raise MissingError(Diagnostic("Missing", message, None, hint))

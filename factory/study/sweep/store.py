@@ -45,20 +45,11 @@ APPLICATION = 0x4B4C4156
 PATIENCE = 30.0
 """Time to wait for another writer [s]."""
 
-DISK = "check the path, its permissions and the space on the disk"
-"""The hint where a database cannot be used that may be sound."""
-
-CIRCUMSTANCES = (
-    sqlite3.SQLITE_PERM,
-    sqlite3.SQLITE_BUSY,
-    sqlite3.SQLITE_READONLY,
-    sqlite3.SQLITE_IOERR,
-    sqlite3.SQLITE_FULL,
-    sqlite3.SQLITE_CANTOPEN,
-    sqlite3.SQLITE_PROTOCOL,
-    sqlite3.SQLITE_NOTADB,
+REPAIR = (
+    "check the path, its permissions and the space on the disk; "
+    "if the database is damaged, delete it and run the sweep again"
 )
-"""SQLite's codes of faults outside the contents of a database."""
+"""The hint where SQLite cannot use a file."""
 
 
 def columns_of(varied: Sequence[str]) -> Mapping[str, str]:
@@ -67,7 +58,7 @@ def columns_of(varied: Sequence[str]) -> Mapping[str, str]:
 
 
 class Store(Closing):
-    """An open database of a sweep, made if need be.
+    """Open database of a sweep, created if need be.
 
     `identity` is what `Recipe.identity` gives. Raises InputError (BadFile) where the file is
     something else, holds another sweep, is damaged, or cannot be read or written.
@@ -75,30 +66,26 @@ class Store(Closing):
 
     def __init__(self, path: Path, identity: Mapping[str, Any]) -> None:
         self.path = path
-        with _told(path):
+        with _sqlite_errors(path):
             self.connection = _connect(path)
             try:
-                kept = _identity(self.connection, path)
-                if kept is not None:
-                    _compare(path, kept, identity)
+                self._begin(identity)
                 mode = self.connection.execute("PRAGMA journal_mode=WAL").fetchone()[0]
                 if mode != "wal":
-                    raise InputError(_bad(path, f"there is no WAL on this drive ({mode})", DISK))
+                    raise InputError(_bad(path, f"there is no WAL on this drive ({mode})", REPAIR))
                 self.connection.execute("PRAGMA synchronous=NORMAL")
-                if kept is None:
-                    self._create(identity)
             except BaseException:
                 self.connection.close()
                 raise
 
     def close(self) -> None:
         """Close the database, which leaves one file."""
-        with _told(self.path):
+        with _sqlite_errors(self.path):
             self.connection.close()
 
     def points(self, status: str) -> set[str]:
         """The names of the points that have a row with this status, done or failed."""
-        with _told(self.path):
+        with _sqlite_errors(self.path):
             rows = self.connection.execute("SELECT point FROM runs WHERE status = ?", (status,))
             return {row[0] for row in rows}
 
@@ -117,19 +104,23 @@ class Store(Closing):
         }
         names = list(row)
         marks = ",".join(f":{name}" for name in names)
-        with _told(self.path):
+        with _sqlite_errors(self.path):
             self.connection.execute(
                 f"INSERT OR REPLACE INTO runs ({','.join(names)}) VALUES ({marks})", row
             )
 
-    def _create(self, identity: Mapping[str, Any]) -> None:
-        """Make the tables, in one transaction, unless another sweep has made them by now."""
+    def _begin(self, identity: Mapping[str, Any]) -> None:
+        """Compare the identity in the database, or create the tables, in one transaction: another
+        sweep may begin at the same time."""
         self.connection.execute("BEGIN IMMEDIATE")
         kept = _identity(self.connection, self.path)
-        if kept is not None:
-            self.connection.execute("ROLLBACK")
+        if kept is None:
+            self._create(identity)
+        else:
             _compare(self.path, kept, identity)
-            return
+        self.connection.execute("COMMIT")
+
+    def _create(self, identity: Mapping[str, Any]) -> None:
         columns = ", ".join(
             f"{name} {kind}" for name, kind in columns_of(identity["varied"]).items()
         )
@@ -141,7 +132,6 @@ class Store(Closing):
         ):
             self.connection.execute(statement)
         self.connection.executemany("INSERT INTO sweep VALUES (?, ?)", rows)
-        self.connection.execute("COMMIT")
 
 
 @contextmanager
@@ -150,10 +140,9 @@ def reading(path: Path) -> Iterator[tuple[dict[str, Any], Iterator[Mapping[str, 
     InputError (BadFile)."""
     if not path.is_file():
         raise InputError(_bad(path, "there is no such file", "give the -o of a sweep"))
-    mode = (
-        "rw" if os.access(path, os.W_OK) else "ro"
-    )  # a reader without write access leaves the WAL
-    with _told(path), closing(_connect(path, mode)) as connection:
+    # a reader without write access leaves the WAL
+    mode = "rw" if os.access(path, os.W_OK) else "ro"
+    with _sqlite_errors(path), closing(_connect(path, mode)) as connection:
         identity = _identity(connection, path)
         if identity is None:
             raise InputError(_bad(path, "no sweep has written it", "give the -o of a sweep"))
@@ -169,66 +158,61 @@ def _connect(path: Path, mode: str = "rwc") -> sqlite3.Connection:
 
 def _identity(connection: sqlite3.Connection, path: Path) -> dict[str, Any] | None:
     """The identity kept in a database, None for an empty one. Raises InputError (BadFile) for one
-    of another program, sqlite3.Error for one that is not sound."""
+    of another program, sqlite3.Error where a sweep cannot have written what it contains."""
     tables = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
     # both come in one transaction: the id, read last, is there where the tables are
-    if connection.execute("PRAGMA application_id").fetchone()[0] == APPLICATION:
-        return _kept_identity(connection)
-    if tables:
-        raise InputError(_bad(path, "it is the database of another program", "choose another -o"))
-    return None
-
-
-def _kept_identity(connection: sqlite3.Connection) -> dict[str, Any]:
-    """The identity in a database. Raises sqlite3.Error where it or some row is not one that a sweep
-    writes."""
-    kept = connection.execute("SELECT key, value FROM sweep")
-    identity = {key: _value(key, text) for key, text in kept}
-    varied = identity.get("varied")
-    if not isinstance(varied, list) or not all(key in KEYS for key in varied):
-        raise sqlite3.DatabaseError("it does not say what varies")
-    if not isinstance(identity.get("product"), str):
-        raise sqlite3.DatabaseError("it does not say what it is of")
-    _check_rows(connection, varied)
+    if connection.execute("PRAGMA application_id").fetchone()[0] != APPLICATION:
+        if tables:
+            message = "it is the database of another program"
+            raise InputError(_bad(path, message, "choose another -o"))
+        return None
+    rows = connection.execute("SELECT key, value FROM sweep")
+    try:
+        identity = {key: json.loads(text) for key, text in rows}
+        sound = isinstance(identity["product"], str) and set(identity["varied"]) <= set(KEYS)
+    except (KeyError, TypeError, ValueError, RecursionError):
+        sound = False
+    if not sound:
+        raise sqlite3.DatabaseError("its table 'sweep' cannot be read")
+    _check_rows(connection, identity["varied"])
     return identity
 
 
-def _value(key: str, text: Any) -> Any:
-    """A value of an identity, from its JSON."""
-    try:
-        return json.loads(text)
-    except (TypeError, ValueError, RecursionError) as error:
-        raise sqlite3.DatabaseError(f"its '{key}' cannot be read") from error
-
-
 def _check_rows(connection: sqlite3.Connection, varied: Sequence[str]) -> None:
-    """Raises sqlite3.Error where a row lacks a point, a status or a value for a key that varies, or
-    where a value is not of the type of its column, which SQLite itself does not check."""
+    """Raises sqlite3.Error for the first row without a point, a status or a key that varies, or
+    with a value that is not of the type of its column, which SQLite does not check."""
     faults = [f"{name} IS NULL" for name in ("point", "status", *varied)]
     faults.append("status NOT IN ('done', 'failed')")
     for name, kind in columns_of(varied).items():
         types = "'text'" if kind.startswith("TEXT") else "'integer', 'real'"
         faults.append(f"typeof({name}) NOT IN ('null', {types}) AND {name} IS NOT '{AUTO}'")
-    bad = connection.execute(f"SELECT rowid FROM runs WHERE {' OR '.join(faults)} LIMIT 1")
-    for (number,) in bad:
-        raise sqlite3.DatabaseError(f"row {number} of its runs is none that a sweep writes")
+    for (row,) in connection.execute(f"SELECT rowid FROM runs WHERE {' OR '.join(faults)} LIMIT 1"):
+        raise sqlite3.DatabaseError(f"row {row} of its table 'runs' cannot be read")
 
 
 def _compare(path: Path, kept: Mapping[str, Any], asked: Mapping[str, Any]) -> None:
     """Raises InputError (BadFile) with what differs between two sweeps."""
-    if kept == dict(asked):
+    if kept == asked:
         return
-    differing = [
-        f"{key} {_shown(kept[key])} there, {_shown(asked[key])} here"
+    differences = [
+        _difference(key, kept[key], asked[key])
         for key in asked
         if key in kept and kept[key] != asked[key] and key != "digest"
     ]
-    if not differing:
-        differing = [f"{key} is missing there" for key in asked if key not in kept]
-    if not differing:
-        differing = ["the product, a mesh, a template or a robot type has changed"]
-    message = f"it holds another sweep: {'; '.join(differing)}"
+    if not differences:
+        differences = [
+            f"{key} is in one of them only" for key in sorted(kept.keys() ^ asked.keys())
+        ]
+    if not differences:
+        differences = ["the product, a mesh, a template or a robot type has changed"]
+    message = f"it holds another sweep: {'; '.join(differences)}"
     raise InputError(_bad(path, message, "choose another -o, or ask for the same sweep"))
+
+
+def _difference(key: str, kept: Any, asked: Any) -> str:
+    if isinstance(kept, dict) and isinstance(asked, dict):
+        return f"another {key} there"
+    return f"{key} {_shown(kept)} there, {_shown(asked)} here"
 
 
 def _shown(value: Any) -> str:
@@ -242,15 +226,9 @@ def _bad(path: Path, message: str, hint: str) -> Diagnostic:
 
 
 @contextmanager
-def _told(path: Path) -> Iterator[None]:
-    """Raises InputError (BadFile) for an error of SQLite; contents that make no sense are damaged,
-    or of another version."""
+def _sqlite_errors(path: Path) -> Iterator[None]:
+    """Raises InputError (BadFile) for an error of SQLite, and for a text that is not UTF-8."""
     try:
         yield
     except (sqlite3.Error, UnicodeDecodeError) as error:
-        code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF
-        message, hint = str(error), DISK
-        if code not in CIRCUMSTANCES:
-            message = f"it is damaged, or of another version of factory: {error}"
-            hint = "run the sweep again, into another file"
-        raise InputError(_bad(path, message, hint)) from error
+        raise InputError(_bad(path, f"it cannot be used: {error}", REPAIR)) from error
