@@ -1,11 +1,11 @@
 """Hidden penetrations: how deep things that are drawn are inside each other, whatever a run leaves
 out of contact.
 
-The poses of a run are looked at in a model of its own, in which all that is drawn is solid: no
-masks, no exclusions, a body against its parent too. A part is as it is drawn: its primitive or its
-convex pieces, whose faces do not recede. Only geoms of one rigid group, which nothing can move
-against each other, and what lies below the floor are not looked at. Of parts that overlap in the
-finished product, what they are deeper inside each other than there counts.
+The poses of a run are examined in a separate model, in which everything drawn is solid: no masks,
+no exclusions, a body against its parent too. A part has the shape that is drawn: its primitive or
+its convex pieces, whose faces do not recede. Left out are geoms of one rigid group, which nothing
+can move against each other, and everything below the floor. Of parts that overlap in the finished
+product, only the penetration beyond that overlap counts.
 """
 
 from __future__ import annotations
@@ -29,45 +29,39 @@ from factory.study.fidelity.record import Penetration
 from factory.support.engine import mujoco
 
 TOUCH = 1e-6
-"""Things that are no deeper inside each other only touch, and what is no deeper by that than before
-is as deep [m]."""
-
+"""Penetration up to which things only touch; by no more than that none is deeper than another [m]."""
 
 BEARING = {"lid", "rod"}
-"""A feeder's rod slides in a hole of its housing's lid, which has none: that is left out."""
+"""A feeder's rod slides in a hole of its housing's lid, which the model lacks: left out."""
 
 EVERY = 0.02
-"""Time from one look to the next [s], in which a robot goes 10 mm at 0.5 m/s."""
+"""Time between two looks [s], in which a robot goes 10 mm at 0.5 m/s."""
 
 
 class HiddenPenetrations:
-    """Looks at poses of a model `m`, and keeps how deep any two things have been inside each other.
-    `overlaps`: how deep two parts are in the finished product [m]."""
+    """The deepest penetrations of any two things in poses of a model `m`, over all their copies.
+    `overlaps`: penetration of two parts in the finished product [m]."""
 
     def __init__(self, m: mujoco.MjModel, overlaps: Mapping[Pair, float]) -> None:
         self.replica = SolidReplica(m)
         self.names = [m.geom(i).name for i in range(m.ngeom)]
-        kinds, numbers = np.unique([names.without_copy(n) for n in self.names], return_inverse=True)
-        self._kind, self._many = numbers.astype(np.intp), len(kinds)
-        self._overlap = self._overlaps(kinds.tolist(), overlaps)
-        self._keys: Index = np.zeros(0, np.intp)
-        self._depth: Array = np.zeros(0)
-        self._found: dict[int, Penetration] = {}
+        self._overlaps = {frozenset(pair): depth for pair, depth in overlaps.items()}
+        self._deepest: dict[tuple[str, ...], Penetration] = {}
         self._due = 0.0
         self._keep(*self.replica.standing(), 0.0, False)
 
     @classmethod
     def of(cls, simulation: Simulation) -> HiddenPenetrations:
         """Those of a simulation, in a model of its own whose parts' faces do not recede."""
-        layout, asked = simulation.layout, simulation.request
+        layout, request = simulation.layout, simulation.request
         model = physical_model(
             layout,
-            asked.units,
-            replace(asked.settings, overlap=0.0),
-            asked.catalogue,
-            asked.wip,
+            request.units,
+            replace(request.settings, overlap=0.0),
+            request.catalogue,
+            request.wip,
             simulation.under_way(),
-            asked.fuse,
+            request.fuse,
         )
         return cls(load(model), overlaps_of(layout))
 
@@ -78,50 +72,24 @@ class HiddenPenetrations:
             self._due = time + EVERY
             self._keep(*self.replica.meeting(qpos), time)
 
-    def _overlaps(self, kinds: list[str], overlaps: Mapping[Pair, float]) -> tuple[Index, Array]:
-        """The keys of pairs of geoms of parts that overlap, and how deep [m]."""
-        geoms: dict[str, list[int]] = {}
-        for number, name in enumerate(kinds):
-            if names.kind(name) == "part":
-                geoms.setdefault(name.rpartition("/")[2], []).append(number)
-        found = {
-            min(a, b) * self._many + max(a, b): deep
-            for (one, other), deep in overlaps.items()
-            for a in geoms.get(one, ())
-            for b in geoms.get(other, ())
-        }
-        keys = np.array(sorted(found), np.intp)
-        return keys, np.array([found[key] for key in keys.tolist()])
-
-    def _bearing(self, geoms: Index) -> list[bool]:
-        """Whether pairs of geoms (n, 2) are a rod and the lid that it slides in."""
-        return [
-            {self.names[geom].rpartition("/")[2] for geom in pair} == BEARING
-            for pair in geoms.tolist()
-        ]
-
     def _keep(self, geoms: Index, depth: Array, time: float, moves: bool = True) -> None:
-        kinds = np.sort(self._kind[geoms], axis=1)
-        keys = kinds[:, 0] * self._many + kinds[:, 1]
-        depth = depth - _looked_up(*self._overlap, keys)
-        depth[self._bearing(geoms)] = 0.0
-        deeper = np.flatnonzero(depth > _looked_up(self._keys, self._depth, keys) + TOUCH)
-        if not len(deeper):
-            return
-        for row in deeper[np.argsort(depth[deeper])].tolist():  # the deepest of a kind comes last
-            pair = sorted(self.names[geom] for geom in geoms[row].tolist())
-            found = Penetration((pair[0], pair[1]), 1e3 * float(depth[row]), time, moves)
-            self._found[int(keys[row])] = found
-        self._keys = np.array(sorted(self._found))
-        self._depth = np.array([1e-3 * self._found[key].depth_mm for key in self._keys.tolist()])
+        inside = np.flatnonzero(depth > TOUCH)
+        for row in inside[np.argsort(-depth[inside])].tolist():  # the deepest of a kind comes first
+            a, b = sorted(self.names[geom] for geom in geoms[row].tolist())
+            kinds = tuple(sorted(map(names.without_copy, (a, b))))
+            deep = float(depth[row]) - self._overlaps.get(frozenset(map(_part, kinds)), 0.0)
+            before = self._deepest.get(kinds)
+            bearing = {name.rpartition("/")[2] for name in (a, b)} == BEARING
+            if not bearing and deep > TOUCH + (1e-3 * before.depth_mm if before else 0.0):
+                self._deepest[kinds] = Penetration((a, b), 1e3 * deep, time, moves)
 
     def found(self) -> tuple[Penetration, ...]:
-        """All that there have been, the deepest first."""
-        return tuple(sorted(self._found.values(), key=lambda p: (-p.depth_mm, p.geoms)))
+        """All penetrations, the deepest first."""
+        return tuple(sorted(self._deepest.values(), key=lambda p: (-p.depth_mm, p.geoms)))
 
     def deepest(self) -> float:
-        """The deepest [mm]; 0 where nothing was inside anything."""
-        return max((p.depth_mm for p in self._found.values()), default=0.0)
+        """The deepest penetration [mm]; 0 where there is none."""
+        return max((p.depth_mm for p in self._deepest.values()), default=0.0)
 
 
 def overlaps_of(layout: Layout) -> dict[Pair, float]:
@@ -129,9 +97,6 @@ def overlaps_of(layout: Layout) -> dict[Pair, float]:
     return {o.parts: max(far for _, _, far in o.bodies) for o in layout.overlaps if o.bodies}
 
 
-def _looked_up(keys: Index, values: Array, wanted: Index) -> Array:
-    """The values (n,) of wanted keys (n,), 0 for those that are not among the sorted `keys`."""
-    if not len(keys):
-        return np.zeros(len(wanted))
-    at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-    return np.asarray(np.where(keys[at] == wanted, values[at], 0.0))
+def _part(kind: str) -> str:
+    """The label of the part that geoms of a kind are of, "" for others."""
+    return kind.rpartition("/")[2] if names.kind(kind) == "part" else ""

@@ -119,16 +119,16 @@ def _read_axis(text: str) -> Axis:
     if key not in KEYS:
         hint = did_you_mean(key, KEYS, "keys")
         raise InputError(Diagnostic("UnknownParameter", f"unknown key '{key}'", None, hint))
-    found: dict[Value, None] = {}
+    distinct: dict[Value, None] = {}
     for item in values.split(",") if equals else ():
-        found |= dict.fromkeys(_read_item(key, item.strip()))
-    if not found:
+        distinct |= dict.fromkeys(_read_item(key, item.strip()))
+    if not distinct:
         raise InputError(_usage(f"'{text}' gives no values", f"for example {_example(key)}"))
-    for value in found:
+    for value in distinct:
         fault = check_value(key, value)
         if fault is not None:
             raise InputError(fault)
-    return Axis(key, tuple(found))
+    return Axis(key, tuple(distinct))
 
 
 def _read_item(key: str, item: str) -> Iterator[Value]:

@@ -33,7 +33,7 @@ MOST = 10
 """Upper bound on the lines or histograms of a plot."""
 
 
-def plots(found: Summary) -> dict[str, bytes]:
+def plots(summary: Summary) -> dict[str, bytes]:
     """The plots by file name, FIGURE.png each. Raises MissingError where there is no
     matplotlib."""
     require_matplotlib("a plot", "-o REPORT.json for figures alone")
@@ -41,16 +41,16 @@ def plots(found: Summary) -> dict[str, bytes]:
 
     with matplotlib.rc_context(STYLE):
         return {
-            f"{key}.png": png(_plot(found, key))
+            f"{key}.png": png(_plot(summary, key))
             for key in PLOTTED
-            if any(key in group.figures for group in found.groups)
+            if any(key in group.figures for group in summary.groups)
         }
 
 
-def _plot(found: Summary, key: str) -> Any:
+def _plot(summary: Summary, key: str) -> Any:
     """A figure against the first number that varies, with confidence intervals; its histogram
     where only seeds, or words, vary."""
-    groups = [group for group in found.groups if key in group.figures]
+    groups = [group for group in summary.groups if key in group.figures]
     words = {k for group in groups for k, v in group.values if isinstance(v, str)}
     numbers = [k for k, _ in groups[0].values if k not in words]
     across = next((k for k in numbers if len({dict(g.values)[k] for g in groups}) > 1), None)
@@ -66,7 +66,7 @@ def _plot(found: Summary, key: str) -> Any:
         axes.set_xlabel(f"{across} [{UNITS[across]}]" if across in UNITS else across)
         axes.set_ylabel(_label(key))
     runs = sum(group.figures[key].n for group in groups)
-    axes.set_title(f"{found.product}: {_label(key)}, {runs} runs")
+    axes.set_title(f"{summary.product}: {_label(key)}, {runs} runs")
     if any(axes.get_legend_handles_labels()[1]):
         axes.legend(fontsize=8)
     return figure
@@ -86,11 +86,13 @@ def _lines(axes: Any, groups: Sequence[Group], key: str, across: str) -> None:
         if number == MOST:
             break
         line = sorted(members, key=place)
-        told = [group.figures[key] for group in line]
-        spread = [0.0 if s.confidence_low is None else s.mean - s.confidence_low for s in told]
+        statistics = [group.figures[key] for group in line]
+        spread = [
+            0.0 if s.confidence_low is None else s.mean - s.confidence_low for s in statistics
+        ]
         axes.errorbar(
             [place(group) for group in line],
-            [s.mean for s in told],
+            [s.mean for s in statistics],
             spread,
             fmt="-o",
             markersize=3,

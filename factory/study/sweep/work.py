@@ -57,7 +57,7 @@ FAILING_FIGURES: Mapping[str, str] = {
     "transitions_undone": "INTEGER",
     "fault_contacts": "INTEGER",
 }
-"""What it keeps more where the rate of faults varies: how many failures were found, then as in
+"""Further figures of a row where the rate of faults varies: number of failures, then as in
 `run --json`."""
 
 KEPT = 8
@@ -99,8 +99,8 @@ class Runner:
             reason, document = _reason(run), run.as_json()
             figures = {name: document[name] for name in FIGURES}
             if run.failures is not None:
-                told = run.failures.as_json() | {"failures": len(run.failures.found)}
-                figures |= {name: told[name] for name in FAILING_FIGURES}
+                counts = run.failures.as_json() | {"failures": len(run.failures.found)}
+                figures |= {name: counts[name] for name in FAILING_FIGURES}
         except FactoryError as error:
             reason = "; ".join(f"{d.code} {d.message}" for d in error.diagnostics[:3])
         except Exception as error:
@@ -165,7 +165,7 @@ def _outcome(point: Point, reason: str, figures: Mapping[str, Any], took: float)
 
 
 def _campaign(rate: float, seed: int) -> Campaign:
-    """Things are dropped, and inputs have slipped, in such a share of operations."""
+    """Faults of both kinds, dropped parts and slipped inputs, in this share of the operations."""
     return Campaign(tuple(WorldFault(kind, rate=rate) for kind in ("drop", "bad_joint")), seed)
 
 
@@ -174,8 +174,8 @@ def _reason(run: Run) -> str:
     return "; ".join(f"{d.code} {d.message}" for d in run.verdict.failures[:3])
 
 
-def _or_raise(found: T | FactoryError) -> T:
-    """What was found; raises it where it is an error."""
-    if isinstance(found, FactoryError):
-        raise found
-    return found
+def _or_raise(result: T | FactoryError) -> T:
+    """The result of a cached step; raises it where it is an error."""
+    if isinstance(result, FactoryError):
+        raise result
+    return result
