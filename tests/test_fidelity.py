@@ -34,8 +34,8 @@ from factory.study.fidelity.causality import (
 from factory.study.fidelity.comparing import Alter, Case
 from factory.study.fidelity.convergence import Series
 from factory.study.fidelity.dynamics import Histogram
-from factory.study.fidelity.finished import Finished
 from factory.study.fidelity.measuring import Measurement
+from factory.study.fidelity.parts import Finished
 from factory.study.fidelity.report import write_report
 from factory.support.engine import mujoco
 from factory.support.settings import Settings

@@ -66,10 +66,10 @@ class Series:
         """Whether the last change of a figure is smaller than the one before; None where there are
         no two changes."""
         values = [figures.get(key) for figures in self.figures[-3:]]
-        known = [value for value in values if value is not None]
-        if len(known) < 3:
+        numbers = [value for value in values if value is not None]
+        if len(numbers) < 3:
             return None
-        return abs(known[2] - known[1]) < abs(known[1] - known[0])
+        return abs(numbers[2] - numbers[1]) < abs(numbers[1] - numbers[0])
 
     def noticeable(self, key: str) -> bool:
         """Whether a figure is anywhere more than its absolute tolerance."""
@@ -134,9 +134,9 @@ def study(
     return Study(seed, (series, _series("weld time constant", stiffnesses, second)))
 
 
-def runs(timesteps: Sequence[float] = TIMESTEPS, stiffnesses: Sequence[float] = STIFFNESSES) -> int:
+def runs() -> int:
     """How many runs a study takes."""
-    return len(timesteps) + len(stiffnesses)
+    return len(TIMESTEPS) + len(STIFFNESSES)
 
 
 def _series(setting: str, factors: Sequence[float], records: Sequence[SeedRecord]) -> Series:

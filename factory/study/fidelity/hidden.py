@@ -29,7 +29,7 @@ from factory.study.fidelity.record import Penetration
 from factory.support.engine import mujoco
 
 TOUCH = 1e-6
-"""Penetration up to which things only touch; by no more than that none is deeper than another [m]."""
+"""Penetration up to which two things only touch; differences up to that do not count [m]."""
 
 BEARING = {"lid", "rod"}
 """A feeder's rod slides in a hole of its housing's lid, which the model lacks: left out."""

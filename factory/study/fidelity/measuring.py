@@ -14,9 +14,8 @@ from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from factory.study.fidelity.approach import BEYOND, Approaches
 from factory.study.fidelity.dynamics import DriveFigures, Payload, Residual
-from factory.study.fidelity.finished import Finished
-from factory.study.fidelity.handoffs import HandOffs
 from factory.study.fidelity.hidden import HiddenPenetrations
+from factory.study.fidelity.parts import Finished, HandOffs
 from factory.study.fidelity.readings import ActiveWelds, Shadow, Steps, Velocities
 
 

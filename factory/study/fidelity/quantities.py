@@ -23,10 +23,10 @@ class Quantity:
 
     def worst(self, values: Iterable[float | None]) -> float | None:
         """The worst of some values; None where there is none."""
-        known = [value for value in values if value is not None]
-        if not known:
+        numbers = [value for value in values if value is not None]
+        if not numbers:
             return None
-        return min(known) if self.least else max(known, key=abs)
+        return min(numbers) if self.least else max(numbers, key=abs)
 
     def exceeded(self, value: float | None) -> bool:
         """Whether a value is beyond the limit."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from types import MappingProxyType
 from typing import Any
 
 from factory.study.fidelity.quantities import QUANTITIES
@@ -136,18 +135,16 @@ class Fidelity:
 
     def values(self, key: str) -> list[float]:
         """A figure over the seeds that have it."""
-        found = (record.figures.get(key) for record in self.seeds)
-        return [value for value in found if value is not None]
+        values = (record.figures.get(key) for record in self.seeds)
+        return [value for value in values if value is not None]
 
     def worst(self) -> Figures:
         """Every figure at the worst seed."""
-        return MappingProxyType({k: q.worst(self.values(k)) for k, q in QUANTITIES.items()})
+        return {key: quantity.worst(self.values(key)) for key, quantity in QUANTITIES.items()}
 
     def mean(self) -> Figures:
         """Every figure's mean over the seeds."""
-        return MappingProxyType(
-            {k: sum(v) / len(v) if (v := self.values(k)) else None for k in QUANTITIES}
-        )
+        return {k: sum(v) / len(v) if (v := self.values(k)) else None for k in QUANTITIES}
 
     def as_json(self) -> dict[str, Any]:
         """The document of `fidelity --json`, without the convergence study."""
