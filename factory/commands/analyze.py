@@ -158,8 +158,8 @@ def _analyze_pag(
     from factory.nets.verify import proved
     from factory.study.analysis import Timing, analyse
     from factory.study.analysis.document import document
+    from factory.study.analysis.measured import Conditions, conditions, logged_record
     from factory.study.analysis.picture import check_picture, picture
-    from factory.study.analysis.recorded import Conditions, conditions, logged_record
     from factory.support.files import write_bytes
 
     writable(given.file, output)
@@ -212,7 +212,7 @@ def _run(
 ) -> tuple[RunRecord, int]:
     """A run on the spot, in which no parts fuse; status 1 where it failed."""
     from factory.simulation.simulation import Simulation
-    from factory.study.analysis.recorded import record_of
+    from factory.study.analysis.measured import record_of
 
     request = replace(asked, fuse=False).request(project, shown=False)
     run = carry_out(Simulation(timing.layout, request), silent)

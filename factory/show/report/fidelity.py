@@ -21,7 +21,7 @@ from factory.show.report.recording import Recording
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Event
 from factory.simulation.simulation import Simulation
-from factory.study.analysis.recorded import conditions
+from factory.study.analysis.measured import conditions
 from factory.study.fidelity.causality import causal_record, duration_differences
 from factory.study.fidelity.readings import ActiveWelds
 

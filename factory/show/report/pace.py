@@ -12,9 +12,8 @@ from factory.nets.undone import Undone
 from factory.show.report.recording import Recording
 from factory.simulation.run import Event, busy_times, mean_interval
 from factory.study.analysis import Timing
-from factory.study.analysis.flow import busy_until, flow, lasting
-from factory.study.analysis.measured import dropoff_times, operation_times
-from factory.study.analysis.recorded import conditions
+from factory.study.analysis.flow import flow
+from factory.study.analysis.measured import conditions, dropoff_times, operation_times
 from factory.study.analysis.timed import timed_net
 
 
@@ -88,7 +87,7 @@ def predicted(recording: Recording) -> Predicted | None:
         found.first if begun else None,
         found.last if begun else None,
         tuple(circuit.name for circuit in net.critical),
-        tuple((lasting(timing, found) + made.settings.tick).tolist()),
-        tuple(busy_until(timing, found)),
+        tuple((found.lasting + made.settings.tick).tolist()),
+        found.busy,
         tuple(own[robot.name] for robot in recording.factory.robots),
     )

@@ -21,7 +21,7 @@ from factory.record.project_table import factory_of, project_of
 from factory.record.verdict import RunVerdict
 from factory.show.report.scene import DrawnFactory, stations
 from factory.simulation.remade import model_faults
-from factory.study.analysis.recorded import conditions
+from factory.study.analysis.measured import conditions
 from factory.support.errors import Diagnostic, InputError, RunError
 
 

@@ -57,21 +57,21 @@ def analyse(
     Raises InputError where `wip` is below 1 or a mode cannot reach its goal.
     """
     net = timed_net(timing, AS_IT_IS, wip)
-    found = flow(timing, net, units)
-    made = scenarios(timing, net, wip)
+    products = flow(timing, net, units)
+    examined = scenarios(timing, net, wip)
     if asked is not None:
         first = scenario(timing, *asked, wip)
-        made = (first, *(s for s in made if s.change != first.change))
+        examined = (first, *(s for s in examined if s.change != first.change))
     return Analysis(
         timing,
         wip,
         net,
-        found,
+        products,
         operation_slacks(timing, net),
         sensitivities(timing, net, wip),
-        made,
+        examined,
         wip_curve(timing),
-        compare(timing, net, found, record) if record else None,
+        compare(timing, net, products, record) if record else None,
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -62,7 +61,9 @@ class Flow:
     """When products come: `first` and `last` of `units`, dropped off (in the engine: out of the
     outfeed) [s]; `full_pace`: the number of the product from which on they come at the pace;
     `settled`: whether the firings become periodic within those that were computed, else `stocks`
-    are those at their end.
+    are those at their end. `durations` (cycles, operations): how long each operation lasts each
+    time, from its start to its end [s]; `busy`: the share of the time until `last` for which each
+    robot is in operations.
     """
 
     units: int
@@ -73,52 +74,68 @@ class Flow:
     stocks: tuple[WorkInProgress, ...] = field(repr=False)
     shares: tuple[Share, ...] = field(repr=False)
     firings: Firings = field(repr=False)
+    durations: Floats = field(repr=False)
+    busy: tuple[float, ...] = field(repr=False)
 
     @property
     def inside(self) -> float:
         """The mean number of parts in the factory at once."""
         return sum(stock.mean for stock in self.stocks if stock.is_part)
 
+    @property
+    def lasting(self) -> Floats:
+        """(operations,): the mean duration of each [s]. The first is left out where there are
+        others: robots start it from other places."""
+        later = self.durations[min(1, len(self.durations) - 1) :]
+        return np.asarray(later.mean(axis=0))
+
 
 def flow(timing: Timing, net: TimedNet, units: int) -> Flow:
     """The flow of at least `units` products from the initial marking, all firing as soon as they
     can."""
-    found = net.firings(units)
-    products = leaving_dates(timing, found)
+    firings, factory = net.firings(units), timing.factory
+    products = leaving_dates(timing, firings)
+    last = float(products[units - 1]) + timing.leaving
+    dates = firings.dates[: -(-units // factory.period)]
+    starts, ends = [o.start for o in factory.operations], [o.end for o in factory.operations]
+    durations = dates[:, ends] - dates[:, starts] - timing.settings.tick
+    spent = durations.sum(axis=0)
     return Flow(
         units,
         float(products[0]) + timing.leaving,
-        float(products[units - 1]) + timing.leaving,
-        _full_pace(products, found, net.units),
-        found.settled is not None,
-        _stocks(timing, found),
-        tuple(_share(timing, net, robot) for robot in range(len(timing.factory.robots))),
-        found,
+        last,
+        _full_pace(products, firings, net.units),
+        firings.settled is not None,
+        _stocks(timing, firings),
+        tuple(_share(timing, net, robot) for robot in range(len(factory.robots))),
+        firings,
+        durations,
+        tuple(float(spent[list(robot.operations)].sum()) / last for robot in factory.robots),
     )
 
 
-def leaving_dates(timing: Timing, found: Firings) -> Floats:
+def leaving_dates(timing: Timing, firings: Firings) -> Floats:
     """When each product is dropped off [s]."""
-    return np.asarray(found.dates[:, [o.end for o in timing.factory.dropoffs]].ravel())
+    return np.asarray(firings.dates[:, [o.end for o in timing.factory.dropoffs]].ravel())
 
 
-def _full_pace(products: Floats, found: Firings, units: int) -> int | None:
+def _full_pace(products: Floats, firings: Firings, units: int) -> int | None:
     """The product, counted from 1, after which the mean interval never leaves the pace."""
-    if found.settled is None:
+    if firings.settled is None:
         return None
-    period = found.period * units
-    apart = products[period:] - products[:-period] - found.advance
+    period = firings.period * units
+    apart = products[period:] - products[:-period] - firings.advance
     late = np.flatnonzero(np.abs(apart) > 1e-9 * (1.0 + products[-1]))
     return int(late[-1]) + 2 if len(late) else 1
 
 
-def _stocks(timing: Timing, found: Firings) -> tuple[WorkInProgress, ...]:
+def _stocks(timing: Timing, firings: Firings) -> tuple[WorkInProgress, ...]:
     """Over as many whole periods as lie before the last firing of every transition."""
-    factory, dates = timing.factory, found.dates
+    factory, dates, advance = timing.factory, firings.dates, firings.advance
     end = float(dates[-1].min())
-    settled = 0 if found.settled is None else found.settled
-    periods = int((end - float(dates[settled].max())) / found.advance) if found.advance else 0
-    begin = end - max(1, periods) * found.advance
+    settled = 0 if firings.settled is None else firings.settled
+    periods = int((end - float(dates[settled].max())) / advance) if advance else 0
+    begin = end - max(1, periods) * advance
     stocks = []
     for operation in factory.making:
         part = not operation.inputs
@@ -163,29 +180,6 @@ def _share(timing: Timing, net: TimedNet, number: int) -> Share:
     cycle = net.pace * circuit.products
     moving = min(moving, spent - working)
     return Share(robot.name, moving, working, max(0.0, spent - moving - working), cycle - spent)
-
-
-def durations(timing: Timing, found: Flow) -> Floats:
-    """(cycles, operations): how long each operation lasts each time, from its start to its end
-    [s]."""
-    operations, cycles = timing.factory.operations, -(-found.units // timing.factory.period)
-    dates = found.firings.dates[:cycles]
-    ends, starts = [o.end for o in operations], [o.start for o in operations]
-    return np.asarray(dates[:, ends] - dates[:, starts] - timing.settings.tick)
-
-
-def lasting(timing: Timing, found: Flow) -> Floats:
-    """(operations,): the mean duration of each [s]. The first is left out where there are others:
-    robots start it from other places."""
-    each = durations(timing, found)
-    return np.asarray(each[min(1, len(each) - 1) :].mean(axis=0))
-
-
-def busy_until(timing: Timing, found: Flow) -> Sequence[float]:
-    """The share of the time until the last of the units for which each robot is in operations."""
-    spent = durations(timing, found).sum(axis=0)
-    robots = timing.factory.robots
-    return [float(spent[list(robot.operations)].sum()) / found.last for robot in robots]
 
 
 def steady_units(timing: Timing, wip: int | None = None) -> int:

@@ -1,19 +1,28 @@
-"""A run compared with its prediction: durations, cycle time, utilisation."""
+"""A run, made now or read from a log, compared with its prediction: durations, cycle time,
+utilisation."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from factory.control.profile import World
 from factory.plant.factory import Factory
-from factory.simulation.run import Event, mean_interval
+from factory.record.log import Log
+from factory.record.project_table import settings_of
+from factory.simulation.run import Event, Run, mean_interval
 from factory.study.analysis.firing import Floats
-from factory.study.analysis.flow import Flow, busy_until, durations, lasting
+from factory.study.analysis.flow import Flow
 from factory.study.analysis.timed import TimedNet
+from factory.support.errors import Diagnostic, InputError
+from factory.support.settings import Settings
 from factory.timing.timing import Timing
+
+HINT = "`factory run FILE.pag --log OUT` writes one that fits"
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,12 +62,6 @@ class Comparison:
     durations: tuple[Duration, ...] = field(repr=False)
     busy: tuple[ComparedFigure, ...] = field(repr=False)
 
-    @property
-    def worst(self) -> Duration | None:
-        """The operation whose duration is predicted worst."""
-        known = [d for d in self.durations if d.time.error is not None]
-        return max(known, key=lambda d: abs(d.time.error or 0.0), default=None)
-
 
 @dataclass(frozen=True, slots=True)
 class RunRecord:
@@ -69,29 +72,74 @@ class RunRecord:
     dropoffs: tuple[float, ...]
 
 
-def compare(timing: Timing, net: TimedNet, found: Flow, record: RunRecord) -> Comparison:
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """The conditions of a run, which its prediction assumes."""
+
+    settings: Settings
+    world: World
+    seed: int
+    jitter: float
+    wip: int | None
+
+
+def conditions(header: Mapping[str, Any]) -> Conditions:
+    """The conditions of the run in a log."""
+    settings, jitter = settings_of(header), float(header["jitter"])
+    return Conditions(settings, header["world"], header["seed"], jitter, header["wip"])
+
+
+def record_of(run: Run) -> RunRecord:
+    """The record of a run that was just made. Raises InputError (BadLog) where it finished no
+    product."""
+    return _checked(RunRecord("a run on the spot", run.lasting, run.dropoffs))
+
+
+def logged_record(source: str, log: Log, factory: Factory) -> RunRecord:
+    """The record of the run in a log. Raises InputError (BadLog) where it is not one of this
+    factory, does not start from its initial marking, or finished no product."""
+    net = factory.net.threaded
+    if log.header["transitions"] != [transition.name for transition in net.transitions]:
+        message = f"'{source}' is the log of another factory: other operations, or other robots"
+        raise InputError(Diagnostic("BadLog", message, None, HINT))
+    if log.header["start"] != sorted(factory.net.initial_marking):
+        message = f"the run in '{source}' began in the middle (--from)"
+        hint = "take one that began at the beginning"
+        raise InputError(Diagnostic("BadLog", message, None, hint))
+    made = tuple(Event(t, name) for t, name in log.lasting)
+    return _checked(RunRecord(source, made, dropoff_times(log.time, log.delivered)))
+
+
+def _checked(record: RunRecord) -> RunRecord:
+    if not record.dropoffs:
+        message = f"'{record.source}' has no finished product"
+        raise InputError(Diagnostic("BadLog", message, None, "take a longer run"))
+    return record
+
+
+def compare(timing: Timing, net: TimedNet, flow: Flow, record: RunRecord) -> Comparison:
     """The record of a run from the initial marking, compared with the flow of as many units."""
     factory = timing.factory
     number = factory.net.threaded.net.transition_index
     spent = operation_times(factory, ((number[e.transition], e.t) for e in record.events))
     busy = robot_times(factory, spent)
-    first, usual = durations(timing, found)[0], lasting(timing, found)
+    first, usual = flow.durations[0], flow.lasting
     compared = [
         _duration(o.label, float((usual if len(times) > 1 else first)[o.index]), times)
         for o, times in zip(factory.operations, spent, strict=True)
     ]
     left = record.dropoffs
     last = left[-1] if left else None
-    shares = busy_until(timing, found)
     return Comparison(
         record.source,
         len(left),
         ComparedFigure(net.pace, mean_interval(left, factory.period)),
-        ComparedFigure(found.first, left[0] if left else None),
-        ComparedFigure(found.last, last),
+        ComparedFigure(flow.first, left[0] if left else None),
+        ComparedFigure(flow.last, last),
         tuple(compared),
         tuple(
-            ComparedFigure(p, b / last if last else None) for p, b in zip(shares, busy, strict=True)
+            ComparedFigure(p, b / last if last else None)
+            for p, b in zip(flow.busy, busy, strict=True)
         ),
     )
 
@@ -102,12 +150,12 @@ def operation_times(factory: Factory, firings: Iterable[tuple[int, float]]) -> l
     times: dict[int, list[float]] = {}
     for number, t in firings:
         times.setdefault(number, []).append(t)
-    found = []
+    spent = []
     for operation in factory.operations:
         begun, ended = times.get(operation.start, []), times.get(operation.end, [])
         late = max(0, len(ended) - len(begun))
-        found.append([end - start for start, end in zip(begun, ended[late:], strict=False)])
-    return found
+        spent.append([end - start for start, end in zip(begun, ended[late:], strict=False)])
+    return spent
 
 
 def robot_times(factory: Factory, spent: Sequence[Sequence[float]]) -> list[float]:

@@ -68,9 +68,9 @@ class TimedNet(Timed):
         first."""
         bounds = self.bounds
         tightest = circuits(self.ratio, bounds) if bounds else ()
-        found = [self._bounded(slack) for slack in tightest]
-        found += self._meeting([*self.named, *found])
-        return tuple(sorted((*self.named, *found), key=lambda c: -c.pace))
+        others = [self._bounded(slack) for slack in tightest]
+        others += self._meeting([*self.named, *others])
+        return tuple(sorted((*self.named, *others), key=lambda c: -c.pace))
 
     @cached_property
     def critical(self) -> tuple[Circuit, ...]:
@@ -78,34 +78,25 @@ class TimedNet(Timed):
         return tuple(c for c in self.circuits if c.pace >= self.pace * (1 - SAME))
 
     def _bounded(self, slack: Slack) -> Circuit:
-        tokens = sum(self.net.tokens[p] for p in slack.circuit)
         names = [self.net.net.places[p].name for p in slack.circuit if p in self.bounds]
-        seconds = sum(self.seconds[p] for p in slack.circuit)
         name = " ".join(names).replace(":", " ")
-        return Circuit(name, seconds, tokens, slack.circuit, self.units)
+        return _circuit(name, slack.circuit, self.seconds, self.net.tokens, self.units)
 
-    def _meeting(self, known: Sequence[Circuit]) -> list[Circuit]:
-        """The critical circuit, where none of those `known` is as slow."""
-        if max(circuit.pace for circuit in known) >= self.pace * (1 - SAME):
+    def _meeting(self, others: Sequence[Circuit]) -> list[Circuit]:
+        """The critical circuit, where none of the `others` is as slow."""
+        if max(circuit.pace for circuit in others) >= self.pace * (1 - SAME):
             return []
         places, robots = self.ratio.circuit, self.timing.factory.robots
         first = self.busiest[0]
         names = ", ".join(robots[robot].name for robot in self.waited_for if robot != first)
-        return [
-            Circuit(
-                f"{robots[first].name} with {names}" if names else robots[first].name,
-                sum(self.seconds[p] for p in places),
-                sum(self.net.tokens[p] for p in places),
-                places,
-                self.units,
-            )
-        ]
+        name = f"{robots[first].name} with {names}" if names else robots[first].name
+        return [_circuit(name, places, self.seconds, self.net.tokens, self.units)]
 
     def slack(self, circuit: Circuit) -> float:
         """How much longer a circuit may take before it sets the pace [s]; for a robot's gear, how
         long it waits in a cycle."""
-        found = self.pace * circuit.products - circuit.seconds
-        return found if found > SAME * self.pace else 0.0
+        slack = self.pace * circuit.products - circuit.seconds
+        return slack if slack > SAME * self.pace else 0.0
 
     def firings(self, units: int) -> Firings:
         """The firings of each transition for at least `units` products from the initial marking, as
@@ -176,7 +167,7 @@ def _gears(
     ways: Mapping[tuple[int, int], int],
 ) -> list[Circuit]:
     """The slowest circuit in each gear."""
-    found = []
+    gears = []
     for robot, gear in zip(timing.factory.robots, timing.factory.net.gears, strict=True):
         slowest = list(gear.places)
         for step, number in enumerate(robot.operations):
@@ -184,16 +175,20 @@ def _gears(
             if way != number and seconds[way] > seconds[gear.places[2 * step]] + seconds[number]:
                 slowest[2 * step], slowest[2 * step + 1] = way, NONE
         places = tuple(p for p in slowest if p != NONE)
-        found.append(
-            Circuit(
-                gear.robot,
-                sum(seconds[p] for p in places),
-                sum(tokens[p] for p in places),
-                places,
-                timing.factory.period,
-            )
-        )
-    return found
+        gears.append(_circuit(gear.robot, places, seconds, tokens, timing.factory.period))
+    return gears
+
+
+def _circuit(
+    name: str,
+    places: tuple[int, ...],
+    seconds: Sequence[float],
+    tokens: Sequence[int],
+    units: int,
+) -> Circuit:
+    """The circuit of these places, with the sums of their `seconds` and `tokens`."""
+    spent, there = sum(seconds[p] for p in places), sum(tokens[p] for p in places)
+    return Circuit(name, spent, there, places, units)
 
 
 def _alone(timing: Timing, change: Change) -> list[int]:

@@ -52,8 +52,8 @@ def _sensitivity(
     timing: Timing, net: TimedNet, wip: int | None, number: int, gear: Circuit
 ) -> Sensitivity:
     def gain(change: Change) -> float:
-        found = net.pace - timed_net(timing, change, wip).pace
-        return found if abs(found) > 1e-9 * net.pace else 0.0
+        saved = net.pace - timed_net(timing, change, wip).pace
+        return saved if abs(saved) > 1e-9 * net.pace else 0.0
 
     slower = gain(Change(speed={number: 1 - STEP}))
     if not any(set(gear.places) & set(circuit.places) for circuit in net.critical):
@@ -113,17 +113,17 @@ def scenarios(timing: Timing, net: TimedNet, wip: int | None) -> tuple[Scenario,
     robots = {robot.name: robot.index for robot in timing.factory.robots}
     critical = [c.name for c in net.critical if c.name in robots]
     percent = round(100 * STEP)
-    made = []
+    changes = []
     if len(critical) > 1:
-        both = {robots[name]: 1 + STEP for name in critical}
-        made.append((f"{listed(critical)} {percent} % faster", Change(speed=both)))
+        together = {robots[name]: 1 + STEP for name in critical}
+        changes.append((f"{listed(critical)} {percent} % faster", Change(speed=together)))
     every = range(len(robots))
-    made += [
+    changes += [
         (f"every robot {percent} % faster", Change(speed=dict.fromkeys(every, 1 + STEP))),
         (f"every way {percent} % shorter", Change(way=dict.fromkeys(every, 1 - STEP))),
     ]
-    found = [scenario(timing, words, change, wip) for words, change in made]
-    return (*found, *in_turn(timing, net, wip))
+    examined = [scenario(timing, words, change, wip) for words, change in changes]
+    return (*examined, *in_turn(timing, net, wip))
 
 
 def in_turn(timing: Timing, net: TimedNet, wip: int | None, most: int = 4) -> list[Scenario]:
@@ -131,18 +131,18 @@ def in_turn(timing: Timing, net: TimedNet, wip: int | None, most: int = 4) -> li
     robots sets it, or the pace does not improve."""
     robots = {robot.name: robot.index for robot in timing.factory.robots}
     copies: dict[int, int] = {}
-    found: list[Scenario] = []
+    better: list[Scenario] = []
     pace, critical = net.pace, tuple(c.name for c in net.critical)
-    while len(found) < most and all(name in robots for name in critical):
+    while len(better) < most and all(name in robots for name in critical):
         for name in critical:
             copies[robots[name]] = copies.get(robots[name], 1) + 1
         words = listed([f"{n} × {timing.factory.robots[r].name}" for r, n in copies.items()])
         last = scenario(timing, words, Change(copies=dict(copies)), wip)
         if last.pace >= pace * (1 - 1e-9):
             break
-        found.append(last)
+        better.append(last)
         pace, critical = last.pace, last.then
-    return found
+    return better
 
 
 def listed(names: list[str], most: int = 6) -> str:
@@ -154,11 +154,10 @@ def listed(names: list[str], most: int = 6) -> str:
 @dataclass(frozen=True, slots=True)
 class WipCurve:
     """Points (W, cycle time [s]) for growing W; `least`: the least W at which the pace is the full
-    one; `all`: that at which W is no bound any more."""
+    one."""
 
     points: tuple[tuple[int, float], ...]
     least: int
-    all: int
 
 
 def wip_curve(timing: Timing) -> WipCurve:
@@ -178,4 +177,4 @@ def wip_curve(timing: Timing) -> WipCurve:
         middle = (low + high) // 2
         low, high = (low, middle) if pace(middle) <= full * (1 + SAME) else (middle, high)
     shown = sorted({round(1 + (top - 1) * i / (POINTS - 1)) for i in range(POINTS)} | {high})
-    return WipCurve(tuple((wip, pace(wip)) for wip in shown), high, top)
+    return WipCurve(tuple((wip, pace(wip)) for wip in shown), high)
