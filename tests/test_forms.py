@@ -38,7 +38,6 @@ from factory.study.allocation.forms import (
     _finished,
     _joined,
     best_forms,
-    forms_task,
     written_forms,
 )
 from factory.study.allocation.search import Search, allocated
@@ -60,7 +59,7 @@ def task_of(pag: PAG, admits: dict[str, Admitted] | None = None) -> FormsTask:
     boxes = {
         label: (0.0, 0.05 + sum(map(ord, label)) % 7 / 20, 0.0, 0.1) for label in plain.contents
     }
-    return forms_task(pag, TEMPLATES, admits or {}, boxes, Pace())
+    return FormsTask(pag, TEMPLATES, admits or {}, boxes, Pace())
 
 
 def parts_made(plain: Factory) -> set[frozenset[str]]:
@@ -223,7 +222,8 @@ def test_few_robots_do_it_in_the_time_that_is_predicted(run: Terminal) -> None:
     assert done.json["cycle_time_s"] == pytest.approx(done.json["predicted_cycle_time_s"], rel=0.02)
     few = run("check", paper, "--robots", "2", "--json")
     assert few.codes == ["TooFewRobots"]
-    assert "'sub3' cannot be held by fewer than 2" in few.json["errors"][0]["message"]
+    (error,) = few.json["errors"]
+    assert error["message"] == "'sub3' needs at least 3 robots: 2 carriers and 1 tool"
     least = run("check", paper, "--robots", "least", "--json").json
     assert least["robots"] == 3
     assert least["gear_train"]

@@ -1,4 +1,4 @@
-"""What is asked of an allocation: so many robots, or a cycle time."""
+"""The aim of an allocation: a number of robots, or a cycle time."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from factory.compiler.parallel import Branches
 from factory.support.settings import LEAST
 
 STEP = 1.15
-"""The bounds on estimated cycles that are tried: each is the one before divided by this."""
+"""Ratio of successive bounds on estimated cycles."""
 
 LABELS, EFFORTS = 3000, (8, 100)
-"""So many labels are laid out in a search, in so many factories: a large product's layout takes as
-long as many of a small one's."""
+"""Number of labels that a search lays out, over all its factories; least and greatest number of
+these: the layout of a large product takes as long as many of a small one."""
 
 
 def usual_effort(labels: int) -> int:
-    """How many factories a search lays out at most for a product of so many labels, where nothing
-    else is said."""
+    """Default of the greatest number of factories that a search lays out, for a product with so
+    many labels."""
     return min(max(LABELS // labels, EFFORTS[0]), EFFORTS[1])
 
 
 @dataclass(frozen=True, slots=True)
 class Aim:
-    """How many `robots` there are, LEAST for as few as found, None for as many as it takes; the
-    `cycle` time to be reached [s], None for the shortest. `effort`: how many factories are laid
-    out at most, None for as many as is usual; none is begun after `seconds`. `branches`: labels,
-    and how often the branch that brings each is to be there."""
+    """Number of `robots`, LEAST for as few as found, None for any number; the `cycle` time to be
+    reached [s], None for the shortest. `effort`: greatest number of factories that are laid out,
+    None for the default; none is begun after `seconds`. `branches`: labels, with the number of
+    copies of the branch that brings each."""
 
     robots: int | Literal["least"] | None = None
     cycle: float | None = None
@@ -38,13 +38,13 @@ class Aim:
 
     @property
     def asks(self) -> bool:
-        """Whether it asks for anything."""
+        """Whether it limits the robots or the cycle time."""
         return self.robots is not None or self.cycle is not None
 
     def rank(self, robots: int, seconds: float, bare: int = 0) -> tuple[float, ...]:
-        """What a factory is judged by, the less the better: how many more robots it has than are
-        asked for, how many more labels are `bare` of hands than as they are written, its cycle
-        time [s]; its robots first where as few as found are asked for."""
+        """Rank of a factory, the less the better: its robots beyond those allowed, the labels
+        without a hand beyond those of the product as written (`bare`), its cycle time [s]; with
+        LEAST, the number of robots before the cycle time."""
         seconds = round(seconds, 3)
         if self.robots == LEAST:
             return bare, robots, seconds
@@ -54,7 +54,7 @@ class Aim:
         return more, bare, max(0.0, seconds - self.cycle), robots, seconds
 
     def wants(self, robots: int, seconds: float) -> bool:
-        """Whether estimates may be those of what is wanted."""
+        """Whether a factory with these estimates may reach the aim."""
         if isinstance(self.robots, int) and robots > self.robots:
             return False
         return self.cycle is None or seconds < self.cycle * STEP

@@ -23,7 +23,6 @@ from factory.study.allocation.forms import (
     FormsTask,
     Order,
     best_forms,
-    forms_task,
     written_forms,
 )
 from factory.study.allocation.lines import SLACKS, Shift
@@ -81,7 +80,7 @@ class Estimator:
         pag, templates, product = project.pag, project.templates, project.product
         admits = admitted(expand(pag, templates), product) if is_shaped(pag) else {}
         boxes = payload_boxes(project.compiled, product)
-        return forms_task(pag, templates, admits, boxes, Pace.of(project.settings))
+        return FormsTask(pag, templates, admits, boxes, Pace.of(project.settings))
 
     @cached_property
     def written(self) -> Mapping[str, int]:

@@ -70,22 +70,26 @@ class Option:
 
 @dataclass(frozen=True)
 class FormsTask:
-    """A product whose forms are to be chosen: its operations in postorder (`expand`), what they
-    `admitted` along either axis, nothing for a product of default boxes, the boxes of its
-    sub-assemblies (`payloads`), the `pace` of robots, forms that are `refused`: joins, and the
-    pile of each, which count as blocked; and the `order` in which ways are compared."""
+    """A product whose forms are to be chosen: what its operations `admitted` along either axis,
+    nothing for a product of default boxes, the boxes of its sub-assemblies (`payloads`), the `pace`
+    of robots, forms that are `refused`: joins, and the pile of each, which count as blocked; and
+    the `order` in which ways are compared."""
 
     pag: PAG
     templates: Mapping[str, Template]
-    nodes: Mapping[str, Node]
     admitted: Mapping[str, Admitted]
     payloads: Mapping[str, Box]
     pace: Pace
     refused: frozenset[tuple[str, int]] = frozenset()
     order: Order = "robots"
 
+    @cached_property
+    def nodes(self) -> Mapping[str, Node]:
+        """Its operations, in postorder."""
+        return expand(self.pag, self.templates)
+
     def size(self, label: str) -> float:
-        """How long a sub-assembly is at most on the floor [m]."""
+        """Length of the longer side of a sub-assembly on the floor [m]."""
         xlo, xhi, ylo, yhi = self.payloads[label]
         return max(xhi - xlo, yhi - ylo)
 
@@ -237,14 +241,3 @@ def _held(node: Node) -> int:
     if variable == NOPART or not node.inputs:
         return -1
     return sorted(node.template.inputs, key=variable_number).index(variable)
-
-
-def forms_task(
-    pag: PAG,
-    templates: Mapping[str, Template],
-    admits: Mapping[str, Admitted],
-    payloads: Mapping[str, Box],
-    pace: Pace,
-) -> FormsTask:
-    """The task of choosing the forms of a product."""
-    return FormsTask(pag, templates, expand(pag, templates), admits, payloads, pace)

@@ -1,9 +1,9 @@
 """The least number of robots that can make a product, tools apart: a lower bound, with its proof.
 
-A part needs one robot. What is joined of two inputs needs max(S1, S2 + 1), where S1 >= S2 are what
-the inputs need: whichever is made first is held while the other is made. Where a third robot takes
-both, it needs three at least. This is the Sethi-Ullman number of the tree. No program, folded or
-not, does with fewer, since each part and sub-assembly is in some robot's hands until it is joined.
+A part needs one robot. A sub-assembly of two inputs needs max(S1, S2 + 1) robots, where S1 >= S2
+are the numbers of the inputs: the input that is made first is held while the other is made. If a
+third robot takes both, at least three are needed. This is the Sethi-Ullman number of the tree. No
+program needs fewer, folded or not: a robot holds each part and sub-assembly until it is joined.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from factory.problem.pag import NOPART, PAG
 from factory.problem.template import Template
 
 SHOWN = 6
-"""So many labels of a proof are shown."""
+"""Number of labels of a proof that are shown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,17 +36,17 @@ class Least:
         return self.robots + self.tools
 
     def __str__(self) -> str:
-        """Why it takes so many, in words."""
-        product, _ = self.path[0]
-        words = f"'{product}' cannot be held by fewer than {self.robots}{self._why()}"
+        """The bound and its proof, in words."""
+        words = f"'{self.path[0][0]}' needs at least {self.total} robots"
         if self.tools:
-            words += f", and takes {self.tools} tool{'' if self.tools == 1 else 's'} besides"
-        return words
+            tools = "1 tool" if self.tools == 1 else f"{self.tools} tools"
+            words += f": {self.robots} carriers and {tools}"
+        return words + self._proof()
 
-    def _why(self) -> str:
-        """The labels on the way down at which it takes one fewer each."""
+    def _proof(self) -> str:
+        """The labels on the path at which one carrier fewer is needed."""
         steps = [b for a, b in pairwise(self.path) if a[1] > b[1] > 1]
-        words = ", ".join(f"'{label}' by {needs}" for label, needs in steps[:SHOWN])
+        words = ", ".join(f"'{label}' needs {needs}" for label, needs in steps[:SHOWN])
         more = ", ..." if len(steps) > SHOWN else ""
         return f" ({words}{more})" if steps else ""
 

@@ -79,42 +79,34 @@ class Shift:
         return fold(self.factory, self.lines(filling), self.catalogue).plan
 
 
-@dataclass(frozen=True)
-class Ways:
-    """How far the robots of a factory have to go: `out` [m], to where each delivers, and `at` [m],
-    where along the path of the one that it delivers to."""
-
-    out: tuple[float, ...]
-    at: tuple[float, ...]
-
-    @classmethod
-    def of(cls, timing: SizeTiming) -> Ways:
-        """Those of a factory. A robot goes past what is joined, and its path has room for all that
-        delivers to it, side by side from either side, with what delivers to those."""
-        factory, count = timing.factory, len(timing.factory.robots)
-        out, at, beside = [0.0] * count, [0.0] * count, [0.0] * count
-        for robot in reversed(range(count)):
-            taken = 0.0
-            for guest in _guests(factory, robot):
-                at[guest] = taken
-                taken += max(LANE, 2 * beside[guest]) / 2
-                beside[robot] = max(beside[robot], out[guest] + BETWEEN)
-            past = max(timing.past(robot, tour) for tour in factory.tours[robot])
-            out[robot] = max(past, BETWEEN + taken)
-        return cls(tuple(out), tuple(at))
+def _ways(timing: SizeTiming) -> tuple[list[float], list[float]]:
+    """How far each robot goes to where it delivers [m], and where that is along the path of the
+    robot that it delivers to [m]. A robot goes past what is joined, and its path has room for all
+    that delivers to it, side by side from either side, with what delivers to those."""
+    factory, count = timing.factory, len(timing.factory.robots)
+    out, at, beside = [0.0] * count, [0.0] * count, [0.0] * count
+    for robot in reversed(range(count)):
+        taken = 0.0
+        for guest in _guests(factory, robot):
+            at[guest] = taken
+            taken += max(LANE, 2 * beside[guest]) / 2
+            beside[robot] = max(beside[robot], out[guest] + BETWEEN)
+        past = max(timing.past(robot, tour) for tour in factory.tours[robot])
+        out[robot] = max(past, BETWEEN + taken)
+    return out, at
 
 
 def _guests(factory: Factory, robot: int) -> list[int]:
     """The robots that deliver to one, or come to it with a tool, in the order of its program."""
     operations = (factory.operations[number] for number in factory.robots[robot].operations)
-    found = (r for o in operations if o.carrier == robot for r in o.robots if r != robot)
-    return list(dict.fromkeys(found))
+    guests = (r for o in operations if o.carrier == robot for r in o.robots if r != robot)
+    return list(dict.fromkeys(guests))
 
 
 def estimated_delays(timing: SizeTiming) -> list[float]:
     """How long each operation of a factory takes [s]: as long as the robot that goes farthest, the
     carrier from where it was."""
-    factory, ways = timing.factory, Ways.of(timing)
+    factory, (out, at) = timing.factory, _ways(timing)
     stands = [0.0] * len(factory.operations)
     for robot in factory.robots:
         here = 0.0
@@ -123,11 +115,11 @@ def estimated_delays(timing: SizeTiming) -> list[float]:
             if operation.carrier != robot.index or len(operation.robots) == 1:
                 here = 0.0
                 continue
-            there = max(ways.at[guest] for guest in operation.robots if guest != robot.index)
+            there = max(at[guest] for guest in operation.robots if guest != robot.index)
             stands[number], here = abs(there - here), there
-    found = []
+    delays = []
     for operation in factory.operations:
         guests = [robot for robot in operation.robots if robot != operation.carrier]
-        longest = max(ways.out[robot] for robot in guests or [operation.carrier])
-        found.append(timing.takes(operation.index, max(longest, stands[operation.index])))
-    return found
+        longest = max(out[robot] for robot in guests or [operation.carrier])
+        delays.append(timing.takes(operation.index, max(longest, stands[operation.index])))
+    return delays

@@ -1,10 +1,10 @@
-"""Choose which robot does what, for few robots and a cycle time: the forms of operations, and the
-lines of robots.
+"""The search for an allocation: the forms of operations and the lines of robots, for few robots and
+a cycle time.
 
-The search begins with the product as it is written, and with forms and lines that are best by
-estimate (`estimating.py`) under bounds of cycles from long to short. Those of them that no other is
-as good as are laid out, the most promising first. Then the best is changed, one join at a time,
-those of the slowest robot first, as long as that makes it better. All are judged by their layouts.
+The search begins with the product as written, and with the forms and lines that are best by
+estimate (`estimating.py`) under bounds on cycles from long to short. The Pareto-optimal estimates
+are laid out, the most promising first. Then one join of the best factory is changed at a time,
+those of the slowest robot first, as long as this improves it. All are judged by their layouts.
 """
 
 from __future__ import annotations
@@ -14,10 +14,11 @@ from dataclasses import replace
 from math import inf
 
 from factory.compiler.folding import kept_apart, lines_of
+from factory.layout.hands.misses import NoGrip
 from factory.pipeline import Project
+from factory.plant.factory import Factory, Operation
 from factory.problem.plan import THIRD
 from factory.study.allocation.aim import Aim, usual_effort
-from factory.study.allocation.blame import blamed
 from factory.study.allocation.bundles import Filling
 from factory.study.allocation.candidate import Candidate
 from factory.study.allocation.estimating import Estimator
@@ -27,14 +28,14 @@ from factory.support.allowance import Allowance
 from factory.support.errors import Diagnostic, InputError
 
 ROUNDS = 8
-"""So often forms are chosen anew where no hand can hold what they ask for."""
+"""Number of times that forms are chosen again because no hand fits."""
 
 CHANGES = 60
-"""So many changes are tried in a row, none of which is better, before the search ends."""
+"""Number of changes in a row without improvement after which the search ends."""
 
 SINGLE, SHARED = 0.3, 0.8
-"""Shares of the effort after which nothing more is tried with a robot for each label, and no more
-estimates are laid out."""
+"""Shares of the effort after which factories with one robot for each label are no longer tried, and
+after which estimates are no longer laid out."""
 
 Seen = Callable[[Candidate, Candidate], None]
 """Told of each candidate, and of the best so far."""
@@ -56,20 +57,21 @@ def allocated(
     if isinstance(aim.robots, int):
         least = least_robots(project.pag, project.templates)
         if aim.robots < least.total:
-            message = f"{aim.robots} robots are too few: {least}"
-            raise InputError(Diagnostic("TooFewRobots", message, None, f"--robots {least.total}"))
+            hint = f"--robots {least.total}"
+            raise InputError(Diagnostic("TooFewRobots", str(least), None, hint))
     search = Search(project, aim)
     search.look(seen)
     best = search.best
     if search.cut_off:
-        message = f"the search ended after {aim.seconds:g} s, with {search.budget.spent} factories"
-        hint = f"it would look at {search.budget.effort:g}: more --seconds, or less --effort"
+        spent, effort = search.budget.spent, search.budget.effort
+        message = f"the search stopped after {aim.seconds:g} s and {spent} of {effort:g} factories"
+        hint = "give it more --seconds, or less --effort"
         warn(Diagnostic("OutOfTime", message, None, hint))
     if isinstance(aim.robots, int) and best.robots > aim.robots:
-        message = f"{aim.robots} robots are too few: found with {best.robots}{search.why()}"
+        message = f"no factory with {aim.robots} robots was found, only with {best.robots}"
         more = "--seconds" if search.cut_off else "--effort"
-        hint = f"--robots {best.robots}; with more {more} fewer may be found"
-        raise InputError(Diagnostic("TooFewRobots", message, None, hint))
+        hint = f"--robots {best.robots}, or a longer search with more {more}"
+        raise InputError(Diagnostic("TooFewRobots", message + search.why(), None, hint))
     if aim.robots is None and aim.cycle is not None and best.seconds > aim.cycle:
         plain = best if best.filling is None else search.written
         relayed = replace(plain, single=plain.single.with_ground(project.ground))
@@ -104,10 +106,10 @@ class Search:
         """For forms and lines, as long as there is effort left and something better may be found.
         Each candidate is `seen`."""
         seen(self.written, self.best)
-        for found in (self.singles(), self._shared()):
-            for one in found:
-                self._judge(one)
-                seen(one, self.best)
+        for candidates in (self.singles(), self._shared()):
+            for candidate in candidates:
+                self._judge(candidate)
+                seen(candidate, self.best)
         while self._better(self._changed(), seen):
             pass
 
@@ -182,3 +184,32 @@ class Search:
             for form in (THIRD, 0, 1):
                 if form != best.forms[label]:
                     yield self._candidate({**best.forms, label: form}, best.filling)
+
+
+def blamed(project: Project, forms: Mapping[str, int]) -> Iterator[tuple[str, int]]:
+    """For each robot that no hand fits, the form (a join and its pile) that is the likely cause: of
+    the joins on this robot the one whose incoming parts are most in the way, else the one at which
+    it delivers; none where these have no such form."""
+    factory = project.plain
+    robots = {robot.name: robot for robot in factory.robots}
+    for no_grip in project.no_grips:
+        robot = robots[no_grip.robot]
+        operations = [factory.operations[number] for number in robot.operations]
+        piles = [o for o in operations if forms.get(o.label, THIRD) != THIRD]
+        carried = [o for o in piles if o.carrier == robot.index] or piles
+        if carried:
+            label = max(carried, key=lambda o: _in_the_way(no_grip, o, factory)).label
+            yield label, forms[label]
+
+
+def _in_the_way(no_grip: NoGrip, operation: Operation, factory: Factory) -> tuple[int, int]:
+    """Number of parts that come in an operation and are in the way of hands; then how early it
+    is."""
+    carrier = operation.template.carrier - 1
+    incoming = {
+        part
+        for slot, label in enumerate(operation.before)
+        if slot != carrier and label in factory.contents
+        for part in factory.contents[label]
+    }
+    return sum(part in incoming for miss in no_grip.misses for part in miss.parts), -operation.index

@@ -1,4 +1,4 @@
-"""The front of a product: what can be had in robots, cycle time and floor, each point a factory."""
+"""The Pareto front of a product in robots, cycle time and floor area; each point is a factory."""
 
 from factory.study.pareto.front import FrontPoint, ParetoFront
 from factory.study.pareto.sweeping import Effort, FrontSweep, pareto

@@ -1,4 +1,4 @@
-"""Points of which no other is as good in everything: robots, cycle time, floor."""
+"""The Pareto front in robots, cycle time and floor area: its points and their dominance."""
 
 from __future__ import annotations
 
@@ -12,15 +12,14 @@ from factory.study.allocation.candidate import Candidate
 from factory.study.allocation.estimating import Estimate
 from factory.study.allocation.least import Least
 from factory.study.pareto.trial import Trial
-from factory.support.errors import FactoryError
 
 
 @dataclass(frozen=True, slots=True)
 class FrontPoint:
-    """A factory for a product: its `robots`, of which so many are `tools` and `relays`; its cycle
-    time as it is `estimated` from sizes and as it is `predicted` for its layout [s]; the floor that
-    takes, `area` [m²], and what its robots spend in operations in a cycle, `work` [robot s]. What
-    comes from a layout is None without one. `trial`: what runs of it gave, if there were any."""
+    """A factory for a product: the number of its `robots`, and of `tools` and `relays` among them;
+    its cycle time `estimated` from sizes and `predicted` for its layout [s]; the floor `area` of
+    the layout [m²]; the time that its robots spend in operations in a cycle, `work` [robot s].
+    Figures of a layout are None without one. `trial`: the results of its runs, if it was run."""
 
     project: Project = field(repr=False)
     robots: int
@@ -34,7 +33,7 @@ class FrontPoint:
 
     @classmethod
     def laid_out(cls, one: Candidate, estimated: float | None = None) -> FrontPoint:
-        """That of a candidate by its layout. Raises FactoryError where there is none."""
+        """The point of a candidate, by its layout. Raises FactoryError where there is none."""
         layout = one.project.layout
         robots = layout.factory.robots
         return cls(
@@ -50,7 +49,7 @@ class FrontPoint:
 
     @classmethod
     def of_estimate(cls, one: Candidate, estimate: Estimate) -> FrontPoint:
-        """That of an estimate, without a layout."""
+        """The point of an estimate, without a layout."""
         robots = one.project.plain.robots
         tools = sum(robot.type == "tool" for robot in robots)
         return cls(one.project, len(robots), tools, estimate.seconds)
@@ -61,9 +60,9 @@ class FrontPoint:
 
     @property
     def seconds(self) -> float:
-        """The cycle time it is judged by [s]: predicted where it has a layout, else estimated."""
-        found = self.estimated if self.predicted is None else self.predicted
-        return inf if found is None else found
+        """The cycle time that counts [s]: predicted where it has a layout, else estimated."""
+        seconds = self.estimated if self.predicted is None else self.predicted
+        return inf if seconds is None else seconds
 
     @property
     def lines(self) -> tuple[tuple[str, ...], ...]:
@@ -74,7 +73,7 @@ class FrontPoint:
 
     @property
     def certified(self) -> bool:
-        """Whether it has a layout with a clearance certificate that holds."""
+        """Whether its layout has a valid clearance certificate."""
         if self.predicted is None:
             return False
         certificate = self.project.layout.certificate
@@ -82,23 +81,23 @@ class FrontPoint:
 
     @property
     def bound(self) -> float | None:
-        """The least cycle time that so many robots allow for its operations [s]; None without a
+        """Lower bound on the cycle time with so many robots and its operations [s]; None without a
         layout."""
         return None if self.work is None else self.work / self.robots
 
     @property
     def figures(self) -> tuple[float, ...]:
-        """What it is judged by, the less the better: robots, cycle time to 10 ms, floor to 1 dm²,
-        as they are printed."""
+        """The objectives, the less the better: robots, cycle time to 10 ms, floor to 1 dm², as they
+        are printed."""
         area = () if self.area is None else (round(self.area, 2),)
         return self.robots, round(self.seconds, 2), *area
 
     def beats(self, other: FrontPoint) -> bool:
-        """Whether it is as good as another in everything."""
+        """Whether it is at least as good as another point in all objectives."""
         return all(a <= b for a, b in zip(self.figures, other.figures, strict=True))
 
     def as_json(self) -> dict[str, Any]:
-        """It as `pareto --json` lists it."""
+        """The point as `pareto --json` lists it."""
         trial = self.trial
         return {
             "robots": self.robots,
@@ -118,20 +117,20 @@ class FrontPoint:
 
 
 def undominated(points: Iterable[FrontPoint]) -> list[FrontPoint]:
-    """Those that no other is as good as in everything, fewest robots first; of equal ones the
-    first."""
-    found: list[FrontPoint] = []
+    """The Pareto-optimal points, fewest robots first; of equal ones the first."""
+    front: list[FrontPoint] = []
     for point in points:
-        if not any(other.beats(point) for other in found):
-            found = [other for other in found if not point.beats(other)] + [point]
-    return sorted(found, key=lambda point: point.figures)
+        if not any(other.beats(point) for other in front):
+            front = [other for other in front if not point.beats(other)] + [point]
+    return sorted(front, key=lambda point: point.figures)
 
 
 @dataclass(frozen=True)
 class ParetoFront:
-    """The front that was found of a product: `points` by their robots; the `least` number of robots
-    that can make it; how many factories were `estimated` and `laid_out`; the `written` product as a
-    point, None where it has no layout; whether all was looked at that was to be (`complete`)."""
+    """The Pareto front found for a product: `points` in the order of their robots; the `least`
+    number of robots that can make it; the numbers of factories `estimated` and `laid_out`; the
+    product as `written` as a point, None where it has no layout; whether the sweep is
+    `complete`."""
 
     name: str
     points: tuple[FrontPoint, ...]
@@ -143,27 +142,27 @@ class ParetoFront:
 
     @property
     def work(self) -> float | None:
-        """The least that the robots of a point spend in operations in a cycle [robot s]: over a
-        number of robots it is a bound of their cycle time. None without layouts."""
-        known = [point.work for point in self.points if point.work is not None]
-        return min(known, default=None)
+        """The least `work` of a point [robot s]: divided by a number of robots, a lower bound on
+        their cycle time. None without layouts."""
+        works = [point.work for point in self.points if point.work is not None]
+        return min(works, default=None)
 
     @property
     def trials(self) -> list[Trial]:
-        """What runs gave, point by point."""
+        """The trials, point by point."""
         return [point.trial for point in self.points if point.trial is not None]
 
     @property
     def unproved(self) -> str:
-        """That points were not run, in words; nothing where all were."""
+        """How many points were not run, in words; "" where all were."""
         count = len(self.points)
-        if not (left := count - len(self.trials)):
+        left = count - len(self.trials)
+        if not left:
             return ""
-        what = (
-            "its cycle time is a prediction" if left == 1 else "their cycle times are predictions"
-        )
-        run = "was" if left == 1 else "were"
-        return f"{left} of {count} points {run} not run: {what} (--validate {count} runs all)"
+        words = "was not run: its cycle time is a prediction"
+        if left > 1:
+            words = "were not run: their cycle times are predictions"
+        return f"{left} of {count} points {words} (--validate {count} runs all)"
 
     def with_trial(self, number: int, trial: Trial) -> ParetoFront:
         """The same with the trial of a point."""
@@ -172,7 +171,7 @@ class ParetoFront:
         return replace(self, points=tuple(points))
 
     def spread(self, count: int) -> list[int]:
-        """The numbers of so many points, spread from the first to the last."""
+        """The numbers of `count` points, spread evenly from the first to the last."""
         last = len(self.points) - 1
         if count > last:
             return list(range(last + 1))
@@ -180,7 +179,7 @@ class ParetoFront:
         return sorted({round(last * n / steps) for n in range(count)})
 
     def as_json(self) -> dict[str, Any]:
-        """The document of `pareto --json`, without what its files are called."""
+        """The document of `pareto --json`, without the names of its files."""
         least = {"robots": self.least.robots, "tools": self.least.tools, "total": self.least.total}
         return {
             "product": self.name,
@@ -196,19 +195,11 @@ class ParetoFront:
 
 
 def candidates_front(found: Sequence[Estimate]) -> list[tuple[float, Estimate]]:
-    """Estimates with how many times the cycle time they have of the best with no more robots, those
-    of the front, with 1, first."""
+    """Estimates with their cycle time over that of the best with no more robots; those of the
+    front, with a ratio of 1, come first."""
     best: dict[int, float] = {}
     for one in sorted(found, key=lambda e: e.robots):
         before = min(best.values(), default=inf)
         best[one.robots] = min(before, best.get(one.robots, inf), one.seconds)
     ranked = [(one.seconds / best[one.robots], one) for one in found]
     return sorted(ranked, key=lambda pair: (round(pair[0], 3), pair[1].robots, pair[1].seconds))
-
-
-def point_of(one: Candidate, estimated: float | None = None) -> FrontPoint | None:
-    """The point of a candidate; None where it has no layout."""
-    try:
-        return FrontPoint.laid_out(one, estimated)
-    except FactoryError:
-        return None

@@ -1,5 +1,5 @@
-"""The files from which a point of a front is made again: its plan and its layout; the meshes of all
-lie beside them."""
+"""The files that reproduce a point of a front: its plan and its layout, with the meshes of all
+points beside them."""
 
 from __future__ import annotations
 
@@ -29,26 +29,26 @@ def command_of(file: Path) -> str:
 
 
 def commands_of(front: ParetoFront, folder: Path) -> list[str]:
-    """Those of all points, in their order."""
+    """The commands of all points, in their order."""
     return [
         command_of(folder / point_name(number) / PLAN_NAME) for number in range(len(front.points))
     ]
 
 
 def point_files(front: ParetoFront, folder: Path) -> dict[Path, bytes]:
-    """The files of all points in a folder. What the input calls its meshes is not followed: each
-    lies in the folder. Raises OSError where a mesh is no longer there."""
-    store, found = MeshStore(MESHES), dict[Path, bytes]()
+    """The files of all points in a folder. Meshes are copied into the folder, whatever their paths
+    in the input. Raises OSError where a mesh no longer exists."""
+    store, files = MeshStore(MESHES), dict[Path, bytes]()
     kept: dict[tuple[str, str], str] = {}
     for number, point in enumerate(front.points):
         pag = write_pag(_with_meshes(point.project.pag, store, kept))
         laid = point.predicted is not None
-        found |= plan_files(point.project, folder / point_name(number), pag, laid)
-    return found | {folder / path: content for path, content in store.files.items()}
+        files |= plan_files(point.project, folder / point_name(number), pag, laid)
+    return files | {folder / path: content for path, content in store.files.items()}
 
 
 def _with_meshes(pag: PAG, store: MeshStore, kept: dict[tuple[str, str], str]) -> PAG:
-    """A PAG whose meshes are those of a store, `kept` by folder and path."""
+    """The PAG with its meshes in a store; `kept`: their paths there, by folder and path."""
     return replace(pag, nodes=tuple(_with_mesh(node, pag, store, kept) for node in pag.nodes))
 
 

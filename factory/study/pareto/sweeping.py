@@ -1,11 +1,11 @@
-"""Look for the front of a product: robots, cycle time, floor.
+"""The search for the Pareto front of a product in robots, cycle time and floor area.
 
-What is swept: forms that are best by estimate under bounds of cycles from long to short, and those
-of the product as it is written; for each a robot for each label, and lines filled for cycles from
-short to long. The forms of the best are estimated with one changed, too. The estimates that no
-other is as good as are laid out, then those next to them, since estimates are off by up to half;
-the fastest with a robot for each label also with relays. What is on the front is then decided by
-certified layouts.
+The sweep covers the forms of the product as written and those that are best by estimate under
+bounds on cycles from long to short; for each of them one robot for each label, and lines filled for
+cycles from short to long. The forms of the best estimates are also estimated with one form changed.
+The Pareto-optimal estimates are laid out, then those next to them, since estimates are off by up to
+half; the fastest with one robot for each label also with relays. The certified layouts then decide
+which points are on the front.
 """
 
 from __future__ import annotations
@@ -29,34 +29,34 @@ from factory.study.pareto.front import (
     FrontPoint,
     ParetoFront,
     candidates_front,
-    point_of,
     undominated,
 )
 from factory.support.allowance import Allowance
+from factory.support.errors import FactoryError
 
 WIDE = 2
-"""A front takes so many times the effort of a search for one factory."""
+"""Effort for a front, over that of a search for one factory."""
 
 HELD = 0.15
-"""The share of the effort for forms that leave no robot without a hand."""
+"""Share of the effort for forms with which each robot has a hand."""
 
 NEXT = 1.5
-"""Estimates up to so many times the cycle of the front's are laid out."""
+"""Upper bound on the cycle time of estimates that are laid out, over that of the front."""
 
 EACH = 3
-"""So many estimates with one number of robots are laid out."""
+"""Number of estimates that are laid out for each number of robots."""
 
 RELAYED = 6
-"""So many of the fastest factories with a robot for each label, each with other robots, are tried
-with relays."""
+"""Number of the fastest factories with one robot for each label, of different numbers of robots,
+that are also tried with relays."""
 
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """What is spent on a front: whether `layouts` are made; how many, at most (`factories`), and of
-    how many forms there are estimates, None for as many as is usual; nothing is begun after
-    `seconds`. `branches` of all its factories: labels, and how often that which brings each is
-    there."""
+    """Effort for a front: whether `layouts` are made; the greatest number of them and of forms
+    that are estimated (`factories`), None for the default; nothing is begun after `seconds`.
+    `branches` of all its factories: labels, with the number of copies of the branch that brings
+    each."""
 
     layouts: bool = True
     factories: int | None = None
@@ -66,8 +66,8 @@ class Effort:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """How far a sweep is: what goes on, how many of how many are `done` (`total` None where that is
-    not known), and how many points the front has."""
+    """Progress of a sweep: the present step, how many of how many are `done` (`total` None where
+    that is unknown), and the number of points on the front."""
 
     what: str
     done: int
@@ -83,16 +83,16 @@ def pareto(
     effort: Effort = Effort(),
     seen: Seen = lambda _: None,
 ) -> ParetoFront:
-    """The front that is found of a project's product, with its settings. Each step is `seen`.
-    Raises InputError, RunError where no factory has a layout."""
+    """The Pareto front found for a project's product, with its settings. `seen` is called with each
+    step. Raises InputError, RunError where no factory has a layout."""
     sweep = FrontSweep(project, effort, seen)
     sweep.look()
     return sweep.front()
 
 
 class FrontSweep:
-    """Looks for the front of a project's product; `points`: what was found so far that no other is
-    as good as."""
+    """Search for the front of a project's product; `points`: the Pareto-optimal points found so
+    far."""
 
     def __init__(self, project: Project, effort: Effort, seen: Seen = lambda _: None) -> None:
         self.project, self.effort, self.seen = project, effort, seen
@@ -109,11 +109,11 @@ class FrontSweep:
 
     @cached_property
     def troubles(self) -> int:
-        """How many operations are in trouble as the product is written."""
+        """Number of operations in trouble in the product as written."""
         return self.estimator.candidate(self.estimator.written).troubles
 
     def front(self) -> ParetoFront:
-        """What was found so far."""
+        """The front found so far."""
         if not self.effort.layouts:
             self._count()
         return ParetoFront(
@@ -127,7 +127,7 @@ class FrontSweep:
         )
 
     def look(self) -> None:
-        """For points, as long as there is effort left."""
+        """Search for points, as long as there is effort left."""
         layouts = self.effort.layouts
         if layouts:
             self.written = self._added(Candidate(self.project, self.estimator.written))
@@ -141,8 +141,8 @@ class FrontSweep:
         self.complete = whole
 
     def _estimate(self) -> bool:
-        """Estimate what is swept; whether that is all. Then what has one form other than those of
-        the best."""
+        """Estimate the sweep, then the best with one form changed; whether the sweep is
+        complete."""
         for one in self.estimator.estimates(self.forms):
             self._note(one)
         whole = not self.forms.over()
@@ -187,7 +187,7 @@ class FrontSweep:
             self._added(one)
 
     def _lay_out(self) -> bool:
-        """Lay out what is promising; whether that is all."""
+        """Lay out the promising estimates; whether all were laid out."""
         chosen = list(self._promising())
         for number, one in enumerate(chosen):
             if self.budget.over():
@@ -207,8 +207,8 @@ class FrontSweep:
                 yield one
 
     def _relay(self) -> bool:
-        """Lay out the fastest with a robot for each label anew, with relays; whether that is
-        all."""
+        """Lay out the fastest with one robot for each label again, with relays; whether all were
+        laid out."""
         plain = sorted(
             (one for one in self.estimates if one.filling is None), key=lambda one: -one.seconds
         )
@@ -227,12 +227,15 @@ class FrontSweep:
         return self.estimator.candidate(one.forms, one.filling)
 
     def _added(self, one: Candidate, estimated: float | None = None) -> FrontPoint | None:
-        """The point of a candidate, which is then on the front unless others are as good; None
-        where it has no layout, or more operations in trouble than as the product is written."""
+        """The point of a candidate, which is then on the front unless it is dominated; None where
+        it has no layout, or more operations in trouble than the product as written."""
         self.laid_out += 1
         self.budget.spend()
-        point = None if one.troubles > self.troubles else point_of(one, estimated)
-        if point is None:
+        if one.troubles > self.troubles:
+            return None
+        try:
+            point = FrontPoint.laid_out(one, estimated)
+        except FactoryError:
             return None
         self.points = undominated([*self.points, point])
         return point

@@ -1,4 +1,4 @@
-"""A factory tried: run in both worlds, to see how far its cycle time is from what is predicted."""
+"""Trial of a factory: runs in both worlds, to measure the error of its predicted cycle time."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from factory.study.analysis.flow import steady_units
 from factory.timing.timing import Timing
 
 SEED, JITTER = 0, 0.3
-"""What the speeds and gains of robots are drawn with."""
+"""Seed and jitter of the robots' speeds and gains."""
 
 MOST = 24
-"""The most products of a trial."""
+"""Upper bound on the products of a trial."""
 
 CLOSE = 0.02
-"""A prediction that is off by no more holds."""
+"""Relative error up to which a prediction holds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """Runs of so many `units` in both worlds: the cycle time `predicted` for the speeds that were
-    drawn, `measured` in MuJoCo, and `ideal` in the other [s]; the `failures` of their verdicts."""
+    """Runs of `units` products in both worlds: the cycle time `predicted` for the speeds that were
+    drawn, `measured` in MuJoCo, and in the `ideal` world [s]; the `failures` of their verdicts."""
 
     units: int
     predicted: float
@@ -37,7 +37,7 @@ class Trial:
 
     @property
     def error(self) -> float | None:
-        """The relative error of the prediction; None where the run came to no end."""
+        """The relative error of the prediction; None where the run did not finish."""
         return self.predicted / self.measured - 1 if self.measured else None
 
     @property
@@ -46,7 +46,7 @@ class Trial:
         return not self.failures and self.error is not None and abs(self.error) <= CLOSE
 
     def as_json(self) -> dict[str, Any]:
-        """It as `pareto --json` lists it."""
+        """The trial as `pareto --json` lists it."""
         return {
             "units": self.units,
             "seed": SEED,
@@ -60,19 +60,19 @@ class Trial:
 
 
 def tried(project: Project, glances: Sequence[Observer] = ()) -> Trial:
-    """The trial of a project's factory: as many units as it takes until they come at the pace of
-    its net, MOST at most."""
+    """The trial of a project's factory: as many units as are needed to reach the pace of its net,
+    at most MOST."""
     layout, settings = project.layout, project.settings
     units = min(MOST, steady_units(Timing(layout, settings, "mujoco", SEED, JITTER)))
     fuse = fusing_pays(layout.factory, layout.product)
     asked = RunRequest("mujoco", units, SEED, JITTER, settings, fuse=fuse, shown=False)
     asked = replace(asked, catalogue=project.catalogue)
     run = watched(Simulation(layout, asked), (), None, glances)
-    thought = Simulation(layout, replace(asked, world="ideal", fuse=False)).run((), None, glances)
+    ideal = Simulation(layout, replace(asked, world="ideal", fuse=False)).run((), None, glances)
     failures = [
-        f"{one.world}: {failure.code}: {failure.message}"
-        for one in (run, thought)
-        for failure in one.verdict.failures
+        f"{each.world}: {failure.code}: {failure.message}"
+        for each in (run, ideal)
+        for failure in each.verdict.failures
     ]
     predicted = run.predicted_cycle_time_s or 0.0
-    return Trial(units, predicted, run.cycle_time_s, thought.cycle_time_s, tuple(failures))
+    return Trial(units, predicted, run.cycle_time_s, ideal.cycle_time_s, tuple(failures))
