@@ -234,7 +234,7 @@ def test_delays_have_bounds(run: Terminal, here: Path) -> None:
     for value in ("1e300", "nan", "9" * 400):
         (here / "d.toml").write_text(f"p = {value}")
         (error,) = run("analyze", "n.pnml", "--delays", "d.toml", "--json").json["errors"]
-        assert error["message"] == f"p = {value[:20]} is no time from 0 to 1e+09 s".replace(
+        assert error["message"] == f"p = {value[:20]} is not between 0 and 1e+09 s".replace(
             "1e300 is", "1e+300 is"
         )
 

@@ -9,32 +9,32 @@ from factory.study.analysis.analysing import Analysis
 from factory.study.analysis.measured import ComparedFigure, Comparison
 
 
-def document(found: Analysis) -> dict[str, Any]:
+def document(analysis: Analysis) -> dict[str, Any]:
     """Everything, times in seconds; null for what does not apply."""
-    timing, net, flow = found.timing, found.net, found.flow
+    timing, net, flow = analysis.timing, analysis.net, analysis.flow
     return {
         "product": timing.factory.pag.root,
         "world": timing.world,
         "units": flow.units,
         "seed": timing.seed,
         "jitter": timing.jitter,
-        "wip": found.wip,
+        "wip": analysis.wip,
         "cycle_time_s": net.pace,
         "products_per_hour": 3600 / net.pace if net.pace else None,
-        "bottlenecks": list(found.bottlenecks),
+        "bottlenecks": list(analysis.bottlenecks),
         "first_product_s": flow.first,
         "last_product_s": flow.last,
         "full_pace_from": flow.full_pace,
         "settled": flow.settled,
         "parts_inside": flow.inside,
-        "circuits": _circuits(found),
+        "circuits": _circuits(analysis),
         "operations": [
             {"label": o.label, "operation": o.template.name, "delay_s": delay, "slack_s": slack}
             for o, delay, slack in zip(
-                timing.factory.operations, net.seconds, found.slack, strict=False
+                timing.factory.operations, net.seconds, analysis.slack, strict=False
             )
         ],
-        "robots": _robots(found),
+        "robots": _robots(analysis),
         "stocks": [
             {
                 "label": s.label,
@@ -45,8 +45,8 @@ def document(found: Analysis) -> dict[str, Any]:
             }
             for s in flow.stocks
         ],
-        "wip_curve": [{"wip": wip, "cycle_time_s": pace} for wip, pace in found.curve.points],
-        "least_wip": found.curve.least,
+        "wip_curve": [{"wip": wip, "cycle_time_s": pace} for wip, pace in analysis.curve.points],
+        "least_wip": analysis.curve.least,
         "scenarios": [
             {
                 "change": s.words,
@@ -54,29 +54,29 @@ def document(found: Analysis) -> dict[str, Any]:
                 "gain_s": net.pace - s.pace,
                 "bottlenecks": list(s.then),
             }
-            for s in found.scenarios
+            for s in analysis.scenarios
         ],
-        "measured": None if found.measured is None else _measured(found, found.measured),
+        "measured": None if analysis.measured is None else _measured(analysis, analysis.measured),
     }
 
 
-def _circuits(found: Analysis) -> list[dict[str, Any]]:
-    places = found.net.net.net.places
+def _circuits(analysis: Analysis) -> list[dict[str, Any]]:
+    places = analysis.net.net.net.places
     return [
         {
             "name": circuit.name,
             "seconds": circuit.seconds,
             "tokens": circuit.tokens,
             "pace_s": circuit.pace,
-            "slack_s": found.net.slack(circuit),
+            "slack_s": analysis.net.slack(circuit),
             "places": [places[p].name for p in circuit.places],
         }
-        for circuit in found.net.circuits
+        for circuit in analysis.net.circuits
     ]
 
 
-def _robots(found: Analysis) -> list[dict[str, Any]]:
-    robots = found.timing.factory.robots
+def _robots(analysis: Analysis) -> list[dict[str, Any]]:
+    robots = analysis.timing.factory.robots
     return [
         {
             "robot": robot.name,
@@ -95,11 +95,13 @@ def _robots(found: Analysis) -> list[dict[str, Any]]:
             "enough_speed_factor": gain.enough,
             "gain_second_robot_s": gain.copy,
         }
-        for robot, share, gain in zip(robots, found.flow.shares, found.sensitivities, strict=True)
+        for robot, share, gain in zip(
+            robots, analysis.flow.shares, analysis.sensitivities, strict=True
+        )
     ]
 
 
-def _measured(found: Analysis, run: Comparison) -> dict[str, Any]:
+def _measured(analysis: Analysis, run: Comparison) -> dict[str, Any]:
     return {
         "source": run.source,
         "units": run.units,
@@ -118,7 +120,7 @@ def _measured(found: Analysis, run: Comparison) -> dict[str, Any]:
         ],
         "busy": [
             {"robot": robot.name, **_pair(pair)}
-            for robot, pair in zip(found.timing.factory.robots, run.busy, strict=True)
+            for robot, pair in zip(analysis.timing.factory.robots, run.busy, strict=True)
         ],
     }
 

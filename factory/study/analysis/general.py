@@ -40,57 +40,57 @@ def analyse_net(net: GearNet | MarkedNet, delays: dict[str, float], name: str) -
     for place, delay in delays.items():
         seconds[index[place]] = delay
     try:
-        found = max_cycle_ratio(subject, seconds)
+        ratio = max_cycle_ratio(subject, seconds)
     except ValueError as error:
-        hint = "`factory check` says what is wrong with it"
+        hint = "run `factory check` on it for the reason"
         raise InputError(Diagnostic("BadNet", f"{name}: {error}", None, hint)) from error
     timed = [p for p, delay in enumerate(seconds) if delay > 0]
-    chosen = timed if len(timed) <= MOST else [p for p in found.circuit if seconds[p] > 0]
-    critical = [*found.circuit[:1], *chosen]
+    chosen = timed if len(timed) <= MOST else [p for p in ratio.circuit if seconds[p] > 0]
+    critical = [*ratio.circuit[:1], *chosen]
     return NetAnalysis(
         subject,
         tuple(seconds),
-        found.seconds,
-        circuits(found, critical),
-        slacks(found, chosen),
+        ratio.seconds,
+        circuits(ratio, critical),
+        slacks(ratio, chosen),
     )
 
 
-def net_document(name: str, found: NetAnalysis) -> dict[str, object]:
+def net_document(name: str, analysis: NetAnalysis) -> dict[str, object]:
     """The keys of `analyze --json` for a net."""
-    places = found.net.net.places
+    places = analysis.net.net.places
     return {
         "net": name,
-        "cycle_time_s": found.pace,
-        "circuits": _circuits(found),
-        "slack_s": {places[p].name: slack.seconds for p, slack in found.slack.items()},
+        "cycle_time_s": analysis.pace,
+        "circuits": _circuits(analysis),
+        "slack_s": {places[p].name: slack.seconds for p, slack in analysis.slack.items()},
     }
 
 
-def _circuits(found: NetAnalysis) -> list[dict[str, Any]]:
-    places = found.net.net.places
+def _circuits(analysis: NetAnalysis) -> list[dict[str, Any]]:
+    places = analysis.net.net.places
     return [
         {
-            "seconds": sum(found.seconds[p] for p in c.circuit),
-            "tokens": sum(found.net.tokens[p] for p in c.circuit),
+            "seconds": sum(analysis.seconds[p] for p in c.circuit),
+            "tokens": sum(analysis.net.tokens[p] for p in c.circuit),
             "slack_s": c.seconds,
             "places": [places[p].name for p in c.circuit],
         }
-        for c in found.circuits
+        for c in analysis.circuits
     ]
 
 
-def net_tables(found: NetAnalysis, verbose: bool) -> Iterator[PrintedTable]:
+def net_tables(analysis: NetAnalysis, verbose: bool) -> Iterator[PrintedTable]:
     """The tables of circuits and of places with little slack."""
-    places, most = found.net.net.places, None if verbose else SHOWN
+    places, most = analysis.net.net.places, None if verbose else SHOWN
     heads = ("slack [s]", "time [s]", "tokens", "places")
     rows = [
         (f"{c['slack_s']:.6g}", f"{c['seconds']:.6g}", str(c["tokens"]), " · ".join(c["places"]))
-        for c in _circuits(found)
+        for c in _circuits(analysis)
     ]
     yield cut("Circuits, the critical first", heads, rows, most)
-    ordered = sorted(found.slack.items(), key=lambda item: item[1].seconds)
-    slack = [(places[p].name, f"{found.seconds[p]:.6g}", f"{s.seconds:.6g}") for p, s in ordered]
+    ordered = sorted(analysis.slack.items(), key=lambda item: item[1].seconds)
+    slack = [(places[p].name, f"{analysis.seconds[p]:.6g}", f"{s.seconds:.6g}") for p, s in ordered]
     yield cut("Places", ("place", "time [s]", "slack [s]"), slack, most)
 
 
@@ -111,7 +111,7 @@ def read_delays(path: Path, net: GearNet | MarkedNet) -> dict[str, float]:
         elif isinstance(value, bool) or not isinstance(value, int | float):
             faults.append(Diagnostic("BadValue", f"{name} must be a number", where, EXAMPLE))
         elif not 0 <= value <= LONGEST:
-            message = f"{name} = {value!s:.20} is no time from 0 to {LONGEST:g} s"
+            message = f"{name} = {value!s:.20} is not between 0 and {LONGEST:g} s"
             faults.append(Diagnostic("BadValue", message, where, EXAMPLE))
     if faults:
         raise InputError(faults)

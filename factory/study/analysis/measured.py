@@ -103,8 +103,8 @@ def logged_record(source: str, log: Log, factory: Factory) -> RunRecord:
         message = f"'{source}' is the log of another factory: other operations, or other robots"
         raise InputError(Diagnostic("BadLog", message, None, HINT))
     if log.header["start"] != sorted(factory.net.initial_marking):
-        message = f"the run in '{source}' began in the middle (--from)"
-        hint = "take one that began at the beginning"
+        message = f"the run in '{source}' did not start from the initial marking (--from)"
+        hint = "use the log of a run without --from"
         raise InputError(Diagnostic("BadLog", message, None, hint))
     made = tuple(Event(t, name) for t, name in log.lasting)
     return _checked(RunRecord(source, made, dropoff_times(log.time, log.delivered)))
@@ -113,7 +113,7 @@ def logged_record(source: str, log: Log, factory: Factory) -> RunRecord:
 def _checked(record: RunRecord) -> RunRecord:
     if not record.dropoffs:
         message = f"'{record.source}' has no finished product"
-        raise InputError(Diagnostic("BadLog", message, None, "take a longer run"))
+        raise InputError(Diagnostic("BadLog", message, None, "use the log of a longer run"))
     return record
 
 

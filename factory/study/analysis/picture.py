@@ -22,13 +22,13 @@ LIGHT = "#9db8db"
 FORMATS = (".svg", ".png")
 
 ROWS = 24
-"""At most so many robots are drawn, the busiest."""
+"""Upper bound on the robots that are drawn, the busiest."""
 
 BARS = 8
-"""At most so many robots have bars of what a change of them alone saves."""
+"""Upper bound on the robots with bars of the time that changing them saves."""
 
 CYCLES = 2.2
-"""So many cycles of the schedule are drawn."""
+"""Number of cycles of the schedule that are drawn."""
 
 STYLE = {**plotting.STYLE, "svg.hashsalt": "factory", "svg.fonttype": "none"}
 
@@ -39,28 +39,28 @@ def check_picture(path: Path | None) -> None:
     if path is None:
         return
     if path.suffix.lower() not in FORMATS:
-        message = f"'{path}' is no name for a picture"
-        raise InputError(Diagnostic("BadFile", message, None, "let it end in .svg or .png"))
+        message = f"'{path}' does not end in .svg or .png"
+        raise InputError(Diagnostic("BadFile", message, None, "a picture is an SVG or a PNG file"))
     plotting.require_matplotlib("a picture", "leave out -o")
 
 
-def picture(found: Analysis, suffix: str) -> bytes:
+def picture(analysis: Analysis, suffix: str) -> bytes:
     """The picture as a file of a kind, .svg or .png; the same bytes for the same analysis."""
     check_picture(Path(f"x{suffix}"))
     import matplotlib
     from matplotlib.figure import Figure
 
-    shown = _shown(found)
+    shown = _shown(analysis)
     with matplotlib.rc_context(STYLE):
         high = 1.2 + 0.24 * len(shown)
         figure = Figure(figsize=(13.0, 1.0 + high + 3.2), layout="constrained")
         grid = figure.add_gridspec(2, 6, height_ratios=[high, 3.2])
-        _schedule(figure.add_subplot(grid[0, :3]), found, shown)
-        _time(figure.add_subplot(grid[0, 3:]), found, shown)
-        _gains(figure.add_subplot(grid[1, :2]), found)
-        _changes(figure.add_subplot(grid[1, 2:4]), found)
-        _copies(figure.add_subplot(grid[1, 4:]), found)
-        figure.suptitle(_title(found), x=0.01, ha="left", fontsize=12)
+        _schedule(figure.add_subplot(grid[0, :3]), analysis, shown)
+        _time(figure.add_subplot(grid[0, 3:]), analysis, shown)
+        _gains(figure.add_subplot(grid[1, :2]), analysis)
+        _changes(figure.add_subplot(grid[1, 2:4]), analysis)
+        _copies(figure.add_subplot(grid[1, 4:]), analysis)
+        figure.suptitle(_title(analysis), x=0.01, ha="left", fontsize=12)
         stream = BytesIO()
         kind = suffix.lower().removeprefix(".")
         metadata = {"Date": None} if kind == "svg" else {"Software": None}
@@ -68,40 +68,40 @@ def picture(found: Analysis, suffix: str) -> bytes:
     return stream.getvalue()
 
 
-def _title(found: Analysis) -> str:
-    names = listed(list(found.bottlenecks), 4)
+def _title(analysis: Analysis) -> str:
+    names = listed(list(analysis.bottlenecks), 4)
     return (
-        f"{found.timing.factory.pag.root}: cycle time {found.net.pace:.3f} s, "
-        f"set by {names} ({found.timing.world})"
+        f"{analysis.timing.factory.pag.root}: cycle time {analysis.net.pace:.3f} s, "
+        f"set by {names} ({analysis.timing.world})"
     )
 
 
-def _shown(found: Analysis) -> list[int]:
+def _shown(analysis: Analysis) -> list[int]:
     """The robots that are drawn, in their order."""
-    shares = found.flow.shares
+    shares = analysis.flow.shares
     busiest = sorted(range(len(shares)), key=lambda robot: -shares[robot].busy)
     return sorted(busiest[:ROWS])
 
 
-def _rows(axes: Any, found: Analysis, shown: list[int]) -> None:
-    axes.set_yticks(range(len(shown)), [found.flow.shares[r].robot for r in shown])
+def _rows(axes: Any, analysis: Analysis, shown: list[int]) -> None:
+    axes.set_yticks(range(len(shown)), [analysis.flow.shares[r].robot for r in shown])
     axes.set_ylim(len(shown) - 0.4, -0.6)
     axes.grid(axis="y", visible=False)
 
 
-def _schedule(axes: Any, found: Analysis, shown: list[int]) -> None:
-    """What each robot does over two cycles in the long run; critical operations stand out."""
-    operations = found.timing.factory.operations
-    critical = {p for circuit in found.net.critical for p in circuit.places}
-    length = CYCLES * found.net.pace * found.net.units
-    begin = _begin(found, length)
+def _schedule(axes: Any, analysis: Analysis, shown: list[int]) -> None:
+    """Operations of each robot over two cycles in the long run; critical ones in red."""
+    operations = analysis.timing.factory.operations
+    critical = {p for circuit in analysis.net.critical for p in circuit.places}
+    length = CYCLES * analysis.net.pace * analysis.net.units
+    begin = _begin(analysis, length)
     for row, robot in enumerate(shown):
-        for number, start, end in _bars(found, robot, begin, length):
+        for number, start, end in _bars(analysis, robot, begin, length):
             left, right = max(start, 0.0), min(end, length)
             colour = RED if number in critical else LIGHT
             axes.barh(row, right - left, 0.7, left, color=colour, edgecolor="white", linewidth=0.6)
-            dwell = found.timing.modes[number].dwell
-            rest = found.timing.rest
+            dwell = analysis.timing.modes[number].dwell
+            rest = analysis.timing.rest
             if dwell and end - rest > 0:
                 left = max(end - rest - dwell, 0.0)
                 wide = max(0.0, min(end - rest, length) - left)
@@ -112,38 +112,38 @@ def _schedule(axes: Any, found: Analysis, shown: list[int]) -> None:
                 middle = (max(start, 0.0) + right) / 2
                 axes.text(middle, row, label, ha="center", va="center", fontsize=7, color=ink)
     for cycle in range(1, int(CYCLES) + 1):
-        axes.axvline(cycle * found.net.pace, color=GREY, linewidth=0.8, linestyle=":")
-    _rows(axes, found, shown)
+        axes.axvline(cycle * analysis.net.pace, color=GREY, linewidth=0.8, linestyle=":")
+    _rows(axes, analysis, shown)
     axes.set_xlim(0, length)
     axes.set_xlabel("time [s]")
-    axes.set_title("in the long run; red: critical, hatched: dwell, dotted: a cycle")
+    axes.set_title("schedule in the long run; red: critical, hatched: dwell, dotted: cycles")
 
 
-def _begin(found: Analysis, length: float) -> float:
+def _begin(analysis: Analysis, length: float) -> float:
     """A moment [s] at which an operation of the critical circuit begins and after which all firings
     are known for `length` [s]."""
-    dates, net = found.flow.firings.dates, found.net
+    dates, net = analysis.flow.firings.dates, analysis.net
     last = float(dates[-1].min()) - length
-    count = len(found.timing.factory.operations)
+    count = len(analysis.timing.factory.operations)
     place = next((p for p in net.critical[0].places if p < count), count - 1)
     starts = dates[:, 2 * place]
     return float(starts[max(0, int(np.searchsorted(starts, last, "right")) - 1)])
 
 
 def _bars(
-    found: Analysis, robot: int, begin: float, length: float
+    analysis: Analysis, robot: int, begin: float, length: float
 ) -> Iterator[tuple[int, float, float]]:
     """Operations of a robot, their starts and ends [s] after `begin`, that fall within."""
-    dates, seconds = found.flow.firings.dates, found.net.seconds
-    for number in found.timing.factory.robots[robot].operations:
+    dates, seconds = analysis.flow.firings.dates, analysis.net.seconds
+    for number in analysis.timing.factory.robots[robot].operations:
         starts = dates[:, 2 * number] - begin
         within = (starts < length) & (starts + seconds[number] > 0)
         for start in starts[within].tolist():
             yield number, start, start + seconds[number]
 
 
-def _time(axes: Any, found: Analysis, shown: list[int]) -> None:
-    """Where the time of each robot goes, and what was measured."""
+def _time(axes: Any, analysis: Analysis, shown: list[int]) -> None:
+    """Shares of each robot's time, predicted and measured."""
     at = np.arange(len(shown))
     left = np.zeros(len(shown))
     for name, colour in (
@@ -152,29 +152,29 @@ def _time(axes: Any, found: Analysis, shown: list[int]) -> None:
         ("standing", GREY),
         ("waiting", PALE),
     ):
-        shares = (found.flow.shares[r] for r in shown)
+        shares = (analysis.flow.shares[r] for r in shown)
         wide = np.array([100 * getattr(s, name) / (s.cycle or 1.0) for s in shares])
         axes.barh(at, wide, 0.7, left, color=colour, label=name)
         left += wide
-    if found.measured is not None:
-        seen = [100 * (found.measured.busy[r].measured or 0.0) for r in shown]
-        axes.plot(seen, at, "|", ms=11, mew=2, color="black", label="busy in the run")
-    _rows(axes, found, shown)
+    if analysis.measured is not None:
+        measured = [100 * (analysis.measured.busy[r].measured or 0.0) for r in shown]
+        axes.plot(measured, at, "|", ms=11, mew=2, color="black", label="busy in the run")
+    _rows(axes, analysis, shown)
     axes.set_xlim(0, 100)
     axes.set_xlabel("share of the time [%]")
     axes.legend(loc="lower left", bbox_to_anchor=(-0.02, 1.0), ncols=5, fontsize=8)
 
 
-def _gains(axes: Any, found: Analysis) -> None:
-    """What a change of one robot alone saves, for the robots that save most."""
+def _gains(axes: Any, analysis: Analysis) -> None:
+    """Cycle time saved by changing one robot, for the robots that save most."""
     kinds = (
         ("speed +10 %", "faster", BLUE),
         ("acceleration +10 %", "quicker", LIGHT),
         ("ways −10 %", "shorter", ORANGE),
     )
-    worth = [(max(getattr(s, k) for _, k, _ in kinds), s) for s in found.sensitivities]
+    worth = [(max(getattr(s, k) for _, k, _ in kinds), s) for s in analysis.sensitivities]
     chosen = [s for w, s in sorted(worth, key=lambda item: -item[0])[:BARS] if w > 0]
-    axes.set_title("what one robot alone saves")
+    axes.set_title("saved by changing one robot")
     axes.set_xlabel("share of the cycle time [%]")
     axes.grid(axis="y", visible=False)
     if not chosen:
@@ -184,7 +184,7 @@ def _gains(axes: Any, found: Analysis) -> None:
         return
     at = np.arange(len(chosen))
     for place, (words, key, colour) in enumerate(kinds):
-        wide = [100 * getattr(s, key) / found.net.pace for s in chosen]
+        wide = [100 * getattr(s, key) / analysis.net.pace for s in chosen]
         bars = axes.barh(at + 0.26 * (place - 1.0), wide, 0.26, color=colour, label=words)
         axes.bar_label(bars, [f"{w:.1f}" if w >= 0.05 else "" for w in wide], padding=2, fontsize=7)
     axes.set_yticks(at, [s.robot for s in chosen])
@@ -193,9 +193,9 @@ def _gains(axes: Any, found: Analysis) -> None:
     axes.legend(loc="best", fontsize=8)
 
 
-def _changes(axes: Any, found: Analysis) -> None:
+def _changes(axes: Any, analysis: Analysis) -> None:
     """The cycle time with each of the changes examined."""
-    rows = [("as it is", found.net.pace), *((s.words, s.pace) for s in found.scenarios)]
+    rows = [("as it is", analysis.net.pace), *((s.words, s.pace) for s in analysis.scenarios)]
     paces = [pace for _, pace in rows]
     bars = axes.barh(range(len(rows)), paces, 0.7, color=[GREY] + [LIGHT] * (len(rows) - 1))
     axes.bar_label(bars, [f"{pace:.2f}" for pace in paces], padding=3, fontsize=8)
@@ -213,19 +213,19 @@ def _short(words: str, most: int = 42) -> str:
     return words if len(words) <= most else f"{words[: most - 1]}…"
 
 
-def _copies(axes: Any, found: Analysis) -> None:
+def _copies(axes: Any, analysis: Analysis) -> None:
     """The cycle time against the bound on copies of each part."""
-    curve, pace = found.curve, found.curve.points[-1][1]
+    curve, pace = analysis.curve, analysis.curve.points[-1][1]
     at, paces = zip(*curve.points, strict=True)
     axes.plot(at, paces, "-o", color=BLUE, ms=4)
     axes.axhline(pace, color=GREY, linewidth=0.8)
     axes.plot([curve.least], [pace], "o", color=RED, ms=7, label=f"W = {curve.least}: full pace")
-    if found.wip is not None:
-        axes.axvline(found.wip, color=ORANGE, linewidth=1.2, label=f"--wip {found.wip}")
+    if analysis.wip is not None:
+        axes.axvline(analysis.wip, color=ORANGE, linewidth=1.2, label=f"--wip {analysis.wip}")
     axes.set_ylim(0, 1.1 * max(paces))
     axes.set_xlim(0.5, max(at) + 0.5)
     axes.xaxis.get_major_locator().set_params(integer=True)
     axes.set_xlabel("W")
     axes.set_ylabel("cycle time [s]")
-    axes.set_title("copies of each part let in at once (--wip)")
+    axes.set_title("bound on copies of each part (--wip)")
     axes.legend(loc="lower left", fontsize=8)

@@ -19,43 +19,43 @@ class Slack:
     circuit: tuple[int, ...]
 
 
-def slacks(found: CycleRatio, places: Iterable[int]) -> dict[int, Slack]:
+def slacks(ratio: CycleRatio, places: Iterable[int]) -> dict[int, Slack]:
     """The slack of each of some places.
 
     With the reduced times of the proof, which are not negative, a circuit is as long as what it
     lacks; so Dijkstra's way back from a place's end to its beginning gives the tightest. One search
     for all places that begin at one transition.
     """
-    number = {int(place): edge for edge, place in enumerate(found.edges)}
+    number = {int(place): edge for edge, place in enumerate(ratio.edges)}
     wanted: dict[int, list[int]] = {}
     result: dict[int, Slack] = {}
     for place in places:
         if place in number:
-            wanted.setdefault(int(found.before[number[place]]), []).append(place)
+            wanted.setdefault(int(ratio.before[number[place]]), []).append(place)
         else:
             result[place] = Slack(inf, ())
     inward: dict[int, list[int]] = {}
-    for edge, event in enumerate(found.after.tolist()):
+    for edge, event in enumerate(ratio.after.tolist()):
         inward.setdefault(event, []).append(edge)
     for target, chosen in wanted.items():
-        distance, onward = _ways_to(found, inward, target)
+        distance, onward = _ways_to(ratio, inward, target)
         for place in chosen:
             edge = number[place]
-            event = int(found.after[edge])
+            event = int(ratio.after[edge])
             circuit = [place]
-            seconds = distance[event] + float(found.reduced[edge])
+            seconds = distance[event] + float(ratio.reduced[edge])
             while event != target:
-                circuit.append(int(found.edges[onward[event]]))
-                event = int(found.after[onward[event]])
-            result[place] = Slack(seconds if seconds > found.tolerance else 0.0, tuple(circuit))
+                circuit.append(int(ratio.edges[onward[event]]))
+                event = int(ratio.after[onward[event]])
+            result[place] = Slack(seconds if seconds > ratio.tolerance else 0.0, tuple(circuit))
     return result
 
 
 def _ways_to(
-    found: CycleRatio, inward: dict[int, list[int]], target: int
+    ratio: CycleRatio, inward: dict[int, list[int]], target: int
 ) -> tuple[dict[int, float], dict[int, int]]:
     """For every transition the shortest reduced way to `target`, and its first edge."""
-    before, reduced = found.before, found.reduced
+    before, reduced = ratio.before, ratio.reduced
     distance: dict[int, float] = {}
     onward: dict[int, int] = {}
     heap: list[tuple[float, int, int]] = [(0.0, target, -1)]
@@ -70,10 +70,10 @@ def _ways_to(
     return distance, onward
 
 
-def circuits(found: CycleRatio, places: Iterable[int]) -> tuple[Slack, ...]:
+def circuits(ratio: CycleRatio, places: Iterable[int]) -> tuple[Slack, ...]:
     """The tightest circuits through some places, each once, the critical ones first."""
     kept: dict[frozenset[int], Slack] = {}
-    for slack in slacks(found, places).values():
+    for slack in slacks(ratio, places).values():
         if slack.circuit:
             kept.setdefault(frozenset(slack.circuit), slack)
     return tuple(sorted(kept.values(), key=lambda slack: (slack.seconds, min(slack.circuit))))

@@ -14,8 +14,8 @@ SHOWN = 12
 
 
 ASSUMED = """\
-assumed: 2 × r are two robots that take turns at the work of one, with room for both; where none but
-such robots works, one works at a time; shorter ways are shorter in proportion, all of a robot's"""
+assumptions: 2 × r are two robots that alternate, with room for both; operations of such robots
+alone are done one at a time; shorter ways scale all ways of a robot alike"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,31 +28,31 @@ class PrintedTable:
     note: str = ""
 
 
-def summary(found: Analysis) -> Iterator[str]:
+def summary(analysis: Analysis) -> Iterator[str]:
     """The main results, in a few lines."""
-    flow, net, timing = found.flow, found.net, found.timing
-    does = "sets" if len(found.bottlenecks) == 1 else "set"
+    flow, net, timing = analysis.flow, analysis.net, analysis.timing
+    does = "sets" if len(analysis.bottlenecks) == 1 else "set"
     hourly = f", {3600 / net.pace:.0f} products an hour" if net.pace else ""
     yield (
         f"{timing.factory.pag.root}, {timing.world}: cycle time {net.pace:.3f} s{hourly}; "
-        f"{listed(list(found.bottlenecks))} {does} the pace"
+        f"{listed(list(analysis.bottlenecks))} {does} the pace"
     )
-    yield f"  {critical_words(found)}"
+    yield f"  {critical_words(analysis)}"
     if flow.full_pace is None:
-        pace = "not at the pace by then"
+        pace = "full pace not yet reached"
     else:
-        pace = f"at the pace from product {flow.full_pace} on"
+        pace = f"full pace from product {flow.full_pace} on"
     yield (
         f"first product after {flow.first:.2f} s, {flow.units} after {flow.last:.2f} s, {pace}; "
         f"{flow.inside:.1f} parts inside at once"
     )
     if not flow.settled:
-        yield "stocks are those of the last products looked at: the factory still fills then"
+        yield "the factory is still filling: stocks are those of the last products computed"
 
 
-def critical_words(found: Analysis) -> str:
+def critical_words(analysis: Analysis) -> str:
     """The first critical circuit: its places that take time, with their times."""
-    circuit, net = found.net.critical[0], found.net
+    circuit, net = analysis.net.critical[0], analysis.net
     spent = dict[str, float]()
     for place, seconds in ((net.net.net.places[p], net.seconds[p]) for p in circuit.places):
         name = f"{place.mode} {place.label}".strip()
@@ -62,41 +62,41 @@ def critical_words(found: Analysis) -> str:
     return f"{circuit.name}: {' · '.join(names)} = {circuit.seconds:.3f} s{tokens}"
 
 
-def tables(found: Analysis, verbose: bool) -> Iterator[PrintedTable]:
+def tables(analysis: Analysis, verbose: bool) -> Iterator[PrintedTable]:
     """The tables, in order."""
     most = None if verbose else SHOWN
-    yield _shares(found, most)
-    yield _gains(found, most)
-    yield _scenarios(found)
-    yield _stocks(found, most)
-    yield _curve(found)
-    if found.measured is not None:
-        yield _totals(found.measured)
-        yield _durations(found.measured, most)
+    yield _shares(analysis, most)
+    yield _gains(analysis, most)
+    yield _scenarios(analysis)
+    yield _stocks(analysis, most)
+    yield _curve(analysis)
+    if analysis.measured is not None:
+        yield _totals(analysis.measured)
+        yield _durations(analysis.measured, most)
 
 
-def _shares(found: Analysis, most: int | None) -> PrintedTable:
-    run, shares = found.measured, found.flow.shares
+def _shares(analysis: Analysis, most: int | None) -> PrintedTable:
+    run, shares = analysis.measured, analysis.flow.shares
     columns = ("robot", "type", "moving", "working", "standing", "waiting", "busy")
     rows = []
     for number in sorted(range(len(shares)), key=lambda n: -shares[n].busy):
-        share, robot = shares[number], found.timing.factory.robots[number]
+        share, robot = shares[number], analysis.timing.factory.robots[number]
         times = (share.moving, share.working, share.standing, share.waiting)
         busy = (run.busy[number].predicted, run.busy[number].measured) if run else ()
         percents = map(_percent, (share.busy, *busy))
         rows.append((robot.name, robot.type, *(f"{t:.3f}" for t in times), *percents))
     added = ("in that run", "measured") if run else ()
-    return cut("Where the time of a cycle goes [s]", (*columns, *added), rows, most)
+    return cut("Robot time in a cycle [s]", (*columns, *added), rows, most)
 
 
-def _gains(found: Analysis, most: int | None) -> PrintedTable:
+def _gains(analysis: Analysis, most: int | None) -> PrintedTable:
     rows = []
-    for s in found.sensitivities:
+    for s in analysis.sensitivities:
         worth = max(s.faster, s.quicker, s.shorter, s.most, s.copy)
         limit = f"{s.most:.3f}"
         if s.enough is not None:
             limit += f" at {s.enough:.2f} times"
-        if worth <= 0 and s.slower >= 0 and len(found.sensitivities) > SHOWN:
+        if worth <= 0 and s.slower >= 0 and len(analysis.sensitivities) > SHOWN:
             continue
         row = (
             s.robot,
@@ -116,24 +116,24 @@ def _gains(found: Analysis, most: int | None) -> PrintedTable:
         "ways -10 %",
         "no speed limit",
         "then",
-        "a second one",
+        "second robot",
     )
     ordered = [row for _, row in sorted(rows, key=lambda item: -item[0])]
-    return cut("What one robot alone buys: cycle time saved [s]", columns, ordered, most)
+    return cut("Cycle time saved by changing one robot [s]", columns, ordered, most)
 
 
-def _scenarios(found: Analysis) -> PrintedTable:
-    pace = found.net.pace
+def _scenarios(analysis: Analysis) -> PrintedTable:
+    pace = analysis.net.pace
     rows = [
         (s.words, f"{s.pace:.3f}", f"{pace - s.pace:.3f}", listed(list(s.then), 3))
-        for s in found.scenarios
+        for s in analysis.scenarios
     ]
     columns = ("change", "cycle time [s]", "saved [s]", "then sets the pace")
     return PrintedTable("What if", columns, rows, ASSUMED)
 
 
-def _stocks(found: Analysis, most: int | None) -> PrintedTable:
-    ordered = sorted(found.flow.stocks, key=lambda s: (not s.is_part, -s.mean))
+def _stocks(analysis: Analysis, most: int | None) -> PrintedTable:
+    ordered = sorted(analysis.flow.stocks, key=lambda s: (not s.is_part, -s.mean))
     rows = [
         (s.label, "part" if s.is_part else "", f"{s.mean:.2f}", str(s.most), f"{s.stay:.3f}")
         for s in ordered
@@ -142,13 +142,13 @@ def _stocks(found: Analysis, most: int | None) -> PrintedTable:
     return cut(title, ("label", "", "mean", "most", "stay [s]"), rows, most)
 
 
-def _curve(found: Analysis) -> PrintedTable:
-    least = found.curve.least
+def _curve(analysis: Analysis) -> PrintedTable:
+    least = analysis.curve.least
     rows = [
-        (str(wip), f"{pace:.3f}", "the least with the full pace" if wip == least else "")
-        for wip, pace in found.curve.points
+        (str(wip), f"{pace:.3f}", "least bound with the full pace" if wip == least else "")
+        for wip, pace in analysis.curve.points
     ]
-    return PrintedTable("Copies of each part let in (--wip)", ("W", "cycle time [s]", ""), rows)
+    return PrintedTable("Bound on copies of each part (--wip)", ("W", "cycle time [s]", ""), rows)
 
 
 def _totals(run: Comparison) -> PrintedTable:
@@ -166,7 +166,7 @@ def _durations(run: Comparison, most: int | None) -> PrintedTable:
         (d.label, *_compared(d.time), f"{d.least:.3f} to {d.greatest:.3f}", str(d.count))
         for d in ordered
     ]
-    columns = ("operation", "predicted", "measured", "error", "from and to", "times")
+    columns = ("operation", "predicted", "measured", "error", "range", "count")
     return cut("Durations of operations [s]", columns, rows, most)
 
 
