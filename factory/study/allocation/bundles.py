@@ -1,10 +1,9 @@
 """Bundles: tours on one line, with the bundles of the lines that deliver to it.
 
-A bundle is made for each tour, those that deliver to it first. Its *load* is how long its tours
-last, waits included: a robot that holds a pile while others bring the rest is not free for anything
-else. Two bundles become one where one robot can do the tours of both, within a limit of load, and
-the lines below them are laid over each other. All of them go as far then as the one that has to go
-farthest.
+A bundle is made for each tour, those that deliver to it first. Its *load* is the duration of its
+tours, waits included: a robot that holds a pile while others bring the rest can do nothing else.
+Two bundles are merged where one robot can do the tours of both within a limit of load; the lines
+below them are merged too. All robots of a bundle then go as far as the one with the longest way.
 """
 
 from __future__ import annotations
@@ -20,23 +19,23 @@ from factory.plant.factory import Factory
 from factory.problem.pag import NOPART
 
 BETWEEN = 0.08
-"""What lies between two sub-assemblies at the ends of a guidepath, beside themselves [m]."""
+"""Distance between two sub-assemblies at the ends of a guidepath [m]."""
 
 LANE = 0.08
-"""What one that delivers takes of the path of another [m]."""
+"""Length of a path that a robot which delivers to it takes [m]."""
 
 TOOL_WAY = 0.12
-"""How far a tool comes [m]."""
+"""Way of a tool [m]."""
 
 ABREAST = 2
-"""So many lines can come to one station, from either side."""
+"""Number of lines that can come to one station, one from either side."""
 
 
 @dataclass(frozen=True, slots=True)
 class Filling:
-    """What lines are filled for: a `limit` of each line's load [s]; by what share of its own work a
-    tour may be longer since it waits for those that share a line (`slack`); whether robots go
-    `onward` from station to station on each tour, or back as well."""
+    """Parameters by which lines are filled: the `limit` of each line's load [s]; the time that a
+    tour may wait for those that share a line, over its own work (`slack`); whether robots only go
+    `onward` from station to station on a tour, or back as well."""
 
     limit: float
     slack: float = inf
@@ -45,8 +44,8 @@ class Filling:
 
 @dataclass(frozen=True, slots=True)
 class SizeTiming:
-    """How long operations of a factory take, from the `sizes` of its sub-assemblies [m] and the
-    `pace` of its robots."""
+    """Durations of a factory's operations, estimated from the `sizes` of its sub-assemblies [m] and
+    the `pace` of its robots."""
 
     factory: Factory
     sizes: Mapping[str, float]
@@ -54,11 +53,11 @@ class SizeTiming:
 
     @classmethod
     def of(cls, factory: Factory, boxes: Mapping[str, Box], pace: Pace) -> SizeTiming:
-        """That of a factory whose sub-assemblies have some boxes."""
+        """The durations for a factory, with the `boxes` of its sub-assemblies."""
         return cls(factory, {n: max(b[1] - b[0], b[3] - b[2]) for n, b in boxes.items()}, pace)
 
     def past(self, robot: int, tour: Sequence[int]) -> float:
-        """How far a robot has to go on a tour, past what it delivers to [m]."""
+        """Way of a robot past the sub-assembly that it delivers to, on a tour [m]."""
         last = self.factory.operations[tour[-1]]
         label = last.before[last.robots.index(robot)]
         if label == NOPART:
@@ -66,7 +65,7 @@ class SizeTiming:
         return (self.sizes[label] + self.sizes.get(last.label, self.sizes[label])) / 2 + BETWEEN
 
     def takes(self, number: int, way: float) -> float:
-        """How long an operation takes in which the farthest way is so long [s]."""
+        """Duration of an operation in which the longest way is `way` [s]."""
         operation, pace = self.factory.operations[number], self.pace
         stroke = operation.approach.stroke if operation.approach and operation.lowered >= 0 else 0.0
         return pace.rest(way) + pace.rest(stroke) + operation.dwell + pace.lost
@@ -103,7 +102,7 @@ class TourBundle:
         object.__setattr__(self, "load", self.busy + trips)
 
     def merged(self, other: TourBundle, filling: Filling) -> TourBundle | None:
-        """Both as one bundle, none of whose lines has too much load; None where that cannot be."""
+        """Both as one bundle with all loads within the limit; None where that is impossible."""
         sides = self.sides & other.sides
         if self.kind != other.kind or not sides or self.load + other.load > filling.limit:
             return None
@@ -113,11 +112,11 @@ class TourBundle:
         below = _laid_over(self.below, other.below, filling)
         tours, busy = self.tours + other.tours, self.busy + other.busy
         past = max(self.past, other.past)
-        found = TourBundle(tours, busy, self.kind, sides, below, first, past, self.pace)
-        return found if found.load <= filling.limit else None
+        merged = TourBundle(tours, busy, self.kind, sides, below, first, past, self.pace)
+        return merged if merged.load <= filling.limit else None
 
     def _first(self, other: TourBundle, filling: Filling) -> tuple[TourBundle, ...] | None:
-        """The two that bring what tours begin with, each of one with one of the other."""
+        """The two bundles that bring what the tours begin with, merged pair by pair."""
         for pair in (other.first, other.first[::-1]):
             both = [mine.merged(its, filling) for mine, its in zip(self.first, pair, strict=True)]
             if None not in both:
@@ -137,8 +136,8 @@ class TourBundle:
 def _laid_over(
     ones: tuple[TourBundle, ...], others: tuple[TourBundle, ...], filling: Filling
 ) -> tuple[TourBundle, ...]:
-    """Bundles in the order of their stations, with others: each of these becomes one with the first
-    that it can, or if its robot goes `onward` with the next, else it is one more there."""
+    """Bundles in the order of their stations, merged with others: each of these with the first that
+    it can be merged with (with `onward` the first after the last merged one), else inserted."""
     below, at = list(ones), 0
     for bundle in others:
         for number in range(at, len(below)):
@@ -155,7 +154,7 @@ def _laid_over(
 
 @dataclass(slots=True)
 class _Local:
-    """A line that delivers in one tour: its bundle, and when it last did [s]."""
+    """A line that delivers in one tour: its bundle, and the time of its last delivery [s]."""
 
     bundle: TourBundle
     at: float
@@ -179,9 +178,9 @@ class _Tour:
     made: dict[int, TourBundle]
 
     def bundle(self, robot: int) -> TourBundle:
-        """That of one tour. Those that deliver to it are dealt to the line that it waits for the
-        least, to one more where it would wait too long; where it only goes onward, of the last two
-        lines: two can come to one station."""
+        """The bundle of one tour. Each robot that delivers to it joins the line with the shortest
+        wait, or a new line where the wait is too long; with `onward` only the last two lines are
+        considered, since two can come to one station."""
         factory, timing = self.timing.factory, self.timing
         numbers = factory.robots[robot].operations
         kids = [kid for number in numbers for kid in self._inserted(robot, number)]
@@ -216,8 +215,8 @@ class _Tour:
     def _least(
         self, lines: Sequence[_Local], kid: TourBundle, now: float
     ) -> tuple[float, TourBundle | None, _Local | None]:
-        """How long a tour has to wait for a kid at the least [s], on which line, and what that is
-        then; None where it can be on none of them."""
+        """The shortest wait of a tour for a kid [s], with the merged bundle and the line; None
+        where it can join none of them."""
         best: tuple[float, TourBundle | None, _Local | None] = inf, None, None
         for line in lines:
             wait = max(0.0, line.at + kid.load - kid.pace.rest(kid.out) - now)
@@ -226,7 +225,7 @@ class _Tour:
         return best
 
     def _inserted(self, robot: int, number: int) -> list[int]:
-        """The robots that bring something to what a robot holds already."""
+        """The robots that bring something to what a robot already holds."""
         operation = self.timing.factory.operations[number]
         if operation.carrier != robot or operation.before[operation.template.carrier - 1] == NOPART:
             return []

@@ -1,4 +1,4 @@
-"""A choice of forms and lines, as a project that can be laid out and judged."""
+"""A candidate: a choice of forms and lines, as a project that can be laid out and ranked."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from factory.timing.prediction import pace
 
 @dataclass(frozen=True)
 class Candidate:
-    """A product with `forms` chosen, by the joins of the product as it is written, and with lines
-    that are filled for something (`filling`), None for a robot for each label: as the project
-    `single`, without the `branches` that are asked for several times."""
+    """A product with `forms` chosen, by the joins of the product as written, and with the `filling`
+    of its lines, None for one robot for each label: the project `single`, without the `branches`
+    that are asked for several times."""
 
     single: Project
     forms: Mapping[str, int]
@@ -30,62 +30,63 @@ class Candidate:
 
     @cached_property
     def project(self) -> Project:
-        """It with all its branches. Raises InputError (Parallel) where some cannot be."""
+        """The project with all its branches. Raises InputError (Parallel) where one is
+        impossible."""
         return self.single.with_branches(self.branches) if self.branches else self.single
 
     @property
     def robots(self) -> int:
-        """How many robots its factory has, tools included."""
+        """Number of robots of its factory, tools included."""
         return len(self.project.factory.robots)
 
     @property
     def seconds(self) -> float:
-        """The cycle time that is predicted for its layout [s]."""
+        """Predicted cycle time of its layout [s]."""
         return self.pace.seconds
 
     @property
     def pace(self) -> CycleTime:
-        """The same, and what allows no less."""
+        """Predicted cycle time of its layout, and the bottleneck."""
         return self._timed[0]
 
     @property
     def work(self) -> float:
-        """What its robots spend in operations in a cycle, all together [robot s]. No factory with
-        these operations has a shorter cycle than that over its number of robots."""
+        """Time of all its robots in operations in a cycle [robot s]. Divided by the number of
+        robots it is a lower bound on the cycle time of any factory with these operations."""
         pairs = zip(self.project.layout.factory.operations, self._timed[1], strict=True)
         return sum(len(operation.robots) * delay for operation, delay in pairs)
 
     @cached_property
     def _timed(self) -> tuple[CycleTime, tuple[float, ...]]:
-        """The pace of its layout, and how long each operation takes [s]."""
+        """The pace of its layout, and the duration of each operation [s]."""
         return pace(self.project.layout, self.project.settings)
 
     @cached_property
     def has_layout(self) -> bool:
-        """Whether there is a layout of it."""
+        """Whether it has a layout."""
         try:
             return bool(self.project.layout)
         except FactoryError:
             return False
 
     def of_the_slowest(self) -> list[str]:
-        """The labels that the robot which allows no shorter cycle makes, or brings."""
+        """The labels that the slowest robot makes or brings."""
         factory, slowest = self.project.plain, self.pace.bottleneck
         slow = [robot for robot in factory.robots if robot.name == slowest]
         return [factory.operations[n].written for robot in slow for n in robot.operations]
 
     @cached_property
     def blocked(self) -> int:
-        """How many of its operations are blocked."""
-        found = self.single.matings
-        return len(found.of_kind("blocked")) if found else 0
+        """Number of blocked operations."""
+        matings = self.single.matings
+        return len(matings.of_kind("blocked")) if matings else 0
 
     @cached_property
     def bare(self) -> int:
-        """How many labels no hand of a robot for one label can hold."""
+        """Number of labels that no hand of a robot for one label can hold."""
         return sum(not grip.shared for grip in self.single.no_grips)
 
     @property
     def troubles(self) -> int:
-        """How many of its operations are blocked, or bring what no such hand can hold."""
+        """Number of operations that are blocked, or bring what no such hand can hold."""
         return self.blocked + self.bare

@@ -1,4 +1,4 @@
-"""Estimates of what forms and lines give, before anything is laid out."""
+"""Estimates of robots and cycle times for forms and lines, without a layout."""
 
 from __future__ import annotations
 
@@ -29,29 +29,28 @@ from factory.study.allocation.lines import SLACKS, Shift
 from factory.support.allowance import Allowance
 
 WIDE = 1.3
-"""The same for LARGE products."""
+"""Ratio of successive bounds on cycles for LARGE products (else `aim.STEP`)."""
 
 LARGE = 400
-"""So many labels make a product large."""
+"""Number of labels from which a product is large."""
 
 FILLED = 1.12
-"""What lines are filled for is each time so much more."""
+"""Ratio of successive limits of the lines' loads."""
 
 FEWER = 0.7
-"""Where so many robots are asked for, no fewer than such a share of them are estimated."""
+"""Least number of robots that is estimated, over the number asked for."""
 
 SHARED = 8.0
-"""So many times its share of the work a tour may last, where few robots are asked for."""
+"""Greatest duration of a tour over its share of the work, where a number of robots is asked for."""
 
 NEAR = 1.3
-"""An estimate is kept unless another is as good with so many times its cycle time: layouts differ
-more."""
+"""Ratio of cycle times from which one estimate is clearly faster; layouts hide smaller ones."""
 
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """What is estimated of forms and lines: `robots`, tools included, and cycle time [s]; the
-    `forms`, and what the lines are filled for, None for a robot for each label."""
+    """Estimate for forms and lines: the number of `robots`, tools included, and the cycle time [s];
+    the `forms`, and the `filling` of the lines, None for one robot for each label."""
 
     robots: int
     seconds: float
@@ -59,7 +58,7 @@ class Estimate:
     filling: Filling | None = None
 
     def beats(self, other: Estimate) -> bool:
-        """Whether it has no more robots than another, and is clearly faster, or is the same."""
+        """Whether it has no more robots than another and is clearly faster, or equals it."""
         faster = self.seconds * NEAR <= other.seconds
         same = self.robots == other.robots and abs(self.seconds - other.seconds) < 1e-9
         return same or (self.robots <= other.robots and faster)
@@ -67,15 +66,15 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Estimator:
-    """Estimates for the product of a `project` that has a robot for each label, and no relays;
-    `branches`: those that its factories have several times."""
+    """Estimates for the product of a `project` with one robot for each label and no relays;
+    `branches` that its factories have several times."""
 
     project: Project
     branches: Branches = ()
 
     @cached_property
     def task(self) -> FormsTask:
-        """What forms are estimated by."""
+        """The task by which forms are estimated."""
         project = self.project
         pag, templates, product = project.pag, project.templates, project.product
         admits = admitted(expand(pag, templates), product) if is_shaped(pag) else {}
@@ -84,31 +83,28 @@ class Estimator:
 
     @cached_property
     def written(self) -> Mapping[str, int]:
-        """The forms of the product as it is written."""
+        """The forms of the product as written."""
         return written_forms(self.task)
 
     def candidate(self, forms: Mapping[str, int], filling: Filling | None = None) -> Candidate:
-        """The product with these forms, and with lines that are filled if that is
-        said."""
+        """The product with these forms, and with lines if a filling is given."""
         project = self._formed(forms)
         if filling is not None:
             project = project.with_plan(self._shift(project).plan(filling))
         return Candidate(project, forms, filling, self.branches)
 
     def front(self, budget: Allowance, robots: float = inf) -> list[Estimate]:
-        """The estimates of which no other is clearly better, with at most so many `robots`, and no
-        more operations blocked than as the product is written; of so many forms as the budget
-        allows."""
-        found: list[Estimate] = []
+        """The estimates with lines of which no other is clearly better (see `estimates`)."""
+        front: list[Estimate] = []
         for one in self.estimates(budget, robots):
-            if one.filling is not None and not any(other.beats(one) for other in found):
-                found = [other for other in found if not one.beats(other)] + [one]
-        return found
+            if one.filling is not None and not any(other.beats(one) for other in front):
+                front = [other for other in front if not one.beats(other)] + [one]
+        return front
 
     def estimates(self, budget: Allowance, robots: float = inf) -> Iterator[Estimate]:
-        """All estimates with at most so many `robots` and no more operations blocked than as the
-        product is written, of so many forms as the budget allows: of each, those as they are
-        written first, that with a robot for each label, then those with lines."""
+        """All estimates with at most `robots` robots and no more blocked operations than the
+        product as written, for as many forms as the budget allows, those as written first: for
+        each, the one with one robot for each label, then those with lines."""
         tried = {tuple(self.written.values())}
         yield from self.of_forms(self.written, robots)
         for task in self._tasks():
@@ -124,7 +120,7 @@ class Estimator:
                 yield from self.of_forms(forms, robots)
 
     def of_forms(self, forms: Mapping[str, int], robots: float = inf) -> Iterator[Estimate]:
-        """The estimates of forms, none where more operations are blocked than as the product is
+        """The estimates for forms; none where more operations are blocked than in the product as
         written."""
         project = self._formed(forms)
         if _blocked(project) <= self._blocked_as_written:
@@ -140,8 +136,8 @@ class Estimator:
             yield replace(self.task, order=order)
 
     def bounds(self, task: FormsTask, robots: float = inf) -> Iterator[float]:
-        """No bound on estimated cycles, and those that can be kept, the longest first. Where so
-        many `robots` are asked for, they begin at SHARED times what each has to do."""
+        """Bounds on estimated cycles: none, then those that can be kept, the longest first. Where a
+        number of `robots` is asked for, they begin at SHARED times the work of each."""
         yield inf
         bound = sum(task.pace.rest(task.size(label)) + task.pace.lost for label in task.nodes)
         bound = min(bound, SHARED * 2 * bound / robots) if robots < inf else bound
@@ -153,8 +149,8 @@ class Estimator:
     def _filled(
         self, project: Project, forms: Mapping[str, int], robots: float
     ) -> Iterator[Estimate]:
-        """The estimates of forms with a robot for each label, and with lines for all that they may
-        be filled for."""
+        """The estimates for forms with one robot for each label, and with lines for each
+        filling."""
         shift, tried = self._shift(project), set[tuple[Line, ...]]()
         large = len(self.task.nodes) >= LARGE
         if shift.count(()) <= robots:
@@ -173,11 +169,11 @@ class Estimator:
         return Shift.of(factory, project.catalogue, boxes, self.task.pace)
 
     def _formed(self, forms: Mapping[str, int]) -> Project:
-        """The product with these forms, a robot for each label."""
+        """The product with these forms, and one robot for each label."""
         other = {label: form for label, form in forms.items() if form != self.written[label]}
         return self.project.with_plan(Plan(other))
 
 
 def _blocked(project: Project) -> int:
-    """How many operations of a project are blocked."""
+    """Number of blocked operations of a project."""
     return len(project.matings.of_kind("blocked")) if project.matings else 0

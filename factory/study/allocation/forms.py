@@ -1,14 +1,13 @@
 """Forms of operations: a third robot takes what two bring, or the robot of one of them keeps it.
 
-A template names with `instead` the one that does the same with one robot fewer. Each operation in
-that form saves a robot; the robot that keeps the pile has a longer cycle. A form also turns what is
-below it: what a robot holds is made on its own way, so the inputs of that come along the other axis
-than they would to a robot that brings it to a third.
+With `instead`, a template names the template that does the same with one robot fewer. Each
+operation in that form saves a robot, but the robot that keeps the pile has a longer cycle. A form
+also turns what is below it: a robot makes what it holds on its own way, so the inputs come along
+the other axis than they would to a robot that brings it to a third.
 
-Of all forms those are chosen that are best in an order, for instance those with the fewest blocked
-operations, then no cycle estimated above a bound, then the fewest robots: exact for what it goes
-by. Cycles are estimated from the sizes of sub-assemblies; layouts decide
-(`study/allocation/search.py`).
+The forms chosen are optimal in a lexicographic order, for instance fewest blocked operations, then
+no estimated cycle above a bound, then fewest robots: exact for these estimates. Cycles are
+estimated from the sizes of sub-assemblies; layouts decide (`study/allocation/search.py`).
 """
 
 from __future__ import annotations
@@ -29,23 +28,23 @@ from factory.problem.plan import THIRD
 from factory.problem.template import Template, variable_number
 
 APART = 0.06
-"""What lies on a guidepath beside a sub-assembly, from one station to the next [m]."""
+"""Length of guidepath from one station to the next, beside the sub-assembly [m]."""
 
 GRAIN = 0.1
-"""By how much estimated cycles above the bound are told apart [s]."""
+"""Resolution of estimated cycles above the bound [s]."""
 
 Order = Literal["robots", "lines", "fewest"]
-"""What forms are chosen by: few robots that serve one label each, few lines, or few lines even
-where more operations are blocked for it."""
+"""Objective by which forms are chosen: few robots that serve one label each, few lines, or few
+lines even if more operations are blocked."""
 
 
 @dataclass(frozen=True, slots=True)
 class Option:
-    """One way to make a sub-assembly: how many operations are `blocked`, and `loose`; how far [s]
-    estimated cycles are `over` the bound in all; how many `robots` have finished theirs; the `time`
-    [s] that the robot which holds it takes up to here, with the way back; which input is the
-    `pile`, and how the inputs are made; how many `lines` hold it if as many robots as can be share
-    one; the `order` in which options are compared."""
+    """One way to make a sub-assembly: the numbers of `blocked` and `loose` operations; the sum of
+    estimated cycles `over` the bound [s]; the number of `robots` that have finished their cycles;
+    the `time` that the robot which holds it needs up to here, with the way back [s]; which input is
+    the `pile`, and the options of the `inputs`; the number of `lines` that hold it if as many
+    robots as possible share one; the `order` in which options are compared."""
 
     blocked: int
     loose: int
@@ -59,7 +58,7 @@ class Option:
 
     @property
     def rank(self) -> tuple[float, ...]:
-        """What is better is less."""
+        """The rank, the less the better."""
         clean, few = (self.blocked, self.loose), (self.robots, self.time)
         if self.order == "robots":
             return *clean, self.over, *few
@@ -95,27 +94,27 @@ class FormsTask:
 
     @cached_property
     def free(self) -> Mapping[str, Template]:
-        """The joins that may have either form, by their labels: the template of each with a third
-        robot. All joins of a statement are, whose template has one with a robot fewer."""
-        found: dict[str, Template] = {}
+        """The joins that may have either form, by their labels, with the template with a third
+        robot: all joins of statements whose template has an alternative with a robot fewer."""
+        free: dict[str, Template] = {}
         for node in self.pag.nodes:
             template = self.templates[node.operation]
             if template.instead:
-                found |= dict.fromkeys(joins(node), template)
-        return found
+                free |= dict.fromkeys(joins(node), template)
+        return free
 
 
 def best_forms(task: FormsTask, bound: float = inf) -> tuple[dict[str, int], float]:
-    """For each operation that can have a robot fewer which input is the pile, or THIRD; and how far
-    estimated cycles are above a `bound` in all [s]. Near linear."""
-    found: dict[tuple[str, int], list[Option]] = {}
+    """The pile of each free join, or THIRD; and the sum of estimated cycles above a `bound` [s].
+    Near linear."""
+    options: dict[tuple[str, int], list[Option]] = {}
     for label, node in task.nodes.items():
         for axis in (0, 1):
-            known = [(found[x, axis], found[x, 1 - axis]) for x in node.inputs]
-            found[label, axis] = _best(_options(task, node, axis, known, bound))
+            inputs = [(options[x, axis], options[x, 1 - axis]) for x in node.inputs]
+            options[label, axis] = _best(_options(task, node, axis, inputs, bound))
     chosen: dict[str, int] = {}
     root = task.pag.root
-    last = min((_finished(task, root, o, bound) for o in found[root, 1]), key=lambda o: o.rank)
+    last = min((_finished(task, root, o, bound) for o in options[root, 1]), key=lambda o: o.rank)
     stack = [(root, last)]
     while stack:
         label, option = stack.pop()
@@ -127,8 +126,8 @@ def best_forms(task: FormsTask, bound: float = inf) -> tuple[dict[str, int], flo
 
 
 def written_forms(task: FormsTask) -> dict[str, int]:
-    """The forms of a product as it is written: the first two inputs of a statement go to a third
-    robot, each further one to the pile."""
+    """The forms of a product as written: the first two inputs of a statement go to a third robot,
+    each further one to the pile."""
     return {
         label: THIRD if task.nodes[label].template == template else 0
         for label, template in task.free.items()
@@ -139,17 +138,17 @@ def _options(
     task: FormsTask,
     node: Node,
     axis: int,
-    known: Sequence[tuple[list[Option], list[Option]]],
+    each: Sequence[tuple[list[Option], list[Option]]],
     bound: float,
 ) -> Iterator[Option]:
-    """The ways to make a node whose inputs come along an axis; `known`: those to make each input if
-    its own come along the same axis, or the other one."""
+    """The options of a node whose inputs come along an axis; `each`: the options of each input if
+    its own inputs come along the same axis, or along the other one."""
     if not node.inputs:
         yield Option(0, 0, 0.0, 0, task.pace.lost, order=task.order)
         return
     for pile in (THIRD, 0, 1) if node.label in task.free else (_held(node),):
         faults = _faults(task, node, axis, pile)
-        for inputs in _combined([known[n][n != pile] for n in range(len(known))]):
+        for inputs in _combined([options[n != pile] for n, options in enumerate(each)]):
             yield _joined(task, node, pile, inputs, bound, faults)
 
 
@@ -170,7 +169,7 @@ def _joined(
     bound: float,
     faults: tuple[int, int],
 ) -> Option:
-    """The inputs joined on the robot of the `pile`, or on a third; the cycles of others end."""
+    """The inputs joined on the robot of the `pile`, or on a third; the cycles of the others end."""
     blocked, loose = faults
     over, robots, time = 0.0, 0, 0.0
     for number, (label, option) in enumerate(zip(node.inputs, inputs, strict=True)):
@@ -190,8 +189,8 @@ def _joined(
 
 
 def _lines(node: Node, pile: int, inputs: tuple[Option, ...]) -> int:
-    """How many lines hold what is joined: a third robot has two lines beside its own, that of a
-    pile one, which those that come one after the other share."""
+    """Number of lines that hold what is joined: a third robot has two lines beside its own, the
+    robot of a pile one, shared by those that come one after the other."""
     if len(node.inputs) < 2:
         return inputs[0].lines
     if pile == THIRD:
@@ -200,29 +199,29 @@ def _lines(node: Node, pile: int, inputs: tuple[Option, ...]) -> int:
 
 
 def _over(task: FormsTask, label: str, option: Option, bound: float) -> float:
-    """How far the estimated cycle of the robot that delivers a label is above the bound [s]."""
+    """Excess over the bound of the estimated cycle of the robot that delivers a label [s]."""
     leg = task.size(label) + APART
     cycle = option.time + 2 * task.pace.rest(leg) + task.pace.lost
     return max(0.0, round((cycle - bound) / GRAIN) * GRAIN) if bound < inf else 0.0
 
 
 def _finished(task: FormsTask, label: str, option: Option, bound: float) -> Option:
-    """A way to make a label, with the cycle of the robot that delivers it."""
+    """An option of a label, with the cycle of the robot that delivers it."""
     return replace(option, over=option.over + _over(task, label, option, bound))
 
 
 def _best(options: Iterator[Option]) -> list[Option]:
-    """Those that no other is as good as in everything and in time."""
-    found: list[Option] = []
+    """The options that are Pareto-optimal in rank and time."""
+    front: list[Option] = []
     for option in sorted(options, key=lambda o: o.rank):
-        if not found or option.time < found[-1].time - 1e-9:
-            found.append(option)
-    return found
+        if not front or option.time < front[-1].time - 1e-9:
+            front.append(option)
+    return front
 
 
 def _faults(task: FormsTask, node: Node, axis: int, pile: int) -> tuple[int, int]:
-    """Whether a node is blocked or refused, or at least not clean on the way, as its inputs come
-    along an axis to the pile."""
+    """Whether a node is blocked or refused (1 or 0), and whether it is not clean on the way, as its
+    inputs come along an axis to the pile."""
     if (node.label, pile) in task.refused:
         return 1, 1
     if len(node.inputs) < 2 or node.label not in task.admitted:

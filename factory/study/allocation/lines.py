@@ -1,7 +1,7 @@
-"""Lines: which robots of a factory become one, for few robots and a cycle time.
+"""Lines: which robots of a factory are merged into one, for few robots and a cycle time.
 
-Lines are filled as `bundles.py` says. The cycle time of the net that comes out is exact for the
-delays, which are estimated from sizes.
+`bundles.py` fills the lines. The cycle time of the resulting net is exact for its delays, which are
+estimated from sizes.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from factory.problem.robot_types import Catalogue
 from factory.study.allocation.bundles import BETWEEN, LANE, Filling, SizeTiming, bundled
 
 SLACKS = (inf, 1.5, 0.6, 0.25, 0.0)
-"""By which shares of their own work tours may be longer."""
+"""Waits of tours over their own work, from long to short."""
 
 
 @dataclass(frozen=True)
 class Shift:
-    """A factory with a robot for each label, whose lines are to be chosen; `boxes`: those of its
-    sub-assemblies, `pace`: that of its robots; what each robot has to do in a cycle, its `work`
-    [s], as estimated."""
+    """A factory with one robot for each label, whose lines are to be chosen; the `boxes` of its
+    sub-assemblies, the `pace` of its robots, and the estimated time of each robot in operations in
+    a cycle, its `work` [s]."""
 
     factory: Factory
     catalogue: Catalogue
@@ -40,7 +40,7 @@ class Shift:
     def of(
         cls, factory: Factory, catalogue: Catalogue, boxes: Mapping[str, Box], pace: Pace
     ) -> Shift:
-        """That of a factory whose sub-assemblies have some boxes."""
+        """The shift of a factory, with the `boxes` of its sub-assemblies."""
         delays = estimated_delays(SizeTiming.of(factory, boxes, pace))
         work = tuple(sum(delays[n] for n in robot.operations) for robot in factory.robots)
         return cls(factory, catalogue, boxes, pace, work)
@@ -56,12 +56,12 @@ class Shift:
         return max_cycle_ratio(net, [*delays, *idle]).seconds
 
     def count(self, lines: Sequence[Line]) -> int:
-        """How many robots there are with these lines, tools included."""
+        """Number of robots with these lines, tools included."""
         return count_of(self.factory, lines)
 
     def fillings(self, step: float, slacks: Sequence[float] = SLACKS) -> Iterator[Filling]:
-        """What lines may be filled for: from the longest work of one robot until nothing more can
-        share a robot, each so many times the one before."""
+        """Fillings to try: limits from the longest work of one robot, each `step` times the one
+        before, until all could share one robot."""
         limit, most = max(self.work), sum(self.work)
         while limit < most * step:
             for slack in slacks:
@@ -70,12 +70,12 @@ class Shift:
             limit *= step
 
     def lines(self, filling: Filling) -> tuple[Line, ...]:
-        """The lines that are filled so."""
+        """The lines for a filling."""
         timing = SizeTiming.of(self.factory, self.boxes, self.pace)
         return tuple(bundled(timing, filling).lines())
 
     def plan(self, filling: Filling) -> Plan:
-        """The plan with the lines that are filled so."""
+        """The plan with the lines for a filling."""
         return fold(self.factory, self.lines(filling), self.catalogue).plan
 
 
@@ -97,15 +97,16 @@ def _ways(timing: SizeTiming) -> tuple[list[float], list[float]]:
 
 
 def _guests(factory: Factory, robot: int) -> list[int]:
-    """The robots that deliver to one, or come to it with a tool, in the order of its program."""
+    """The robots that deliver to a robot, or come to it with a tool, in the order of its
+    program."""
     operations = (factory.operations[number] for number in factory.robots[robot].operations)
     guests = (r for o in operations if o.carrier == robot for r in o.robots if r != robot)
     return list(dict.fromkeys(guests))
 
 
 def estimated_delays(timing: SizeTiming) -> list[float]:
-    """How long each operation of a factory takes [s]: as long as the robot that goes farthest, the
-    carrier from where it was."""
+    """Duration of each operation of a factory [s]: that of the robot with the longest way; the
+    carrier's way begins at its previous stop."""
     factory, (out, at) = timing.factory, _ways(timing)
     stands = [0.0] * len(factory.operations)
     for robot in factory.robots:
