@@ -1,4 +1,4 @@
-"""A bar on stderr while runs go on: how many are done and failed, runs per second, time left."""
+"""Progress bar of runs on stderr: numbers done and failed, runs per second, time left."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 class RunsBar(ProgressBar):
-    """Counts runs, of which some may be there already."""
+    """Counts runs; `there`: how many were done before."""
 
     def __init__(self, total: int, there: int = 0, quiet: bool = False) -> None:
         super().__init__(quiet)
@@ -20,12 +20,12 @@ class RunsBar(ProgressBar):
         self.done = self.failed = 0
 
     def drawn(self) -> tuple[Progress, TaskID]:
-        """The runs there are, and how fast they come."""
+        """The bar, with the runs done and their rate."""
         bar = counter("runs, {task.fields[words]}, left")
         return bar, bar.add_task("", total=self.total, completed=self.there, words="")
 
     def advance(self, failed: bool = False) -> None:
-        """One more run is done."""
+        """Count a finished run."""
         self.done += 1
         self.failed += failed
         if self.bar is not None:

@@ -1,4 +1,4 @@
-"""What a PAG compiles to and what is proved of it, or of a net in PNML."""
+"""Check of a PAG or of a net in PNML: the compiled net and what is proved of it."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Checked:
-    """A net with its verdict, of a PAG called `name` or read from PNML. `pool`: copies of each part
-    that are inside at once; `matings`: how its inputs come together, None where no part has a shape
-    of its own; `product`: None where every part is a default box; `no_grips`: what no hand can
-    hold, None where hands are not chosen; `factory` and the `least` robots that can make its
-    product, None for a net from elsewhere; `deputies` of each robot and the net that is
-    `coordinated` with hands, magazines and the tray, None where not asked for."""
+    """A net with its verdict, of a PAG called `name` or read from PNML. `pool`: number of copies of
+    each part inside at once; `matings`: how inputs come together, None if no part has its own
+    shape; `product`: None if every part is a default box; `no_grips`: what no hand can hold, None
+    if hands are not chosen; `factory` and the `least` number of robots for its product, None for a
+    net from PNML; the `deputies` of each robot, and the `coordinated` net with hands, magazines and
+    the tray, None if not requested."""
 
     name: str
     net: GearNet | MarkedNet
@@ -55,7 +55,7 @@ class Checked:
         subject = marked(self.net)
         places = subject.net.places
         blocked = self.matings.of_kind("blocked") if self.matings else ()
-        no_grips = None if self.no_grips is None else [found.as_json() for found in self.no_grips]
+        no_grips = None if self.no_grips is None else [miss.as_json() for miss in self.no_grips]
         return {
             "product": self.name,
             "labels": self.labels,
@@ -77,7 +77,8 @@ class Checked:
         }
 
     def _overlaps(self) -> dict[str, Any]:
-        """Which parts overlap when finished, by how much, and how much is allowed [mm]."""
+        """The parts that overlap in the finished product, by how much, and the allowed depth
+        [mm]."""
         if self.product is None or self.factory is None:
             return {}
         from factory.geometry.overlapping import overlaps_of
@@ -94,7 +95,7 @@ class Checked:
         return {"overlaps": rows}
 
     def _allocation(self) -> dict[str, Any]:
-        """Which robots serve several labels, how few could do, and a live order."""
+        """The robots that serve several labels, the least number of robots, and a live order."""
         if self.factory is None or self.least is None:
             return {}
         factory = self.factory
@@ -107,7 +108,7 @@ class Checked:
         }
 
     def _deputies(self, factory: Factory) -> dict[str, Any]:
-        """Which robots could take over for each, none for one that needs a spare."""
+        """The robots that could take over for each, none for a robot that needs a spare."""
         if self.deputies is None:
             return {}
         names = [robot.name for robot in factory.robots]
@@ -130,9 +131,9 @@ def _gear_json(gear: Gear, places: Sequence[Place]) -> dict[str, Any]:
 def check_project(
     project: Project, wip: int | None = None, deputies: bool = False, laid_out: bool = False
 ) -> Checked:
-    """Check a PAG, with at most `wip` units inside at once, and look for `deputies`, which asks how
-    boxes come together; where the project is laid out for them, they are those that can take over.
-    `laid_out`: its coordinated net too, which asks for a layout. Raises InputError."""
+    """Check a PAG, with at most `wip` units inside at once, and find `deputies`, for which matings
+    of boxes are needed too; if the project is laid out for deputies, only those of the layout.
+    `laid_out`: include the coordinated net, which needs a layout. Raises InputError."""
     factory = project.factory
     sources = {r.name: r.position for r in factory.robots if r.position}
     verdict = verify(factory.net, sources)

@@ -1,8 +1,7 @@
-"""Items of work over processes of this machine; no server.
+"""A pool of processes of this machine for items of work.
 
-Each process has a pipe of its own, so that one that is killed takes with it only the item under
-way: that one goes to another process. (An executor of the standard library, and joblib's, give up
-as a whole when a process dies.)
+Each process has its own pipe: if one is killed, only its present item is lost and goes to another
+process. (The executors of the standard library and of joblib fail as a whole if a process dies.)
 """
 
 from __future__ import annotations
@@ -30,14 +29,14 @@ Found = TypeVar("Found")
 CONTEXT = get_context("spawn")
 
 TRIES = 3
-"""An item whose process dies so many times is given up."""
+"""Number of deaths of its process after which an item is given up."""
 
 STILLBORN = 3
-"""So many processes in a row that die before they are ready end the work."""
+"""Number of processes in a row that die before they are ready, after which the work ends."""
 
 NOTHING: Mapping[str, str] = MappingProxyType({})
 
-pickle_locked_mappings()  # of which layouts and factories are full
+pickle_locked_mappings()  # layouts and factories contain many
 
 
 def cores() -> int:
@@ -49,8 +48,8 @@ def cores() -> int:
 
 @dataclass(frozen=True, slots=True)
 class Worked(Generic[Found]):
-    """What became of an item: its number, what was found, None where its process died in all its
-    tries, and how many these were; `status`: the exit status of the last that died."""
+    """Result of an item: its number, the result `found`, None if its process died in all tries, and
+    the number of tries; `status`: exit status of the last process that died."""
 
     number: int
     found: Found | None
@@ -64,9 +63,9 @@ def over_processes(
     jobs: int,
     variables: Mapping[str, str] = NOTHING,
 ) -> Generator[Worked[Found], None, None]:
-    """What `work` finds of all items as it comes, from `jobs` processes with these environment
-    variables; `work`, items and what is found must be picklable. Closing the iterator ends the
-    processes. Raises what `work` raises, RunError where processes die as they start."""
+    """The results of `work` for all items as they come, from `jobs` processes with these
+    environment variables; `work`, items and results must be picklable. Closing the iterator ends
+    the processes. Raises what `work` raises, and RunError if processes die as they start."""
     pool = _Pool(work, items, variables)
     try:
         yield from pool.results(min(jobs, len(items)))
@@ -76,7 +75,7 @@ def over_processes(
 
 @dataclass(slots=True)
 class _Worker:
-    """A process, our end of its pipe, the number of the item it was given, and whether it is
+    """A process, the parent's end of its pipe, the number of its present item, and whether it is
     ready."""
 
     process: SpawnProcess
@@ -86,7 +85,7 @@ class _Worker:
 
 
 class _Pool(Generic[Item, Found]):
-    """Workers, and the numbers of the items that wait for one."""
+    """Workers, and the numbers of the items that wait for a worker."""
 
     def __init__(
         self, work: Callable[[Item], Found], items: Sequence[Item], variables: Mapping[str, str]
@@ -98,14 +97,14 @@ class _Pool(Generic[Item, Found]):
         self.workers: list[_Worker] = []
 
     def results(self, jobs: int) -> Generator[Worked[Found], None, None]:
-        """What becomes of the items, until all are done."""
+        """The results of the items, until all are done."""
         for _ in range(jobs):
             self._start()
         left = len(self.items)
         while left:
             busy = {w.pipe: w for w in self.workers if w.number is not None or not w.ready}
             for pipe in wait(list(busy)):
-                worked = self._heard(busy[pipe])  # type: ignore[index]
+                worked = self._received(busy[pipe])  # type: ignore[index]
                 if worked is not None:
                     left -= 1
                     yield worked
@@ -118,61 +117,60 @@ class _Pool(Generic[Item, Found]):
         for worker in self.workers:
             worker.process.join()
 
-    def _heard(self, worker: _Worker) -> Worked[Found] | None:
-        """Receive what a worker sends: that it is ready, or what it has found; its pipe ends where
-        it has died. It gets its next item before what it has found is given on."""
+    def _received(self, worker: _Worker) -> Worked[Found] | None:
+        """Receive from a worker that it is ready, or a result; its pipe ends if it has died. It
+        gets its next item before its result is returned."""
         number = worker.number
         try:
-            told: tuple[Found | None, Exception | None] = worker.pipe.recv()
+            message: tuple[Found | None, Exception | None] = worker.pipe.recv()
         except (EOFError, OSError):
             return self._bury(worker)
         self.stillborn, worker.ready = 0, True
         worker.number = self.waiting.popleft() if self.waiting else None
         if worker.number is not None:
-            with suppress(OSError):  # that a worker is dead shows when it is next received from
+            with suppress(OSError):  # the next receive shows that a worker is dead
                 worker.pipe.send(self.items[worker.number])
         if number is None:
             return None
-        found, error = told
+        result, error = message
         if error is not None:
             raise error
-        return Worked(number, found, self.tries[number])
+        return Worked(number, result, self.tries[number])
 
     def _bury(self, worker: _Worker) -> Worked[Found] | None:
-        """Another process takes the place and the item of one that died; an item that has had all
-        its tries is given up."""
+        """Replace a process that died; its item is tried again, or given up after all its tries."""
         worker.process.join()
         status, number = worker.process.exitcode, worker.number
         self.workers.remove(worker)
         self.stillborn += not worker.ready
         if self.stillborn == STILLBORN:
             message = f"the processes die as they start (exit status {status})"
-            raise RunError(Diagnostic("Killed", message, None, "take fewer --jobs, or more memory"))
-        gone: Worked[Found] | None = None
+            raise RunError(Diagnostic("Killed", message, None, "use fewer --jobs, or more memory"))
+        lost: Worked[Found] | None = None
         if number is not None:
             self.tries[number] += 1
             if self.tries[number] > TRIES:
-                gone = Worked(number, None, TRIES, status)
+                lost = Worked(number, None, TRIES, status)
             else:
                 self.waiting.appendleft(number)
         if self.waiting:
             self._start()
-        return gone
+        return lost
 
     def _start(self) -> None:
-        ours, theirs = CONTEXT.Pipe()
-        process = CONTEXT.Process(target=_work, args=(self.work, theirs), daemon=True)
+        parent_end, child_end = CONTEXT.Pipe()
+        process = CONTEXT.Process(target=_work, args=(self.work, child_end), daemon=True)
         with _uninterrupted(), ExitStack() as stack:
             for name, value in self.variables.items():
                 stack.enter_context(environment(name, value))
             process.start()
-        theirs.close()
-        self.workers.append(_Worker(process, ours))
+        child_end.close()
+        self.workers.append(_Worker(process, parent_end))
 
 
 @contextmanager
 def _uninterrupted() -> Iterator[None]:
-    """Processes started in here do not get Ctrl-C, which goes to all: their parent ends them."""
+    """Processes started in here do not receive Ctrl-C: their parent ends them."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -195,7 +193,7 @@ def _work(work: Callable[[Any], Any], pipe: Connection) -> None:
 
 
 def _tried(work: Callable[[Any], Any], item: Any) -> tuple[Any, Exception | None]:
-    """What work finds of an item, or what it raises."""
+    """The result of work on an item, or the exception that it raises."""
     try:
         return work(item), None
     except Exception as error:

@@ -1,4 +1,5 @@
-"""How near the physics is to the ideal world: runs in both over the same seeds, in figures.
+"""Fidelity: figures of how close MuJoCo is to the ideal world, from runs in both over the same
+seeds.
 
     >>> from factory.study.fidelity import QUANTITIES
     >>> QUANTITIES["handoff_gap_max_mm"].unit

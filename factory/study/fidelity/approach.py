@@ -1,11 +1,11 @@
-"""The least distances of bodies that are not meant to touch, against those certified.
+"""The least distances of bodies that are not meant to touch, compared with the certified ones.
 
-Left out are pairs that are meant to be near: a part and what holds it, parts held by one body,
-parts whose robots are in one and the same active operation, robots on the floor, the output robot
-at the outfeed that it serves, bodies of one feeder or of the outfeed, sliders, which hand over, and
-spare copies. Hands, which reach between the parts, are also near those robots, feeders and parts
-that they meet at their carrier, or that deliver to the same one, whenever that is. No distance is
-certified for these; that they do not touch is measured by `hidden_penetration_max_mm`."""
+Left out are pairs that are meant to be near: a part and its holder, parts held by one body, parts
+whose robots are in the same active operation, robots and the floor, the output robot at the outfeed
+that it serves, bodies of one feeder or of the outfeed, sliders, which hand over, and spare copies.
+Hands reach between the parts: they may also be near the robots, feeders and parts that they meet at
+their carrier, and those that deliver to the same carrier. No distance is certified for these pairs;
+`hidden_penetration_max_mm` measures that they do not touch."""
 
 from __future__ import annotations
 
@@ -27,26 +27,26 @@ ROBOT, PART, FEEDER, OUTFEED, NONE = range(5)
 KINDS = ("robot", "part", "feeder", "outfeed")
 
 LIMBS = ("finger", "column", "pad", "cross", "riser", "tower", "bar", "beam", "stem")
-"""The limbs of hands."""
+"""Names of the limbs of hands."""
 
 BEYOND = 2e-3
 """Distances are measured up to the clearance plus this [m]."""
 
 
 def certified(layout: Layout) -> Array:
-    """The distance certified for two bodies by their kinds (4, 4) [m]: the clearance in plan or,
-    where layers may lie upon each other, the gap between those if that is less."""
+    """Certified distance of two bodies by their kinds (4, 4) [m]: the clearance in plan or, where
+    layers may lie above each other, the gap between these if it is less."""
     certificate = layout.certificate or certify(layout)
     gaps, c = dict(certificate.gaps), certificate.clearance
-    found = np.full((4, 4), c)
-    found[ROBOT, ROBOT] = min(c, gaps.get("carriages to arms", c))
-    found[ROBOT, PART] = min(c, gaps.get("masts and arms to payloads", c))
-    found[OUTFEED, PART] = min(c, gaps.get("outfeed to payloads", c))
-    return np.asarray(np.minimum(found, found.T))
+    distances = np.full((4, 4), c)
+    distances[ROBOT, ROBOT] = min(c, gaps.get("carriages to arms", c))
+    distances[ROBOT, PART] = min(c, gaps.get("masts and arms to payloads", c))
+    distances[OUTFEED, PART] = min(c, gaps.get("outfeed to payloads", c))
+    return np.asarray(np.minimum(distances, distances.T))
 
 
 class Reaching:
-    """Hands that reach to what is at their carrier."""
+    """Hands that reach to bodies at their carrier."""
 
     def __init__(self, m: mujoco.MjModel, layout: Layout, welds: ActiveWelds) -> None:
         self.welds = welds
@@ -55,9 +55,9 @@ class Reaching:
         self.on = np.array([*carriers(layout.factory), -2])
 
     def meant(self, geoms: Index, bodies: Index) -> Truth:
-        """Whether of pairs of geoms (n, 2), with their bodies (n, 2), one is of a hand, and their
-        robots, or those of what holds the bodies, or of the feeders that do, are carrier and guest,
-        or guests of one carrier."""
+        """Whether pairs of geoms (n, 2), of bodies (n, 2), include a hand, and their robots are
+        carrier and guest, or guests of one carrier. The robot of a body is also that of its holder
+        or of the feeder that holds it."""
         holder = self.welds.holder[bodies]
         of = np.where(holder >= 0, self.serves[holder], self.serves[bodies])
         (a, b), (on_a, on_b) = of.T, self.on[of].T
@@ -110,7 +110,7 @@ class Approaches:
             self._keep(pairs[kept], dist[kept])
 
     def _couple(self, active: tuple[int, ...]) -> None:
-        """Record which robot is in which operation."""
+        """Note the operation of each robot."""
         self._coupled = active
         self.operation[:] = -1
         for number in active:
@@ -143,7 +143,7 @@ class Approaches:
             )
 
     def found(self) -> tuple[ClosestApproach, ...]:
-        """The kinds of pairs that have come within the detection distance."""
+        """The closest approach of each pair of kinds that came within the detection distance."""
         return tuple(
             ClosestApproach(
                 f"{KINDS[i]} - {KINDS[j]}",
@@ -155,13 +155,13 @@ class Approaches:
         )
 
     def closest(self) -> float:
-        """The least distance [m], those to the outfeed's table left out."""
+        """The least distance [m], except to the outfeed's table."""
         return min(self.shadow.reach, float(self.least[:OUTFEED, :OUTFEED].min()))
 
     def margin(self) -> float:
         """The least of the distances less those certified [m]."""
-        found = np.minimum(self.least[:NONE, :NONE], self.shadow.reach) - self.certified
-        return float(found[np.triu_indices(4)].min())
+        margins = np.minimum(self.least[:NONE, :NONE], self.shadow.reach) - self.certified
+        return float(margins[np.triu_indices(4)].min())
 
 
 def _is_hand(geom: str) -> bool:
@@ -170,18 +170,18 @@ def _is_hand(geom: str) -> bool:
 
 
 def _served(bodies: list[str], layout: Layout) -> Index:
-    """The index of the robot of each body, or that a feeder or the tray serves; that after the last
-    for none."""
+    """Index of the robot of each body, or of the robot that a feeder or the tray serves; the number
+    of robots for none."""
     factory = layout.factory
     stations = {names.feeder(outlet.name): outlet.robot for outlet in outlets_of(layout)}
     stations[names.OUTFEED_TRAY] = 0
-    found = _robots(bodies, [robot.name for robot in factory.robots])
+    served = _robots(bodies, [robot.name for robot in factory.robots])
     for number, body in enumerate(bodies):
-        found[number] = stations.get("/".join(body.split("/")[:2]), found[number])
-    return found
+        served[number] = stations.get("/".join(body.split("/")[:2]), served[number])
+    return served
 
 
 def _robots(bodies: list[str], robots: list[str]) -> Index:
-    """The index of the robot of each body; that after the last for none."""
+    """Index of the robot of each body; the number of robots for none."""
     number = {name: i for i, name in enumerate(robots)}
     return np.array([number.get(name.partition("/")[0], len(robots)) for name in bodies])

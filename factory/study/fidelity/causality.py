@@ -1,8 +1,8 @@
-"""Two records of one net compared: causes, order and times of their firings.
+"""Comparison of two records of one net: causes, order and times of their firings.
 
-The n-th firing of a transition in one record stands for the n-th in the other. A firing's immediate
-causes are the firings that made the tokens it takes; what is not before it through causes, nor
-after it, is causally unrelated to it and may come in any order.
+The n-th firing of a transition in one record corresponds to the n-th in the other. The immediate
+causes of a firing are the firings that made the tokens it takes. Firings that are neither before
+nor after it in the closure of this relation are causally unrelated to it: their order is free.
 """
 
 from __future__ import annotations
@@ -14,19 +14,18 @@ import numpy as np
 
 from factory.control.mode import Array, Truth
 from factory.nets.gears import GearNet
-from factory.nets.petri import Marking
 from factory.simulation.run import Event
 
 Firing = tuple[str, int]
-"""A transition's name and which of its firings."""
+"""A transition's name and the number of the firing, from 1."""
 
 MOST = 6000
-"""Number of firings that are compared pair by pair; of longer records the first."""
+"""Number of firings that are compared pair by pair, the first of longer records."""
 
 
 @dataclass(frozen=True, slots=True)
 class CausalRecord:
-    """A record as a partial order: its firings with their times [s] and immediate causes."""
+    """A record as a partial order: the times [s] and the immediate causes of its firings."""
 
     times: dict[Firing, float]
     causes: dict[Firing, frozenset[Firing]]
@@ -34,8 +33,9 @@ class CausalRecord:
 
 @dataclass(frozen=True, slots=True)
 class Orders:
-    """How two records differ: of the `unrelated` pairs, which are causally unrelated and apart in
-    time in both, the number `swapped`; the number of firings whose `causes` differ."""
+    """Differences of two records: the number of `unrelated` pairs, which are causally unrelated and
+    at different times in both, and how many of these are `swapped`; the number of firings whose
+    `causes` differ."""
 
     swapped: int
     unrelated: int
@@ -47,14 +47,12 @@ class Orders:
         return 100.0 * self.swapped / self.unrelated if self.unrelated else 0.0
 
 
-def causal_record(
-    net: GearNet, events: Iterable[Event], start: Marking | None = None
-) -> CausalRecord:
-    """The partial order of a legal record: the token game, with the firing that made each token."""
-    marking = net.initial_marking if start is None else start
+def causal_record(net: GearNet, events: Iterable[Event]) -> CausalRecord:
+    """The partial order of a legal record from the initial marking: the token game, with the firing
+    that made each token."""
     threaded = net.threaded.net
     number = {t.name: i for i, t in enumerate(net.threaded.transitions)}
-    made: dict[int, Firing | None] = dict.fromkeys(marking)
+    made: dict[int, Firing | None] = dict.fromkeys(net.initial_marking)
     count: dict[str, int] = {}
     times: dict[Firing, float] = {}
     causes: dict[Firing, frozenset[Firing]] = {}
@@ -88,13 +86,13 @@ def differences(one: CausalRecord, other: CausalRecord) -> Array:
 
 
 def durations(record: CausalRecord) -> dict[Firing, float]:
-    """X_e - X_s [s] by the end's firing, where both are in the record."""
-    found = {}
+    """X_e - X_s [s] of each operation, by the firing of its end, where both are in the record."""
+    spent = {}
     for (name, n), time in record.times.items():
         begun = record.times.get((f"{name[:-2]}_s", n)) if name.endswith("_e") else None
         if begun is not None:
-            found[name, n] = time - begun
-    return found
+            spent[name, n] = time - begun
+    return spent
 
 
 def duration_differences(one: CausalRecord, other: CausalRecord) -> Array:
@@ -104,7 +102,7 @@ def duration_differences(one: CausalRecord, other: CausalRecord) -> Array:
 
 
 def _related(firings: Sequence[Firing], record: CausalRecord) -> Truth:
-    """Whether one of two firings is before the other through causes (n, n)."""
+    """Whether two firings are causally related (n, n)."""
     place = {firing: i for i, firing in enumerate(firings)}
     before = np.zeros((len(firings), len(firings)), bool)
     for i, firing in enumerate(firings):

@@ -1,4 +1,4 @@
-"""Both worlds, run over the same seeds and compared; seeds may be shared out to processes."""
+"""Comparison of the two worlds over the same seeds, in one process or several."""
 
 from __future__ import annotations
 
@@ -33,16 +33,16 @@ from factory.support.settings import Settings
 from factory.timing.timing import Timing
 
 WORST = 10
-"""So many pairs of things that are inside each other are listed of a seed."""
+"""Number of penetrations that are listed for each seed."""
 
 Alter = Callable[[mujoco.MjModel], None]
-"""Changes the engine's model before a run."""
+"""A change of the engine's model before a run."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """A layout and how it is run. Without `units` each seed makes as many as it takes to show its
-    cycle time, by its net. `alter` must be picklable where processes share the work."""
+    """A layout and the conditions of its runs. Without `units` each seed makes as many as its net
+    needs to show its cycle time. `alter` must be picklable where several processes are used."""
 
     layout: Layout
     units: int | None = None
@@ -62,9 +62,9 @@ def measure(
     done: Callable[[int], None] | None = None,
     max_time: float | None = None,
 ) -> Fidelity:
-    """Compare the worlds over `seeds`. With `jobs` > 1 as many processes share the seeds (a script
-    then needs its `if __name__ == "__main__"`); the figures are the same. `done` is called with the
-    number of seeds that are finished."""
+    """Compare the worlds over `seeds`. With `jobs` > 1 so many processes share the seeds (a script
+    then needs `if __name__ == "__main__"`); the figures are the same. `done` is called with the
+    number of finished seeds."""
     case = Case(layout, units, jitter, settings or Settings(), max_time)
     records = over_cases([(case, seed) for seed in seeds], jobs, done)
     factory = layout.factory
@@ -77,12 +77,12 @@ def over_cases(
     done: Callable[[int], None] | None = None,
 ) -> list[SeedRecord]:
     """`measure_seed` of every case and seed, in their order."""
-    found: dict[int, SeedRecord] = {}
+    records: dict[int, SeedRecord] = {}
     for number, record in _worked(work, jobs):
-        found[number] = record
+        records[number] = record
         if done is not None:
-            done(len(found))
-    return [found[number] for number in range(len(work))]
+            done(len(records))
+    return [records[number] for number in range(len(work))]
 
 
 def _worked(work: Sequence[tuple[Case, int]], jobs: int) -> Iterator[tuple[int, SeedRecord]]:
@@ -91,13 +91,13 @@ def _worked(work: Sequence[tuple[Case, int]], jobs: int) -> Iterator[tuple[int, 
             yield number, measure_seed(case, seed)
         return
     with closing(over_processes(_measured, work, jobs)) as results:
-        for one in results:
-            if one.found is None:
-                seed = work[one.number][1]
-                message = f"the process of seed {seed} died in {one.tries} tries"
-                hint = "take fewer --jobs, or more memory"
+        for result in results:
+            if result.found is None:
+                seed = work[result.number][1]
+                message = f"the process of seed {seed} died in all {result.tries} tries"
+                hint = "use fewer --jobs, or more memory"
                 raise RunError(Diagnostic("Killed", message, None, hint))
-            yield one.number, one.found
+            yield result.number, result.found
 
 
 def _measured(item: tuple[Case, int]) -> SeedRecord:
@@ -105,19 +105,19 @@ def _measured(item: tuple[Case, int]) -> SeedRecord:
 
 
 def measure_seed(case: Case, seed: int) -> SeedRecord:
-    """One seed in both worlds."""
+    """Run one seed in both worlds and measure it."""
     layout = case.layout
     units = case.units or steady_units(Timing(layout, case.settings, "mujoco", seed, case.jitter))
-    asked = RunRequest("mujoco", units, seed, case.jitter, case.settings)
-    physical = Simulation(layout, asked)
-    ideal = Simulation(layout, replace(asked, world="ideal"))
+    request = RunRequest("mujoco", units, seed, case.jitter, case.settings)
+    physical = Simulation(layout, request)
+    ideal = Simulation(layout, replace(request, world="ideal"))
     if case.alter is not None:
         case.alter(physical.physical.m)
     measurement = Measurement(physical)
     begin = perf_counter()
-    thought, run = ideal.run(max_time=case.max_time), measurement.run(case.max_time)
+    ideal_run, run = ideal.run(max_time=case.max_time), measurement.run(case.max_time)
     took = perf_counter() - begin
-    figures, apart, spent = _compared(layout.factory.net, thought, run)
+    figures, firings, durations = _compared(layout.factory.net, ideal_run, run)
     figures |= measurement.figures()
     return SeedRecord(
         seed,
@@ -127,17 +127,17 @@ def measure_seed(case: Case, seed: int) -> SeedRecord:
         measurement.finished.found(),
         measurement.approaches.found(),
         measurement.hidden.found()[:WORST],
-        tuple(np.round(apart, 9).tolist()),
-        tuple(np.round(spent, 9).tolist()),
+        tuple(np.round(firings, 9).tolist()),
+        tuple(np.round(durations, 9).tolist()),
         run.physics.contacts if run.physics else (),
-        (*thought.verdict.failures, *run.verdict.failures),
+        (*ideal_run.verdict.failures, *run.verdict.failures),
         took - measurement.seconds,
         measurement.seconds,
     )
 
 
 def _compared(net: GearNet, ideal: Run, run: Run) -> tuple[dict[str, float | None], Array, Array]:
-    """The figures that need both runs; how far firing times and durations are apart [s]."""
+    """The figures that need both runs; the differences of firing times and of durations [s]."""
     illegal = (not ideal.refines_net) + (not run.refines_net)
     figures: dict[str, float | None] = {
         "illegal_records": illegal,
@@ -151,30 +151,31 @@ def _compared(net: GearNet, ideal: Run, run: Run) -> tuple[dict[str, float | Non
         return figures, np.empty(0), np.empty(0)
     one, other = causal_record(net, ideal.lasting), causal_record(net, run.lasting)
     orders = compare(one, other)
-    apart, spent = differences(one, other), duration_differences(one, other)
+    firings, durations = differences(one, other), duration_differences(one, other)
     figures |= {
         "orders_swapped_percent": orders.percent,
         "causes_differing": orders.causes,
-        **_distances(apart, spent, ideal.cycle_time_s or ideal.predicted_cycle_time_s),
+        **_distances(firings, durations, ideal.cycle_time_s or ideal.predicted_cycle_time_s),
     }
-    return figures, apart, spent
+    return figures, firings, durations
 
 
-def _distances(apart: Array, spent: Array, cycle: float | None) -> dict[str, float | None]:
-    """How far firing times and durations [s] are apart; `cycle` is the ideal cycle time."""
-    if not len(apart) or not len(spent):
+def _distances(firings: Array, durations: Array, cycle: float | None) -> dict[str, float | None]:
+    """The figures of the differences of firing times and durations [s]; `cycle`: the ideal cycle
+    time [s]."""
+    if not len(firings) or not len(durations):
         return {}
-    mean, most = float(np.abs(apart).mean()), float(np.abs(apart).max())
+    mean, most = float(np.abs(firings).mean()), float(np.abs(firings).max())
     return {
         "firing_difference_mean_s": mean,
         "firing_difference_max_s": most,
         "firing_difference_mean_percent": 100 * mean / cycle if cycle else None,
         "firing_difference_max_percent": 100 * most / cycle if cycle else None,
-        "duration_difference_mean_s": float(spent.mean()),
-        "duration_difference_max_s": float(spent[np.abs(spent).argmax()]),
+        "duration_difference_mean_s": float(durations.mean()),
+        "duration_difference_max_s": float(durations[np.abs(durations).argmax()]),
     }
 
 
 def _over(value: float | None, reference: float | None) -> float | None:
-    """How much larger a value is than a reference [%]."""
+    """Relative excess of a value over a reference [%]."""
     return None if value is None or not reference else 100 * (value / reference - 1)

@@ -1,4 +1,4 @@
-"""Convergence of the figures: the same run with other timesteps and other weld stiffnesses."""
+"""Convergence of the figures over timestep and weld stiffness."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ STIFFNESSES = (2.0, 1.0, 0.5)
 constant below two timesteps is raised to those by the engine."""
 
 RELATIVE = 0.05
-"""A figure has converged where its last change is at most this share of its last value..."""
+"""A figure has converged if its last change is at most this share of its last value..."""
 
 ABSOLUTE = {
     "%": 0.1,
@@ -41,7 +41,7 @@ ABSOLUTE = {
 
 @dataclass(frozen=True)
 class Series:
-    """One run with several values of one setting, the finest last."""
+    """Runs of one seed with several values of one setting, the finest last."""
 
     setting: str
     factors: tuple[float, ...]
@@ -49,12 +49,12 @@ class Series:
     troubled: tuple[bool, ...]
 
     def change(self, key: str) -> float | None:
-        """How much a figure changed between the two finest settings."""
+        """Change of a figure between the two finest settings."""
         one, other = (figures.get(key) for figures in self.figures[-2:])
         return None if one is None or other is None else other - one
 
     def converged(self, key: str) -> bool:
-        """Whether a figure's last change is small; one that is not there does not change."""
+        """Whether the last change of a figure is small; a figure without values has converged."""
         change = self.change(key)
         if change is None:
             values = [figures.get(key) for figures in self.figures[-2:]]
@@ -63,8 +63,8 @@ class Series:
         return abs(change) <= max(RELATIVE * abs(last), ABSOLUTE.get(QUANTITIES[key].unit, 0.0))
 
     def shrinking(self, key: str) -> bool | None:
-        """Whether the last change of a figure is smaller than the one before; None where there are
-        no two changes."""
+        """Whether the last change of a figure is smaller than the one before; None without two
+        changes."""
         values = [figures.get(key) for figures in self.figures[-3:]]
         numbers = [value for value in values if value is not None]
         if len(numbers) < 3:
@@ -72,7 +72,7 @@ class Series:
         return abs(numbers[2] - numbers[1]) < abs(numbers[1] - numbers[0])
 
     def noticeable(self, key: str) -> bool:
-        """Whether a figure is anywhere more than its absolute tolerance."""
+        """Whether a figure exceeds its absolute tolerance at any setting."""
         least = ABSOLUTE.get(QUANTITIES[key].unit, 0.0)
         return any(abs(figures.get(key) or 0.0) > least for figures in self.figures)
 
@@ -135,7 +135,7 @@ def study(
 
 
 def runs() -> int:
-    """How many runs a study takes."""
+    """Number of runs of a study."""
     return len(TIMESTEPS) + len(STIFFNESSES)
 
 

@@ -1,4 +1,4 @@
-"""Drives, payloads and welds, tick by tick: tracking errors, forces, accelerations, residuals."""
+"""Figures of drives, payloads and welds: tracking errors, forces, accelerations, residuals."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ LOWEST, HIGHEST = -12, 6
 
 
 class Histogram:
-    """A distribution of positive values [any unit] in fixed memory: its maximum exactly, its
-    quantiles within 1 %, from counts in bins of equal ratio.
+    """A distribution of positive values [any unit] in fixed memory: the exact maximum, and
+    quantiles within 1 % from counts in bins of equal ratio.
 
     >>> h = Histogram()
     >>> h.add(np.linspace(0.001, 1, 1000))
@@ -64,13 +64,13 @@ class Histogram:
         return self._largest
 
     def quantile(self, share: float) -> float:
-        """The value that `share` of all do not exceed: the upper edge of its bin, at most the
-        largest; 0 where there are none."""
+        """The value that a `share` of all values does not exceed: the upper edge of its bin, at
+        most the largest; 0 without values."""
         self._count()
         if not self.total:
             return 0.0
-        found = int(np.searchsorted(np.cumsum(self.counts), share * self.total))
-        edge = 0.0 if found == 0 else 10.0 ** (LOWEST + found / PER_DECADE)
+        number = int(np.searchsorted(np.cumsum(self.counts), share * self.total))
+        edge = 0.0 if number == 0 else 10.0 ** (LOWEST + number / PER_DECADE)
         return float(min(edge, self._largest))
 
     @property
@@ -112,9 +112,8 @@ class DriveFigures:
 
 
 class Payload:
-    """Accelerations [m/s²], step by step, and jerks [m/s³], tick by tick, of parts held by robots
-    and the tray. Parts in feeders and spare copies are left out, and with them the engine's only
-    teleports."""
+    """Accelerations [m/s²] of steps, and jerks [m/s³] of ticks, of parts held by robots and the
+    tray. Parts in feeders and spare copies are left out: only these are ever teleported."""
 
     def __init__(self, welds: ActiveWelds, velocities: Velocities, timestep: float) -> None:
         self.welds, self.velocities, self.timestep = welds, velocities, timestep
@@ -138,8 +137,8 @@ class Payload:
 
 class Residual:
     """Residuals [m] of active, awake welds at the end of ticks: the `largest` of all, and the
-    distribution of those whose holder goes faster than the speed at which robots hand over: a
-    holder that stands may be asleep or not."""
+    distribution of those whose holder is faster than robots are when they hand over: a holder at
+    rest may be asleep."""
 
     def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, slides: Slides) -> None:
         self.m, self.d, self.slides = m, d, slides

@@ -1,4 +1,4 @@
-"""The measurement of a run in MuJoCo: an observer that only reads.
+"""Measurement of a run in MuJoCo, by an observer that only reads.
 
 The run is the same, to the last bit, with and without it.
 """
@@ -20,8 +20,8 @@ from factory.study.fidelity.readings import ActiveWelds, Shadow, Steps, Velociti
 
 
 class Measurement:
-    """Measures a simulation, which is run by `run`. `seconds`: what measuring and the monitor
-    took."""
+    """Measurement of a simulation, which `run` runs. `seconds`: time spent on measuring and on the
+    monitor."""
 
     def __init__(self, simulation: Simulation) -> None:
         model, layout = simulation.model, simulation.layout
@@ -41,12 +41,12 @@ class Measurement:
         self.finished = Finished(model)
         self.residual = Residual(m, d, velocities.slides)
         self.seconds = 0.0
-        self._seen = self._what_happened()
+        self._seen = self._counts()
         self._steps = Steps(m, d, simulation.request.settings.steps)
 
     def run(self, max_time: float | None = None) -> Run:
-        """Run the simulation, measuring, with a monitor beside it; without, where it recovers: the
-        monitor then judges its log (`record.monitor.calm`)."""
+        """Run and measure the simulation, with a monitor beside it unless it recovers: the monitor
+        then judges its log (`record.monitor.calm`)."""
         if self.simulation.request.recovers:
             with self._steps:
                 return self.simulation.run([self.observe], max_time)
@@ -58,13 +58,13 @@ class Measurement:
         return replace(run, monitor=report)
 
     def observe(self, world: Any, supervisor: Any) -> None:
-        """Measure a tick. The shadow is in the configuration in which the tick began, in which
-        welds were switched."""
+        """Measure a tick. The shadow still has the configuration at the beginning of the tick, in
+        which welds were switched."""
         begin, shadow = perf_counter(), self.approaches.shadow
         v, force = self._steps.take()
-        happened = self._what_happened()
-        if happened != self._seen:
-            self._seen = happened
+        counts = self._counts()
+        if counts != self._seen:
+            self._seen = counts
             fresh = self.welds.scan()
             xpos, xmat = shadow.d.xpos, shadow.d.xmat
             self.finished.tick(self.welds, fresh, xpos, xmat)
@@ -80,8 +80,8 @@ class Measurement:
         self.hidden.look(world.d.qpos, world.time)
         self.seconds += perf_counter() - begin
 
-    def _what_happened(self) -> tuple[int, int]:
-        """Numbers of firings and of products gone so far; welds are switched only with one of
+    def _counts(self) -> tuple[int, int]:
+        """Numbers of firings and of finished products so far; welds are switched only with one of
         them."""
         world, supervisor = self.simulation.world, self.simulation.supervisor
         return len(supervisor.events), len(world.dropoffs)

@@ -53,7 +53,7 @@ class HandOffs:
             self._watched.append(_Watched(made, fresh[here], parts, holders[here], u, time))
 
     def tick(self, v: Array, time: float) -> None:
-        """The steps of a tick, speeds (n + 1, nv), that ends at `time`."""
+        """Watch the steps of a tick, with speeds (n + 1, nv), that ends at `time`."""
         for watched in self._watched:
             u = self.velocities.relative(v, watched.parts, watched.holders)
             change = np.linalg.norm(u - watched.u, axis=2)
@@ -85,8 +85,8 @@ def _added(values: Array) -> Array:
 
 @dataclass(slots=True)
 class _Watched:
-    """A hand-off under watch: its welds, parts and holders, their first relative velocity `u`, when
-    it began, and the peaks so far."""
+    """A hand-off that is watched: its welds, parts and holders, the first relative velocity `u` of
+    these, its beginning, and the peaks so far."""
 
     made: HandOff
     welds: Index
@@ -110,7 +110,7 @@ class _Watched:
 
 
 class Finished:
-    """The worst displacement of every part over all products, after a rigid fit on the first."""
+    """Largest displacement of every part over all products, after a rigid fit on the first part."""
 
     def __init__(self, model: Model) -> None:
         product = model.layout.product
@@ -131,8 +131,8 @@ class Finished:
         self._held: Index | None = None
 
     def tick(self, welds: ActiveWelds, fresh: Index, xpos: Array, xmat: Array) -> None:
-        """Welds have been switched, with bodies at `xpos`, `xmat`, those in `fresh` on. A product
-        is measured when the outfeed takes it and when it has gone."""
+        """Measure a product when the outfeed takes it and when it has gone. Welds have been
+        switched, those in `fresh` on, with bodies at `xpos`, `xmat`."""
         if self._held is not None and not (welds.kind[self._held] == HOLD).all():
             self.measure(self._held, xpos, xmat)
             self._held = None
@@ -143,7 +143,7 @@ class Finished:
             self.measure(self._held, xpos, xmat)
 
     def measure(self, bodies: Index, xpos: Array, xmat: Array) -> None:
-        """A product made of `bodies`, in the order of `parts`."""
+        """Measure a product of `bodies`, in the order of `parts`."""
         turn = xmat[bodies].reshape(-1, 3, 3)
         turn = turn[0].T @ turn
         place = (xpos[bodies] - xpos[bodies[0]]) @ xmat[bodies[0]].reshape(3, 3)
@@ -156,7 +156,7 @@ class Finished:
         self.products += 1
 
     def found(self) -> tuple[Misplaced, ...]:
-        """Every part at its worst; none where no product was finished."""
+        """The largest deviations of every part; none without a finished product."""
         if not self.products:
             return ()
         rows = zip(

@@ -21,7 +21,7 @@ from factory.support.plotting import (
 )
 
 MOST = 40
-"""Number of parts that have a bar each; of more, the worst."""
+"""Upper bound on the parts with a bar each, the worst of more."""
 
 LEAST = 1e-5
 """Smaller energies are drawn as this [mJ/kg]."""
@@ -32,18 +32,18 @@ def check_plots() -> None:
     require_matplotlib("a plot", "-o REPORT.json for figures alone")
 
 
-def plots(found: Fidelity, study: Study | None = None) -> dict[str, bytes]:
+def plots(fidelity: Fidelity, study: Study | None = None) -> dict[str, bytes]:
     """The plots by file name. Raises MissingError where there is no matplotlib."""
     check_plots()
     import matplotlib
 
     with matplotlib.rc_context(STYLE):
         made = {
-            "limits.png": _limits(found),
-            "times.png": _times(found),
-            "handoffs.png": _handoffs(found),
-            "product.png": _product(found),
-            "approach.png": _approach(found),
+            "limits.png": _limits(fidelity),
+            "times.png": _times(fidelity),
+            "handoffs.png": _handoffs(fidelity),
+            "product.png": _product(fidelity),
+            "approach.png": _approach(fidelity),
         }
         if study is not None:
             made["convergence.png"] = _convergence(study)
@@ -58,9 +58,9 @@ def _words(key: str) -> str:
     return key.removesuffix("_percent").replace("_", " ")
 
 
-def _limits(found: Fidelity) -> Any:
+def _limits(fidelity: Fidelity) -> Any:
     """Every figure that has a limit other than 0, as a share of it."""
-    worst = found.worst()
+    worst = fidelity.worst()
     rows = [
         (f"{_words(k)}  ({value:.3g} of {q.limit:g} {q.unit})", abs(value / q.limit))
         for k, q in QUANTITIES.items()
@@ -75,12 +75,12 @@ def _limits(found: Fidelity) -> Any:
     return figure
 
 
-def _times(found: Fidelity) -> Any:
+def _times(fidelity: Fidelity) -> Any:
     """Distributions of differences in firing times and durations."""
     figure, ((left, right),) = figure_and_axes(2)
-    cycle = np.mean(found.values("ideal_cycle_time_s") or [np.nan])
-    apart = np.concatenate([np.array(r.differences) for r in found.seeds])
-    spent = np.concatenate([np.array(r.durations) for r in found.seeds])
+    cycle = np.mean(fidelity.values("ideal_cycle_time_s") or [np.nan])
+    apart = np.concatenate([np.array(r.differences) for r in fidelity.seeds])
+    spent = np.concatenate([np.array(r.durations) for r in fidelity.seeds])
     for axes, values, title in (
         (left, apart, "firing times, MuJoCo less ideal"),
         (right, spent, "durations of operations, MuJoCo less ideal"),
@@ -99,9 +99,9 @@ def _times(found: Fidelity) -> Any:
     return figure
 
 
-def _handoffs(found: Fidelity) -> Any:
+def _handoffs(fidelity: Fidelity) -> Any:
     """Injected energy against the gap and against the speed step."""
-    handoffs = [h for record in found.seeds for h in record.handoffs]
+    handoffs = [h for record in fidelity.seeds for h in record.handoffs]
     if not handoffs:
         return None
     figure, ((left, right),) = figure_and_axes(2)
@@ -121,10 +121,10 @@ def _handoffs(found: Fidelity) -> Any:
     return figure
 
 
-def _product(found: Fidelity) -> Any:
+def _product(fidelity: Fidelity) -> Any:
     """Position, vertex and angle of every part, at its worst over the seeds."""
     parts: dict[str, list[Any]] = {}
-    for record in found.seeds:
+    for record in fidelity.seeds:
         for misplaced in record.misplaced:
             parts.setdefault(misplaced.part, []).append(misplaced)
     if not parts:
@@ -155,14 +155,14 @@ def _product(found: Fidelity) -> Any:
     return figure
 
 
-def _approach(found: Fidelity) -> Any:
-    """Least distances by kinds of bodies against what is certified."""
+def _approach(fidelity: Fidelity) -> Any:
+    """Least distances by kinds of bodies, and those certified."""
     least: dict[str, ClosestApproach] = {}
-    for record in found.seeds:
-        for one in record.approaches:
-            kept = least.get(one.kinds)
-            if kept is None or one.least_mm < kept.least_mm:
-                least[one.kinds] = one
+    for record in fidelity.seeds:
+        for approach in record.approaches:
+            kept = least.get(approach.kinds)
+            if kept is None or approach.least_mm < kept.least_mm:
+                least[approach.kinds] = approach
     if not least:
         return None
     rows = [least[kinds] for kinds in sorted(least, reverse=True)]
@@ -178,7 +178,8 @@ def _approach(found: Fidelity) -> Any:
 
 
 def _convergence(study: Study) -> Any:
-    """Every figure over its value at the finest setting, in colour where it does not converge."""
+    """Every figure relative to its value at the finest setting, coloured if it does not
+    converge."""
     import matplotlib
 
     unsettled = study.unsettled()

@@ -1,5 +1,5 @@
-"""What is read from a running engine without changing the run: configurations in a copy of its
-model, the steps within a tick, and what holds each body."""
+"""Readings of a running engine that do not change the run: configurations in a copy of its model,
+the steps within a tick, and the holder of each body."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from factory.mjcf.weld_frames import GRIP, KINDS, Slides
 from factory.support.engine import mujoco
 
 COPIED = ("geom_contype", "geom_conaffinity", "exclude_signature")
-"""What a run changes of its model: who may touch whom."""
+"""Fields of the model that a run changes: the contact masks."""
 
 MASKS = (("body_contype", "geom_contype"), ("body_conaffinity", "geom_conaffinity"))
-"""The mask of a body is that of its geoms; a run leaves bodies out that have nothing near."""
+"""Masks of bodies and of their geoms; a run masks bodies that have nothing near."""
 
 
 class Shadow(Replica):
-    """A second copy of a run's model, `m`, `d`, in which nothing sleeps and near is as good as
-    touching: contacts are found up to `reach` [m]. Every tick it takes over the run's configuration
-    and contact masks. The run never sees it."""
+    """A second copy of a run's model, `m`, `d`, in which nothing sleeps and contacts are detected
+    up to a distance of `reach` [m]. It takes over the run's configuration and contact masks every
+    tick; the run is not affected."""
 
     def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, reach: float) -> None:
         super().__init__(m)
@@ -37,11 +37,11 @@ class Shadow(Replica):
         self.follow()
 
     def follow(self) -> None:
-        """Take over where everything is."""
+        """Take over the configuration of the run."""
         self.place(self.run_d.qpos)
 
     def collide(self) -> None:
-        """Find what is near, by the masks of the run; the floor is near everything."""
+        """Detect contacts by the masks of the run, without the floor."""
         m = self.m
         for own, other in self._pairs:
             own[...] = other

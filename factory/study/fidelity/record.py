@@ -1,4 +1,4 @@
-"""What a comparison of the worlds gives: frozen values."""
+"""Results of a comparison of the worlds: frozen values."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ Figures = Mapping[str, float | None]
 
 @dataclass(frozen=True, slots=True)
 class HandOff:
-    """One hand-off: when, to which body, how many parts of what mass; see `quantities` for the
-    figures."""
+    """One hand-off: its time, the new carrier, number and mass of the parts; figures as defined in
+    `quantities`."""
 
     time_s: float
     carrier: str
@@ -30,7 +30,7 @@ class HandOff:
 
 @dataclass(frozen=True, slots=True)
 class Misplaced:
-    """How far a part is from its place in a finished product, at the worst."""
+    """Largest deviation of a part from its place in a finished product."""
 
     part: str
     position_mm: float
@@ -40,8 +40,8 @@ class Misplaced:
 
 @dataclass(frozen=True, slots=True)
 class ClosestApproach:
-    """The least distance between bodies of two kinds that came within the detection distance, what
-    is certified for them, and which bodies it was."""
+    """The least distance between bodies of two kinds within the detection distance, the certified
+    distance, and the two bodies."""
 
     kinds: str
     certified_mm: float
@@ -51,8 +51,8 @@ class ClosestApproach:
 
 @dataclass(frozen=True, slots=True)
 class Penetration:
-    """Two geoms, by name, the deepest of all copies of theirs: how deep one is inside the other
-    [mm], when that was first so [s], and whether one can move against the other."""
+    """The deepest penetration of two geoms, over all their copies: their names, depth [mm], the
+    time at which it was first reached [s], and whether one can move against the other."""
 
     geoms: tuple[str, str]
     depth_mm: float
@@ -65,10 +65,10 @@ class Penetration:
 
 @dataclass(frozen=True, slots=True)
 class SeedRecord:
-    """One seed: both worlds run, and what was measured.
+    """One seed: the figures of its runs in both worlds.
 
-    `differences` [s]: MuJoCo's time less the ideal world's for every firing, `durations` for every
-    operation. `trouble`: why a run did not succeed.
+    `differences` [s]: time in MuJoCo less time in the ideal world of every firing; `durations`:
+    likewise of every operation. `trouble`: why a run did not succeed.
     """
 
     seed: int
@@ -124,7 +124,7 @@ class Fidelity:
 
     @property
     def units(self) -> int:
-        """How many products the longest run was asked for."""
+        """The number of products of the longest run."""
         return max(record.units for record in self.seeds)
 
     @property

@@ -24,10 +24,10 @@ TITLES = {
 }
 
 
-def document(found: Fidelity, study: Study | None = None) -> dict[str, Any]:
+def document(fidelity: Fidelity, study: Study | None = None) -> dict[str, Any]:
     """The JSON document of a comparison, with the keys of `fidelity --json`."""
     unsettled = set(study.unsettled()) if study else set()
-    made = found.as_json()
+    made = fidelity.as_json()
     for key, figure in made["figures"].items():
         figure["converged"] = None if study is None else key not in unsettled
     made["convergence"] = None if study is None else study.as_json()
@@ -45,15 +45,15 @@ def check_report(path: Path | None) -> None:
     check_plots()
 
 
-def write_report(path: Path, found: Fidelity, study: Study | None = None) -> list[Path]:
+def write_report(path: Path, fidelity: Fidelity, study: Study | None = None) -> list[Path]:
     """Write a folder, or figures alone where `path` ends in .json; all files or none. Gives their
     paths."""
-    text = json.dumps(finite(document(found, study)), indent=1).encode() + b"\n"
+    text = json.dumps(finite(document(fidelity, study)), indent=1).encode() + b"\n"
     if _is_json(path):
         contents = {path: text}
     else:
-        pictures = plots(found, study)
-        page = markdown(found, study, list(pictures)).encode()
+        pictures = plots(fidelity, study)
+        page = markdown(fidelity, study, list(pictures)).encode()
         contents = {
             path / "report.md": page,
             path / "figures.json": text,
@@ -63,20 +63,20 @@ def write_report(path: Path, found: Fidelity, study: Study | None = None) -> lis
     return list(contents)
 
 
-def markdown(found: Fidelity, study: Study | None, pictures: list[str]) -> str:
+def markdown(fidelity: Fidelity, study: Study | None, pictures: list[str]) -> str:
     """The text of report.md."""
-    verdict = "All runs passed." if found.passed else "**Some run failed.**"
+    verdict = "All runs passed." if fidelity.passed else "**Some run failed.**"
     lines = [
-        f"# Fidelity of {found.product}",
+        f"# Fidelity of {fidelity.product}",
         "",
-        f"{found.robots} robots, {found.runs}, jitter {found.jitter:g}. {verdict}",
+        f"{fidelity.robots} robots, {fidelity.runs}, jitter {fidelity.jitter:g}. {verdict}",
         "",
         "| figure | worst | mean | unit | limit | |",
         "|---|---:|---:|---|---:|---|",
-        *_rows(found, study),
+        *_rows(fidelity, study),
         "",
     ]
-    for record in found.seeds:
+    for record in fidelity.seeds:
         lines += [f"* seed {record.seed}: {t.code} {t.message}" for t in record.trouble]
         lines += [f"* seed {record.seed}: contact of {pair}" for pair in record.contacts]
     for name in pictures:
@@ -86,8 +86,8 @@ def markdown(found: Fidelity, study: Study | None, pictures: list[str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _rows(found: Fidelity, study: Study | None) -> list[str]:
-    worst, mean = found.worst(), found.mean()
+def _rows(fidelity: Fidelity, study: Study | None) -> list[str]:
+    worst, mean = fidelity.worst(), fidelity.mean()
     return [
         f"| {key} | {shown(worst[key])} | {shown(mean[key])} | {q.unit} | {shown(q.limit)} | "
         f"{remark(key, worst[key], study)} |"
@@ -97,11 +97,11 @@ def _rows(found: Fidelity, study: Study | None) -> list[str]:
 
 def remark(key: str, value: float | None, study: Study | None) -> str:
     """Remarks on a figure: beyond its limit, not converged."""
-    found = {
+    remarks = {
         "beyond its limit": QUANTITIES[key].exceeded(value),
         "not converged": study is not None and key in study.unsettled(),
     }
-    return ", ".join(words for words, holds in found.items() if holds)
+    return ", ".join(words for words, holds in remarks.items() if holds)
 
 
 def shown(value: float | None) -> str:

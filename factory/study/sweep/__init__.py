@@ -1,12 +1,12 @@
-"""Many runs: a grid of seeds, speeds, clearances, ..., run by processes or by a Dask cluster, into
-an SQLite database, with which a stopped sweep goes on.
+"""Sweeps: runs over a grid of seeds, speeds, clearances, ..., by processes or a Dask cluster, into
+an SQLite database from which a stopped sweep resumes.
 
     >>> from factory.study.sweep import points, read_axes
     >>> [dict(point) for point in points(read_axes(["seed=0:2", "jitter=0.1"]))]
     [{'jitter': 0.1, 'seed': 0}, {'jitter': 0.1, 'seed': 1}]
 
-`sweep(Recipe(...), axes, database, jobs)` runs one; `summarise(database)` gives means, spreads and
-confidence intervals.
+`sweep(Recipe(...), axes, database, jobs)` runs one; `summarise(database)` gives means, standard
+deviations and confidence intervals.
 """
 
 from factory.study.sweep.grid import Axis, points, read_axes

@@ -1,5 +1,5 @@
-"""The runs of a sweep on a Dask cluster: the same work, sent to `dask worker`s by a `dask
-scheduler`. Needs `distributed`, an optional package."""
+"""The runs of a sweep on a Dask cluster, sent to `dask worker`s by a `dask scheduler`. Needs
+`distributed`, an optional package."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 PREFIX = "dask://"
 
 PATIENCE = "10s"
-"""Time after which a scheduler that does not answer is taken to be absent."""
+"""Timeout of the connection to a scheduler."""
 
 AHEAD = 4
-"""Number of runs that wait for each thread of a worker, so that none is idle."""
+"""Number of runs that wait for each thread of a worker, so that no thread is idle."""
 
 
 def address_of(place: str) -> str:
@@ -39,12 +39,11 @@ def address_of(place: str) -> str:
 
 
 def run_dask(recipe: Recipe, points: Sequence[Point], place: str) -> Generator[Outcome, None, None]:
-    """The outcomes of all points as they come, from the workers there are and those that join. A
-    run whose worker dies goes to another, three times. Closing the iterator cancels what is not
-    done.
+    """The outcomes of all points as they come, from the present workers and those that join. A run
+    whose worker dies goes to another one, three times. Closing the iterator cancels the rest.
 
-    Raises MissingError where there is no Dask, no scheduler, or workers without factory; RunError
-    where the scheduler is lost.
+    Raises MissingError without Dask or a scheduler, or for workers without factory; RunError if the
+    scheduler is lost.
     """
     client = connect(place)
     try:
@@ -96,13 +95,13 @@ def _run(runner: Runner, point: Point) -> Outcome:
 
 
 def _wanted(client: Client) -> int:
-    """The number of runs that should be on the cluster now."""
+    """Number of runs that the cluster should have now."""
     threads: int = sum(client.nthreads().values())
     return AHEAD * max(1, threads)
 
 
 def _outcome(future: Any, point: Point) -> Outcome:
-    """The outcome of a run. Raises RunError where the cluster lost it."""
+    """The outcome of a run. Raises RunError if the scheduler is lost."""
     from distributed.scheduler import KilledWorker
 
     if future.status == "finished":
@@ -110,16 +109,16 @@ def _outcome(future: Any, point: Point) -> Outcome:
         return outcome
     error = future.exception() if future.status == "error" else None
     if isinstance(error, KilledWorker):
-        return failed(point, f"Killed the worker died, {error.allowed_failures + 1} times", 1)
+        return failed(point, f"Killed the worker died {error.allowed_failures + 1} times", 1)
     if error is not None:
         return failed(point, f"Internal {type(error).__name__}: {error}", 1)
-    message = "the Dask scheduler was lost"
-    raise RunError(Diagnostic("Missing", message, None, "run it again: what is done is kept"))
+    hint = "run the sweep again: finished runs are kept"
+    raise RunError(Diagnostic("Missing", "the Dask scheduler was lost", None, hint))
 
 
 def _check_workers(client: Client) -> None:
-    """Raises MissingError for a worker with another factory or engine, without one, or that does
-    not answer."""
+    """Raises MissingError for a worker with other versions of factory or of the engine, or that
+    does not report them."""
     ours = versions()
     for address, theirs in client.run(versions, on_error="return").items():
         if theirs == ours:
@@ -128,5 +127,5 @@ def _check_workers(client: Client) -> None:
         hint = "install the same klavins-factory there"
         if isinstance(theirs, Exception):
             message = f"the worker at {address} cannot report its versions: {theirs!r}"
-            hint += ", start it again and run this again: what is done is kept"
+            hint += ", start it again and run the sweep again"
         raise MissingError(Diagnostic("Missing", message, None, hint))

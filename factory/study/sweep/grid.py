@@ -1,4 +1,4 @@
-"""The grid of a sweep: which keys vary, over which values, and the points they span.
+"""The grid of a sweep: the keys that vary, their values, and the points that they span.
 
 `seed=0:1000` is a range, its end left out; `speed=0.2:0.6:0.1` has a step; `jitter=0.1,0.3` is a
 list. Items of a list may be ranges.
@@ -28,19 +28,19 @@ WHOLE: Mapping[str, tuple[int, int]] = {
     "wip": (1, 10**9),
     **{name: (int(RANGES[name][0]), int(RANGES[name][1])) for name in WHOLE_SETTINGS},
 }
-"""Keys whose values are whole numbers, with the least and the greatest."""
+"""Keys of whole numbers, with the least and the greatest value."""
 
 WORLDS = ("mujoco", "ideal")
 
 FAULT_RATE = "fault_rate"
-"""The share of operations in which a robot drops what it carries, and of those that join in which
-an input has slipped. It may vary, and is in a database where it does; elsewhere nothing fails."""
+"""The share of operations in which a robot drops its payload, and of joining operations in which an
+input has slipped. It has columns in a database only if it varies; else nothing fails."""
 
 KEYS = ("seed", "jitter", "units", "wip", "world", FAULT_RATE, *SETTINGS)
 """All keys that may vary."""
 
 SHARES: Mapping[str, tuple[float, float]] = {"jitter": (0, 0.9), FAULT_RATE: (0, 0.5)}
-"""Keys whose values are shares, with the least and the greatest."""
+"""Keys of shares, with the least and the greatest value."""
 
 DEFAULTS: Mapping[str, Value] = {
     "seed": 0,
@@ -49,7 +49,7 @@ DEFAULTS: Mapping[str, Value] = {
     "wip": None,
     "world": "mujoco",
 }
-"""Keys that are not settings, with their default values."""
+"""Default values of the keys that are not settings."""
 
 MOST = 1_000_000
 """Upper bound on the runs of a sweep."""
@@ -57,14 +57,14 @@ MOST = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """A key that varies and its values, all different, in the order given."""
+    """A key that varies, and its distinct values in the order given."""
 
     key: str
     values: tuple[Value, ...]
 
 
 def read_axes(texts: Sequence[str]) -> tuple[Axis, ...]:
-    """The axes that `--vary` was given, e.g. `seed=0:1000`. Raises InputError with every fault."""
+    """The axes of the texts of `--vary`, e.g. `seed=0:1000`. Raises InputError with every fault."""
     axes: list[Axis] = []
     faults: list[Diagnostic] = []
     for text in texts:
@@ -84,8 +84,8 @@ def read_axes(texts: Sequence[str]) -> tuple[Axis, ...]:
 
 
 def points(axes: Sequence[Axis]) -> Iterator[Point]:
-    """All points of a grid. Settings vary slowest and seeds fastest: other settings need another
-    model, some another layout."""
+    """All points of a grid. Settings vary slowest and seeds fastest: a change of settings takes a
+    new model, and of some a new layout."""
     rank = [(axis.key == "seed", axis.key not in SETTINGS) for axis in axes]
     order = sorted(range(len(axes)), key=lambda i: rank[i])
     for values in product(*(axes[i].values for i in order)):
@@ -93,8 +93,7 @@ def points(axes: Sequence[Axis]) -> Iterator[Point]:
 
 
 def check_value(key: str, value: Value) -> Diagnostic | None:
-    """The error of a value of a key: a number out of range, an unknown word; None for a good
-    one."""
+    """The error of a value of a key: a number out of range or an unknown word; None if valid."""
     if key in SETTINGS and value is not None:
         try:
             Settings().with_options({key: value})
@@ -142,7 +141,7 @@ def _read_item(key: str, item: str) -> Iterator[Value]:
 
 
 def _read_range(key: str, item: str) -> Iterator[Value]:
-    """`a:b` of whole numbers, `a:b:step` of any; b is left out."""
+    """Values of `a:b` for whole numbers, of `a:b:step` for any; b is excluded."""
     words = item.split(":")
     if len(words) > 3 or (len(words) == 2 and key not in WHOLE):
         raise InputError(_usage(f"'{item}' of {key} has no step", f"{key}=START:END:STEP"))
@@ -160,7 +159,7 @@ def _read_range(key: str, item: str) -> Iterator[Value]:
 
 
 def _number(key: str, word: str, item: str) -> int | float:
-    """A number as a key takes it. Raises InputError."""
+    """The number in a word, whole if the key's are. Raises InputError."""
     kind = "whole number" if key in WHOLE else "number"
     try:
         number = int(word) if key in WHOLE else float(word)

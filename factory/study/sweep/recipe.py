@@ -1,4 +1,4 @@
-"""What a sweep runs, apart from the points of its grid, and its identity."""
+"""The recipe of a sweep: everything that its runs share; and the identity of a sweep."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from factory.support.resources import mjcf_folder
 from factory.support.tables import table_of
 from factory.support.version import __version__
 
-pickle_locked_mappings()  # of which factories are full
+pickle_locked_mappings()  # factories contain many
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """A factory, the solids of its product, the values of keys that are the same in all runs, the
-    simulated time after which a run is given up [s], what it is laid out for, whether joined parts
-    become one body (None: where that pays), and its layout where that is kept (`laid`). A worker
-    needs nothing else, and reads no file of the user's."""
+    """A factory, the solids of its product, the `fixed` values of keys, the simulated time after
+    which a run is stopped [s], the `ground` of its layout, whether joined parts become one body
+    (None: if it pays), and its layout if it is given (`laid`). A worker needs nothing else and
+    reads no file of the user."""
 
     factory: Factory
     product: Product
@@ -46,8 +46,8 @@ class Recipe:
         return {**DEFAULTS, **self.fixed, **dict(point)}
 
     def identity(self, axes: Sequence[Axis]) -> dict[str, Any]:
-        """What must be the same where a sweep is resumed: product, versions, fixed values, which
-        keys vary. The values of these may change: a grid may grow."""
+        """What must not change if a sweep is resumed: product, versions, fixed values, and the keys
+        that vary. The values of these may change: a grid may grow."""
         varied = sorted(axis.key for axis in axes)
         fixed = {k: v for k, v in self.at(()).items() if k not in varied}
         return {
@@ -72,8 +72,8 @@ def versions() -> dict[str, str]:
 
 
 def digest(factory: Factory, product: Product) -> str:
-    """SHA-256 of a product and of what it is compiled with: the PAG's canonical text, the solids
-    that its meshes gave, the templates it uses, the files of the robot types."""
+    """SHA-256 of a product and its compilation: the PAG's canonical text, the solids of its meshes,
+    its templates, and the files of the robot types."""
     made = sha256(write_pag(factory.pag).encode())
     for name, template in sorted({o.template.name: o.template for o in factory.operations}.items()):
         made.update(f"{name}\n{write_template(template)}".encode())
@@ -102,5 +102,5 @@ def _bytes(value: Any) -> Iterable[bytes]:
 
 
 def name_of(point: Point) -> str:
-    """A point as the database names it: JSON with its keys in order."""
+    """Name of a point in the database: JSON with sorted keys."""
     return json.dumps(dict(point), sort_keys=True, separators=(",", ":"))

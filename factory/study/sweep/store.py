@@ -1,7 +1,7 @@
-"""The database of a sweep: SQLite in WAL mode, a row for each run that is done.
+"""The database of a sweep: SQLite in WAL mode, with a row for each finished run.
 
-Only the parent writes it, and commits every row by itself: killing it, or a worker, loses no row
-that is there. It may be read while it is written.
+Only the parent process writes it, one commit for each row: killing it, or a worker, loses no
+finished row. It may be read while it is written.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ COLUMNS: Mapping[str, str] = {
     "tries": "INTEGER",
     "finished": "TEXT",
 }
-"""Of the table `runs`. `point`: the values of the keys that vary, as JSON; `status`: done or
-failed; then every key and figure; `row_time_s`: what the run took its worker in all [s]."""
+"""Columns of the table `runs`. `point`: the values of the keys that vary, as JSON; `status`: done
+or failed; then every key and figure; `row_time_s`: total time of the worker for the run [s]."""
 
 FAILING_COLUMNS: Mapping[str, str] = {FAULT_RATE: "REAL", **FAILING_FIGURES}
-"""Of a sweep in which the rate of faults varies."""
+"""Further columns of a sweep in which the rate of faults varies."""
 
 APPLICATION = 0x4B4C4156
 """SQLite's application_id of such a database."""
@@ -49,11 +49,11 @@ REPAIR = (
     "check the path, its permissions and the space on the disk; "
     "if the database is damaged, delete it and run the sweep again"
 )
-"""The hint where SQLite cannot use a file."""
+"""Hint for a file that SQLite cannot use."""
 
 
 def columns_of(varied: Sequence[str]) -> Mapping[str, str]:
-    """The columns of a sweep in which these keys vary, with their types."""
+    """Columns of a sweep over these keys, with their types."""
     return {**COLUMNS, **(FAILING_COLUMNS if FAULT_RATE in varied else {})}
 
 
@@ -84,13 +84,14 @@ class Store(Closing):
             self.connection.close()
 
     def points(self, status: str) -> set[str]:
-        """The names of the points that have a row with this status, done or failed."""
+        """Names of the points with a row of this status, done or failed."""
         with _sqlite_errors(self.path):
             rows = self.connection.execute("SELECT point FROM runs WHERE status = ?", (status,))
             return {row[0] for row in rows}
 
     def add(self, outcome: Outcome, values: Mapping[str, Value]) -> None:
-        """Write a row and commit it; `values` of every key. A row of the same point is replaced."""
+        """Write a row, with the `values` of every key, and commit it; it replaces a row of its
+        point."""
         row = {
             "point": name_of(outcome.point),
             "status": "failed" if outcome.reason else "done",

@@ -1,4 +1,4 @@
-"""Mean, spread and confidence of the figures of a sweep, from its database."""
+"""Mean, standard deviation and confidence interval of the figures of a sweep, from its database."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from factory.study.sweep.work import FAILING_FIGURES, FIGURES
 CONFIDENCE = 0.95
 
 UNTOLD = ("wall_time_s", "physics_time_s", "supervisor_time_s", "refines_net")
-"""Figures that do not depend on the factory."""
+"""Figures that do not depend on the factory: left out of a summary."""
 
 SUMMED = (
     *(key for key, kind in FIGURES.items() if kind != "TEXT" and key not in UNTOLD),
@@ -31,8 +31,8 @@ SUMMED = (
 
 @dataclass(frozen=True, slots=True)
 class Statistic:
-    """Of n values: mean, standard deviation (n - 1), and the ends of the interval that holds the
-    true mean with 95 % confidence (Student's t); None where n is less than 2. Least, greatest."""
+    """Statistic of n values: mean, standard deviation (n - 1), the 95 % confidence interval of the
+    mean (Student's t), None for n < 2; the least and the greatest value."""
 
     n: int
     mean: float
@@ -45,8 +45,8 @@ class Statistic:
 
 @dataclass
 class Group:
-    """The runs that differ in their seeds alone: what they share of the keys that vary, how many
-    are done and failed, and the values of each figure of those that are done."""
+    """The runs that differ only in their seeds: the `values` of the other keys that vary, the
+    numbers of runs done and failed, and the values of each figure of those done."""
 
     values: tuple[tuple[str, Value], ...]
     done: int = 0
@@ -54,7 +54,7 @@ class Group:
     columns: dict[str, array[float]] = field(default_factory=dict, repr=False)
 
     def add(self, row: Mapping[str, Any]) -> None:
-        """One more run."""
+        """Add a run."""
         if row["status"] == "failed":
             self.failed += 1
             return
@@ -66,7 +66,7 @@ class Group:
 
     @cached_property
     def figures(self) -> Mapping[str, Statistic]:
-        """The statistic of each figure, once all runs are there."""
+        """The statistic of each figure, after all runs are added."""
         return {key: statistic(self.columns[key]) for key in SUMMED if key in self.columns}
 
     def as_json(self) -> dict[str, Any]:
@@ -79,8 +79,8 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """A sweep's groups, in the order of their values; `reasons`: why runs failed, with how many
-    each."""
+    """The groups of a sweep, in the order of their values; `reasons`: why runs failed, with the
+    number of each."""
 
     product: str
     varied: tuple[str, ...]
@@ -89,12 +89,12 @@ class Summary:
 
     @property
     def done(self) -> int:
-        """Runs that are done."""
+        """Number of runs done."""
         return sum(group.done for group in self.groups)
 
     @property
     def failed(self) -> int:
-        """Runs that failed."""
+        """Number of runs failed."""
         return sum(group.failed for group in self.groups)
 
     def as_json(self) -> dict[str, Any]:

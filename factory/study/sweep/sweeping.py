@@ -1,5 +1,4 @@
-"""A sweep: the points that its database does not have are run, and every outcome is written as it
-comes."""
+"""A sweep: run the points that its database lacks, and write every outcome as it comes."""
 
 from __future__ import annotations
 
@@ -24,13 +23,13 @@ LOCAL = "local"
 Outcomes = Generator[Outcome, None, None]
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-"""Environment variables set to 1 for the processes: there is one for each core already."""
+"""Environment variables set to 1 for the processes, of which there is one for each core."""
 
 
 @dataclass(slots=True)
 class Tally:
-    """What a sweep did: runs in its grid, rows that were there, how many of these had failed, runs
-    done and failed now; the time it took, the sum of the workers' times, and that of their run
+    """Counts of a sweep: `runs` in its grid, those already `there`, how many of these had failed,
+    runs done and failed now; the wall time, the sum of the workers' times, and that of their run
     loops [s]."""
 
     runs: int
@@ -44,7 +43,7 @@ class Tally:
 
     @property
     def overhead(self) -> float | None:
-        """The share of the workers' time that was not spent in run loops."""
+        """Share of the workers' time outside run loops."""
         return 1 - self.loops_time_s / self.rows_time_s if self.rows_time_s else None
 
     @property
@@ -69,7 +68,7 @@ class Tally:
         }
 
     def count(self, outcome: Outcome) -> None:
-        """One more outcome."""
+        """Count an outcome."""
         self.done += not outcome.reason
         self.failed += bool(outcome.reason)
         loop = outcome.figures.get("wall_time_s")
@@ -87,12 +86,12 @@ def sweep(
     retry: bool = False,
     quiet: bool = True,
 ) -> Tally:
-    """Run every point of a grid that has no row in the database yet; with `retry`, those that
-    failed too. `on` is `local`, in `jobs` processes, or dask://HOST:PORT.
+    """Run every point of a grid without a row in the database; with `retry`, also those that
+    failed. `on` is `local`, in `jobs` processes, or dask://HOST:PORT.
 
-    After KeyboardInterrupt, or when this process is killed, all rows written stay, and the same
-    call goes on. Raises InputError where a fixed value is out of range (BadValue), where the
-    database holds another sweep or is damaged (BadFile).
+    After KeyboardInterrupt, or if this process is killed, all rows stay, and the same call resumes.
+    Raises InputError if a fixed value is out of range (BadValue), or if the database holds another
+    sweep or is damaged (BadFile).
     """
     fixed = recipe.at(()).items()
     faults = [fault for key, value in fixed if (fault := check_value(key, value))]
@@ -100,10 +99,10 @@ def sweep(
         raise InputError(faults)
     grid = {name_of(point): point for point in points(axes)}
     with Store(database, recipe.identity(axes)) as store:
-        lost = set() if retry else store.points("failed")
-        there = store.points("done") | lost
+        failures = set() if retry else store.points("failed")
+        there = store.points("done") | failures
         wanted = [point for name, point in grid.items() if name not in there]
-        tally = Tally(len(grid), len(grid) - len(wanted), len(grid.keys() & lost))
+        tally = Tally(len(grid), len(grid) - len(wanted), len(grid.keys() & failures))
         if not wanted:
             return tally
         begin = perf_counter()
@@ -122,15 +121,15 @@ def sweep(
 
 
 def run_local(recipe: Recipe, points: Sequence[Point], jobs: int) -> Outcomes:
-    """The outcomes of all points as they come, from `jobs` processes. Closing the iterator ends
-    them. Raises RunError where processes die as they start."""
+    """The outcomes of all points as they come, from `jobs` processes. Closing the iterator ends the
+    processes. Raises RunError if processes die as they start."""
     with closing(over_processes(Runner(recipe), points, jobs, dict.fromkeys(THREADS, "1"))) as done:
-        for one in done:
-            if one.found is None:
-                reason = f"Killed the process died in {one.tries} tries (exit status {one.status})"
-                yield failed(points[one.number], reason, one.tries)
+        for run in done:
+            if run.found is None:
+                reason = f"Killed the process died in {run.tries} tries (exit status {run.status})"
+                yield failed(points[run.number], reason, run.tries)
             else:
-                yield replace(one.found, tries=one.tries)
+                yield replace(run.found, tries=run.tries)
 
 
 def _outcomes(recipe: Recipe, wanted: Sequence[Point], on: str, jobs: int) -> Outcomes:

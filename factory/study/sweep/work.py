@@ -49,7 +49,7 @@ FIGURES: Mapping[str, str] = {
     "engine_warnings": "INTEGER",
     "mating_force_max_n": "REAL",
 }
-"""What a row keeps of a run, under the names of `run --json`, with its type in the database."""
+"""Figures of a run in a row, under the names of `run --json`, with their types in the database."""
 
 FAILING_FIGURES: Mapping[str, str] = {
     "failures": "INTEGER",
@@ -61,13 +61,13 @@ FAILING_FIGURES: Mapping[str, str] = {
 `run --json`."""
 
 KEPT = 8
-"""Number of layouts and models that a worker keeps: the grid puts points of one together."""
+"""Number of layouts and models that a worker keeps; the grid puts the points of one together."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """A point that is done. `reason`: why its run failed, "" if it did not; `row_time_s`: the time
-    that it took its worker [s], of which `wall_time_s` of the figures is the run loop."""
+    """The outcome of a point. `reason`: why its run failed, "" if it did not; `row_time_s`: time of
+    the worker [s], of which the figure `wall_time_s` is the run loop."""
 
     point: Point
     reason: str = ""
@@ -79,8 +79,8 @@ class Outcome:
 
 
 class Runner:
-    """Runs points of a sweep in one process. Layouts, and models as the engine has loaded them, are
-    kept from run to run: they are the same for all seeds."""
+    """Runs points of a sweep in one process. It keeps layouts and loaded models from run to run:
+    they are the same for all seeds."""
 
     def __init__(self, recipe: Recipe) -> None:
         self.recipe = recipe
@@ -91,7 +91,7 @@ class Runner:
         return Runner, (self.recipe,)
 
     def __call__(self, point: Point) -> Outcome:
-        """Run a point. Every error is the reason of its outcome."""
+        """Run a point. Any error is the reason of its outcome."""
         begin = perf_counter()
         figures: dict[str, Any] = {}
         try:
@@ -146,7 +146,7 @@ class Runner:
             return error
 
     def _compile(self, settings: Settings, request: RunRequest) -> Compiled | FactoryError:
-        """For a layout with settings, whose timestep the request has as a number."""
+        """Compile the model for settings; the request has the timestep as a number."""
         try:
             return compiled(_or_raise(self._layout(settings)), request)
         except FactoryError as error:
