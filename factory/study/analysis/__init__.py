@@ -1,4 +1,4 @@
-"""How fast a factory is, what sets its pace and what would change it, from its timed net."""
+"""Analysis of a factory's pace by its timed net: cycle time, bottlenecks, sensitivities."""
 
 from factory.study.analysis.analysing import Analysis, analyse
 from factory.timing.timing import Change, Timing

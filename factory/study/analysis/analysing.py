@@ -24,7 +24,7 @@ from factory.timing.timing import AS_IT_IS, Change, Timing
 class Analysis:
     """The results of the timed net of a laid-out factory.
 
-    `slack[i]`: how much longer operation i may take before it sets the pace [s].
+    `slack[i]`: increase of the duration of operation i from which it sets the pace [s].
     """
 
     timing: Timing
@@ -39,7 +39,7 @@ class Analysis:
 
     @property
     def bottlenecks(self) -> tuple[str, ...]:
-        """The names of what sets the pace."""
+        """The names of the critical circuits."""
         return tuple(circuit.name for circuit in self.net.critical)
 
 
@@ -51,10 +51,10 @@ def analyse(
     record: RunRecord | None = None,
 ) -> Analysis:
     """The analysis of a laid-out factory: of `units` products from the initial marking, with a
-    bound `wip` on copies of each part, with a change that is `asked` about, in words, and with the
-    `record` of a run to compare with.
+    bound `wip` on copies of each part, a change `asked` for, with its description, and the `record`
+    of a run to compare with.
 
-    Raises InputError where `wip` is below 1 or a mode cannot reach its goal.
+    Raises InputError if `wip` is below 1 or a mode cannot reach its goal.
     """
     net = timed_net(timing, AS_IT_IS, wip)
     products = flow(timing, net, units)
@@ -76,7 +76,7 @@ def analyse(
 
 
 def operation_slacks(timing: Timing, net: TimedNet) -> tuple[float, ...]:
-    """How much longer each operation may take before it sets the pace [s]: the slack of the
+    """Increase of the duration of each operation from which it sets the pace [s]: the slack of the
     tightest circuit through it."""
     operations = timing.factory.operations
     tightest = slacks(net.ratio, (o.place for o in operations))

@@ -10,7 +10,7 @@ from factory.study.analysis.measured import ComparedFigure, Comparison
 
 
 def document(analysis: Analysis) -> dict[str, Any]:
-    """Everything, times in seconds; null for what does not apply."""
+    """The document, with times in seconds; null for what does not apply."""
     timing, net, flow = analysis.timing, analysis.net, analysis.flow
     return {
         "product": timing.factory.pag.root,

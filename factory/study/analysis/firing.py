@@ -1,4 +1,4 @@
-"""When the transitions of a timed marked graph fire, each as soon as it can (max-plus dates)."""
+"""Earliest firing dates of the transitions of a timed marked graph (max-plus dates)."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Firings:
-    """`dates` (n, T): when each transition fires for the k-th time [s], from the initial marking at
-    time 0; from the k-th to the (k + `period`)-th of each it takes `advance` [s] for all k from
-    `settled` on, None where that does not show within n."""
+    """`dates` (n, T): date of the k-th firing of each transition [s], from the initial marking at
+    time 0. From the k-th to the (k + `period`)-th firing it takes `advance` [s], for all k from
+    `settled` on; None if that does not hold within n firings."""
 
     dates: Floats = field(repr=False)
     settled: int | None
@@ -33,13 +33,12 @@ def earliest_firings(
     first: Mapping[int, float] = MappingProxyType({}),
     ready: Mapping[int, float] = MappingProxyType({}),
 ) -> Floats:
-    """(count, T): the dates of the first `count` firings of every transition.
+    """(count, T): dates of the first `count` firings of every transition [s].
 
-    The k-th firing takes the k-th token of each place before it: one of the initial ones, ready at
-    once, or when `ready` says so, or what the producer's firing k - tokens put there, ready
-    `seconds[p]` later; `first` says how long the first such token of a place takes, where that
-    differs. Raises ValueError where the net is no live marked graph.
-    """
+    The k-th firing takes the k-th token of each place before it: an initial token, available at
+    time 0 or at `ready[p]`, or the token of the producer's firing k - tokens, available
+    `seconds[p]` later; `first[p]` is the delay of the first such token if it differs. Raises
+    ValueError if the net is not a live marked graph."""
     free = token_free(net)
     if not net.is_marked_graph or free.stuck or dead_ends(net):
         raise ValueError("only a live marked graph fires for ever")
@@ -84,8 +83,8 @@ def settled_firings(
     ready: Mapping[int, float] = MappingProxyType({}),
     work: int = 4_000_000,
 ) -> Firings:
-    """The firings until each repeats itself every `period` firings, `ratio` seconds apart each, but
-    at least `least` of them; more and more are tried, as far as so many steps of `work` allow."""
+    """At least `least` firings, until all repeat every `period` firings with `ratio` seconds for
+    each; their number is doubled until then, as far as `work` steps allow."""
     count = max(least, 8 * period, 16)
     most = max(count, work // max(1, len(net.tokens)))
     while True:

@@ -1,4 +1,4 @@
-"""The firings of a timed net: filling, work in progress, how robots spend their time."""
+"""The flow of products in a timed net: filling, work in progress, shares of the robots' time."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from factory.study.analysis.timed import TimedNet, timed_net
 from factory.timing.timing import Timing
 
 APART = 1e-3
-"""The pace counts as reached where the mean interval is within this share of it."""
+"""Relative deviation of the mean interval up to which the pace counts as reached."""
 
 LEAST, MOST = 4, 100
 
 
 @dataclass(frozen=True, slots=True)
 class WorkInProgress:
-    """The number of copies of a label at once in the long run, and how long each stays [s].
+    """Number of copies of a label at once in the long run, and the time that each stays [s].
 
-    A part stays from the start of the operation that takes it until it is dropped off, whatever it
-    has become a part of; any other sub-assembly from the end of the operation that makes it to that
-    of the one that takes it.
+    A part stays from the start of the operation that takes it until its product is dropped off; any
+    other sub-assembly from the end of the operation that makes it to the end of the one that takes
+    it.
     """
 
     label: str
@@ -35,9 +35,9 @@ class WorkInProgress:
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """How a robot spends a cycle [s]: `moving`; `working`, a dwell; `standing` at its place in an
-    operation while other robots or the outfeed's tray move; `waiting` for the next operation. Going
-    ahead while it waits counts as moving. Of several copies of a robot, one of them."""
+    """Times of a robot in a cycle [s]: `moving`; `working`, in dwells; `standing` in an operation
+    while other robots or the outfeed's tray move; `waiting` for the next operation. Going ahead
+    while it waits counts as moving. For copies of a robot, the times of one of them."""
 
     robot: str
     moving: float
@@ -52,19 +52,17 @@ class Share:
 
     @property
     def busy(self) -> float:
-        """The share of its time that it is in an operation."""
+        """Share of its time in operations."""
         return 1.0 - self.waiting / self.cycle if self.cycle else 0.0
 
 
 @dataclass(frozen=True)
 class Flow:
-    """When products come: `first` and `last` of `units`, dropped off (in the engine: out of the
-    outfeed) [s]; `full_pace`: the number of the product from which on they come at the pace;
-    `settled`: whether the firings become periodic within those that were computed, else `stocks`
-    are those at their end. `durations` (cycles, operations): how long each operation lasts each
-    time, from its start to its end [s]; `busy`: the share of the time until `last` for which each
-    robot is in operations.
-    """
+    """Flow of `units` products: the dates of the `first` and the `last` dropoff (in the engine:
+    exit from the outfeed) [s]; `full_pace`: number of the product from which on they come at the
+    pace; `settled`: whether the computed firings become periodic, else `stocks` are those at their
+    end. `durations` (cycles, operations): time from start to end of each operation each time [s];
+    `busy`: share of the time until `last` for which each robot is in operations."""
 
     units: int
     first: float
@@ -79,20 +77,19 @@ class Flow:
 
     @property
     def inside(self) -> float:
-        """The mean number of parts in the factory at once."""
+        """Mean number of parts in the factory at once."""
         return sum(stock.mean for stock in self.stocks if stock.is_part)
 
     @property
     def lasting(self) -> Floats:
-        """(operations,): the mean duration of each [s]. The first is left out where there are
-        others: robots start it from other places."""
+        """(operations,): mean duration of each [s], without its first occurrence if there are
+        others: robots start that one from other positions."""
         later = self.durations[min(1, len(self.durations) - 1) :]
         return np.asarray(later.mean(axis=0))
 
 
 def flow(timing: Timing, net: TimedNet, units: int) -> Flow:
-    """The flow of at least `units` products from the initial marking, all firing as soon as they
-    can."""
+    """The flow of at least `units` products from the initial marking, with earliest firings."""
     firings, factory = net.firings(units), timing.factory
     products = leaving_dates(timing, firings)
     last = float(products[units - 1]) + timing.leaving
@@ -115,12 +112,12 @@ def flow(timing: Timing, net: TimedNet, units: int) -> Flow:
 
 
 def leaving_dates(timing: Timing, firings: Firings) -> Floats:
-    """When each product is dropped off [s]."""
+    """Date of the dropoff of each product [s]."""
     return np.asarray(firings.dates[:, [o.end for o in timing.factory.dropoffs]].ravel())
 
 
 def _full_pace(products: Floats, firings: Firings, units: int) -> int | None:
-    """The product, counted from 1, after which the mean interval never leaves the pace."""
+    """The product, counted from 1, from which on the mean interval is the pace."""
     if firings.settled is None:
         return None
     period = firings.period * units
@@ -130,7 +127,7 @@ def _full_pace(products: Floats, firings: Firings, units: int) -> int | None:
 
 
 def _stocks(timing: Timing, firings: Firings) -> tuple[WorkInProgress, ...]:
-    """Over as many whole periods as lie before the last firing of every transition."""
+    """Work in progress over the whole periods before the last firing of every transition."""
     factory, dates, advance = timing.factory, firings.dates, firings.advance
     end = float(dates[-1].min())
     settled = 0 if firings.settled is None else firings.settled
@@ -150,7 +147,7 @@ def _stocks(timing: Timing, firings: Firings) -> tuple[WorkInProgress, ...]:
 def _stock(
     operation: Operation, enters: Floats, leaves: Floats, begin: float, end: float
 ) -> WorkInProgress:
-    """Time averages between `begin` and `end`. A copy that leaves at the moment at which another
+    """Time averages between `begin` and `end`. A copy that leaves at the instant at which another
     comes is not counted with it."""
     stays = np.clip(leaves, begin, end) - np.clip(enters, begin, end)
     instants = [(float(t), -1) for t in leaves if begin < t <= end]
@@ -183,11 +180,10 @@ def _share(timing: Timing, net: TimedNet, number: int) -> Share:
 
 
 def steady_units(timing: Timing, wip: int | None = None) -> int:
-    """The least number of products, 4 to 100, over whose last half the timed net predicts the mean
-    interval between dropoffs (the `cycle_time_s` of a run) to be that of the long run, and over any
-    larger number too.
+    """Least number of products, 4 to 100, from which on the predicted mean interval between
+    dropoffs over their last half (the `cycle_time_s` of a run) is that of the long run.
 
-    Robots before the bottleneck fill first, and until then products come at the pace of others.
+    Robots before the bottleneck fill first; until then products come at the pace of other robots.
     """
     net = timed_net(timing, wip=wip)
     dates = leaving_dates(timing, net.firings(MOST))[:MOST]
@@ -195,8 +191,8 @@ def steady_units(timing: Timing, wip: int | None = None) -> int:
 
 
 def reached(dates: Floats, pace: float, period: int = 1) -> int:
-    """The same number, by the `dates` [s] of at least 4 dropoffs, of which so many come in a
-    `period`; all of them where the pace is not reached."""
+    """The same number, for the `dates` [s] of at least 4 dropoffs, with `period` of them in a
+    cycle; the number of all if the pace is not reached."""
     units = np.arange(LEAST, len(dates) + 1)
     count = units - units // 2
     count -= np.where(count >= period, count % period, 0)

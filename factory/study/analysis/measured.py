@@ -27,21 +27,22 @@ HINT = "`factory run FILE.pag --log OUT` writes one that fits"
 
 @dataclass(frozen=True, slots=True)
 class ComparedFigure:
-    """A quantity as predicted and as measured; None where the run is too short."""
+    """A quantity as predicted and as measured; None if the run is too short."""
 
     predicted: float
     measured: float | None
 
     @property
     def error(self) -> float | None:
-        """Predicted less measured, as a share of the measured value."""
+        """Relative error of the prediction."""
         return self.predicted / self.measured - 1 if self.measured else None
 
 
 @dataclass(frozen=True, slots=True)
 class Duration:
-    """The duration of an operation from its start to its end [s], with the `least` and `greatest`
-    measured. The first is left out where there are others: robots start it from other places."""
+    """Duration of an operation from its start to its end [s], with the `least` and `greatest`
+    measured. Its first occurrence is left out if there are others: robots start it from other
+    positions."""
 
     label: str
     time: ComparedFigure
@@ -65,7 +66,7 @@ class Comparison:
 
 @dataclass(frozen=True, slots=True)
 class RunRecord:
-    """A run to compare with: its events, and when each product was dropped off [s]."""
+    """A run to compare with: its events, and the date of each dropoff [s]."""
 
     source: str
     events: tuple[Event, ...]
@@ -90,14 +91,13 @@ def conditions(header: Mapping[str, Any]) -> Conditions:
 
 
 def record_of(run: Run) -> RunRecord:
-    """The record of a run that was just made. Raises InputError (BadLog) where it finished no
-    product."""
+    """The record of a run just made. Raises InputError (BadLog) if it finished no product."""
     return _checked(RunRecord("a run on the spot", run.lasting, run.dropoffs))
 
 
 def logged_record(source: str, log: Log, factory: Factory) -> RunRecord:
-    """The record of the run in a log. Raises InputError (BadLog) where it is not one of this
-    factory, does not start from its initial marking, or finished no product."""
+    """The record of the run in a log. Raises InputError (BadLog) if it is of another factory, does
+    not start from the initial marking, or finished no product."""
     net = factory.net.threaded
     if log.header["transitions"] != [transition.name for transition in net.transitions]:
         message = f"'{source}' is the log of another factory: other operations, or other robots"
@@ -145,8 +145,8 @@ def compare(timing: Timing, net: TimedNet, flow: Flow, record: RunRecord) -> Com
 
 
 def operation_times(factory: Factory, firings: Iterable[tuple[int, float]]) -> list[list[float]]:
-    """How long each operation lasted each time, from its start to its end [s], by the times at
-    which transitions (by number) fired. An end whose start was before the run is left out."""
+    """Time from start to end of each operation each time [s], by the times at which transitions (by
+    number) fired. An end whose start was before the run is left out."""
     times: dict[int, list[float]] = {}
     for number, t in firings:
         times.setdefault(number, []).append(t)
@@ -159,7 +159,7 @@ def operation_times(factory: Factory, firings: Iterable[tuple[int, float]]) -> l
 
 
 def robot_times(factory: Factory, spent: Sequence[Sequence[float]]) -> list[float]:
-    """How long each robot was in operations [s], by how long each of these lasted each time."""
+    """Time of each robot in operations [s], by the durations of these each time."""
     busy = [0.0] * len(factory.robots)
     for operation, times in zip(factory.operations, spent, strict=True):
         for robot in operation.robots:
@@ -168,7 +168,7 @@ def robot_times(factory: Factory, spent: Sequence[Sequence[float]]) -> list[floa
 
 
 def dropoff_times(time: Floats, delivered: NDArray[np.int32]) -> tuple[float, ...]:
-    """When products were dropped off [s], to a tick, by the ticks of a log."""
+    """Dates of the dropoffs [s], to a tick, by the ticks of a log."""
     return tuple(time[np.flatnonzero(np.diff(delivered)) + 1].tolist())
 
 

@@ -1,4 +1,4 @@
-"""Slack: how much longer a place may keep its tokens before it sets the pace of a marked graph."""
+"""Slack: the increase of a place's delay from which it sets the pace of a marked graph."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from factory.nets.cycle_ratio import CycleRatio
 
 @dataclass(frozen=True, slots=True)
 class Slack:
-    """By how many seconds the tightest circuit through a place is shorter than r per token, and
-    its places in order; infinite, with no places, where the place lies on no circuit."""
+    """Slack of a place: the seconds by which the tightest circuit through it is shorter than r per
+    token, and the places of this circuit in order; infinite, without places, for a place on no
+    circuit."""
 
     seconds: float
     circuit: tuple[int, ...]
@@ -22,9 +23,9 @@ class Slack:
 def slacks(ratio: CycleRatio, places: Iterable[int]) -> dict[int, Slack]:
     """The slack of each of some places.
 
-    With the reduced times of the proof, which are not negative, a circuit is as long as what it
-    lacks; so Dijkstra's way back from a place's end to its beginning gives the tightest. One search
-    for all places that begin at one transition.
+    With the reduced times of the proof, which are not negative, the length of a circuit is its
+    slack. Dijkstra's shortest path from a place's end back to its beginning gives the tightest
+    circuit; one search serves all places that begin at one transition.
     """
     number = {int(place): edge for edge, place in enumerate(ratio.edges)}
     wanted: dict[int, list[int]] = {}
@@ -54,7 +55,7 @@ def slacks(ratio: CycleRatio, places: Iterable[int]) -> dict[int, Slack]:
 def _ways_to(
     ratio: CycleRatio, inward: dict[int, list[int]], target: int
 ) -> tuple[dict[int, float], dict[int, int]]:
-    """For every transition the shortest reduced way to `target`, and its first edge."""
+    """Length of the shortest reduced path from every transition to `target`, and its first edge."""
     before, reduced = ratio.before, ratio.reduced
     distance: dict[int, float] = {}
     onward: dict[int, int] = {}

@@ -1,4 +1,4 @@
-"""The timed net of a factory: the compiled net, with the times and places that a run adds."""
+"""The timed net of a factory: the compiled net with the delays and places of a run."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ LONGEST_PERIOD = 60
 
 @dataclass(frozen=True, slots=True)
 class Circuit:
-    """A circuit of the timed net: its name (a robot, `outfeed`, `station part1`, `wip part1`, of
-    several robots `r3 with r5`, that first which spends most of it), its time [s], its tokens, and
-    its places in order; `units`: how many are made in a cycle of the net."""
+    """A circuit of the timed net: its name (a robot, `outfeed`, `station part1`, `wip part1`, or
+    `r3 with r5` for several robots, the one with the largest share first), its time [s], its
+    tokens, and its places in order; `units`: number of products in a cycle of the net."""
 
     name: str
     seconds: float
@@ -31,7 +31,7 @@ class Circuit:
 
     @property
     def products(self) -> int:
-        """How many products come in its time."""
+        """Number of products in its time."""
         return self.tokens * self.units
 
     @property
@@ -45,13 +45,12 @@ class TimedNet(Timed):
     """A timed net, and those of its circuits that have a name.
 
     In the ideal world the named circuits of a gear net without a bound `wip` are all its simple
-    circuits: robots' gears, and places that go back over one operation alone. With copies of a
-    robot its gear has so many tokens, and an operation that it does alone, which has one place on
-    the floor, a place of one token back over it: one at a time. Where robots go ahead while they
-    wait, a gear's slowest circuit goes by those of its ways that take longer than the operation.
-    `first`: what a place takes for the first time [s], and `ready`: when robots have gone ahead
-    that set out at the beginning, where those are other times.
-    """
+    circuits: robots' gears, and places that lead back over one operation alone. With copies of a
+    robot its gear has as many tokens; an operation that it does alone has one position on the
+    floor, so a place of one token leads back over it: one at a time. If robots go ahead while they
+    wait, the slowest circuit of a gear contains those of its ways that take longer than the
+    operation. `first`: delay of the first token of a place [s], and `ready`: dates at which robots
+    that set out at time 0 have gone ahead, where these differ."""
 
     named: tuple[Circuit, ...] = field(default=(), repr=False)
     first: Mapping[int, float] = field(default_factory=dict, repr=False)
@@ -59,12 +58,12 @@ class TimedNet(Timed):
 
     @property
     def units(self) -> int:
-        """How many products come in a cycle of the net."""
+        """Number of products in a cycle of the net."""
         return self.timing.factory.period
 
     @cached_property
     def circuits(self) -> tuple[Circuit, ...]:
-        """Those with a name, the tightest through each bound, and the critical one, the slowest
+        """The named circuits, the tightest through each bound, and the critical one; the slowest
         first."""
         bounds = self.bounds
         tightest = circuits(self.ratio, bounds) if bounds else ()
@@ -93,14 +92,14 @@ class TimedNet(Timed):
         return [_circuit(name, places, self.seconds, self.net.tokens, self.units)]
 
     def slack(self, circuit: Circuit) -> float:
-        """How much longer a circuit may take before it sets the pace [s]; for a robot's gear, how
-        long it waits in a cycle."""
+        """Increase of a circuit's time from which it sets the pace [s]; for the gear of a robot,
+        its waiting time in a cycle."""
         slack = self.pace * circuit.products - circuit.seconds
         return slack if slack > SAME * self.pace else 0.0
 
     def firings(self, units: int) -> Firings:
-        """The firings of each transition for at least `units` products from the initial marking, as
-        soon as possible."""
+        """The earliest firings of each transition for at least `units` products from the initial
+        marking."""
         period = lcm(*(c.tokens for c in self.critical))
         period, cycle = min(period, LONGEST_PERIOD), self.pace * self.units
         rounds = -(-units // self.units)
@@ -192,7 +191,7 @@ def _circuit(
 
 
 def _alone(timing: Timing, change: Change) -> list[int]:
-    """The operations, other than dropoff in the engine, that robots with copies do alone."""
+    """The operations that only robots with copies do, except the dropoff in the engine."""
     factory = timing.factory
     numbers = dict.fromkeys(n for robot in change.copies for n in factory.robots[robot].operations)
     outfed = timing.outfeed > 0

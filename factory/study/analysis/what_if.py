@@ -1,4 +1,5 @@
-"""What the cycle time would be: faster robots, shorter ways, further robots, fewer parts let in."""
+"""Cycle times under changes: faster robots, shorter ways, more robots, bounds on copies of
+parts."""
 
 from __future__ import annotations
 
@@ -18,14 +19,13 @@ POINTS = 12
 
 @dataclass(frozen=True, slots=True)
 class Sensitivity:
-    """The reduction of the cycle time [s] by a change of one robot alone.
+    """Reduction of the cycle time [s] by changes of one robot alone.
 
     `faster`: its speed (and its lift's) a tenth higher, `slower` (negative): a tenth lower;
     `quicker`: its acceleration a tenth higher; `shorter`: each of its ways a tenth shorter; `most`:
-    its speed not limited at all, its acceleration still; `then`: what sets the pace after that;
-    `enough`: the least factor on its speed with nearly all of `most`, None where `most` is 0 or the
-    factor is above 64. `copy`: a second robot takes turns with it. `slack`: how long the robot
-    waits in a cycle."""
+    unlimited speed, limited acceleration; `then`: the bottleneck after that; `enough`: the least
+    factor on its speed with nearly all of `most`, None if `most` is 0 or the factor is above 64.
+    `copy`: a second robot alternates with it. `slack`: waiting time of the robot in a cycle."""
 
     robot: str
     slack: float
@@ -75,8 +75,8 @@ def _sensitivity(
 
 
 def _enough(timing: Timing, wip: int | None, number: int, least: float) -> float | None:
-    """The least factor on a robot's speed, within 1 %, with which the pace is at most 0.1 % above
-    `least`."""
+    """Least factor on a robot's speed, within 1 %, with a pace at most 0.1 % above `least`; None if
+    above 64."""
     low, high = 1.0, 64.0
 
     def reached(factor: float) -> bool:
@@ -93,7 +93,7 @@ def _enough(timing: Timing, wip: int | None, number: int, least: float) -> float
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """A change, in words, the cycle time with it [s], and what sets the pace then."""
+    """A change with its description, the cycle time with it [s], and its bottlenecks."""
 
     change: Change
     words: str
@@ -108,8 +108,8 @@ def scenario(timing: Timing, words: str, change: Change, wip: int | None) -> Sce
 
 
 def scenarios(timing: Timing, net: TimedNet, wip: int | None) -> tuple[Scenario, ...]:
-    """The robots that set the pace, all robots, and all ways, changed by a tenth; then further
-    copies of the robots that set the pace."""
+    """The scenarios of critical robots, all robots and all ways changed by a tenth; then of copies
+    of the critical robots."""
     robots = {robot.name: robot.index for robot in timing.factory.robots}
     critical = [c.name for c in net.critical if c.name in robots]
     percent = round(100 * STEP)
@@ -127,8 +127,8 @@ def scenarios(timing: Timing, net: TimedNet, wip: int | None) -> tuple[Scenario,
 
 
 def in_turn(timing: Timing, net: TimedNet, wip: int | None, most: int = 4) -> list[Scenario]:
-    """Another copy of all the robots that set the pace, repeatedly, until something else than
-    robots sets it, or the pace does not improve."""
+    """Scenarios with one more copy of all critical robots each time, until something other than
+    robots is critical or the pace does not improve."""
     robots = {robot.name: robot.index for robot in timing.factory.robots}
     copies: dict[int, int] = {}
     better: list[Scenario] = []
@@ -153,16 +153,15 @@ def listed(names: list[str], most: int = 6) -> str:
 
 @dataclass(frozen=True, slots=True)
 class WipCurve:
-    """Points (W, cycle time [s]) for growing W; `least`: the least W at which the pace is the full
-    one."""
+    """Points (W, cycle time [s]) for growing W; `least`: the least W with the full pace."""
 
     points: tuple[tuple[int, float], ...]
     least: int
 
 
 def wip_curve(timing: Timing) -> WipCurve:
-    """The cycle time for some W from 1 up to the least at which the pace is the full one, and on
-    to where W bounds nothing. Found by bisection: the cycle time never grows with W."""
+    """The curve of the cycle time from W = 1 to a W that bounds nothing; the least W with the full
+    pace by bisection, since the cycle time never grows with W."""
     full = timed_net(timing).pace
     paces: dict[int, float] = {}
 
