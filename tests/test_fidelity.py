@@ -161,15 +161,20 @@ def test_a_misplaced_grip_injects_what_its_spring_holds(metres: float) -> None:
     assert figure(record, "payload_acceleration_max_m_s2") > 0.5 * metres * STIFFNESS**2 / e
 
 
-def test_speed_step_impulse_and_energy_of_known_motion() -> None:
+def until_carried() -> tuple[mujoco.MjModel, Measurement, int]:
+    """A run up to where a robot has taken a part: its model, its measurement, and the part."""
     simulation = Simulation(layout(), RunRequest(units=2, seed=0))
     measurement = Measurement(simulation)
     with measurement._steps:
         while not measurement.welds.carried().size:
             simulation.supervisor.step()
             measurement.observe(simulation.world, simulation.supervisor)
-    m, handoffs = simulation.world.m, measurement.handoffs
-    part = int(measurement.welds.carried()[0])
+    return simulation.world.m, measurement, int(measurement.welds.carried()[0])
+
+
+def test_speed_step_impulse_and_energy_of_known_motion() -> None:
+    m, measurement, part = until_carried()
+    handoffs = measurement.handoffs
     weld = np.flatnonzero(measurement.welds.active & (measurement.welds.target == part))
     dof, mass = m.body_dofadr[part], m.body_mass[part]
     v = np.zeros((3, m.nv))
@@ -191,14 +196,8 @@ def test_speed_step_impulse_and_energy_of_known_motion() -> None:
 
 
 def test_a_carrier_that_moves_along_gives_no_speed_step() -> None:
-    simulation = Simulation(layout(), RunRequest(units=2, seed=0))
-    measurement = Measurement(simulation)
-    with measurement._steps:
-        while not measurement.welds.carried().size:
-            simulation.supervisor.step()
-            measurement.observe(simulation.world, simulation.supervisor)
-    m, welds = simulation.world.m, measurement.welds
-    part = int(welds.carried()[0])
+    m, measurement, part = until_carried()
+    welds = measurement.welds
     weld = np.flatnonzero(welds.active & (welds.target == part))
     holder = int(welds.holder[part])
     v = np.zeros(m.nv)
@@ -416,12 +415,12 @@ def test_a_stalled_run_is_told_and_fails() -> None:
 
 
 def test_processes_give_the_same_figures() -> None:
-    told: list[int] = []
+    finished: list[int] = []
     alone = measure(layout(), range(2), units=2)
-    shared = measure(layout(), range(2), units=2, jobs=2, done=told.append)
+    shared = measure(layout(), range(2), units=2, jobs=2, done=finished.append)
     assert [r.figures for r in alone.seeds] == [r.figures for r in shared.seeds]
     assert [r.handoffs for r in alone.seeds] == [r.handoffs for r in shared.seeds]
-    assert told == [1, 2]
+    assert finished == [1, 2]
     assert alone.worst()["handoff_gap_max_mm"] == max(alone.values("handoff_gap_max_mm"))
 
 
