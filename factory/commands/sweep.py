@@ -98,7 +98,7 @@ def sweep(
     """
     writable_folder(plots)
     if plots is not None:
-        from factory.study.fidelity.plots import check_plots
+        from factory.study.sweep.summary import check_plots
 
         check_plots()
     is_summary = summary or plots is not None
@@ -194,7 +194,7 @@ def _summarise(database: Path | None, folder: Path | None, out: OutputOptions) -
     found = summarise(database)
     drawn: dict[Path, bytes] = {}
     if folder is not None:
-        from factory.study.sweep.plots import plots
+        from factory.study.sweep.summary import plots
 
         drawn = {folder / name: picture for name, picture in plots(found).items()}
         write_all(drawn)
