@@ -1,4 +1,4 @@
-"""The figures that are measured, each with its unit and definition."""
+"""The quantities of a comparison, each with its unit and definition."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from types import MappingProxyType
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """A figure of one run (or of one seed's pair of runs): its key, unit and definition.
+    """A figure of one run (or of the two runs of a seed): its key, unit and definition.
 
-    `least`: the worst is the smallest value, not the largest. `limit`: what a good factory keeps,
-    None where nothing is asked for.
+    `least`: the worst value is the smallest, not the largest. `limit`: bound for a good factory,
+    None for none.
     """
 
     key: str
@@ -22,7 +22,7 @@ class Quantity:
     least: bool = False
 
     def worst(self, values: Iterable[float | None]) -> float | None:
-        """The worst of some values; None where there is none."""
+        """The worst of some values; None without values."""
         numbers = [value for value in values if value is not None]
         if not numbers:
             return None
@@ -62,14 +62,15 @@ _ALL = (
     Quantity(
         "monitor_violations",
         "violations",
-        "What the independent monitor, which sees the engine alone, could not explain by the net.",
+        "Observations of the independent monitor, which sees only the engine, that contradict the "
+        "net.",
         0,
     ),
     Quantity(
         "firing_difference_mean_s",
         "s",
         "Mean over all firings of |t in MuJoCo - t in the ideal world|, the n-th firing of a "
-        "transition against the n-th. Includes what has added up since the beginning.",
+        "transition against the n-th. Includes differences accumulated since the beginning.",
     ),
     Quantity("firing_difference_max_s", "s", "The largest of those differences."),
     Quantity(
@@ -114,7 +115,9 @@ _ALL = (
     ),
     Quantity("tracking_error_rms_mm", "mm", "Root mean square over the same."),
     Quantity(
-        "handoffs", "switches", "Grips and holds switched on to a part that another let go of."
+        "handoffs",
+        "switches",
+        "Grips and holds of a part switched on as another carrier releases it.",
     ),
     Quantity(
         "handoff_gap_max_mm",
@@ -185,22 +188,22 @@ _ALL = (
         "hidden_penetration_max_mm",
         "mm",
         "Deepest penetration between any two things that are drawn, with all of them solid, every "
-        "20 ms: no contact is left out but between what is fixed to each other. Of parts that "
-        "overlap in the finished product, what they are deeper than there.",
+        "20 ms: no contact is left out except between things fixed to each other. Of parts that "
+        "overlap in the finished product, only the penetration beyond that overlap.",
         0.1,
     ),
     Quantity(
         "grip_gap_max_mm",
         "mm",
         "Largest distance between the pads of a robot, a feeder or the tray and the nearest of the "
-        "bodies that it takes, when it takes what it holds first.",
+        "bodies that it takes, when it takes its first.",
         0.5,
     ),
     Quantity(
         "grip_strength_share_max",
         "",
-        "Largest share of the strength of a hand's tips that force and moment of its load about "
-        "them use, measured several times a second; none where hands are not chosen (--no-hands). "
+        "Largest share of the strength of a hand's tips used by the force and moment of its load, "
+        "measured several times a second; none if hands are not chosen (--no-hands). "
         "Above 1 the hand lets go (Dropped).",
         1,
     ),
@@ -226,9 +229,9 @@ _ALL = (
     ),
     Quantity("payload_jerk_p99_m_s3", "m/s^3", "99th percentile over parts and ticks."),
     Quantity("moved_mass_kg", "kg", "Mass of everything that can move: carriages, tray, parts."),
-    Quantity("unintended_contacts", "onsets", "Onsets of contact that nothing intends.", 0),
+    Quantity("unintended_contacts", "onsets", "Onsets of unintended contact.", 0),
     Quantity("engine_warnings", "warnings", "Warnings of the engine.", 0),
 )
 
 QUANTITIES: Mapping[str, Quantity] = MappingProxyType({q.key: q for q in _ALL})
-"""Every figure by its key, in the order in which reports list them."""
+"""Every quantity by its key, in the order of the reports."""
