@@ -9,6 +9,7 @@ import socket
 import sqlite3
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -301,7 +302,7 @@ def test_two_sweeps_may_begin_at_once(
 
     class Late(sqlite3.Connection):
         def execute(self, sql: str, *values: Any) -> sqlite3.Cursor:
-            if sql == "BEGIN IMMEDIATE" and not begun:
+            if sql == "BEGIN EXCLUSIVE" and not begun:
                 begun.append(sql)
                 Store(database, other).close()
             return super().execute(sql, *values)
@@ -315,6 +316,29 @@ def test_two_sweeps_may_begin_at_once(
         with pytest.raises(InputError, match="it holds another sweep: varied units there, seed"):
             Store(database, mine)
     assert begun
+
+
+def test_a_sweep_waits_for_another_that_begins(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One has created the tables; before it sets the mode, the other locks the database."""
+    database, identity = tmp_path / "r.db", recipe_of().identity(read_axes(["seed=0:2"]))
+    connect, locks, timers = sqlite3.connect, list[str](), list[threading.Timer]()
+
+    class Late(sqlite3.Connection):
+        def execute(self, sql: str, *values: Any) -> sqlite3.Cursor:
+            if sql.startswith("BEGIN"):
+                locks.append(sql)
+            if sql.startswith("PRAGMA journal_mode") and not timers:
+                other = connect(database, isolation_level=None, check_same_thread=False)
+                other.execute(locks[0])
+                timers.append(threading.Timer(0.2, other.close))
+                timers[0].start()
+            return super().execute(sql, *values)
+
+    monkeypatch.setattr(sqlite3, "connect", partial(sqlite3.connect, factory=Late))
+    Store(database, identity).close()
+    assert timers
 
 
 def test_files_of_others_are_left_alone(tmp_path: Path, run: Terminal, here: None) -> None:

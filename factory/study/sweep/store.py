@@ -112,8 +112,9 @@ class Store(Closing):
 
     def _begin(self, identity: Mapping[str, Any]) -> None:
         """Compare the identity in the database, or create the tables, in one transaction: another
-        sweep may begin at the same time."""
-        self.connection.execute("BEGIN IMMEDIATE")
+        sweep may begin at the same time. Its lock is exclusive: where another only reserves the
+        database, SQLite refuses the change to WAL at once instead of waiting."""
+        self.connection.execute("BEGIN EXCLUSIVE")
         kept = _identity(self.connection, self.path)
         if kept is None:
             self._create(identity)
