@@ -34,7 +34,7 @@ def deadly(mark: Path, number: int) -> tuple[int, str | None]:
 def test_results_come_with_the_numbers_of_their_items() -> None:
     items = [5, 3, 9, 0]
     with closing(over_processes(squared, items, 2)) as results:
-        found = {one.number: one.found for one in results}
+        found = {one.number: one.result for one in results}
     assert found == {n: item**2 for n, item in enumerate(items)}
 
 
@@ -49,7 +49,7 @@ def test_a_process_that_dies_loses_its_item_alone(
     monkeypatch.setattr(pool, "TRIES", 2)
     work = partial(deadly, tmp_path / "mark")
     found = {one.number: one for one in over_processes(work, range(4), 2, {"POOLED": "yes"})}
-    assert (found[1].found, found[1].tries, found[1].status) == (None, 2, -9)
-    assert (found[2].found, found[2].tries) == ((2, "yes"), 2)
-    assert all(found[n].found == (n, "yes") and found[n].tries == 1 for n in (0, 3))
+    assert (found[1].result, found[1].tries, found[1].status) == (None, 2, -9)
+    assert (found[2].result, found[2].tries) == ((2, "yes"), 2)
+    assert all(found[n].result == (n, "yes") and found[n].tries == 1 for n in (0, 3))
     assert "POOLED" not in os.environ

@@ -24,7 +24,7 @@ from factory.support.errors import Diagnostic, RunError
 from factory.support.pickling import pickle_locked_mappings
 
 Item = TypeVar("Item")
-Found = TypeVar("Found")
+Result = TypeVar("Result")
 
 CONTEXT = get_context("spawn")
 
@@ -47,22 +47,22 @@ def cores() -> int:
 
 
 @dataclass(frozen=True, slots=True)
-class Worked(Generic[Found]):
-    """Result of an item: its number, the result `found`, None if its process died in all tries, and
+class Worked(Generic[Result]):
+    """Result of an item: its number, its `result`, None if its process died in all tries, and
     the number of tries; `status`: exit status of the last process that died."""
 
     number: int
-    found: Found | None
+    result: Result | None
     tries: int
     status: int | None = None
 
 
 def over_processes(
-    work: Callable[[Item], Found],
+    work: Callable[[Item], Result],
     items: Sequence[Item],
     jobs: int,
     variables: Mapping[str, str] = NOTHING,
-) -> Generator[Worked[Found], None, None]:
+) -> Generator[Worked[Result], None, None]:
     """The results of `work` for all items as they come, from `jobs` processes with these
     environment variables; `work`, items and results must be picklable. Closing the iterator ends
     the processes. Raises what `work` raises, and RunError if processes die as they start."""
@@ -84,11 +84,11 @@ class _Worker:
     ready: bool = False
 
 
-class _Pool(Generic[Item, Found]):
+class _Pool(Generic[Item, Result]):
     """Workers, and the numbers of the items that wait for a worker."""
 
     def __init__(
-        self, work: Callable[[Item], Found], items: Sequence[Item], variables: Mapping[str, str]
+        self, work: Callable[[Item], Result], items: Sequence[Item], variables: Mapping[str, str]
     ) -> None:
         self.work, self.items, self.variables = work, items, variables
         self.waiting = deque(range(len(items)))
@@ -96,7 +96,7 @@ class _Pool(Generic[Item, Found]):
         self.stillborn = 0
         self.workers: list[_Worker] = []
 
-    def results(self, jobs: int) -> Generator[Worked[Found], None, None]:
+    def results(self, jobs: int) -> Generator[Worked[Result], None, None]:
         """The results of the items, until all are done."""
         for _ in range(jobs):
             self._start()
@@ -117,12 +117,12 @@ class _Pool(Generic[Item, Found]):
         for worker in self.workers:
             worker.process.join()
 
-    def _received(self, worker: _Worker) -> Worked[Found] | None:
+    def _received(self, worker: _Worker) -> Worked[Result] | None:
         """Receive from a worker that it is ready, or a result; its pipe ends if it has died. It
         gets its next item before its result is returned."""
         number = worker.number
         try:
-            message: tuple[Found | None, Exception | None] = worker.pipe.recv()
+            message: tuple[Result | None, Exception | None] = worker.pipe.recv()
         except (EOFError, OSError):
             return self._bury(worker)
         self.stillborn, worker.ready = 0, True
@@ -137,7 +137,7 @@ class _Pool(Generic[Item, Found]):
             raise error
         return Worked(number, result, self.tries[number])
 
-    def _bury(self, worker: _Worker) -> Worked[Found] | None:
+    def _bury(self, worker: _Worker) -> Worked[Result] | None:
         """Replace a process that died; its item is tried again, or given up after all its tries."""
         worker.process.join()
         status, number = worker.process.exitcode, worker.number
@@ -146,7 +146,7 @@ class _Pool(Generic[Item, Found]):
         if self.stillborn == STILLBORN:
             message = f"the processes die as they start (exit status {status})"
             raise RunError(Diagnostic("Killed", message, None, "use fewer --jobs, or more memory"))
-        lost: Worked[Found] | None = None
+        lost: Worked[Result] | None = None
         if number is not None:
             self.tries[number] += 1
             if self.tries[number] > TRIES:

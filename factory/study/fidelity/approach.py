@@ -128,9 +128,9 @@ class Approaches:
         kinds = self.kind[a] + self.kind[b]
         serving = (kinds == ROBOT + OUTFEED) & (np.minimum(self.robot[a], self.robot[b]) == 0)
         serving &= (self.kind[a] == OUTFEED) | (self.kind[b] == OUTFEED)
-        own = (root[a] == root[b]) | ((self.kind[a] == OUTFEED) & (self.kind[b] == OUTFEED))
+        same = (root[a] == root[b]) | ((self.kind[a] == OUTFEED) & (self.kind[b] == OUTFEED))
         spare = (hold_a == 0) | (hold_b == 0)
-        return np.asarray(held | together | joining | serving | own | spare)
+        return np.asarray(held | together | joining | serving | same | spare)
 
     def _keep(self, pairs: Index, dist: Array) -> None:
         for nearest in np.argsort(-dist):  # the nearest of a kind comes last, and is kept

@@ -91,13 +91,13 @@ def _worked(work: Sequence[tuple[Case, int]], jobs: int) -> Iterator[tuple[int, 
             yield number, measure_seed(case, seed)
         return
     with closing(over_processes(_measured, work, jobs)) as results:
-        for result in results:
-            if result.found is None:
-                seed = work[result.number][1]
-                message = f"the process of seed {seed} died in all {result.tries} tries"
+        for worked in results:
+            if worked.result is None:
+                seed = work[worked.number][1]
+                message = f"the process of seed {seed} died in all {worked.tries} tries"
                 hint = "use fewer --jobs, or more memory"
                 raise RunError(Diagnostic("Killed", message, None, hint))
-            yield result.number, result.found
+            yield worked.number, worked.result
 
 
 def _measured(item: tuple[Case, int]) -> SeedRecord:

@@ -43,8 +43,8 @@ class Shadow(Replica):
     def collide(self) -> None:
         """Detect contacts by the masks of the run, without the floor."""
         m = self.m
-        for own, other in self._pairs:
-            own[...] = other
+        for copied, original in self._pairs:
+            copied[...] = original
         for body, geom in MASKS:
             masks = np.bitwise_or.reduceat(getattr(m, geom), m.body_geomadr[self._solid])
             getattr(m, body)[self._solid] = masks

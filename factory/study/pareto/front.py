@@ -194,12 +194,12 @@ class ParetoFront:
         }
 
 
-def candidates_front(found: Sequence[Estimate]) -> list[tuple[float, Estimate]]:
+def candidates_front(estimates: Sequence[Estimate]) -> list[tuple[float, Estimate]]:
     """Estimates with their cycle time over that of the best with no more robots; those of the
     front, with a ratio of 1, come first."""
     best: dict[int, float] = {}
-    for one in sorted(found, key=lambda e: e.robots):
+    for one in sorted(estimates, key=lambda e: e.robots):
         before = min(best.values(), default=inf)
         best[one.robots] = min(before, best.get(one.robots, inf), one.seconds)
-    ranked = [(one.seconds / best[one.robots], one) for one in found]
+    ranked = [(one.seconds / best[one.robots], one) for one in estimates]
     return sorted(ranked, key=lambda pair: (round(pair[0], 3), pair[1].robots, pair[1].seconds))

@@ -63,8 +63,10 @@ def _with_mesh(
         name = PurePosixPath(path.replace("\\", "/"))
         content = read_bytes(Path(pag.folder) / path, MESH)
         kept[pag.folder, path] = f"../{store.add(name.stem, name.suffix.lower(), content)}"
-    own = kept[pag.folder, path]
+    stored = kept[pag.folder, path]
     return replace(
         node,
-        parameters=tuple(replace(p, value=own) if p.name == "mesh" else p for p in node.parameters),
+        parameters=tuple(
+            replace(p, value=stored) if p.name == "mesh" else p for p in node.parameters
+        ),
     )

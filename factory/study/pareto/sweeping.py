@@ -175,8 +175,8 @@ class FrontSweep:
         """The points of estimates alone, as there are no layouts."""
         shares = [one for share, one in candidates_front(self.estimates) if share <= 1]
         made = [self._candidate(one) for one in shares]
-        found = [FrontPoint.of_estimate(*pair) for pair in zip(made, shares, strict=True)]
-        self.points = undominated(found)
+        points = [FrontPoint.of_estimate(*pair) for pair in zip(made, shares, strict=True)]
+        self.points = undominated(points)
 
     def _hold(self) -> None:
         """Lay out those with a robot for each label in which each robot has a hand."""
@@ -198,11 +198,11 @@ class FrontSweep:
 
     def _promising(self) -> Iterator[Estimate]:
         """The estimates of the front, then those next to it."""
-        counts, known = Counter[int](), set[tuple[int, float]]()
+        counts, chosen = Counter[int](), set[tuple[int, float]]()
         for share, one in candidates_front(self.estimates):
             key = one.robots, round(one.seconds, 2)
-            if share <= NEXT and key not in known and counts[one.robots] < EACH:
-                known.add(key)
+            if share <= NEXT and key not in chosen and counts[one.robots] < EACH:
+                chosen.add(key)
                 counts[one.robots] += 1
                 yield one
 

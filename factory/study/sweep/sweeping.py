@@ -125,11 +125,11 @@ def run_local(recipe: Recipe, points: Sequence[Point], jobs: int) -> Outcomes:
     processes. Raises RunError if processes die as they start."""
     with closing(over_processes(Runner(recipe), points, jobs, dict.fromkeys(THREADS, "1"))) as done:
         for run in done:
-            if run.found is None:
+            if run.result is None:
                 reason = f"Killed the process died in {run.tries} tries (exit status {run.status})"
                 yield failed(points[run.number], reason, run.tries)
             else:
-                yield replace(run.found, tries=run.tries)
+                yield replace(run.result, tries=run.tries)
 
 
 def _outcomes(recipe: Recipe, wanted: Sequence[Point], on: str, jobs: int) -> Outcomes:

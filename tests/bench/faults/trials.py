@@ -102,8 +102,8 @@ def all_tried(trials: Sequence[Trial]) -> Iterator[dict[str, Any]]:
     """What came of all, as it comes, from all cores."""
     for worked in over_processes(tried, trials, cores()):
         print(".", end="", flush=True)
-        assert worked.found is not None
-        yield worked.found
+        assert worked.result is not None
+        yield worked.result
     print()
 
 
