@@ -103,13 +103,13 @@ def test_the_search_for_codes_sees_them() -> None:
 
 
 @pytest.mark.parametrize("code", codes())
-def test_an_explanation_says_what_it_means_and_how_to_mend_it(code: str) -> None:
+def test_an_explanation_says_what_it_means_and_what_the_remedy_is(code: str) -> None:
     found = explain(code)
     assert found.code == code
     assert found.title and found.title[0].islower() and not found.title.endswith(".")
     lines = found.text.splitlines()
     assert max(map(len, lines)) <= 100
-    assert any(line.startswith("To mend it: ") for line in lines) or code == "Interrupted"
+    assert any(line.startswith("Remedy: ") for line in lines) or code == "Interrupted"
 
 
 def example(code: str, folder: Path) -> list[str]:
