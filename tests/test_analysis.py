@@ -545,7 +545,7 @@ def test_nets_need_delays_and_have_no_picture(run: Terminal, tmp_path: Path) -> 
     assert "Usage a net has no robots to draw" in done.err
     done = run("analyze", net, "--delays", delays, "--run", "--wip", 2, "--no-stage", "--json")
     assert done.codes == ["Usage"] * 3
-    assert f"--run is for a PAG; '{net}' is a net in PNML" in done.out
+    assert f"--run applies to a PAG; '{net}' is a net in PNML" in done.out
     assert not (tmp_path / "x.png").exists()
 
 

@@ -100,7 +100,10 @@ def test_a_robot_that_touches_a_bin_counts(monkeypatch: pytest.MonkeyPatch) -> N
 
 @pytest.mark.parametrize(
     ("spilled", "words"),
-    [((), "scrap in bins: 3\n"), (("r1", "r4"), "scrap in bins: 3; no bin for that of r1, r4\n")],
+    [
+        ((), "scrap in bins: 3\n"),
+        (("r1", "r4"), "scrap in bins: 3; no bin for the scrap of r1, r4\n"),
+    ],
 )
 def test_bins_are_told_in_words(
     capsys: pytest.CaptureFixture[str], spilled: tuple[str, ...], words: str

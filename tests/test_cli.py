@@ -535,7 +535,7 @@ def test_what_a_net_has_not_is_refused(run: Terminal, out: Path) -> None:
     assert refused.codes == ["Usage"] * 5
     for word in words[::2]:
         if isinstance(word, str):
-            assert f"{word} is for a PAG; '{net}' is a net in PNML" in refused.out
+            assert f"{word} applies to a PAG; '{net}' is a net in PNML" in refused.out
     assert files_in(out).keys() == {"net.pnml"}
     assert run("check", net, "--certificate", out / "proof.json", "-v").status == 0
 
@@ -552,14 +552,14 @@ def test_what_a_log_has_not_is_refused(
         refused = run(*command, *words, *more)
         given = [word for word in (*words, *more) if word.startswith("--")]
         assert refused.status == 2
-        assert refused.err.count(f" is for a PAG; '{log}' is a log\n") == len(given)
+        assert refused.err.count(f" applies to a PAG; '{log}' is a log\n") == len(given)
     assert files_in(out).keys() == {"run.log"}
     (out / "factory.toml").write_text('units = 2\nwip = 2\nfloor = "9x9"\nspeed = 0.3')
     monkeypatch.setenv("FACTORY_SEED", "3")
     assert run(*page).status == 0
     shown = ["--size", "640x360", "--fps", 5, "--camera", "top", "--with", "net", "--title", "A"]
     assert run(*picture, *shown, "--at", 1, "--quiet").status == 0
-    assert "--poster is of a film; this is a still" in run(*picture, "--poster", "b.png").err
+    assert "--poster applies to a film; this is a still" in run(*picture, "--poster", "b.png").err
 
 
 def test_options_of_a_film_are_refused_without_one(run: Terminal, out: Path) -> None:
@@ -569,7 +569,7 @@ def test_options_of_a_film_are_refused_without_one(run: Terminal, out: Path) -> 
     messages = [error["message"] for error in refused.json["errors"]]
     assert refused.status == 2 and {*refused.codes} == {"Usage"}
     assert messages == [
-        f"{x} is of a film, and there is none" for x in ("--size", "--camera", "--poster")
+        f"{x} applies to a film, and there is none" for x in ("--size", "--camera", "--poster")
     ]
 
 

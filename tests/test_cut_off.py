@@ -84,7 +84,7 @@ def assert_told(run: Terminal, log: Path, html: Path) -> None:
     assert str(cut) == f"cut off at {cut.t:.2f} s: {cut.products} of {cut.units} units"
     told = run("monitor", log)
     assert told.status == 1
-    assert f"they explain the run as far as it goes, {cut}\n" in told.out
+    assert f"consistent with the net as far as it goes, {cut}\n" in told.out
     assert f"CutOff '{log}' is {cut.told}\n" in told.err
     document = run("monitor", log, "--json")
     assert document.status == 1 and document.json["refines_net"]
@@ -106,7 +106,7 @@ def test_a_run_that_makes_its_units_is_not_cut_off(run: Terminal, whole: Path, o
     assert log.complete and log.cut_off is None
     done = run("monitor", whole)
     assert done.status == 0 and not done.err
-    assert done.out.endswith("; they explain the run\nthe run succeeded\n")
+    assert done.out.endswith("; consistent with the net\nthe run succeeded\n")
     assert run("monitor", whole, "--json").json["cut_off"] is None
     assert run("report", whole, "-o", out / "a.html").status == 0
     words = Page((out / "a.html").read_text("utf-8")).words
@@ -141,7 +141,7 @@ def test_the_longest_time(run: Terminal, out: Path) -> None:
     words = "run", PAPER, "--units", 50, "--max-time", 1.5, "--monitor", "--log", log
     done = run(*words)
     assert done.status == 1
-    assert f"they explain the run as far as it goes, {cut_off(log)}\n" in done.out
+    assert f"consistent with the net as far as it goes, {cut_off(log)}\n" in done.out
     assert cut_off(log).t == pytest.approx(1.5, abs=0.011)
     assert cut_off(log).code == "Timeout" and "r3 in weld(sub2)" in cut_off(log).message
     assert_told(run, log, out / "a.html")

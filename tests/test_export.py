@@ -129,7 +129,7 @@ def test_what_takes_several_files_needs_a_place(run: Terminal, out: Path) -> Non
     assert (done.status, done.out) == (2, "")
     assert run("export", MESHES, "--format", "urdf", "-o", out / "m.urdf", "--json").status == 0
     files = files_in(out)
-    assert f"this takes {len(files)} files" in done.err
+    assert f"this format writes {len(files)} files" in done.err
     assert {name.partition("/")[0] for name in files} == {"m.urdf", "m_meshes"}
     named = set(re.findall(r'filename="([^"]*)"', files["m.urdf"].decode()))
     assert named == set(files) - {"m.urdf"}
@@ -140,7 +140,7 @@ def test_what_takes_several_files_needs_a_place(run: Terminal, out: Path) -> Non
     [
         (["--format", "dfx"], "Usage unknown format 'dfx'\n    did you mean 'dxf'?"),
         (["--format", "csv"], "Usage csv is made from a log; '{}' is a PAG\n    keep one first:"),
-        (["--format", "dxf", "--of", "x"], "Usage there is no choice with dxf, so no --of\n"),
+        (["--format", "dxf", "--of", "x"], "Usage format dxf offers no choice, so no --of\n"),
         (
             ["--format", "svg", "--of", "nett"],
             "Usage --of 'nett' is none of the views\n    did you mean",

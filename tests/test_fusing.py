@@ -282,9 +282,9 @@ def test_run_says_that_it_fuses(run: Terminal, tmp_path: Path) -> None:
     assert run("run", PAPER, "--json").json["fused"] is False
     log = tmp_path / "run.log"
     said = run("run", PAPER, "--fuse", "--monitor", "--log", log).out
-    assert "parts joined for good are one rigid body" in said
-    assert "they explain the run" in said
-    assert "they explain the run" in run("monitor", log).out
+    assert "parts joined for good are merged into one rigid body" in said
+    assert "consistent with the net" in said
+    assert "consistent with the net" in run("monitor", log).out
 
 
 @pytest.mark.parametrize("first", ["consumer", "maker"])

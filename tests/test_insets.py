@@ -339,16 +339,16 @@ def test_a_run_says_how_many_pairs_it_did_not_test(run: Terminal, tmp_path: Path
     file = tmp_path / "four.pag"
     file.write_text(FOUR)
     done = run("run", file)
-    told = "0 unintended contacts; 1 of 6 pairs were not tested against each other"
+    told = "0 unintended contacts; 1 of 6 pairs of parts not checked for collisions"
     assert f"{told} (list: -v)" in done.out and "clash" not in done.out
     verbose = run("run", file, "-v").out
-    assert f"{told}\n  not tested: a - b\n" in verbose
+    assert f"{told}\n  not checked: a - b\n" in verbose
     document = run("run", file, "--json").json
     assert (document["pairs_tested"], document["pairs_excluded"]) == (5, 1)
     assert document["excluded"] == [["a", "b"]]
     assert [one["code"] for one in document["warnings"]] == ["Overlap"]
     whole = run("run", file, "--overlap", 0.003).out
-    assert "0 unintended contacts, 0 engine warnings" in whole and "not tested" not in whole
+    assert "0 unintended contacts, 0 engine warnings" in whole and "not checked" not in whole
 
 
 def test_the_tolerance_is_a_setting(run: Terminal, tmp_path: Path) -> None:

@@ -521,7 +521,7 @@ def test_run_with_a_monitor(run: Terminal) -> None:
     assert document["monitor_time_s"] > 0
     spent = document["physics_time_s"] + document["supervisor_time_s"]
     assert spent == pytest.approx(document["wall_time_s"])
-    assert "they explain the run" in run("run", PAPER, "--monitor").out
+    assert "consistent with the net" in run("run", PAPER, "--monitor").out
     refused = run("run", PAPER, "--world", "ideal", "--monitor", "--json")
     assert refused.status == 2 and refused.codes == ["Usage"]
 

@@ -431,7 +431,7 @@ def test_the_option_and_the_table_say_the_same(run: Terminal, file: Path) -> Non
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--parallel", "sub2"], "no label with a number"),
+        (["--parallel", "sub2"], "not a label with a number"),
         (["--parallel", "sub2=0"], "0 is not in the range"),
         (["--parallel", "sub2=2", "--relay"], "--relay does not go with robots that have several"),
         (["--parallel", "part3=2"], "'part3' is made by the output robot"),

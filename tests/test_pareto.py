@@ -264,7 +264,7 @@ def test_the_command_tells_its_points(run: Terminal, out: Path) -> None:
     assert f"{count} points" in told.out
     said = f"{count} of {count} points were not run: their cycle times are predictions"
     assert said in told.out and said in (out / "front" / "pareto.html").read_text()
-    assert "3 robots at least, tools included" in told.out
+    assert "lower bound: 3 robots, tools included" in told.out
     assert "pareto.html" in told.out
 
 
@@ -362,7 +362,7 @@ def test_a_search_for_few_robots_shows_the_best(
     told: list[str] = []
     monkeypatch.setattr(StepBar, "show", lambda _, what, *words: told.append(f"{what} {words}"))
     assert run("check", PAPER, "--robots", "least", "--no-hands").status == 0
-    assert "looking for few robots" in told[-1]
+    assert "searching for few robots" in told[-1]
     assert re.search(r"best: 3 robots, \d\.\d\d s", told[-1])
 
 

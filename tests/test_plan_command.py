@@ -287,7 +287,7 @@ def test_no_pictures_are_made_after_a_signal(
     monkeypatch.setattr(StepBar, "show", stop)
     done = planning(LOADED)
     assert done.status == 0, done.err
-    assert "once more: at once" in done.err
+    assert "interrupt again to stop at once" in done.err
     assert not [name for name in files_in(tmp_path / "out") if name.endswith(("png", "mp4"))]
 
 

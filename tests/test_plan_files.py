@@ -295,7 +295,7 @@ def test_what_does_not_go_with_a_plan(run: Terminal, built: Path, tmp_path: Path
     ):
         done = run("check", plan, *words, "--json")
         assert done.status == 2 and done.codes == ["Usage"]
-        assert f"{words[0]} is for a PAG" in done.json["errors"][0]["message"]
+        assert f"{words[0]} applies to a PAG" in done.json["errors"][0]["message"]
     assert "laid out anew" not in run("run", plan, "--world", "ideal", "--speed", 1).err
     assert "other settings" in run("run", plan, "--world", "ideal", "--clearance", 0.03).err
     assert "other settings" in run("run", plan, "--world", "ideal", "--floor", "9x9").err

@@ -287,7 +287,7 @@ def test_a_net_has_no_guidepaths(run: Terminal, tmp_path: Path) -> None:
     file.write_text("<pnml/>")
     said = run("check", file, "--relay")
     assert said.status == 2
-    assert f"--relay is for a PAG; '{file}' is a net in PNML" in said.err
+    assert f"--relay applies to a PAG; '{file}' is a net in PNML" in said.err
 
 
 def test_sweeps_and_exports_with_relays_are_those_of_a_run(run: Terminal, out: Path) -> None:

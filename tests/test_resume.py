@@ -162,14 +162,14 @@ def test_the_whole_run_is_judged(run: Terminal, whole: Path, tmp_path: Path) -> 
     assert len(found["events"]) == len(read_log(whole).events)
     assert found["sim_time_s"] == pytest.approx(read_log(whole).time[-1])
     words = run("run", "--resume", cut(whole, log, whole.stat().st_size // 2)).out
-    assert "the run is made again until then" in words and f"{UNITS} of {UNITS} products" in words
+    assert "the run is repeated up to there" in words and f"{UNITS} of {UNITS} products" in words
 
 
 def test_a_run_that_is_at_its_end(run: Terminal, whole: Path, tmp_path: Path) -> None:
     log = cut(whole, tmp_path / "run.log", whole.stat().st_size)
     then = log.stat().st_mtime_ns
     done = run("run", "--resume", log)
-    assert done.status == 0 and f"has made its units, {UNITS} of {UNITS}" in done.out
+    assert done.status == 0 and f"is complete, {UNITS} of {UNITS} units" in done.out
     assert run("run", "--resume", log, "--json").json["products"] == UNITS
     assert log.stat().st_mtime_ns == then and log.read_bytes() == whole.read_bytes()
 

@@ -255,14 +255,14 @@ def test_runs_that_failed_before_are_not_forgotten(
     assert run(*words, "clearance=0.02,5,6").status == 1
     again = run(*words, "clearance=0.02,5,6")
     assert again.status == 1
-    failed = "3 of 3 were there, of which 2 failed; --retry runs them again"
+    failed = "3 of 3 already done, of which 2 failed; --retry runs them again"
     assert again.out == f"0 runs, 0 failed ({failed}): {database}\n"
     part = run(*words, "clearance=0.02,5,0.03", "--json")
     assert part.status == 1
     assert [part.json[key] for key in ("there", "there_failed", "done", "failed")] == [2, 1, 1, 0]
     good = run(*words, "clearance=0.02,0.03")
     assert good.status == 0
-    assert good.out == f"0 runs, 0 failed (2 of 2 were there): {database}\n"
+    assert good.out == f"0 runs, 0 failed (2 of 2 already done): {database}\n"
 
 
 def test_another_sweep_is_refused(tmp_path: Path, run: Terminal, here: None) -> None:
@@ -414,7 +414,7 @@ def test_bytes_that_are_not_what_they_were(run: Terminal, tmp_path: Path, here: 
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ([PAPER, "-o", "r.db"], "Usage nothing varies"),
+        ([PAPER, "-o", "r.db"], "Usage there is nothing to vary"),
         (["-o", "r.db", "--vary", "seed=1"], "Usage there is no FILE.pag"),
         ([PAPER, "--vary", "seed=1"], "Usage there is no database for the results"),
         (["--summary"], "Usage there is no database"),

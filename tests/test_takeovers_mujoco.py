@@ -352,7 +352,7 @@ def test_end_to_end(run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert (change["dead"], change["deputy"]) == ("r4", "r2")
     assert done.json["unintended_contacts"] == 0
     judged = run("monitor", log)
-    assert judged.status == 0 and "they explain the run" in judged.out
+    assert judged.status == 0 and "consistent with the net" in judged.out
     report, subject = watch_log(read_log(log))
     assert not report.violations and {robots for _, robots in subject.others} >= {(3,), (1,)}
     later = [one for one in report.seen if one.seen and one.seen > change["t"]]

@@ -275,7 +275,7 @@ def test_run_says_which_it_took(run: Terminal) -> None:
     done = run("run", PAPER, "--world", "ideal", "--json").json
     assert (done["timestep_s"], done["timestep_chosen"]) == (None, None)
     assert "timestep 10 ms, chosen" in run("run", PAPER).out
-    assert "timestep 4 ms, as asked for" in run("run", PAPER, "--timestep", "0.004").out
+    assert "timestep 4 ms, as requested" in run("run", PAPER, "--timestep", "0.004").out
 
 
 def test_an_option_comes_before_the_environment_and_that_before_the_file(

@@ -132,7 +132,7 @@ def test_the_monitor_on_a_log_with_failures(run: Terminal, tmp_path: Path) -> No
     assert log.undone
     found = run("monitor", tmp_path / "log", "--json").json
     assert found["refines_net"] and found["violations"] == []
-    assert "in which nothing failed" in run("monitor", tmp_path / "log").out
+    assert "without a failure or a repair" in run("monitor", tmp_path / "log").out
     after, undone = log.undone[0]
     less = replace(undone, transitions=undone.transitions[1:])
     report, _ = watch_log(replace(log, undone=((after, less), *log.undone[1:])))

@@ -103,7 +103,7 @@ def _refusal(error: BaseException) -> FactoryError:
     if isinstance(error, OSError):
         return _unwritten(error)
     if isinstance(error, MemoryError):
-        message = f"there is not enough memory: {error or 'no more to be had'}"
+        message = f"out of memory{error and f': {error}'}"
         return MissingError(Diagnostic("Missing", message, None, "take a smaller product"))
     if isinstance(error, RecursionError):
         message = "the input is nested too deeply"
@@ -111,7 +111,7 @@ def _refusal(error: BaseException) -> FactoryError:
     if os.environ.get("FACTORY_TRACEBACK"):
         raise error
     message = f"{type(error).__name__}: {error}"
-    hint = "a fault of factory: please report it, with what FACTORY_TRACEBACK=1 prints"
+    hint = "a bug in factory: please report it, with the output of FACTORY_TRACEBACK=1"
     return InputError(Diagnostic("Internal", message, None, hint))
 
 
@@ -180,7 +180,7 @@ class _Commands(click.Group):
 
 @click.group(cls=_Commands, context_settings=CONTEXT, invoke_without_command=True)
 @click.option("--version", is_flag=True, help="Show the version and exit.")
-@click.option("--explain", type=Code(), help="Say more about the code of an error and exit.")
+@click.option("--explain", type=Code(), help="Explain the code of an error and exit.")
 @click.option("--json", "as_json", is_flag=True, hidden=True)
 @click.pass_context
 def cli(ctx: click.Context, version: bool, explain: str | None, as_json: bool) -> None:

@@ -37,7 +37,7 @@ ALLOW = click.option(
     "--allow",
     multiple=True,
     type=OverlapOption(),
-    help="An overlap that is meant: a:b, a:b:0.5mm, or 0.5mm everywhere (repeatable).",
+    help="Accept an overlap: a:b, a:b:0.5mm, or 0.5mm everywhere (repeatable).",
 )
 
 

@@ -84,22 +84,22 @@ class AnalyzeOptions:
 
 @click.command(cls=Grouped)
 @SOURCE
-@click.option("--units", type=click.IntRange(1, 10_000), default=20, help="Products to look at.")
+@click.option("--units", type=click.IntRange(1, 10_000), default=20, help="Number of products.")
 @click.option(
     "--world",
     type=click.Choice(["mujoco", "ideal"]),
     default="mujoco",
-    help="Whose times: MuJoCo's, or those of the paper's ideal world.",
+    help="World whose timing is analysed: MuJoCo, or the paper's ideal world.",
 )
 @DRAW
 @WIP
-@click.option("--second", "seconds", multiple=True, help="What if: another such robot, as r4.")
-@click.option("--faster", multiple=True, help="What if: a robot faster by so many percent, r4=20.")
-@click.option("--shorter", multiple=True, help="What if: its ways shorter by percent, r4=20.")
-@click.option("--measured", type=PATH, help="Compare with the LOG of a run, made as that was.")
-@click.option("--run", "on_the_spot", is_flag=True, help="Compare with a run of these units.")
+@click.option("--second", "seconds", multiple=True, help="What-if: a second robot like r4.")
+@click.option("--faster", multiple=True, help="What-if: a robot faster by percent, r4=20.")
+@click.option("--shorter", multiple=True, help="What-if: its paths shorter by percent, r4=20.")
+@click.option("--measured", type=PATH, help="Compare with the LOG of a run, under its settings.")
+@click.option("--run", "on_the_spot", is_flag=True, help="Compare with a run of --units.")
 @click.option("--delays", type=PATH, help="For a net in PNML: a TOML file of place = seconds.")
-@click.option("-o", "--output", type=PATH, help="A picture: .svg or .png.")
+@click.option("-o", "--output", type=PATH, help="Write a picture (.svg or .png).")
 @gathered(AnalyzeOptions, "study")
 @RUNS
 @FLOOR
@@ -114,7 +114,7 @@ def analyze(
     delays: Path | None,
     output: Path | None,
 ) -> int:
-    """Say what sets the pace of FILE.pag (or of a net in FILE.pnml), and what would change it."""
+    """Find the bottleneck of FILE.pag (or of a net in FILE.pnml), and what would relieve it."""
     from factory.support.files import is_net
 
     if is_net(given.file):

@@ -32,10 +32,10 @@ SHOWN = 20
 
 @click.command(cls=Grouped)
 @SOURCE
-@click.option("--mjcf", type=PATH, help="Write the model as one XML here.")
-@click.option("-o", "--output", type=PATH, help="Write everything in a folder.")
+@click.option("--mjcf", type=PATH, help="Write the MJCF model as one XML file.")
+@click.option("-o", "--output", type=PATH, help="Folder for all output files.")
 @click.option(
-    "--units", type=click.IntRange(1, 10**9), help="Size the pool of parts for so many products."
+    "--units", type=click.IntRange(1, 10**9), help="Number of products to size the part pool for."
 )
 @WIP
 @FLOOR
@@ -89,7 +89,7 @@ def build(
         for line in (*kept["lines"], *_listed(kept["document"]["files"], out.verbose)):
             say(line)
         if is_current:
-            say("nothing has changed since: these files are up to date")
+            say("nothing has changed: these files are up to date")
     return 0
 
 
@@ -144,7 +144,7 @@ def _printed(project: Project, built: Built, spent: float, wip: int | None) -> d
         document["bores"] = [bore.as_json() for bore in drilled]
     if drilled:
         where = ", ".join(dict.fromkeys(bore.label for bore in drilled))
-        lines.append(f"hands hold by pins in bores of {where} (where: --json)")
+        lines.append(f"hands grip with pins in bores of {where} (positions: --json)")
     every, brief = (
         printed([*map(warning, told(project.warnings, all_))], "warnings") for all_ in (True, False)
     )

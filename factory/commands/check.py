@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 SHOWN = 24
 """The most robots that are printed, unless `-v` asks for all."""
 
-PICTURES = "Write a picture of each blocked operation, and of what no hand can hold, in a folder."
-"""What `--clashes` does."""
+PICTURES = "Folder for pictures of blocked operations and of parts that no hand can hold."
+"""The help of `--clashes`."""
 
 AGAINST = 3
 """The most that is printed against one property, unless `-v` asks for all."""
@@ -44,8 +44,8 @@ POOLED = 8
 
 @click.command(cls=Grouped)
 @SOURCE
-@click.option("--certificate", type=PATH, help="Write the proof here.")
-@click.option("--against", type=PATH, help="Check a proof that --certificate has written.")
+@click.option("--certificate", type=PATH, help="Write the proof to this file.")
+@click.option("--against", type=PATH, help="Check a proof written by --certificate.")
 @WIP
 @ALLOW
 @click.option("--clashes", type=PATH, help=PICTURES)
@@ -61,7 +61,7 @@ def check(
     wip: int | None,
     clashes: Path | None,
 ) -> int:
-    """Parse, compile and prove FILE.pag (or a net in FILE.pnml); or check its certificate."""
+    """Parse, compile and prove FILE.pag (or a net in FILE.pnml), or check its certificate."""
     from factory.study.checking import check_net, check_project
     from factory.support.files import own_names, write_all, write_text
 
@@ -173,7 +173,8 @@ def _describe(checked: Checked, verbose: bool) -> None:
     if checked.pool:
         most = sorted(checked.pool.items(), key=lambda item: -item[1])[:POOLED]
         listed = ", ".join(f"{label} {count}" for label, count in most)
-        say(f"copies inside at once: {listed}{', ...' if len(checked.pool) > POOLED else ''}")
+        more = ", ..." if len(checked.pool) > POOLED else ""
+        say(f"copies of each part inside at once: {listed}{more}")
     if checked.matings is not None:
         _describe_approaches(checked.matings)
     if "deputies" in document:
@@ -212,8 +213,8 @@ def _describe_approaches(matings: Matings) -> None:
     strict, no_deeper, left_out = (matings.count(level) for level in (3, 2, 1))
     lowered, blocked = len(matings.of_kind("lower")), len(matings.of_kind("blocked"))
     say(
-        f"approach: {left_out} of {len(matings.all)} operations clean with finished overlaps left"
-        f" out, {no_deeper} with paths no deeper, {strict} strictly; {lowered} lowered,"
+        f"approach: {left_out} of {len(matings.all)} operations clear but for overlaps"
+        f" when finished, {no_deeper} never deeper, {strict} strictly; {lowered} lowered,"
         f" {blocked} blocked{' (--clashes DIR draws each)' if blocked else ''}"
     )
 

@@ -1,4 +1,4 @@
-"""The command `doctor`: what works on this machine, and the one line that mends what does not."""
+"""The command `doctor`: what works on this machine, and a command that repairs the rest."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ PACKAGES = (
 @click.command()
 @OUTPUT
 def doctor(out: OutputOptions) -> int:
-    """Say what works on this machine, and what would mend the rest."""
+    """Report what works on this machine, and how to repair the rest."""
     findings = examine()
     good = all(f.ok for f in findings)
     extras = [_extra(name) for name in EXTRAS]
@@ -57,7 +57,7 @@ def doctor(out: OutputOptions) -> int:
             say(f"{'ok     ' if finding.ok else 'MISSING'} {finding.name}: {finding.found}")
             if not finding.ok:
                 say(f"        {finding.mend}")
-        say("extras, none of which is needed for the rest:")
+        say("optional extras:")
         for extra in extras:
             here = extra.found if extra.ok else f"not installed: {extra.mend}"
             say(f"  {extra.name:10} {EXTRAS[extra.name][1]}: {here}")

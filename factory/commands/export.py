@@ -67,9 +67,9 @@ class _Format(click.ParamType[str]):
 
 @click.command(cls=_Listing)
 @SOURCE
-@click.option("--format", "form", type=_Format(), required=True, help="One of those below.")
-@click.option("-o", "--output", type=PATH, help="A file; stdout without, for texts.")
-@click.option("--of", default="", help="What to export of it, where a format offers a choice.")
+@click.option("--format", "form", type=_Format(), required=True, help="A format listed below.")
+@click.option("-o", "--output", type=PATH, help="Output file (default: stdout, for text formats).")
+@click.option("--of", default="", help="What to export, where a format offers a choice.")
 @FLOOR
 @RELAY
 @MOTION
@@ -141,8 +141,8 @@ def _exporter(form: str, of: str) -> Exporter:
         raise InputError(Diagnostic("Usage", f"unknown format '{form}'", None, hint))
     if of and not known[form].of:
         some = ", ".join(f"{e.format} ({e.of})" for e in known.values() if e.of)
-        message = f"there is no choice with {form}, so no --of"
-        raise InputError(Diagnostic("Usage", message, None, f"there is with {some}"))
+        message = f"format {form} offers no choice, so no --of"
+        raise InputError(Diagnostic("Usage", message, None, f"a choice is offered by {some}"))
     return known[form]
 
 
@@ -169,7 +169,7 @@ def _files(made: Made, output: Path | None, whole: bool) -> dict[Path, bytes]:
         content = made.encode() if isinstance(made, str) else made
         return {} if output is None else {output: content}
     if output is None:
-        message = f"this takes {len(made)} files"
+        message = f"this format writes {len(made)} files"
         raise InputError(Diagnostic("Usage", message, None, "give -o OUT for the first of them"))
     folder = output if whole else output.parent
     return {folder / name if name else output: content for name, content in made.items()}

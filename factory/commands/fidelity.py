@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING
 import click
 
 from factory.commands.grouped import Grouped
-from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, RELAY, SECONDS, SOURCE, Number
+from factory.commands.options import (
+    FLOOR,
+    JOBS,
+    MOTION,
+    OUTPUT,
+    PATH,
+    RELAY,
+    SECONDS,
+    SOURCE,
+    Number,
+)
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced
@@ -22,27 +32,28 @@ if TYPE_CHECKING:
 
 @click.command(cls=Grouped)
 @SOURCE
-@click.option("--seeds", type=click.IntRange(1, 10_000), default=5, help="Runs, seeds 0 to K - 1.")
+@click.option(
+    "--seeds", type=click.IntRange(1, 10_000), default=5, help="Number of runs: seeds 0 to K - 1."
+)
 @click.option(
     "--units",
     type=click.IntRange(1, 10**6),
-    help="Products of each run; default: as many, 4 to 100, as it takes until they come at the pace"
-    " of the net.",
+    help="Products per run (default: 4 to 100, until the cycle time is that of the net).",
 )
 @click.option(
     "--jitter",
     type=Number(0, 0.9),
     default=0.3,
-    help="Draw each robot's speed and gain within ± this share.",
+    help="Draw each robot's speed and gain at random within ± this fraction.",
 )
-@click.option("--jobs", type=click.IntRange(1, 1024), help="Processes; default: the cores.")
+@JOBS
 @click.option(
     "--convergence/--no-convergence",
     default=True,
-    help="Study seed 0 with other timesteps and weld stiffnesses too.",
+    help="Repeat seed 0 with other timesteps and weld stiffnesses.",
 )
-@click.option("-o", "--output", type=PATH, help="A folder for a report, or a .json file.")
-@click.option("--max-time", type=SECONDS, help="Stop a run after this time [s].")
+@click.option("-o", "--output", type=PATH, help="Folder for a report, or a .json file.")
+@click.option("--max-time", type=SECONDS, help="Stop a run after this simulated time [s].")
 @FLOOR
 @RELAY
 @MOTION
@@ -122,6 +133,6 @@ def _tell(found: Fidelity, studied: Study | None, verbose: bool) -> None:
     say("all runs passed" if found.passed else "SOME RUN FAILED")
     for record in found.seeds:
         for pair in record.contacts:
-            say(f"  seed {record.seed} touched: {pair}")
+            say(f"  seed {record.seed}, contact: {pair}")
         for penetration in record.hidden if verbose else ():
-            say(f"  seed {record.seed}, one inside the other by {penetration}")
+            say(f"  seed {record.seed}, penetration: {penetration}")

@@ -17,14 +17,14 @@ def for_a_pag(file: Path, kind: str, *but: str) -> None:
     given on the command line `but` these, and those of OUTPUT. Raises InputError (Usage) with every
     one."""
     but = (*but, "file", "as_json", "quiet", "verbose")
-    words, hint = f"is for a PAG; '{file}' is {kind}", "leave it out"
+    words, hint = f"applies to a PAG; '{file}' is {kind}", "leave it out"
     _refuse_given(lambda name: name not in but, words, hint)
 
 
 def for_a_film() -> None:
     """Refuses the options of PICTURE that are given on the command line where nothing is filmed.
     Raises InputError (Usage) with every one."""
-    words, hint = "is of a film, and there is none", "give --video OUT.mp4 as well"
+    words, hint = "applies to a film, and there is none", "add --video OUT.mp4"
     _refuse_given(OF_A_PICTURE.__contains__, words, hint)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, cast
 
 import click
 
-from factory.commands.options import OUTPUT, PATH
+from factory.commands.options import LIBRARY, OUTPUT, PATH, TEMPLATES
 from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions
 from factory.commands.warnings import announced
@@ -24,12 +24,15 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 
 @click.command("import")
 @click.argument("source", type=PATH)
-@click.option("-o", "--output", type=PATH, help="The folder to write; named after SOURCE without.")
-@click.option("--library", type=PATH, envvar="LDRAWDIR", help="An LDraw parts library.")
-@click.option("--boxes", is_flag=True, help="Parts whose shape is missing become boxes.")
-@click.option("--meshes", type=PATH, help="Where the meshes of a tree or a bill are.")
+@click.option("-o", "--output", type=PATH, help="Output folder (default: named after SOURCE).")
+@LIBRARY
+@click.option("--boxes", is_flag=True, help="Use boxes for parts without a shape.")
+@click.option("--meshes", type=PATH, help="Folder of the meshes of a tree or a bill.")
 @click.option(
-    "--unit", type=click.Choice(list(UNITS)), default="m", help="Of a tree, a bill, their meshes."
+    "--unit",
+    type=click.Choice(list(UNITS)),
+    default="m",
+    help="Unit of a tree, a bill, their meshes.",
 )
 @click.option(
     "--mates",
@@ -37,13 +40,7 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
     default="many",
     help="Mate all inputs in one operation, or two at a time.",
 )
-@click.option(
-    "--templates",
-    "folders",
-    multiple=True,
-    type=PATH,
-    help="A folder of further operations, searched first (repeatable).",
-)
+@TEMPLATES
 @OUTPUT
 def import_(
     out: OutputOptions,
@@ -56,8 +53,8 @@ def import_(
     mates: str,
     folders: tuple[Path, ...],
 ) -> int:
-    """Make a PAG of SOURCE: an LDraw model (.ldr, .mpd), a tree of meshes (.json, .yaml), a bill of
-    materials with levels (.csv), or a folder with one of these."""
+    """Convert SOURCE to a PAG: an LDraw model (.ldr, .mpd), a tree of meshes (.json, .yaml), a bill
+    of materials with levels (.csv), or a folder with one of these."""
     from factory.importing import Options, import_product
     from factory.importing.assembling import Mates
     from factory.pipeline import all_templates
@@ -75,7 +72,7 @@ def import_(
     own_names(folder, files)
     write_all(files)
     pag, meshes_made = next(iter(files)), len(files) - 1
-    with Waiting("looking at the shapes", out.silent):
+    with Waiting("checking the shapes", out.silent):
         shapes = _shape_warnings(pag, templates)
     warnings = announced((*product.warnings, *shapes), out)
     parts = sum(1 for _ in product.pag.parts())
@@ -95,7 +92,7 @@ def import_(
         operations = len(product.pag) - parts
         say(f"{pag}: parts {parts}, operations {operations}, meshes {meshes_made}")
         for allowed in product.pag.allowed:
-            say(f"its drawing has no fits: overlaps up to {1e3 * allowed.depth:g} mm are allowed")
+            say(f"the source has no fits: overlaps up to {1e3 * allowed.depth:g} mm are allowed")
         for path in files if out.verbose else ():
             say(f"  {path}")
     return 0

@@ -39,18 +39,18 @@ def cannot(found: CannotAssemble, pictures: list[Path]) -> Diagnostic:
     """That parts interlock, what shows it, and what would help."""
     stuck = "; ".join(map(_held, found.interlocks))
     more = " and ".join(found.removal.labels)
-    fewest = "no fewer parts do" if found.removal.smallest else "fewer may do"
+    fewest = "the fewest parts" if found.removal.smallest else "perhaps fewer suffice"
     pairs = [":".join(lock.labels) for lock in found.interlocks if len(lock.labels) == 2]
     every = len(pairs) == len(found.interlocks)
     options = " ".join(f"--allow {name}" for name in (pairs if every else found.removal.labels))
     shown = f" (see {listing(map(str, pictures), 2)})" if pictures else ""
-    message = f"no straight motion along x, y or z divides these parts: {stuck}{shown}"
-    hint = f"without {more} the rest can be joined ({fewest}); {options} lets parts clash"
+    message = f"no straight motion along x, y or z separates these parts: {stuck}{shown}"
+    hint = f"without {more} the rest can be joined ({fewest}); {options} accepts the clash"
     if found.needs:
         from factory.planning.posing import in_words
 
         ways = [f"{listing(labels)} along {in_words(way)}" for labels, way in found.needs]
-        hint = f"no turn brings all ways along axes ({'; '.join(ways)}); {hint}"
+        hint = f"no orientation aligns all motions with axes ({'; '.join(ways)}); {hint}"
     return Diagnostic("CannotAssemble", message, None, hint)
 
 

@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 @LENIENT
 @OUTPUT
 def monitor(file: Path, lenient: bool, out: OutputOptions) -> int:
-    """Judge the run in a LOG that `run --log` has kept against its net, from its states; where
-    something failed, from those between failures, and from what fired and was undone.
+    """Check the run in a LOG, written by `run --log`, against its net, from the recorded states;
+    after failures, from the states between these, and from what fired and was undone.
 
-    The status is 1 for a run that does not follow its net, in which bodies did otherwise than the
-    net says, or that was cut off before its units were made, and 2 for a LOG that ends before there
-    is anything to judge."""
+    The exit status is 1 if the run does not follow its net, moves bodies other than the net says,
+    or was cut off before its units were made, and 2 if the LOG ends before there is anything to
+    check."""
     from factory.record.log import read_log
     from factory.record.monitor.record import verdict_on, watch_log
     from factory.simulation.remade import model_faults
@@ -59,7 +59,7 @@ def monitor(file: Path, lenient: bool, out: OutputOptions) -> int:
             say_verdict(verdict, out.verbose)
         say(found_by(report, log.cut_off))
         if why:
-            say(f"its model was not compared with that of its PAG: {why}")
+            say(f"the model was not compared with that of the PAG: {why}")
         if log.failures is not None:
             say_failures(log.failures, out.verbose)
         if verdict.succeeded:
@@ -80,7 +80,7 @@ def say_verdict(verdict: RunVerdict, verbose: bool = False) -> None:
     failures = verdict.failures if verbose else verdict.gathered
     lines = [f"{failure.code}: {failure.message}" for failure in failures]
     if verdict.succeeded:
-        say("the run succeeded" + (", as --lenient leaves this out:" if lines else ""))
+        say("the run succeeded" + (", with --lenient, in spite of:" if lines else ""))
     else:
         say(f"the run FAILED: {lines.pop(0)}")
     for line in lines:
@@ -92,12 +92,12 @@ def say_verdict(verdict: RunVerdict, verbose: bool = False) -> None:
 
 def found_by(report: Report, cut_off: CutOff | None) -> str:
     """What a monitor found, in a line for people."""
-    counts = f"{len(report.seen)} firings seen, {len(report.inferred)} inferred"
+    counts = f"{len(report.seen)} firings observed, {len(report.inferred)} inferred"
     judged = f"{len(report.violations)} VIOLATIONS"
     if report.refines_net:
-        judged = f"they explain the run{' as far as it goes' if cut_off else ''}"
+        judged = f"consistent with the net{' as far as it goes' if cut_off else ''}"
     if report.calm_s is not None:
-        judged += f" in the {report.calm_s:.1f} s in which nothing failed or was put right"
+        judged += f" in the {report.calm_s:.1f} s without a failure or a repair"
     return f"monitor: {counts}; {judged}" + (f", {cut_off}" if cut_off else "")
 
 
@@ -109,11 +109,11 @@ def say_failures(failures: Failures, verbose: bool) -> None:
     say(
         f"{len(failures.found)} failures, {failures.undone} transitions undone,"
         f" {failures.scrapped} scrapped, {failures.spares} spares used,"
-        f" {failures.contacts} contacts with what fell or lay askew"
+        f" {failures.contacts} contacts with fallen or misplaced parts"
     )
     if failures.binned or failures.spilled:
         spilled = ", ".join(failures.spilled)
-        none = f"; no bin for that of {spilled}" if spilled else ""
+        none = f"; no bin for the scrap of {spilled}" if spilled else ""
         say(f"scrap in bins: {failures.binned}{none}")
     for one in failures.found if verbose else ():
         say(f"  {one.t:.2f} s: {one}")

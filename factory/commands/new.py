@@ -28,7 +28,7 @@ GRIP = "0 0, 9 0, 12 15, 13 32, 10 52, 7 60, 0 60"
 @click.argument("name", type=PATH)
 @OUTPUT
 def new(name: Path, out: OutputOptions) -> int:
-    """Write a small product to start from in a new folder NAME."""
+    """Write a small example product to a new folder NAME."""
     from factory.support.files import write_all
 
     files = {name / path: content for path, content in starter(name.name).items()}

@@ -24,7 +24,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 PATH = click.Path(path_type=Path, readable=False)
-"""A path as it is given; the stage that opens it reports its faults, as diagnostics."""
+"""A path that is not checked here: the stage that opens it reports its faults."""
 
 
 class PagPath(click.Path):
@@ -129,23 +129,20 @@ def gathered(kind: type, name: str) -> Callable[[F], F]:
 
 
 OUTPUT = options(
-    click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout."),
+    click.option("--json", "as_json", is_flag=True, help="Print one JSON document to stdout."),
     click.option("-q", "--quiet", is_flag=True, help="No progress, no warnings."),
-    click.option("-v", "--verbose", is_flag=True, help="Say more."),
+    click.option("-v", "--verbose", is_flag=True, help="Print more detail."),
     gathered(OutputOptions, "out"),
 )
 PROJECT = gathered(ProjectOptions, "given")
-SOURCE = options(
-    click.argument("file", type=PAG_PATH),
-    click.option(
-        "--templates",
-        "folders",
-        multiple=True,
-        type=PATH,
-        help="A folder of further operations, searched first (repeatable).",
-    ),
-    PROJECT,
+TEMPLATES = click.option(
+    "--templates",
+    "folders",
+    multiple=True,
+    type=PATH,
+    help="Folder of additional operation templates, searched first (repeatable).",
 )
+SOURCE = options(click.argument("file", type=PAG_PATH), TEMPLATES, PROJECT)
 
 
 class Number(click.FloatRange):
@@ -183,7 +180,7 @@ class Branch(click.ParamType[tuple[str, int]]):
             return value
         label, equals, number = value.rpartition("=")
         if not equals or not label.strip():
-            self.fail(f"'{value}' is no label with a number, as sub2=3.", param, ctx)
+            self.fail(f"'{value}' is not a label with a number, such as sub2=3.", param, ctx)
         return label.strip(), click.IntRange(1, MOST_BRANCHES).convert(number, param, ctx)
 
 
@@ -199,87 +196,101 @@ class RobotCount(click.ParamType[int | str]):
 HANDS = click.option(
     "--hands/--no-hands",
     default=None,
-    help="Robots hold by solid hands that are chosen from the geometry of the parts.",
+    help="Give robots solid hands (grippers), chosen from the geometry of the parts.",
 )
 MOTION = options(
-    click.option("--speed", type=float, help="Speed of a robot [m/s]."),
-    click.option("--acceleration", type=float, help="Acceleration of a robot [m/s²]."),
-    click.option("--force", type=float, help="Actuator limit, as a multiple of what is needed."),
+    click.option("--speed", type=float, help="Robot speed [m/s]."),
+    click.option("--acceleration", type=float, help="Robot acceleration [m/s²]."),
+    click.option(
+        "--force", type=float, help="Actuator force limit, as a multiple of the force needed."
+    ),
     click.option(
         "--timestep",
         type=Timestep(),
-        help="The engine's timestep [s]; auto, the default: as long as the drives allow.",
+        help="Timestep of the physics engine [s]; auto (default): the longest that drives allow.",
     ),
     click.option(
         "--substeps",
         type=click.IntRange(1),
-        help="Timesteps in a supervisor's tick (of 10 ms by default).",
+        help="Timesteps per supervisor tick (default: as many as fit into 10 ms).",
     ),
     click.option(
         "--overlap",
         type=float,
-        help="Parts that overlap by no more are tested against each other [m]; 0.0005 by default.",
+        help="Largest overlap of two parts whose collisions are checked [m] (default: 0.0005).",
     ),
     click.option(
         "--stage/--no-stage",
         default=None,
-        help="Robots that wait empty-handed go ahead to where they are needed next.",
+        help="Move idle robots ahead to where they are needed next.",
     ),
     HANDS,
 )
 FLOOR = options(
-    click.option("--clearance", type=float, help="Least distance between things [m]."),
-    click.option("--floor", help="Width x depth of the floor there is [m], as 4x3."),
+    click.option("--clearance", type=float, help="Minimum distance between moving bodies [m]."),
+    click.option("--floor", help="Available floor, width x depth [m], for example 4x3."),
 )
 RELAY = options(
     click.option(
-        "--relay", is_flag=True, help="Share guidepaths that set the pace among several robots."
+        "--relay",
+        is_flag=True,
+        help="Divide the guidepaths that limit the cycle time among several robots.",
     ),
     click.option(
         "--cycle",
         type=SECONDS,
-        help="The cycle time to be reached [s], with few robots; with relays where it takes them.",
+        help="Target cycle time [s], met with few robots, and with relays where needed.",
     ),
     click.option(
         "--robots",
         type=RobotCount(),
-        help="At most so many robots, tools included, as fast as found; or as few as found: least.",
+        help="Maximum number of robots, tools included; `least`: the fewest that are found.",
     ),
     click.option(
         "--parallel",
         type=Branch(),
         multiple=True,
-        help="So many branches make and bring a label in turn, as sub2=3 (repeatable).",
+        help="Number of branches that make a label in turn, for example sub2=3 (repeatable).",
     ),
     click.option(
-        "--deputies", is_flag=True, help="Robots can take over for others, where there is room."
+        "--deputies", is_flag=True, help="Let robots take over for others where there is room."
     ),
     click.option(
         "--effort",
         type=click.IntRange(1, 10**6),
-        help="To look for few robots: so many factories are laid out; 8 to 100 by default.",
+        help="Number of factories to lay out in the search for few robots (default: 8 to 100).",
     ),
     click.option(
         "--seconds",
         "limit",
         type=SECONDS,
-        help="No factory is laid out after so long [s]; it is said where that ends the search.",
+        help="Time limit of the search for few robots [s]; a search that it cuts short says so.",
     ),
 )
 WIP = click.option(
-    "--wip", type=click.IntRange(1, 10**9), help="Copies of each part let in at once."
+    "--wip",
+    type=click.IntRange(1, 10**9),
+    help="Work in progress: most copies of each part inside.",
 )
 RUNS = gathered(RunOptions, "asked")
+JOBS = click.option(
+    "--jobs", type=click.IntRange(1, 1024), help="Number of processes (default: one per core)."
+)
+LIBRARY = click.option(
+    "--library", type=PATH, envvar="LDRAWDIR", help="Folder of an LDraw parts library."
+)
 LENIENT = click.option(
-    "--lenient", is_flag=True, help="A run succeeds whatever its bodies do, if it makes its units."
+    "--lenient",
+    is_flag=True,
+    help="Let a run that makes its units succeed, whatever its bodies do.",
 )
 DRAW = options(
-    click.option("--seed", type=SEEDS, default=0, help="Of what jitter draws."),
+    click.option("--seed", type=SEEDS, default=0, help="Random seed of --jitter."),
     click.option(
         "--jitter",
         type=Number(0, 0.9),
         default=0.0,
-        help="Draw each robot's speed and gain within ± this share.",
+        help="Draw each robot's speed and gain at random within ± this fraction.",
     ),
 )
 RUN = options(
@@ -289,7 +300,9 @@ RUN = options(
         default="mujoco",
         help="MuJoCo's physics, or the paper's ideal world.",
     ),
-    click.option("--units", type=click.IntRange(1, 10**9), default=1, help="Products to make."),
+    click.option(
+        "--units", type=click.IntRange(1, 10**9), default=1, help="Number of products to make."
+    ),
     DRAW,
     WIP,
     click.option(
@@ -298,34 +311,36 @@ RUN = options(
     click.option(
         "--fuse/--no-fuse",
         default=None,
-        help="Parts joined for good become one rigid body; by itself for large factories.",
+        help="Merge parts joined for good into one rigid body (default: in large factories).",
     ),
     click.option("--max-time", type=SECONDS, help="Stop after this simulated time [s]."),
     RUNS,
 )
 FAULTS = options(
-    click.option("--faults", type=PATH, help="What goes wrong in the run (.toml)."),
-    click.option("--spares", type=click.IntRange(0, 10**6), default=0, help="Robots in the depot."),
-    click.option("--swap", type=SECONDS, help="To replace a dead robot takes so long [s]."),
+    click.option("--faults", type=PATH, help="Faults to inject into the run (.toml)."),
+    click.option(
+        "--spares", type=click.IntRange(0, 10**6), default=0, help="Number of spare robots."
+    ),
+    click.option("--swap", type=SECONDS, help="Time to replace a dead robot [s]."),
 )
 PICTURE = options(
-    click.option("--size", default="1280x720", help="Of the picture, as 1280x720."),
-    click.option("--fps", type=click.IntRange(1, 120), default=30, help="Pictures a second."),
+    click.option("--size", default="1280x720", help="Picture size, for example 1280x720."),
+    click.option("--fps", type=click.IntRange(1, 120), default=30, help="Frames per second."),
     click.option(
         "--camera",
         type=CameraName(),
         default="overview",
-        help="overview, orbit, top, product, part:LABEL to follow a part, or handover:LABEL to look"
-        " from near by where it is taken.",
+        help="overview, orbit, top, product, part:LABEL to follow a part, or handover:LABEL for a"
+        " close-up of its hand-over.",
     ),
     click.option(
         "--with",
         "panels",
         type=Suggested("net", "gantt", "net,gantt"),
-        help="Beside the 3-D: net, gantt or net,gantt (modes over time).",
+        help="Panels beside the 3-D view: net, gantt (modes over time) or net,gantt.",
     ),
-    click.option("--title", default="", help="Shown at the beginning of a film."),
-    click.option("--poster", type=PATH, help="A still of a film's best moment (.png)."),
+    click.option("--title", default="", help="Title at the start of a film."),
+    click.option("--poster", type=PATH, help="Write a still of a film's best moment (.png)."),
     gathered(PictureOptions, "shown"),
 )
 OF_A_PICTURE = tuple(field.name for field in fields(PictureOptions))

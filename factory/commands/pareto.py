@@ -33,26 +33,26 @@ PAGE_NAME = "pareto.html"
     "trials",
     type=click.IntRange(0, 1000),
     default=0,
-    help="Run so many points, spread over the front, in both worlds.",
+    help="Number of points, spread over the front, to run in both worlds.",
 )
 @click.option(
-    "-o", "--output", type=PATH, help="A folder for a page, and for the files of each point."
+    "-o", "--output", type=PATH, help="Folder for a web page and the files of each point."
 )
 @click.option(
     "--effort",
     type=click.IntRange(1, 10**6),
-    help="So many factories are laid out; by default 16 to 200, by the size of the product.",
+    help="Number of factories to lay out (default: 16 to 200, by the size of the product).",
 )
 @click.option(
     "--seconds",
     "limit",
     type=SECONDS,
-    help="Nothing more is looked at after so long [s]; that is said.",
+    help="Time limit of the search [s]; a search that it cuts short says so.",
 )
 @click.option(
     "--layouts/--no-layouts",
     default=True,
-    help="Lay points out and certify them, which is the default, or go by estimates.",
+    help="Lay out and certify the points (default), or estimate them.",
 )
 @FLOOR
 @MOTION
@@ -64,11 +64,10 @@ def pareto(
     output: Path | None,
     layouts: bool,
 ) -> int:
-    """Look for the factories for FILE.pag of which no other is as good in robots, cycle time and
-    floor.
+    """Find the Pareto-optimal factories for FILE.pag in robots, cycle time and floor area.
 
-    Ctrl-C ends the search: what was found until then is told and written. The status is 1 where a
-    point that was run fails, or is further than 2 % from its prediction."""
+    Ctrl-C ends the search; the points found until then are printed and written. The exit status
+    is 1 if a point that was run fails, or differs from its prediction by more than 2 %."""
     from factory.study.pareto import Effort
 
     if trials and not layouts:
@@ -106,7 +105,7 @@ def _found(
     from factory.support.progress import StepBar
 
     front = None
-    with StepBar("looking for the front", out.silent) as bar:
+    with StepBar("searching for the front", out.silent) as bar:
 
         def seen(step: Step) -> None:
             bar.show(step.what, step.done, step.total, f"{step.points} points" * bool(step.points))
@@ -161,7 +160,7 @@ def _tell(front: ParetoFront, commands: Sequence[str | None]) -> None:
     table(title, tuple(heads), rows)
     if front.written is not None:
         say(f"as written: {front.written}")
-    say(f"{front.least.total} robots at least, tools included")
+    say(f"lower bound: {front.least.total} robots, tools included")
     if front.unproved:
         say(front.unproved)
     for point in front.points:
@@ -171,7 +170,7 @@ def _tell(front: ParetoFront, commands: Sequence[str | None]) -> None:
 
 def _looked_at(front: ParetoFront) -> str:
     laid_out = f", {front.laid_out} layouts" if front.laid_out else ""
-    rest = "" if front.complete else "; not all was looked at (--effort, --seconds)"
+    rest = "" if front.complete else "; the search is incomplete (--effort, --seconds)"
     return f"{front.estimated} estimates{laid_out}{rest}"
 
 

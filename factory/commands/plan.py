@@ -13,7 +13,7 @@ import click
 from factory.commands.allowing import allowed_in
 from factory.commands.asking import UNITS, asked
 from factory.commands.interlocking import refuse
-from factory.commands.options import OUTPUT, PATH, SECONDS
+from factory.commands.options import LIBRARY, OUTPUT, PATH, SECONDS, TEMPLATES
 from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions
 from factory.commands.warnings import announced, say_allowed
@@ -39,56 +39,51 @@ UPS = {
 
 LOOKS = ("exploded.png", "assembly.mp4")
 """How the names of the still and of the film end."""
-STOPPING = "stopping with the best tree so far, which is laid out; once more: at once"
-"""The answer to a signal."""
+STOPPING = "stopping: the best tree so far is laid out; interrupt again to stop at once"
+"""The message after a signal."""
 
 KINDS: tuple[Kind, ...] = ("slide", "lower", "blocked")
 
 
 @click.command()
 @click.argument("source", type=PATH)
-@click.option("-o", "--output", type=PATH, help="The folder to write; without, SOURCE-planned.")
+@click.option("-o", "--output", type=PATH, help="Output folder (default: SOURCE-planned).")
 @click.option(
     "--for",
     "aim",
     type=click.Choice(AIMS),
     default="cycle",
-    help="What the tree is chosen for: a short cycle, few robots, a small floor.",
+    help="What to minimise: cycle time, number of robots or floor area.",
 )
 @click.option(
     "--seconds",
     type=SECONDS,
-    help="To look for a better tree [s]: 30 for up to 16 parts, then 0.2 for each part.",
+    help="Time to search for a better tree [s] (default: 30 up to 16 parts, else 0.2 per part).",
 )
-@click.option("--keep", multiple=True, help="A sub-tree of a PAG that stays (repeatable).")
-@click.option("--replan", is_flag=True, help="Throw the tree of a PAG away.")
+@click.option("--keep", multiple=True, help="Sub-tree of a PAG to keep (repeatable).")
+@click.option("--replan", is_flag=True, help="Ignore the assembly tree of a PAG.")
 @click.option(
     "--allow",
     multiple=True,
-    help="A part that may pass through others, or two, A:B, through each other, where there is no"
-    " other way (repeatable).",
+    help="Part that may pass through others, or pair A:B, if nothing else works (repeatable).",
 )
 @click.option(
     "--up",
     type=click.Choice(UPS),
-    help="The axis of SOURCE that is up; without, z, unless the product would tip over.",
+    help="Axis of SOURCE that points up (default: z, unless the product would tip over).",
 )
-@click.option("--base", help="The part, or sub-tree, onto which all others come.")
-@click.option("--screw", "screws", multiple=True, help="A part that is a screw (repeatable).")
-@click.option("--no-screws", is_flag=True, help="Parts that look or are called so are no screws.")
-@click.option("--hulls", is_flag=True, help="Plan with hulls, though they hide what goes in.")
-@click.option("--unit", type=click.Choice(UNITS), help="Of lengths; found out without.")
-@click.option("--in-place", is_flag=True, help="Parts are in place, whatever they look like.")
-@click.option("--library", type=PATH, envvar="LDRAWDIR", help="An LDraw parts library.")
-@click.option("--boxes", is_flag=True, help="LDraw parts whose shape is missing become boxes.")
-@click.option("--look/--no-look", default=True, help="Write an exploded view, and its film.")
+@click.option("--base", help="Part or sub-tree to assemble the others onto.")
+@click.option("--screw", "screws", multiple=True, help="Part that is a screw (repeatable).")
+@click.option("--no-screws", is_flag=True, help="Treat no part as a screw.")
 @click.option(
-    "--templates",
-    "folders",
-    multiple=True,
-    type=PATH,
-    help="A folder of further operations, searched first (repeatable).",
+    "--hulls", is_flag=True, help="Plan with convex hulls, even where they hide openings."
 )
+@click.option("--unit", type=click.Choice(UNITS), help="Unit of lengths (default: detected).")
+@click.option("--in-place", is_flag=True, help="Assume that the parts are in place.")
+@LIBRARY
+@click.option("--boxes", is_flag=True, help="Use boxes for LDraw parts without a shape.")
+@click.option("--look/--no-look", default=True, help="Write an exploded view and its film.")
+@TEMPLATES
 @OUTPUT
 def plan(
     out: OutputOptions,
@@ -111,9 +106,10 @@ def plan(
     look: bool,
     folders: tuple[Path, ...],
 ) -> int:
-    """Find an assembly tree for the parts of SOURCE, which are where they are in the finished
-    product, and write it as a PAG with its meshes. SOURCE is a folder of meshes, a file with named
-    bodies (.glb, .3mf, .step), an LDraw model (.ldr, .mpd), or a PAG whose tree is thrown away."""
+    """Plan the assembly of SOURCE, whose parts are in their places in the finished product, and
+    write the assembly tree as a PAG with its meshes. SOURCE is a folder of meshes, a file with
+    named bodies (.glb, .3mf, .step), an LDraw model (.ldr, .mpd), or a PAG whose assembly tree is
+    to be ignored."""
     from factory.pipeline import all_templates, read
     from factory.planning.plan import CannotAssemble, PlanOptions
     from factory.planning.source import SourceOptions, read_source
@@ -200,7 +196,7 @@ def _looks(project: Project, out: OutputOptions) -> list[Path]:
         return []
     view = ExplodedView(project.product, explosion(project.pag, project.matings, project.product))
     try:
-        with Waiting("drawing the exploded view, and filming it", out.silent):
+        with Waiting("drawing and filming the exploded view", out.silent):
             view.still(still)
             view.film(film)
     except MissingError as error:
@@ -272,7 +268,7 @@ def _tell(
     figures = planned.figures
     for note in planned.notes:
         say(note)
-    best = "none is better by estimate" if planned.optimal else "the best that was found"
+    best = "optimal by estimate" if planned.optimal else "the best found"
     cycle = f", cycle time about {figures.cycle or figures.expected:.2f} s"
     say(f"{figures.robots} robots{cycle}; {best}")
     if out.verbose and matings:

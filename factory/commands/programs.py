@@ -12,7 +12,7 @@ from factory.support.errors import Diagnostic, InputError, did_you_mean
 
 @click.command()
 @SOURCE
-@click.option("--robot", help="Only this robot, as r3.")
+@click.option("--robot", help="Only this robot, for example r3.")
 @RELAY
 @HANDS
 @OUTPUT

@@ -56,7 +56,7 @@ def render(
     output: Path,
     at: str,
 ) -> int:
-    """Film FILE.pag, or a LOG that `run --log` has kept, headless through EGL."""
+    """Film FILE.pag, or the run in a LOG written by `run --log`, headless through EGL."""
     from factory.record.log import is_log
     from factory.render import Film, Still, check_output, render_log
     from factory.support.gl import probe
@@ -69,7 +69,7 @@ def render(
     is_still = check_output(output, size, shown.fps, still=None)
     picture = shown.picture()
     if is_still and shown.poster is not None:
-        message = "--poster is of a film; this is a still"
+        message = "--poster applies to a film; this is a still"
         raise InputError(Diagnostic("Usage", message, None, "leave out --poster"))
     probe()
     log = None

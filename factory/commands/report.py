@@ -40,16 +40,16 @@ if TYPE_CHECKING:
 
 @click.command(cls=Grouped)
 @SOURCE
-@click.option("-o", "--output", type=PATH, required=True, help="The page: OUT.html.")
+@click.option("-o", "--output", type=PATH, required=True, help="Output page: OUT.html.")
 @click.option(
     "--units",
     type=click.IntRange(1, 10_000),
     default=4,
-    help="Products of the run; a cycle time is measured from 4 on.",
+    help="Number of products to make; the cycle time is measured from 4 on.",
 )
 @DRAW
 @WIP
-@click.option("--max-time", type=SECONDS, help="Stop after this time [s].")
+@click.option("--max-time", type=SECONDS, help="Stop after this simulated time [s].")
 @LENIENT
 @RUNS
 @FLOOR
@@ -57,10 +57,10 @@ if TYPE_CHECKING:
 @MOTION
 @OUTPUT
 def report(given: ProjectOptions, asked: RunOptions, out: OutputOptions, output: Path) -> int:
-    """Write one HTML page about a run of FILE.pag, or the run in a LOG that `run --log` kept.
+    """Write one HTML page about a run of FILE.pag, or about the run in a LOG of `run --log`.
 
-    The status is 1 for a run that failed, or was cut off before its units were made: --lenient
-    leaves out what its bodies do. The page is written, and says so."""
+    The page is always written. The exit status is 1 if the run failed, or was cut off before its
+    units were made; --lenient ignores what its bodies do."""
     from factory.record.log import is_log
     from factory.show.report import page, recording_of
     from factory.support.files import write_text

@@ -42,7 +42,7 @@ def check_together(given: Mapping[str, bool]) -> None:
     for one, others, reason in APART:
         for other in others:
             if given.get(one) and given.get(other):
-                message = f"{one} does not go with {other}: {reason}"
+                message = f"{one} cannot be combined with {other}: {reason}"
                 raise InputError(Diagnostic("BadValue", message, None, "leave out one of the two"))
 
 
@@ -170,7 +170,9 @@ class ProjectOptions:
         if not is_plan(self.file):
             return None
         faults = [
-            Diagnostic("Usage", f"{option} is for a PAG; '{self.file}' is a plan", None, OF_A_PLAN)
+            Diagnostic(
+                "Usage", f"{option} applies to a PAG; '{self.file}' is a plan", None, OF_A_PLAN
+            )
             for name, option in PLANNED.items()
             if getattr(self, name) not in (None, False, ())
         ]
@@ -192,10 +194,10 @@ class ProjectOptions:
         effort = self.effort or usual_effort(len(project.pag) * units)
         aim = Aim(self.robots, self.cycle, effort, self.limit or inf, several)
         looked_at, warnings = count(1), list[Diagnostic]()
-        with StepBar("looking for few robots", silent) as steps:
+        with StepBar("searching for few robots", silent) as steps:
 
             def seen(_: Candidate, best: Candidate) -> None:
-                steps.show("looking for few robots", next(looked_at), effort, f"best: {best}")
+                steps.show("searching for few robots", next(looked_at), effort, f"best: {best}")
 
             made = allocated(project, aim, seen, warnings.append)
         warn(warnings, silent)

@@ -24,14 +24,14 @@ def resumed(file: Path, max_time: float | None, out: OutputOptions) -> Resumed |
     from factory.simulation.resuming import resume
 
     for_a_pag(file, "a log", *ALLOWED)
-    with Waiting("reading the log, and making its simulation again", out.silent):
+    with Waiting("reading the log and rebuilding its simulation", out.silent):
         found = resume(file, max_time)
     if isinstance(found, CutOff):
         if out.as_json:
             emit({"log": str(file), "units": found.units, "products": found.products})
         else:
-            say(f"'{file}' has made its units, {found.products} of {found.units}: nothing is left")
+            say(f"'{file}' is complete, {found.products} of {found.units} units: nothing to resume")
         return None
     if not out.silent:
-        say(f"'{file}' is {found.came}; the run is made again until then, and goes on")
+        say(f"'{file}' is {found.came}; the run is repeated up to there, then continued")
     return found

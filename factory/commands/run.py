@@ -61,18 +61,16 @@ if TYPE_CHECKING:
 @RUN
 @ALLOW
 @click.option("--video", type=PATH, help="Film the run (.mp4).")
-@click.option("--log", type=PATH, help="Keep every tick in a file.")
+@click.option("--log", type=PATH, help="Log every tick to a file.")
 @click.option(
     "--distributed", is_flag=True, help="Each robot runs its own program (paper, section 6)."
 )
 @click.option(
     "--monitor/--no-monitor",
     default=None,
-    help="Judge the run from the engine alone, which is the default: in every tick, or not at all.",
+    help="Check the run from the engine's states alone: at events (default), every tick, never.",
 )
-@click.option(
-    "--resume", is_flag=True, help="FILE is the log of a run that was cut off: go on with it."
-)
+@click.option("--resume", is_flag=True, help="Continue an interrupted run, whose log is FILE.")
 @LENIENT
 @PICTURE
 @FLOOR
@@ -91,11 +89,11 @@ def run(
 ) -> int:
     """Run FILE.pag until its products are dropped off.
 
-    The status is 1 for a run that does not make its units, or does not follow its net, or in which
-    bodies do otherwise than the net says: --lenient leaves those out.
+    The exit status is 1 if the run does not make its units, does not follow its net, or moves
+    bodies other than the net says; --lenient ignores the last.
 
-    With --resume FILE is a log; its run is made again up to where the log ends, which is compared,
-    and goes on from there in that log."""
+    With --resume, FILE is a log: its run is repeated up to the end of the log, compared with it,
+    and continued in the same log."""
     if resume:
         going = resumed(given.file, asked.max_time, out)
         return 0 if going is None else _go_on(going, asked, monitor, out)
@@ -254,13 +252,13 @@ def carry_out(
         message = f"stopped by the user, {came}"
         if made.world.time < since:
             message = f"stopped by the user before {since:.2f} s, so '{log}' is as it was"
-        hint = f"log: {log}; go on: factory run --resume {quote(str(log))}" if log else ""
+        hint = f"log: {log}; continue: factory run --resume {quote(str(log))}" if log else ""
         raise StoppedError(Diagnostic("Interrupted", message, None, hint)) from error
 
 
 def not_tested(physics: PhysicsFigures) -> str:
     """How many pairs of parts had no contact, of how many."""
-    return f"{physics.pairs_excluded} of {physics.pairs} pairs were not tested against each other"
+    return f"{physics.pairs_excluded} of {physics.pairs} pairs of parts not checked for collisions"
 
 
 def summarise(record: Run, factory: Factory, verbose: bool) -> None:
@@ -284,7 +282,7 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
     physics = record.physics
     if physics is not None:
         chosen = physics.timestep_chosen
-        how = "chosen automatically (--timestep)" if chosen else "as asked for"
+        how = "chosen automatically (--timestep)" if chosen else "as requested"
         say(f"timestep {1000 * physics.timestep_s:g} ms, {how}")
         if physics.wip_chosen:
             say(f"at most {physics.wip_chosen} units inside at once: {POOL_BOUND}")
@@ -292,28 +290,28 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
         contacts = f"{physics.unintended_contacts} unintended contacts"
         warnings = f"{physics.engine_warnings} engine warnings"
         say(
-            f"{physics.handoffs} hand-offs, gap at most {physics.handoff_gap_max_mm:.3f} mm; "
+            f"{physics.handoffs} hand-offs, largest gap {physics.handoff_gap_max_mm:.3f} mm; "
             f"product error {'none measured' if error is None else f'{error:.3f} mm'}, "
-            f"{physics.joining_error_max_mm:.3f} mm as grips closed; "
+            f"{physics.joining_error_max_mm:.3f} mm when grips close; "
             + (warnings if physics.excluded else f"{contacts}, {warnings}")
         )
         if physics.grip_gap_max_mm is not None:
-            say(f"what is taken is at most {physics.grip_gap_max_mm:.3f} mm from its holder's pad")
+            say(f"largest gap between part and gripper: {physics.grip_gap_max_mm:.3f} mm")
         if physics.grip_strength_share_max is not None:
             where = f"{physics.grip_strength_robot} with '{physics.grip_strength_label}'"
             used = 100 * physics.grip_strength_share_max
-            say(f"at most {used:.0f} % of the strength of a hand used: {where}")
+            say(f"highest grip load: {used:.0f} % of the hand's strength ({where})")
         if physics.excluded:
             say(f"{contacts}; {not_tested(physics)}{'' if verbose else ' (list: -v)'}")
         for one, other in physics.excluded if verbose else ():
-            say(f"  not tested: {one} - {other}")
+            say(f"  not checked: {one} - {other}")
         for pair in physics.contacts[:8]:
-            say(f"  touched: {pair}")
+            say(f"  contact: {pair}")
         if physics.mating_forces:
             most = max(physics.mating_forces, key=physics.mating_forces.__getitem__)
-            say(f"inputs pressed on each other with {physics.mating_force_max_n:.3f} N in {most}")
+            say(f"largest force between inputs: {physics.mating_force_max_n:.3f} N, in {most}")
         if physics.fused:
-            say("parts joined for good are one rigid body (--no-fuse keeps them apart)")
+            say("parts joined for good are merged into one rigid body (--no-fuse: kept separate)")
     if record.failures is not None:
         say_failures(record.failures, verbose)
     for exchange in record.exchanges:

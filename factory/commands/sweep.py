@@ -12,6 +12,7 @@ import click
 from factory.commands.grouped import Grouped
 from factory.commands.options import (
     FLOOR,
+    JOBS,
     MOTION,
     OUTPUT,
     PATH,
@@ -19,6 +20,7 @@ from factory.commands.options import (
     RELAY,
     SECONDS,
     SEEDS,
+    TEMPLATES,
     WIP,
     Number,
     gathered,
@@ -55,26 +57,26 @@ class SweepOptions:
 
 @click.command(cls=Grouped)
 @click.argument("source", metavar="[FILE]", type=PATH, required=False)
-@click.option("--templates", "folders", multiple=True, type=PATH, help="As of `run`.")
+@TEMPLATES
 @click.option(
     "--vary",
     multiple=True,
     metavar="KEY=VALUES",
-    help="seed=0:100, jitter=0.1,0.3, speed=0.2:0.6:0.1 ... (repeatable).",
+    help="Values to vary: seed=0:100, jitter=0.1,0.3, speed=0.2:0.6:0.1 ... (repeatable).",
 )
-@click.option("-o", "--output", "database", type=PATH, help="The database of the results.")
-@click.option("--jobs", type=click.IntRange(1, 1024), help="Processes; default: the cores.")
-@click.option("--on", default="local", help="local, or dask://HOST:PORT of a Dask scheduler.")
-@click.option("--retry", is_flag=True, help="Run those again that failed.")
-@click.option("--summary", is_flag=True, help="Tell means, spreads and confidence intervals.")
-@click.option("--plots", type=PATH, help="Draw the summary into a folder.")
-@click.option("--world", type=click.Choice(["mujoco", "ideal"]), help="As of `run`.")
-@click.option("--units", type=click.IntRange(1, 10**9), help="Products of each run; default: 4.")
-@click.option("--seed", type=SEEDS, help="As of `run`.")
-@click.option("--jitter", type=Number(0, 0.9), help="As of `run`; default: 0.")
+@click.option("-o", "--output", "database", type=PATH, help="Database of the results.")
+@JOBS
+@click.option("--on", default="local", help="Where to run: local, or dask://HOST:PORT (Dask).")
+@click.option("--retry", is_flag=True, help="Repeat failed runs.")
+@click.option("--summary", is_flag=True, help="Print means, deviations and confidence intervals.")
+@click.option("--plots", type=PATH, help="Folder for plots of the summary.")
+@click.option("--world", type=click.Choice(["mujoco", "ideal"]), help="As for `run`.")
+@click.option("--units", type=click.IntRange(1, 10**9), help="Products per run (default: 4).")
+@click.option("--seed", type=SEEDS, help="As for `run`.")
+@click.option("--jitter", type=Number(0, 0.9), help="As for `run` (default: 0).")
 @WIP
 @click.option("--max-time", type=SECONDS, help="Stop a run after this time [s].")
-@click.option("--fuse/--no-fuse", default=None, help="As of `run`.")
+@click.option("--fuse/--no-fuse", default=None, help="As for `run`.")
 @gathered(SweepOptions, "runs")
 @PROJECT
 @FLOOR
@@ -91,10 +93,10 @@ def sweep(
     summary: bool,
     plots: Path | None,
 ) -> int:
-    """Run FILE.pag many times, over all combinations of what varies, into an SQLite database.
+    """Run FILE.pag for every combination of the varied values, and keep the results in SQLite.
 
-    Called again it goes on where it was stopped. `factory sweep RESULTS --summary` summarises what
-    is there, also while a sweep goes on.
+    Called again, the sweep continues where it stopped. `factory sweep RESULTS --summary`
+    summarises the results so far, also during a sweep.
     """
     writable_folder(plots)
     if plots is not None:
@@ -117,7 +119,7 @@ def sweep(
         if not out.as_json:
             _tell(tally, database)
     elif not is_summary:
-        message, hint = "nothing varies", "for example --vary seed=0:100"
+        message, hint = "there is nothing to vary", "for example --vary seed=0:100"
         raise InputError(Diagnostic("Usage", message, None, hint))
     if is_summary:
         document |= _summarise(database or source, plots, out)
@@ -171,7 +173,7 @@ def _carry_out(
 
 def _tell(tally: Tally, database: Path) -> None:
     """What a sweep did, for people."""
-    there = f"{tally.there} of {tally.runs} were there"
+    there = f"{tally.there} of {tally.runs} already done"
     if tally.there_failed:
         there += f", of which {tally.there_failed} failed; --retry runs them again"
     there = f" ({there})" if tally.there else ""

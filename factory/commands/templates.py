@@ -6,18 +6,16 @@ from pathlib import Path
 
 import click
 
-from factory.commands.options import OUTPUT, PATH
+from factory.commands.options import OUTPUT, TEMPLATES
 from factory.commands.requests import OutputOptions
 from factory.support.console import emit, say, table
 
 
 @click.command()
-@click.option(
-    "--templates", "folders", multiple=True, type=PATH, help="A folder of further operations."
-)
+@TEMPLATES
 @OUTPUT
 def templates(folders: tuple[Path, ...], out: OutputOptions) -> int:
-    """List the operations and robot types there are."""
+    """List the available operations and robot types."""
     from factory.lang.writer import write_template
     from factory.pipeline import all_templates
     from factory.problem.robot_types import load_catalogue

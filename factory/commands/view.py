@@ -25,10 +25,17 @@ FOR_EVER = 10**9
 @click.command(cls=Grouped)
 @SOURCE
 @FAULTS
-@click.option("--port", type=click.IntRange(0, 65535), default=8765, help="0: a free one.")
-@click.option("--host", default="127.0.0.1", help="Listen here; only this machine can come.")
-@click.option("--expose", is_flag=True, help="Let HOST be one that other machines can reach.")
-@click.option("--paused", is_flag=True, help="Do not run before Play is pressed.")
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=8765,
+    help="Port to listen on; 0: any free port.",
+)
+@click.option(
+    "--host", default="127.0.0.1", help="Address to listen on; local connections only by default."
+)
+@click.option("--expose", is_flag=True, help="Allow a HOST that other machines can reach.")
+@click.option("--paused", is_flag=True, help="Wait until Play is pressed.")
 @DRAW
 @WIP
 @RUNS
@@ -45,10 +52,10 @@ def view(
     expose: bool,
     paused: bool,
 ) -> int:
-    """Run FILE.pag for ever and show it in a browser: pause it, push robots, block feeders.
+    """Run FILE.pag endlessly in a browser, where you can pause it, push robots and block feeders.
 
-    With --spares, --deputies or --faults it goes on after failures: let robots drop things and die,
-    and parts be no good."""
+    With --spares, --deputies or --faults the run recovers from failures: you can make robots drop
+    parts or die, and make parts defective."""
     from factory.nets.verify import proved
     from factory.show.live import Server, Session
     from factory.show.live.page import page
@@ -80,13 +87,13 @@ def view(
 
 def _tell(server: Server, host: str, expose: bool) -> None:
     """The address; printed with --quiet too, since it cannot be guessed."""
-    say(f"{server.address}  (Ctrl-C ends it)")
+    say(f"{server.address}  (Ctrl-C to stop)")
     if not expose:
         there = f"ssh -L {server.port}:127.0.0.1:{server.port} THIS-MACHINE"
-        say(f"from elsewhere: {there}, then the same address there")
+        say(f"from another machine: {there}, then open the same address there")
         return
     print(
-        f"warning: everyone that reaches {host} and knows this address can push this factory's "
-        "robots; nothing is encrypted",
+        f"warning: anyone who can reach {host} and knows this address can push this factory's "
+        "robots; the connection is not encrypted",
         file=sys.stderr,
     )

@@ -140,10 +140,10 @@ class NoGrip:
         if self.ways:
             ways = "; ".join(self._way(kind, labels) for kind, labels in self.ways)
             message = f"no one hand can hold all that {self.robot} brings, {_listed(self.line)}"
-            hint = f"{ways}; they are held without one; let other labels share a robot"
+            hint = f"{ways}; they are attached without one; let other labels share a robot"
             return self._told(message, hint, ", ".join(self.line))
         words = "; ".join(miss.words for miss in self.misses)
-        hint = "it is held without one; join it in another order, or by a relay from above"
+        hint = "it is attached without one; change the assembly order, or add a relay from above"
         others = [label for label in self.line if label != self.label]
         if others:
             words += f"; so {self.robot} has no hand for {_listed(others)} either"
