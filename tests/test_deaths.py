@@ -20,12 +20,11 @@ from factory.record.failures import Failing
 from factory.record.log import Log
 from factory.record.log.model import model_of
 from factory.record.monitor.record import recorded_subject
-from factory.render.caption import Caption
+from factory.render.caption import Caption, draw_notices
 from factory.render.colours import DEAD
 from factory.render.history import History
-from factory.render.left_out import LeftOut
+from factory.render.marks import LeftOut
 from factory.render.net_panel import NetPanel
-from factory.render.notices import draw_notices
 from factory.render.rows import Rows
 from factory.show.report.failures import failures_data
 from factory.show.report.recording import recording_of

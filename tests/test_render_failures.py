@@ -19,7 +19,7 @@ from factory.record.log import Log
 from factory.record.log.model import model_of
 from factory.record.monitor.record import recorded_subject
 from factory.record.monitor.subject import subject_of
-from factory.render.caption import Caption
+from factory.render.caption import TOLD, Caption, draw_notices
 from factory.render.colours import AMBER, DEAD, FLASH
 from factory.render.film import moment_of
 from factory.render.gantt_panel import GanttPanel
@@ -27,7 +27,6 @@ from factory.render.history import History
 from factory.render.ink import Ink
 from factory.render.marks import Mark, Marks
 from factory.render.net_panel import NetPanel
-from factory.render.notices import SHOWN, draw_notices
 from factory.render.rows import Rows
 from factory.support.settings import Settings
 from tests.failing_runs import failing, paper_layout
@@ -157,7 +156,7 @@ def test_a_caption_says_for_some_seconds_what_failed(subject) -> None:
     history, caption = History(subject), Caption(SIZE)
     history.failings.append(Failing(2.0, "lost", "sub1", "r6", "scrap", ("part2",)))
     seen = {}
-    for time in (1.9, 2.0 + SHOWN / 2, 2.0 + SHOWN + 2):
+    for time in (1.9, 2.0 + TOLD / 2, 2.0 + TOLD + 2):
         pixels = np.full((400, 640, 3), 120, np.uint8)
         draw_notices(pixels, history, time, caption)
         seen[time] = int((pixels != 120).any(axis=-1).sum())

@@ -12,14 +12,12 @@ import numpy as np
 from factory.control.mode import Array
 from factory.mjcf import names
 from factory.record.monitor.subject import MonitorSubject
-from factory.render.caption import Caption, draw_title
+from factory.render.caption import Caption, draw_notices, draw_title
 from factory.render.gantt_panel import GanttPanel
 from factory.render.history import History
 from factory.render.ink import Pixels
-from factory.render.left_out import LeftOut
-from factory.render.marks import Marks
+from factory.render.marks import LeftOut, Marks
 from factory.render.net_panel import NetPanel
-from factory.render.notices import draw_notices
 from factory.render.painter import Painter
 from factory.render.picture import Area, PanelName, Picture, Size, shared
 from factory.render.rows import Rows

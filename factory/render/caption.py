@@ -1,13 +1,17 @@
-"""The words on a picture: a caption below (product, units made, time), and at the beginning of a
-film a title in the upper left corner, which fades away."""
+"""Words on a picture: a caption below (product, units made, time), notices of failures above it,
+and at the start of a film a title in the upper left corner, which fades out."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from factory.render.colours import FAINT, FLASH, INK, WHITE
-from factory.render.ink import Ink, Pixels, fitted, width
+from factory.nets.verdict import listing
+from factory.render.colours import AMBER, DEAD, FAINT, FLASH, INK, WHITE
+from factory.render.history import History
+from factory.render.ink import Colour, Ink, Pixels, fitted, width
 
 HALO = (250, 250, 251)
 
@@ -75,3 +79,44 @@ def draw_title(pixels: Pixels, title: str, detail: str, time: float) -> None:
     left, top = edge + 1.2 * small, edge + 0.5 * small
     ink.words(left, top + 0.75 * points, title, points, INK, "l", alpha)
     ink.words(left, top + 1.5 * points + 0.8 * small, detail, small, FAINT, "l", alpha)
+
+
+TOLD, VANISHES = 4.0, 0.6
+"""How long a notice of a failure is shown, and how long it then fades [s]."""
+
+MOST = 3
+"""Maximum number of notices at once; the latest are shown."""
+
+
+def draw_notices(pixels: Pixels, history: History, time: float, caption: Caption) -> None:
+    """Draw notices of recent failures on a picture, in place, from its caption upwards."""
+    if not caption.strip:
+        return
+    points, ink = caption.points, Ink(pixels)
+    edge, bottom = 1.2 * points, pixels.shape[0] - caption.strip - 0.4 * points
+    for words, colour, alpha in _notices(history, time):
+        words = fitted(words, points, pixels.shape[1] - 2 * edge - 2 * points)
+        right, top = edge + width(words, points) + 1.6 * points, bottom - 1.9 * points
+        ink.box(edge, top, right, bottom, WHITE, 0.86 * alpha, 0.3 * points)
+        ink.box(edge, top, edge + max(3.0, 0.3 * points), bottom, colour, alpha)
+        ink.words(edge + points, (top + bottom) / 2, words, points, INK, "l", alpha)
+        bottom = top - 0.4 * points
+
+
+def _notices(history: History, time: float) -> Iterator[tuple[str, Colour, float]]:
+    """Words, their colour and their opacity, the lowest first."""
+    dead, robots = history.dead(time), history.factory.robots
+    if stands := sorted(history.stands(time) - dead):
+        names = listing(robots[robot].name for robot in stands)
+        yield f"{names} stand{'s' if len(stands) == 1 else ''} still", AMBER, 1.0
+    failed = history.failed(time - TOLD - VANISHES, time)
+    told = {one.robot for one in failed if one.is_death}
+    if silent := [robots[robot].name for robot in sorted(dead) if robots[robot].name not in told]:
+        yield f"{listing(silent)} {'is' if len(silent) == 1 else 'are'} dead", DEAD, 1.0
+    for death in history.deaths():
+        if death.end < time < death.end + TOLD + VANISHES:
+            alpha = min(1.0, (death.end + TOLD + VANISHES - time) / VANISHES)
+            yield death.then, DEAD, alpha
+    for failing in failed[: -MOST - 1 : -1]:
+        alpha = min(1.0, (failing.t + TOLD + VANISHES - time) / VANISHES)
+        yield str(failing), FLASH, alpha

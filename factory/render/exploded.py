@@ -8,20 +8,15 @@ from pathlib import Path
 import numpy as np
 
 from factory.geometry.meshes import Array
-from factory.geometry.sight import Framing, View, fit, towards
+from factory.geometry.sight import View, fit, towards
 from factory.geometry.solids import Product
-from factory.mjcf.loose_parts import loose_parts
-from factory.mjcf.replica import Replica
 from factory.planning.exploding import Explosion
 from factory.planning.source import surface
 from factory.render.ink import Pixels
-from factory.render.painter import Renderer
+from factory.render.painter import LooseParts
 from factory.render.picture import Size
 from factory.render.reel import SAMPLES, write_still
 from factory.render.video import VideoFile, check_output
-from factory.support import gl
-from factory.support.engine import mujoco
-from factory.support.resource import Closing
 
 FPS = 20.0
 
@@ -101,27 +96,18 @@ class ExplodedView:
         return np.asarray((self.boxes + self.explosion.offsets(done)[:, None]).reshape(-1, 3))
 
 
-class _Stage(Closing):
-    """Draws the parts of a view where they are at a moment."""
+class _Stage(LooseParts):
+    """Draws the parts of a view when so many operations are done."""
 
     def __init__(self, shown: ExplodedView, size: Size) -> None:
-        gl.probe()
         self.shown = shown
         solids = [shown.product.solids[label] for label in shown.explosion.parts]
         apart = shown._points(0.0)
         extent = float(np.linalg.norm(np.ptp(apart, axis=0)))
         surfaces = {solid.label: surface(solid) for solid in solids}
         colours = [solid.rgba for solid in solids]
-        model = loose_parts(surfaces, colours, float(apart[:, 2].min()), extent)
-        model.vis.global_.offwidth, model.vis.global_.offheight = size
-        self.replica = Replica(model)
-        self.framing = Framing(size[0] / size[1], 0.06, 0.06, 0.06)
-        self.renderer = Renderer(self.replica, size)
+        super().__init__(surfaces, colours, float(apart[:, 2].min()), extent, size)
         self.last: float | None = None
-
-    def close(self) -> None:
-        """Give the GL context back."""
-        self.renderer.close()
 
     def still(self) -> Pixels:
         """All apart."""
@@ -137,10 +123,7 @@ class _Stage(Closing):
 
     def _place(self, done: float) -> None:
         if done != self.last:
-            offsets = self.shown.explosion.offsets(done)
-            upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(offsets), 1))
-            self.replica.place(np.hstack([offsets, upright]).ravel())
-            mujoco.mj_camlight(self.replica.m, self.replica.d)
+            self.move(self.shown.explosion.offsets(done))
             self.last = done
 
     def views(self, done: Array) -> list[View]:

@@ -37,33 +37,39 @@ class Ink:
         line: float = 0.0,
     ) -> None:
         """A filled box, or with `line` only its edge, so wide and inside."""
-        x0, y0 = max(0, int(left) - 1), max(0, int(top) - 1)
-        x1 = min(self.pixels.shape[1], int(right) + 2)
-        y1 = min(self.pixels.shape[0], int(bottom) + 2)
-        if x1 <= x0 or y1 <= y0 or right <= left or bottom <= top or alpha <= 0.0:
+        x, y = self._pixels_of(left, top, right, bottom)
+        if not (x.size and y.size) or alpha <= 0.0:
             return
-        x, y = np.arange(x0, x1, dtype=np.float32), np.arange(y0, y1, dtype=np.float32)
         covered = _covered(x, y, left, top, right, bottom, radius)
         if line:
             inner = left + line, top + line, right - line, bottom - line
             covered = covered - _covered(x, y, *inner, max(0.0, radius - line))
-        self._blend(x0, y0, covered * np.float32(alpha), colour)
+        self._blend(int(x[0]), int(y[0]), covered * np.float32(alpha), colour)
 
     def hatched(
         self, left: float, top: float, right: float, bottom: float, colour: Colour, pitch: float
     ) -> None:
         """A box with only its edge and stripes that rise to the right, so far from each other."""
-        x0, y0 = max(0, int(left) - 1), max(0, int(top) - 1)
-        x1 = min(self.pixels.shape[1], int(right) + 2)
-        y1 = min(self.pixels.shape[0], int(bottom) + 2)
-        if x1 <= x0 or y1 <= y0 or right <= left or bottom <= top:
+        x, y = self._pixels_of(left, top, right, bottom)
+        if not (x.size and y.size):
             return
-        x, y = np.arange(x0, x1, dtype=np.float32), np.arange(y0, y1, dtype=np.float32)
         covered, line = _covered(x, y, left, top, right, bottom, 0.0), max(1.0, pitch / 5)
         inner = _covered(x, y, left + line, top + line, right - line, bottom - line, 0.0)
         phase = (x[None] - np.float32(right) + y[:, None]) % np.float32(pitch)
         stripes = np.clip(np.abs(phase - pitch / 2) - (pitch / 2 - line), 0, 1)
-        self._blend(x0, y0, np.asarray(covered - inner * (1 - stripes), np.float32), colour)
+        striped = np.asarray(covered - inner * (1 - stripes), np.float32)
+        self._blend(int(x[0]), int(y[0]), striped, colour)
+
+    def _pixels_of(
+        self, left: float, top: float, right: float, bottom: float
+    ) -> tuple[Coverage, Coverage]:
+        """The columns and rows of the picture that a box touches; none of an empty box."""
+        if right <= left or bottom <= top:
+            return np.empty(0, np.float32), np.empty(0, np.float32)
+        x1 = min(self.pixels.shape[1], int(right) + 2)
+        y1 = min(self.pixels.shape[0], int(bottom) + 2)
+        x0, y0 = max(0, int(left) - 1), max(0, int(top) - 1)
+        return np.arange(x0, x1, dtype=np.float32), np.arange(y0, y1, dtype=np.float32)
 
     def disc(self, x: float, y: float, radius: float, colour: Colour, alpha: float = 1.0) -> None:
         """A disc."""

@@ -9,20 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from factory.geometry.meshes import Array, Indices
-from factory.geometry.sight import Framing, View, fit, towards
-from factory.mjcf.loose_parts import loose_parts
-from factory.mjcf.replica import Replica
+from factory.geometry.sight import View, fit, towards
 from factory.planning.cannot import Interlock
 from factory.planning.parts import InPlace
 from factory.render.colours import EDGE, FAINT, GROUND, INK
 from factory.render.ink import Colour, Ink, Pixels, fitted, width
-from factory.render.painter import Renderer
+from factory.render.painter import LooseParts
 from factory.render.picture import Size
 from factory.render.reel import SAMPLES, write_still
 from factory.render.video import check_output
-from factory.support import gl
-from factory.support.engine import mujoco
-from factory.support.resource import Closing
 
 PANEL: Size = (640, 360)
 """Of each of the four pictures."""
@@ -147,11 +142,10 @@ class InterlockedView:
         return rows
 
 
-class _Parts(Closing):
+class _Parts(LooseParts):
     """Draws the parts of a view, where they are or drawn out."""
 
     def __init__(self, shown: InterlockedView) -> None:
-        gl.probe()
         self.shown = shown
         surfaces: dict[str, tuple[Array, Indices]] = {}
         colours: list[tuple[float, ...]] = []
@@ -167,14 +161,8 @@ class _Parts(Closing):
         points = shown.boxes.reshape(-1, 3)
         size = float(np.linalg.norm(np.ptp(points, axis=0)))
         self.far = np.array([0.0, 0.0, 1e4 * size])
-        model = loose_parts(surfaces, colours, float(points[:, 2].min()) - 1e3 * size, size)
-        model.vis.global_.offwidth, model.vis.global_.offheight = PANEL
-        self.replica = Replica(model)
-        self.renderer = Renderer(self.replica, PANEL)
-
-    def close(self) -> None:
-        """Give the GL context back."""
-        self.renderer.close()
+        floor = float(points[:, 2].min()) - 1e3 * size
+        super().__init__(surfaces, colours, floor, size, PANEL)
 
     def whole(self) -> Pixels:
         """All in place, the rest of the product faint."""
@@ -186,16 +174,11 @@ class _Parts(Closing):
 
     def _picture(self, moved: Array, rest: Array) -> Pixels:
         """The units of the view moved (n, 3), and the rest (3,) [m]."""
-        offsets = np.vstack([moved, rest])[self.unit]
-        upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(offsets), 1))
-        self.replica.place(np.hstack([offsets, upright]).ravel())
-        mujoco.mj_camlight(self.replica.m, self.replica.d)
-        view = self._view(moved)
-        return self.renderer.mean(view, SAMPLES)
+        self.move(np.vstack([moved, rest])[self.unit])
+        return self.renderer.mean(self._view(moved), SAMPLES)
 
     def _view(self, moved: Array) -> View:
         """The nearest one of those that interlock."""
         bits = np.array([[n >> 2 & 1, n >> 1 & 1, n & 1] for n in range(8)])
         corners = self.shown.boxes[:, bits, [0, 1, 2]] + moved[:, None]
-        framing = Framing(PANEL[0] / PANEL[1], 0.06, 0.06, 0.06)
-        return fit(corners.reshape(-1, 3), towards(AZIMUTH, ELEVATION), framing)
+        return fit(corners.reshape(-1, 3), towards(AZIMUTH, ELEVATION), self.framing)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from functools import cache
 
 import numpy as np
 
-from factory.geometry.sight import Array, Framing, View
+from factory.geometry.meshes import Array, Indices
+from factory.geometry.sight import Framing, View
 from factory.mjcf import names
+from factory.mjcf.loose_parts import loose_parts
 from factory.mjcf.replica import SHOWN, Replica
 from factory.record.monitor.subject import MonitorSubject
 from factory.render.camera import Camera
@@ -159,6 +162,36 @@ class Renderer(Closing):
                 if sample is not None:
                     light.dir = _moved(np.asarray(light.dir, float), sample)
                 light.pos = middle - sum(view.range) / 2 * np.asarray(light.dir, float)
+
+
+class LooseParts(Closing):
+    """Draws the parts of a product alone, moved from their places, with a GL context of its own.
+    Its arguments are those of `loose_parts`. Raises MissingError where there is no GL."""
+
+    def __init__(
+        self,
+        surfaces: Mapping[str, tuple[Array, Indices]],
+        colours: Sequence[tuple[float, ...]],
+        floor: float,
+        extent: float,
+        size: Size,
+    ) -> None:
+        gl.probe()
+        model = loose_parts(surfaces, colours, floor, extent)
+        model.vis.global_.offwidth, model.vis.global_.offheight = size
+        self.replica = Replica(model)
+        self.framing = Framing(size[0] / size[1], 0.06, 0.06, 0.06)
+        self.renderer = Renderer(self.replica, size)
+
+    def close(self) -> None:
+        """Give the GL context back."""
+        self.renderer.close()
+
+    def move(self, offsets: Array) -> None:
+        """Move each part by an offset (n, 3) [m] from its place in the product."""
+        upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(offsets), 1))
+        self.replica.place(np.hstack([offsets, upright]).ravel())
+        mujoco.mj_camlight(self.replica.m, self.replica.d)
 
 
 ROUND = (

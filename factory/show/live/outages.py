@@ -10,7 +10,7 @@ from math import ceil, isfinite
 import numpy as np
 
 from factory.nets.verdict import listing
-from factory.render.zones import Zone, Zones
+from factory.render.marks import Zone, Zones
 from factory.simulation.recovery import Recovery
 
 Told = tuple[str, str]
