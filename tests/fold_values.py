@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 
+from factory.compiler.assigning import gear_net
 from factory.compiler.compiler import compile_pag
 from factory.compiler.folding import (
     Line,
@@ -17,7 +18,6 @@ from factory.compiler.folding import (
     mismatch,
     sides_of,
 )
-from factory.compiler.gearing import gear_net
 from factory.compiler.mating.mating import judged
 from factory.layout.durations import Pace
 from factory.layout.embedding import lay_out

@@ -9,11 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from factory.compiler.deputies import deputies
+from factory.compiler.deputies import chosen_pairs, deputies, standing_by
 from factory.compiler.folding import fold
 from factory.compiler.mating.mating import judged
 from factory.compiler.parallel import in_parallel
-from factory.compiler.standing_by import chosen_pairs, standing_by
 from factory.compiler.taking_over import taken_over
 from factory.layout.durations import Pace
 from factory.layout.shapes import payload_boxes

@@ -20,7 +20,7 @@ from pag_values import TEMPLATES as OWN
 import factory
 from factory.compiler.compiler import compile_pag
 from factory.compiler.expanding import expand, joins
-from factory.compiler.mating.admitting import Admitted, admitted
+from factory.compiler.mating.mating import Admitted, admitted
 from factory.lang.template_reader import load_templates
 from factory.layout.durations import Pace
 from factory.nets.verify import verify

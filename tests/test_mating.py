@@ -20,7 +20,7 @@ from scipy.spatial import ConvexHull
 
 from factory.commands.warnings import LISTED, told
 from factory.compiler.expanding import expand
-from factory.compiler.mating import overlaps, seeking
+from factory.compiler.mating import overlaps, paths
 from factory.compiler.mating.depth import Difference, exact, polytope, rough, summits
 from factory.compiler.mating.findings import (
     BLOCKED,
@@ -33,8 +33,7 @@ from factory.compiler.mating.findings import (
 from factory.compiler.mating.mating import matings
 from factory.compiler.mating.meetings import meetings
 from factory.compiler.mating.overlaps import CHUNK
-from factory.compiler.mating.paths import CLEAR, TOLERANCE, depths_of
-from factory.compiler.mating.seeking import NEAR, sought
+from factory.compiler.mating.paths import CLEAR, NEAR, TOLERANCE, depths_of, sought
 from factory.export.clash_picture import draw
 from factory.export.product_view import picture_names
 from factory.geometry.product import product_geometry
@@ -455,10 +454,10 @@ def test_few_facets_of_fine_bodies_are_looked_at(monkeypatch: pytest.MonkeyPatch
 
     def touching(normals: np.ndarray, *bodies: np.ndarray) -> object:
         looked.append(len(normals))
-        return seeking_touching(normals, *bodies)
+        return real_touching(normals, *bodies)
 
-    seeking_touching = seeking._touching
-    monkeypatch.setattr(seeking, "_touching", touching)
+    real_touching = paths._touching
+    monkeypatch.setattr(paths, "_touching", touching)
     monkeypatch.setattr(overlaps, "exact", pytest.fail)
     p, q = egg(3000, (0.02, 0.03, 0.02)), egg(3000, (0.02, 0.02, 0.04))
     beside, above = (

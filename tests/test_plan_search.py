@@ -11,9 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from factory.compiler.expanding import expand
-from factory.compiler.mating.admitting import admitted
 from factory.compiler.mating.findings import BLOCKED, LEFT_OUT, NO_DEEPER, STRICT
-from factory.compiler.mating.mating import matings
+from factory.compiler.mating.mating import admitted, matings
 from factory.geometry.product import product_geometry
 from factory.lang.pag_reader import read_pag
 from factory.layout.durations import Pace

@@ -13,8 +13,7 @@ import pytest
 from hypothesis import given, settings
 
 from factory.compiler import taking_over
-from factory.compiler.deputies import deputies
-from factory.compiler.standing_by import chosen_pairs, rounds_of, standing_by
+from factory.compiler.deputies import chosen_pairs, deputies, rounds_of, standing_by
 from factory.compiler.taking_over import Takeover, nets_after, present, with_moved
 from factory.layout.clearance import certify
 from factory.layout.layout import Layout

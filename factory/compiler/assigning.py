@@ -1,5 +1,5 @@
-"""Assignments: which robot does which tour, unit by unit. Every variant of a factory follows from
-one.
+"""Assignments: which robot does which tour, unit by unit, and the net of gears that follows. Every
+variant of a factory follows from one.
 
 A factory as Compile makes it has one *tour* a robot, from empty hands to empty hands. A *period*
 has one turn or several, a unit is made in each, and an assignment gives for each turn and each
@@ -15,7 +15,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from factory.compiler.gearing import gear_net
+from factory.nets.gears import Gear, GearNet
+from factory.nets.petri import PetriNet, Place, Transition
+from factory.nets.threaded import Redistribution, ThreadedNet
 from factory.plant.approaches import Overlap
 from factory.plant.factory import Factory, Operation, Robot, in_turn
 from factory.problem.pag import NOPART
@@ -24,9 +26,77 @@ from factory.problem.robot_types import LIFT, Catalogue
 from factory.support.errors import Diagnostic, InputError
 
 
+def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> GearNet:
+    """N: for each operation a start, an end and a place; for each robot a gear through them.
+
+    Operation i has transitions 2i and 2i + 1 and place i; the wait places follow, robot by robot. A
+    removed robot has no operations, and a gear without places.
+    """
+    transitions = tuple(
+        Transition(f"{o.label}_{end}", o.position) for o in operations for end in ("s", "e")
+    )
+    places = [
+        Place(
+            o.label,
+            (o.start,),
+            (o.end,),
+            o.template.name,
+            "" if o.after[o.template.carrier - 1] == NOPART else o.label,
+            len(o.robots),
+            o.position,
+        )
+        for o in operations
+    ]
+    slots = [o.robots for o in operations]
+    slot_of = [{robot: i for i, robot in enumerate(o.robots)} for o in operations]
+    pairs: list[list[tuple[tuple[int, int], tuple[int, int]]]] = [[] for _ in transitions]
+    gears = []
+    for robot in robots:
+        gear_places, gear_events = [], []
+        several = (
+            sum(operations[n].before[slot_of[n][robot.index]] == NOPART for n in robot.operations)
+            > 1
+        )
+        for step, number in enumerate(robot.operations):
+            before, operation = operations[robot.operations[step - 1]], operations[number]
+            done, begun = before.end, operation.start
+            slot = slot_of[number][robot.index]
+            label = operation.before[slot]
+            stays = label != NOPART and operation.after[slot] != NOPART
+            wait = len(places)
+            places.append(
+                Place(
+                    _wait_name(robot, label, operation, several),
+                    (done,),
+                    (begun,),
+                    "hold" if stays else "wait",
+                    label,
+                    1,
+                    operation.position,
+                )
+            )
+            slots.append((robot.index,))
+            pairs[begun].append(((wait, 0), (number, slot)))
+            pairs[done].append(((before.place, slot_of[before.index][robot.index]), (wait, 0)))
+            gear_places += [wait, number]
+            gear_events += [done, begun]
+        gears.append(Gear(robot.name, robot.type, tuple(gear_places), tuple(gear_events)))
+    redistribution: tuple[Redistribution, ...] = tuple(tuple(sorted(p)) for p in pairs)
+    net = ThreadedNet(PetriNet(transitions, tuple(places)), redistribution)
+    return GearNet(net, tuple(gears), tuple(g.places[0] for g in gears if g.places), tuple(slots))
+
+
+def _wait_name(robot: Robot, label: str, onward: Operation, several: bool) -> str:
+    """Name of the place where a robot waits for an operation `onward`: `r2:part1`. The empty-handed
+    waits of a robot with several tours are told apart by the operation, `r2:nopart/part3`."""
+    if label == NOPART and several:
+        return f"{robot.name}:{label}/{onward.label}"
+    return f"{robot.name}:{label}"
+
+
 def assigned(base: Factory, robots: Sequence[Robot], turns: Sequence[Sequence[int]]) -> Factory:
-    """The factory with these `robots`, whose programs are made anew, where in turn t robot
-    `turns[t][r]` (index) does the tours of robot r of `base`. Near-linear."""
+    """The factory with these `robots` and new programs: in turn t robot `turns[t][r]` (index) does
+    the tours of robot r of `base`. Near-linear."""
     period, when = len(turns), base.postorder
     makes, drops = range(len(base.making)), range(len(base.making), len(base.operations))
     every = ((o, turn) for part in (makes, drops) for turn in range(period) for o in part)
@@ -59,8 +129,8 @@ def assigned(base: Factory, robots: Sequence[Robot], turns: Sequence[Sequence[in
 
 
 def shared(base: Factory, plan: Plan, catalogue: Catalogue) -> Factory:
-    """The factory of a plan, from that with a robot for each tour. The type of each robot fits all
-    its tours. Raises InputError (BadPlan) where the tours or robots of the plan are others."""
+    """The factory of a plan, made from that with a robot for each tour. The type of each robot fits
+    all its tours. Raises InputError (BadPlan) if the plan does not have these tours or robots."""
     if not plan.turns:
         return base
     tours = range(len(base.robots))
@@ -95,7 +165,8 @@ def _bad(words: str) -> InputError:
 
 
 def _for_unit(o: Operation, index: int, unit: int, does: Sequence[int]) -> Operation:
-    """An operation for a unit of a period; `does`: for each of its robots who does its tours."""
+    """A copy of an operation for a unit of a period; `does`: the robot that does the tours of each
+    robot."""
     robots = tuple(does[robot] for robot in o.robots)
     if unit == o.turn:
         return replace(o, index=index, robots=robots)

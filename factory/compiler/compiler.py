@@ -12,9 +12,9 @@ from dataclasses import replace
 from functools import cache
 from types import MappingProxyType
 
+from factory.compiler.assigning import gear_net
 from factory.compiler.domains import check_prepared
 from factory.compiler.expanding import Node, expand
-from factory.compiler.gearing import gear_net
 from factory.plant.approaches import Approach
 from factory.plant.factory import Factory, Operation, Robot
 from factory.problem.pag import NOPART, PAG
@@ -90,9 +90,8 @@ def _check_types(nodes: Mapping[str, Node], output: Template, catalogue: Catalog
 
 
 class _Draft:
-    """What CompileNode has allocated so far: operations with their parents and, per robot, its
-    type, the position that made it necessary and its operations from the last of its cycle to the
-    first."""
+    """The allocations of CompileNode so far: operations with their parents and, for each robot, its
+    type, the source position that required it and its operations, the last of its cycle first."""
 
     def __init__(
         self,
@@ -196,7 +195,7 @@ class _Draft:
         return tuple(robots[slot] for slot in range(len(template.robots)))
 
     def _lift(self, wanted: str, node: Node) -> str:
-        """The type of a robot that takes the role of a `wanted` and can lower what it brings."""
+        """The type of a robot that fills the role of a `wanted` and has a lift."""
         met = self.catalogue.meet(LIFT, wanted) if LIFT in self.catalogue.types else None
         if met is not None and self.catalogue.fits(met, LIFT):
             return met
@@ -208,6 +207,6 @@ class _Draft:
 
 @cache
 def _arguments(before: tuple[str, ...]) -> tuple[int, ...]:
-    """For each label of a template's a the number of the input that it stands for, -1 for none."""
+    """For each label of a template's a the index of its input, -1 for nopart."""
     variables = sorted({*before} - {NOPART}, key=variable_number)
     return tuple(-1 if label == NOPART else variables.index(label) for label in before)

@@ -17,12 +17,13 @@ ascends in it. Without a deputy a robot needs a spare.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice, pairwise, permutations
 from types import MappingProxyType
 
+from factory.compiler.assigning import assigned
 from factory.compiler.folding import delivery, kind_of, mismatch, sides_at
 from factory.plant.factory import Factory
 from factory.problem.robot_types import Catalogue
@@ -32,7 +33,7 @@ MOST = 16
 """The most deputies of one kind that are listed for a robot."""
 
 Moved = Mapping[int, int]
-"""For each robot that is no longer there the one that has its tours, carriers first (indices)."""
+"""For each removed robot the robot that gets its tours, carriers first (indices)."""
 
 
 def deputies(factory: Factory, catalogue: Catalogue) -> tuple[tuple[int, ...], ...]:
@@ -51,8 +52,8 @@ def deputies(factory: Factory, catalogue: Catalogue) -> tuple[tuple[int, ...], .
 
 
 def moved_to(factory: Factory, dead: int, deputy: int, catalogue: Catalogue) -> Moved:
-    """Which robots are no longer there if a deputy takes over for a robot (indices), and where
-    their tours are. Raises InputError (BadLine) where it is no deputy."""
+    """The robots that are removed if a deputy takes over for a robot (indices), each with the robot
+    that gets its tours. Raises InputError (BadLine) if it is not a deputy."""
     siblings = Siblings(factory, catalogue)
     top, twin = siblings.tops(dead, deputy)
     message = siblings.refusal(top, twin)
@@ -71,14 +72,14 @@ def moved_to(factory: Factory, dead: int, deputy: int, catalogue: Catalogue) -> 
 
 @dataclass(frozen=True)
 class Siblings:
-    """What robots of a factory that deliver to one carrier have in common."""
+    """Relations between the robots of a factory that deliver to the same carrier."""
 
     factory: Factory
     catalogue: Catalogue
 
     @cached_property
     def kids(self) -> list[list[int]]:
-        """For each robot those that deliver to it, tools with them."""
+        """For each robot the robots that deliver to it, and its tools."""
         found: list[list[int]] = [[] for _ in self.factory.robots]
         for robot in self.factory.robots[1:]:
             found[self._carrier(robot.index)].append(robot.index)
@@ -91,7 +92,7 @@ class Siblings:
 
     @cached_property
     def _sides(self) -> list[frozenset[int]]:
-        """From which sides each robot may come, on all its tours."""
+        """For each robot the sides from which it may come on all its tours."""
         operations = self.factory.operations
         return [
             frozenset.intersection(
@@ -101,7 +102,7 @@ class Siblings:
         ]
 
     def ascends(self, program: Sequence[int]) -> bool:
-        """Whether the operations of a program come one after the other in the witness."""
+        """Whether a program ascends in the postorder of the operations, the witness of liveness."""
         when = self.factory.postorder
         return all(when[one] < when[other] for one, other in pairwise(program))
 
@@ -113,8 +114,8 @@ class Siblings:
                 yield from self.twins(top, twin).items()
 
     def _for_leaves(self, robots: Sequence[int]) -> Iterator[tuple[int, int]]:
-        """The leaves among the robots of a carrier, with their deputies among all. Robots that are
-        alike in all but what they deliver in are judged once."""
+        """The leaves among the robots of a carrier, each with its deputies. Robots that differ only
+        in the operations that they deliver in are judged once."""
         alike: dict[tuple[object, ...], list[int]] = {}
         for robot in robots:
             key = kind_of(self.factory, robot), self.factory.robots[robot].type, self._sides[robot]
@@ -129,7 +130,7 @@ class Siblings:
                 yield from ((dead, deputy) for deputy in islice(deputies, MOST))
 
     def _branches(self, robots: Sequence[int]) -> Iterator[tuple[int, int]]:
-        """Of the carrier's robots to which others deliver: those at the top of twins."""
+        """Pairs of twin branches among the carrier's robots, each by the robot at its top."""
         alike: dict[object, list[int]] = {}
         for robot in robots:
             alike.setdefault(self._signature(robot), []).append(robot)
@@ -141,8 +142,8 @@ class Siblings:
                     yield top, twin
 
     def _live(self, dead: int, deputy: int) -> bool:
-        """Whether a robot is never needed in an operation of the other, and its program with the
-        tours of both ascends in the witness."""
+        """Whether the two robots never deliver in the same operation, and a program with the tours
+        of both ascends in the witness."""
         if dead == deputy or self._deliveries[dead] & self._deliveries[deputy]:
             return False
         tours = (*self.factory.tours[dead], *self.factory.tours[deputy])
@@ -150,7 +151,7 @@ class Siblings:
         return self.ascends([n for tour in sorted(tours, key=lambda t: when[t[-1]]) for n in tour])
 
     def refusal(self, dead: int, deputy: int) -> str:
-        """Why a robot cannot bring what another brings, in words, "" where it can."""
+        """The reason why a robot cannot take over the deliveries of another, "" if it can."""
         factory = self.factory
         if dead == deputy:
             return "it is the same robot"
@@ -161,7 +162,7 @@ class Siblings:
         return message
 
     def _unlike(self, dead: int, deputy: int) -> str:
-        """What of its kind, type and sides forbids that a robot stands in for another."""
+        """The reason in kind, type or sides why a robot cannot replace another, "" for none."""
         factory = self.factory
         types = factory.robots[dead].type, factory.robots[deputy].type
         message = mismatch(factory, dead, deputy, range(len(factory.robots)), self.catalogue)
@@ -172,8 +173,8 @@ class Siblings:
         return message
 
     def twins(self, top: int, twin: int) -> Moved:
-        """For each robot of a branch, given by the one that brings what it makes, the robot that
-        does the same in a twin of it; empty where that is no twin."""
+        """For each robot of the branch below `top` the corresponding robot of the branch below
+        `twin`; empty if that is not a twin."""
         found, todo = dict[int, int](), [(top, twin)]
         for one, other in todo:
             pairs = [sorted(self.kids[robot], key=self._signature) for robot in (one, other)]
@@ -184,8 +185,8 @@ class Siblings:
         return MappingProxyType(found)
 
     def tops(self, dead: int, deputy: int) -> tuple[int, int]:
-        """The robots at the top of the branches of two, which deliver to one carrier; the two
-        themselves where there are none."""
+        """The robots at the top of the branches of two robots, which deliver to one carrier; the
+        two robots themselves if there are no such branches."""
         top, twin = dead, deputy
         while 0 not in (top, twin):
             if top == twin or self._carrier(top) == self._carrier(twin):
@@ -200,3 +201,45 @@ class Siblings:
         """What robots in twins have in common: their type, and what they do, but for the unit."""
         found = self.factory.robots[robot]
         return (found.type, *(self.factory.operations[n].written for n in found.operations))
+
+
+Pair = tuple[int, int]
+"""A robot and its deputy (indices)."""
+
+
+def chosen_pairs(factory: Factory, deputies: Sequence[Sequence[int]]) -> tuple[Pair, ...]:
+    """One deputy for each robot that has a deputy at the same carrier and to which no robot
+    delivers: branches that a twin takes over as a whole do not stand by. If possible two robots are
+    each other's deputies, so that each must be fit for few tours."""
+    mate: dict[int, int] = {}
+    to = [delivery(factory, robot.index).carrier for robot in factory.robots]
+    rows = [[r for r in row if to[r] == to[robot]] for robot, row in enumerate(deputies)]
+    deputies = [() if robot in to else row for robot, row in enumerate(rows)]
+    for robot, row in enumerate(deputies):
+        if robot not in mate:
+            free = (other for other in row if other not in mate and robot in deputies[other])
+            if (other := next(free, None)) is not None:
+                mate |= {robot: other, other: robot}
+    return tuple((robot, mate.get(robot, row[0])) for robot, row in enumerate(deputies) if row)
+
+
+def rounds_of(pairs: Iterable[Pair]) -> tuple[Mapping[int, int], ...]:
+    """Pairs distributed over turns, such that no deputy of a turn rests in it."""
+    found: list[dict[int, int]] = []
+    for robot, deputy in pairs:
+        fitting = (r for r in found if deputy not in r and robot not in r.values())
+        if (chosen := next(fitting, None)) is None:
+            found.append(chosen := {})
+        chosen[robot] = deputy
+    return tuple(found)
+
+
+def standing_by(factory: Factory, pairs: Iterable[Pair]) -> Factory:
+    """The factory of a period in which deputies do the tours of their robots in some of the turns.
+    Robots keep their numbers.
+
+    It is a fold (`parallel`), so its net is live, safe and reversible. It is not run: its layout is
+    that of the factory in which any of its deputies may have to take over, with all that a deputy
+    may bring in its feeder, its hand, its regions and the certificate."""
+    every, turns = range(len(factory.robots)), ({}, *rounds_of(pairs))
+    return assigned(factory, factory.robots, [[m.get(r, r) for r in every] for m in turns])

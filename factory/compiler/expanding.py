@@ -1,5 +1,5 @@
-"""The operations of a product, one by one: a statement with many inputs is one operation for each
-further input, in the forms of a plan, and what is handed over on its way has one for each time."""
+"""The operations of a product: a statement with many inputs becomes one operation for each further
+input, in the forms of a plan, and each hand-over of a plan becomes an operation."""
 
 from __future__ import annotations
 
@@ -53,8 +53,8 @@ def expand(pag: PAG, templates: Mapping[str, Template], plan: Plan = AS_WRITTEN)
 def handed_over(
     nodes: dict[str, Node], numbers: Mapping[str, int], templates: Mapping[str, Template]
 ) -> dict[str, Node]:
-    """The operations, and one for each time that a label is handed over on its way: of x they are
-    `x/relay1`, `x/relay2`, and so on."""
+    """The operations with those of hand-overs, `numbers` of each label: `x/relay1`, `x/relay2`, and
+    so on for x."""
     if not numbers:
         return nodes
     made, come = dict[str, Node](), dict[str, str]()
@@ -73,24 +73,24 @@ def handed_over(
 
 
 def relay_label(label: str, number: int) -> str:
-    """What a label is called after a hand-over, counted from 0."""
+    """Label after a hand-over, counted from 0."""
     return f"{label}/{RELAY}{number + 1}"
 
 
 def delivered(label: str, plan: Plan) -> str:
-    """What a label is called when it comes to the next operation."""
+    """Label with which the next operation takes it, after all its hand-overs."""
     number = plan.relays.get(label, 0)
     return relay_label(label, number - 1) if number else label
 
 
 def origin_of(label: str) -> str:
-    """The label of which another is a hand-over; the label itself where it is none."""
+    """Label before hand-overs."""
     origin, _, last = label.rpartition("/")
     return origin if last.startswith(RELAY) else label
 
 
 def nodes_of(factory: Factory) -> dict[str, Node]:
-    """The operations of a factory as they were expanded, for the first unit of a period."""
+    """The expanded operations of a factory, for the first unit of a period."""
     nodes: dict[str, Node] = {}
     for number in sorted(range(len(factory.making)), key=factory.postorder.__getitem__):
         o = factory.operations[number]
@@ -113,7 +113,7 @@ def _in_postorder(nodes: Mapping[str, Node], root: str) -> dict[str, Node]:
 
 
 def joins(node: Assembly) -> Iterator[str]:
-    """The labels of what a statement of two inputs or more makes one after the other."""
+    """The labels of the piles that a statement with two inputs or more makes, in order."""
     for number in range(2, len(node.inputs)):
         yield f"{node.label}/{number}"
     yield node.label
@@ -122,8 +122,9 @@ def joins(node: Assembly) -> Iterator[str]:
 def _operations(
     assembly: Assembly, templates: Mapping[str, Template], forms: Mapping[str, int]
 ) -> Iterator[Join]:
-    """The operations of a statement. Where its template has one with a robot fewer, each join has a
-    form: as it is written a third robot takes the first two inputs, and the rest are inserted."""
+    """The operations of a statement. If its template has a variant with a robot fewer (`instead`),
+    each join has a form; as written, a third robot takes the first two inputs, and the rest are
+    inserted."""
     template = of = templates[assembly.operation]
     taken, count = len(template.inputs), len(assembly.inputs)
     at = assembly.input_positions if len(assembly.input_positions) == count else ()

@@ -33,8 +33,8 @@ Line = tuple[int, ...]
 
 
 def fold(factory: Factory, lines: Iterable[Line], catalogue: Catalogue) -> Factory:
-    """The factory with one robot for each of the `lines`, and for each robot that is in none of
-    them. Raises InputError (BadLine) with everything that makes this no fold."""
+    """The factory with one robot for each of the `lines`, and for each robot on no line. Raises
+    InputError (BadLine) with every reason why the lines are not a fold."""
     shared = [line for line in lines if len(line) > 1]
     faults = [fault for line in shared for fault in _faults(factory, line, shared, catalogue)]
     if faults:
@@ -46,7 +46,7 @@ def fold(factory: Factory, lines: Iterable[Line], catalogue: Catalogue) -> Facto
 
 def folded(factory: Factory, lines: Iterable[Line], catalogue: Catalogue) -> Factory:
     """The factory with one robot for each of the `lines` of a fold, which is not checked, and for
-    each robot that is in none of them."""
+    each robot on no line."""
     on = line_of(len(factory.robots), lines)
     heads = sorted(set(on))
     number = {head: n for n, head in enumerate(heads)}
@@ -74,14 +74,14 @@ def _tool_lines(factory: Factory, lines: Sequence[Line]) -> list[Line]:
 
 
 def count_of(factory: Factory, lines: Sequence[Line]) -> int:
-    """How many robots a factory has that is folded so."""
+    """Number of robots of a factory that is folded by these lines."""
     found = [line for line in lines if len(line) > 1]
     found += _tool_lines(factory, found) if found else []
     return len(factory.robots) - sum(len(line) - 1 for line in found)
 
 
 def line_of(count: int, lines: Iterable[Line]) -> list[int]:
-    """For each of so many robots the first robot of its line, itself where it is in none."""
+    """For each of `count` robots the first robot of its line; itself for a robot on no line."""
     on = list(range(count))
     for line in lines:
         for robot in line:
@@ -98,8 +98,8 @@ def lines_of(plan: Plan) -> tuple[Line, ...]:
 
 
 def lines_of_labels(factory: Factory, sides: Iterable[Sequence[str]]) -> tuple[Line, ...]:
-    """Lines given by the labels that their robots bring. Raises InputError (BadLine) where a label
-    is brought by no robot, or is on two lines."""
+    """Lines given by the labels that their robots bring. Raises InputError (BadLine) for a label
+    that no robot brings, or that is on two lines."""
     brings = {
         label: robot
         for o in factory.operations[:-1]
@@ -138,7 +138,7 @@ def _type(factory: Factory, line: Sequence[int], catalogue: Catalogue) -> str:
 def _faults(
     factory: Factory, line: Line, lines: Sequence[Line], catalogue: Catalogue
 ) -> Iterator[Diagnostic]:
-    """What makes a line no line, pair by pair with its first tour."""
+    """The reasons why tours cannot be on one line, pair by pair with its first tour."""
     on = line_of(len(factory.robots), lines)
     first, *others = line
     for other in others:
@@ -162,8 +162,8 @@ def _faults(
 
 
 def kept_apart(factory: Factory, lines: Sequence[Line], catalogue: Catalogue) -> Iterator[str]:
-    """Why lines that deliver to one robot cannot become one, in words, for each two that follow
-    each other there and are not needed at once. They are named by what their first tours bring."""
+    """The reasons why lines that deliver to one robot cannot become one, for each two consecutive
+    ones that are not needed at once. Lines are named by the labels of their first tours."""
     on = line_of(len(factory.robots), lines)
     heads: dict[int, list[int]] = {}
     for robot in dict.fromkeys(on[1:]):
@@ -184,8 +184,8 @@ def kept_apart(factory: Factory, lines: Sequence[Line], catalogue: Catalogue) ->
 def mismatch(
     factory: Factory, one: int, other: int, on: Sequence[int], catalogue: Catalogue
 ) -> str:
-    """Why two tours, given by their robots, cannot be on one line if the tours that they deliver to
-    are on the lines `on`; "" where they can."""
+    """The reason why two tours, given by their robots, cannot be on one line, "" if they can; `on`:
+    the lines of all tours."""
     ends = delivery(factory, one), delivery(factory, other)
     if 0 in (one, other):
         return "the output robot has a line of its own"
@@ -199,10 +199,9 @@ def mismatch(
 
 
 def kind_of(factory: Factory, robot: int) -> tuple[object, ...]:
-    """What tours on one line have in common: whether a feeder begins them or two others that bring
-    something; whether they end at a station of a carrier that holds something, or one that takes
-    what they bring; whether they lower it. Tools, what they do, and in which of the template's
-    roles."""
+    """Kind of a tour, which is the same for all tours of a line: whether it begins at a feeder or
+    takes inputs from two robots; whether it ends with an insertion, or with a carrier that takes
+    its label; whether it lowers it. For tools, their template and their role in it."""
     first = factory.operations[factory.robots[robot].operations[0]]
     last = delivery(factory, robot)
     slot = last.robots.index(robot)
@@ -215,18 +214,18 @@ def kind_of(factory: Factory, robot: int) -> tuple[object, ...]:
 
 
 def begun_by(factory: Factory, robot: int) -> list[int]:
-    """The robots that bring what a tour begins with, two where its robot takes what they bring."""
+    """The robots that bring the first inputs of a tour; none for a tour that begins at a feeder."""
     first = factory.operations[factory.robots[robot].operations[0]]
     return [other for other in first.robots if other != robot] if first.carrier == robot else []
 
 
 def sides_of(factory: Factory, robot: int) -> set[int]:
-    """From which sides of the axis of its approach a robot may come with what it delivers."""
+    """Sides of the approach axis from which a robot may come to its last operation."""
     return sides_at(delivery(factory, robot), robot)
 
 
 def sides_at(o: Operation, robot: int) -> set[int]:
-    """From which sides of the axis of its approach a robot may come to an operation."""
+    """Sides of the approach axis from which a robot may come to an operation."""
     slot, approach = o.robots.index(robot), o.approach
     if approach is None or o.before[slot] == NOPART:
         return {-1, +1}

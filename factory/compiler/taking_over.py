@@ -29,8 +29,8 @@ from factory.problem.robot_types import Catalogue
 
 @dataclass(frozen=True)
 class Takeover:
-    """Robots of the factory `before` that are gone, `dead` (index) first among them, and the
-    factory `after`, in which others have their tours (`moved`)."""
+    """The change from a factory `before` to a factory `after`, in which the robot `dead` (index)
+    and its branch are removed and others have their tours (`moved`)."""
 
     before: Factory
     after: Factory
@@ -39,19 +39,19 @@ class Takeover:
 
     @cached_property
     def crew(self) -> Factory:
-        """`after`, where all robots keep the numbers that they have before: those that are gone
-        have no operations. Its net has the places of that of `after`, in their order."""
+        """`after` with the robot numbers of `before`: removed robots have no operations. Its net
+        has the places of that of `after`, in their order."""
         return crew_with(self.before, self.moved)
 
     @property
     def names(self) -> tuple[str, str]:
-        """The robot that is dead, and its deputy."""
+        """Names of the dead robot and its deputy."""
         robots = self.before.robots
         return robots[self.dead].name, robots[self.moved[self.dead]].name
 
     def exchanged(self, fired: Sequence[int], t: float) -> tuple[tuple[int, ...], Undone]:
-        """n' of the counts n (`fired`, from m_0 on) that were reached at time t [s], and what the
-        record of the run says of it. Raises RunError (NotProved) where the net of `after` is not
+        """Counts n' after the exchange of the counts n (`fired`, from m_0 on) at time t [s], and
+        its entry in the record of the run. Raises RunError (NotProved) if the net of `after` is not
         live."""
         net = self.after.net
         proved(net)
@@ -64,21 +64,20 @@ class Takeover:
 
 
 def taken_over(factory: Factory, dead: int, deputy: int, catalogue: Catalogue) -> Takeover:
-    """What a factory becomes when a deputy takes over for a robot (indices). Raises InputError
-    (BadLine) where it is no deputy."""
+    """The change when a deputy takes over for a robot (indices). Raises InputError (BadLine) if it
+    is not a deputy."""
     moved = moved_to(factory, dead, deputy, catalogue)
     return Takeover(factory, with_moved(factory, moved), dead, moved)
 
 
 def nets_after(factory: Factory, entries: Iterable[Entry]) -> Iterator[GearNet]:
-    """The nets in which a recorded run went on where robots were exchanged, in their order. They
-    are not proved."""
+    """The nets of a recorded run after each exchange of robots, in order. They are not proved."""
     return (without_gone(crew).net for crew in crews_after(factory, entries))
 
 
 def crews_after(factory: Factory, entries: Iterable[Entry]) -> Iterator[Factory]:
-    """The factories in which a recorded run went on where robots were exchanged, in their order,
-    with all robots (`crew_with`)."""
+    """The factories of a recorded run after each exchange of robots, in order, with all robots
+    (`crew_with`)."""
     number = {robot.name: robot.index for robot in factory.robots}
     for entry in exchanges(entries):
         dead, deputy = (number[name] for name in entry.robots)
@@ -87,13 +86,13 @@ def crews_after(factory: Factory, entries: Iterable[Entry]) -> Iterator[Factory]
 
 
 def with_moved(factory: Factory, moved: Moved) -> Factory:
-    """The factory in which tours are moved, which is not checked."""
+    """The factory with moved tours, without removed robots; it is not checked."""
     return without_gone(crew_with(factory, moved))
 
 
 def crew_with(factory: Factory, moved: Moved) -> Factory:
-    """The factory in which tours are moved, which is not checked, with all its robots; those that
-    are gone have no operations, and their lifts stay where they are."""
+    """The factory with moved tours and all its robots; it is not checked. Removed robots have no
+    operations, and their lifts stay where they are."""
     robots = factory.robots
     crew = assigned(factory, robots, [[moved.get(robot.index, robot.index) for robot in robots]])
     return replace(crew, adjusted=factory.adjusted | (factory.strokes.keys() & moved.keys()))
@@ -115,11 +114,11 @@ def present(factory: Factory) -> list[int]:
 
 
 def lost(factory: Factory, fired: Sequence[int], robots: Iterable[int]) -> tuple[int, ...]:
-    """The transitions that are undone with robots (indices) that are gone: all ends that made what
-    they hold, each as often as it is in their hands, or the start of what one is at with nothing.
+    """The transitions that are undone when robots (indices) are removed: all ends that made their
+    payloads, once for each copy in their hands, or the start of an operation begun empty-handed.
 
-    The material rule counts what is in one pile. A part in a pile and another copy of it in the
-    next hand are two.
+    The material rule counts the contents of one pile: a part in a pile and another copy of it in
+    the next hand are two.
     """
     found, begun, marking = list[int](), set[int](), marking_after(factory.net, fired)
     for robot in robots:

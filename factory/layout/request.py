@@ -81,8 +81,7 @@ class Ground:
         catalogue: Catalogue | None,
     ) -> Layout:
         """The layout of a factory, of all whose deputies as many as possible can take over."""
-        from factory.compiler.deputies import deputies
-        from factory.compiler.standing_by import Pair, chosen_pairs, standing_by
+        from factory.compiler.deputies import Pair, chosen_pairs, deputies, standing_by
         from factory.layout.standby import laid_out_for, part_of
         from factory.problem.robot_types import load_catalogue
 

@@ -1,12 +1,12 @@
 """The layout of a factory in which deputies can take over: a part of one in which robots and their
-deputies do the same tours in turn (`compiler.standing_by`)."""
+deputies do the same tours in turn (`compiler.deputies`)."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from factory.compiler.standing_by import Pair
+from factory.compiler.deputies import Pair
 from factory.layout.layout import Layout
 from factory.plant.factory import Factory
 from factory.support.errors import FactoryError

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from factory.compiler.mating.bodies import ConvexBodies, bodies
+from factory.compiler.mating.mating import AMPLE
 from factory.compiler.mating.meetings import Ints, Meeting, Meetings
 from factory.compiler.mating.overlaps import Finder, Overlaps
 from factory.compiler.mating.paths import TOLERANCE
-from factory.compiler.mating.rooms import AMPLE
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
 from factory.planning.hulls import Drawn

@@ -57,7 +57,7 @@ def bodies(product: Product, parts: Sequence[str]) -> ConvexBodies:
 def _boxes(
     points: Array, starts: NDArray[np.int64], counts: NDArray[np.int64], low: Array, high: Array
 ) -> NDArray[np.bool_]:
-    """Whether a body has eight vertices, one in each corner of its bounding box."""
+    """Whether each body has eight vertices, one in each corner of its bounding box."""
     found = counts == 8
     chosen = np.flatnonzero(found)
     corners = points[starts[chosen][:, None] + np.arange(8)]

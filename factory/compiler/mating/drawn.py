@@ -40,12 +40,12 @@ class DrawnWays:
 
     @cached_property
     def rough(self) -> NDArray[np.bool_]:
-        """The parts (n,) that are known by their hulls alone: their meshes bound no volume."""
+        """Whether each part (n,) is known by its hull alone, since its mesh bounds no volume."""
         return np.asarray(self._meshes[0])
 
     @cached_property
     def wider(self) -> NDArray[np.bool_]:
-        """The parts (n,) that are less than the convex bodies which collide for them."""
+        """Whether each part (n,) is smaller than the convex bodies that collide for it."""
         return np.asarray(self._meshes[1])
 
     @cached_property
@@ -64,7 +64,7 @@ class DrawnWays:
 
     @cached_property
     def _beyond(self) -> float:
-        """A way that is as long as this leads out of the product [m]."""
+        """Length of a path that leads out of the product [m]."""
         low = np.min([solid.low for solid in self._solids], axis=0)
         high = np.max([solid.high for solid in self._solids], axis=0)
         return 1.01 * float((high - low).max()) + 1e-3
@@ -116,7 +116,7 @@ class DrawnWays:
         return finished, path, shift, graze
 
     def finished(self, one: int, other: int) -> float:
-        """How deep two parts are in each other in the finished product [m]."""
+        """Penetration depth of two parts in the finished product [m]."""
         if (one, other) not in self._finished:
             self._finished[one, other] = common(self._body(one), self._body(other)).depth
         return self._finished[one, other]
@@ -139,7 +139,7 @@ class DrawnWays:
         return depth, self._shift(found, moving, axis, sign)
 
     def _cut(self, moving: int, standing: int, axis: int, sign: int, samples: int) -> Common | None:
-        """What a part cuts out of another on its way; None for nothing."""
+        """The volume that a part on its way cuts out of another; None if it is empty."""
         swept, body = self._swept(moving, axis, sign), self._body(standing)
         found = common(swept, body, both=False, samples=samples)
         return found if found.volume else None

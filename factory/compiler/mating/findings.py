@@ -1,4 +1,4 @@
-"""What is found of how the inputs of a product's operations can come together.
+"""Findings on how the inputs of a product's operations can come together.
 
 Three levels say how strictly. At a *strict* one no two parts ever overlap, nor scrape along each
 other; at one that goes *no deeper* they overlap on the way by no more than in the finished product;
@@ -27,8 +27,8 @@ LEVELS = ("none", "left_out", "no_deeper", "strict")
 
 @dataclass(frozen=True, slots=True)
 class Mating:
-    """What was found of one operation: the approach chosen, and the best levels at which its inputs
-    slide or one is lowered."""
+    """The judgement of one operation: its approach, and the best levels at which its inputs slide
+    or one is lowered."""
 
     label: str
     inputs: tuple[str, ...]
@@ -60,7 +60,7 @@ class Mating:
 
     @property
     def clashes(self) -> tuple[Clash, ...]:
-        """Where it is blocked, the pairs that pass through each other, the deepest first."""
+        """If it is blocked, the pairs that pass through each other, the deepest first."""
         return self.approach.clashes
 
     def clashes_as_json(self) -> dict[str, Any]:
@@ -85,7 +85,7 @@ class Mating:
 
 @dataclass(frozen=True)
 class Matings:
-    """All that a product's operations were judged to be, inputs before what is made of them."""
+    """The judgements of a product's operations, inputs before the operations that take them."""
 
     all: tuple[Mating, ...]
     parts: Mapping[str, tuple[str, ...]] = field(repr=False)
@@ -105,12 +105,12 @@ class Matings:
         return tuple(mating for mating in self.all if mating.approach.kind == kind)
 
     def faults(self, allowed: Sequence[AllowedOverlap]) -> tuple[Diagnostic, ...]:
-        """What is said of blocked operations in which not all that happens is allowed."""
+        """The warnings of blocked operations, except those whose clashes are all allowed."""
         found = (m.approach.fault(m.label, m.inputs[-1], m.position, allowed) for m in self.all)
         return tuple(fault for fault in found if fault is not None)
 
     def notes(self, allowed: Sequence[AllowedOverlap]) -> list[str]:
-        """What is used of what is allowed, in words."""
+        """A note on the clashes that are allowed."""
         used = [c for m in self.all for c in m.clashes if c.is_allowed(allowed)]
         if not used:
             return []

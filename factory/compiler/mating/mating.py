@@ -1,10 +1,10 @@
-"""Judges how the inputs of each operation of a product can come together: they slide, one is
-lowered, or they are blocked."""
+"""How the inputs of each operation of a product can come together: they slide, one is lowered, or
+they are blocked; and the room that they have on the way."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import ceil
 
 import numpy as np
@@ -75,21 +75,21 @@ class _Judge:
         self.overlaps: dict[int, Overlaps] = {}
 
     def slide(self, axis: int, overlaps: Overlaps) -> None:
-        """Takes note of what happens along x or y."""
+        """Note the levels along x or y."""
         at = self.meetings.axes == axis
         levels, clashing = levels_of(overlaps, len(at))
         self.slides[at], self.clashing[at] = levels[at], clashing[at]
         self.overlaps[axis] = overlaps
 
     def lower(self, overlaps: Overlaps, tried: NDArray[np.bool_]) -> None:
-        """Takes note of what happens along z: column 0, the first is lowered, 1, the last."""
+        """Note the levels along z: column 0 if the first input is lowered, 1 if the last is."""
         either = np.array([m.either for m in self.meetings.all])
         self.lowers[tried] = levels_of(overlaps, len(tried))[0][tried]
         self.lowers[~either, 0] = BLOCKED
         self.overlaps[UPRIGHT] = overlaps
 
     def mating(self, number: int) -> Mating:
-        """The best: the stricter, and of the same level to slide."""
+        """The best approach: that of the stricter level, or sliding if both are equal."""
         meeting = self.meetings.all[number]
         slides, clashing = self.slides[number].tolist(), self.clashing[number].tolist()
         slide, lower = max(slides), max(self.lowers[number].tolist())
@@ -116,7 +116,8 @@ class _Judge:
         return Approach(kind, axis, sides, "", 0.0, overlaps)
 
     def _lowering(self, number: int, level: int) -> Approach:
-        """Of two that can be lowered the one with the shorter stroke, or else the last."""
+        """Lowering of the input with the shorter stroke if both can be lowered, else of the
+        last."""
         meeting = self.meetings.all[number]
         stroke = self._strokes(meeting)
         columns = [c for c in (1, 0) if self.lowers[number, c] == level]
@@ -199,3 +200,68 @@ def levels_of(overlaps: Overlaps, count: int) -> tuple[Ints, Ints]:
     )
     found = [faulty == 0, deeper == 0, clashing == 0]
     return np.select(found, [STRICT, NO_DEEPER, LEFT_OUT], BLOCKED), clashing
+
+
+@dataclass(frozen=True, slots=True)
+class Admitted:
+    """The best levels (`findings`) of one operation: its inputs `slides` along x and y from the
+    better side; the first, or the last of them is lowered (`lowers`)."""
+
+    slides: tuple[int, int] = (STRICT, STRICT)
+    lowers: tuple[int, int] = (STRICT, STRICT)
+
+
+def admitted(nodes: Mapping[str, Node], product: Product) -> Mapping[str, Admitted]:
+    """The levels of each operation with two inputs or more, by its label, whichever robot holds the
+    pile: the choice of forms is made from them. As costly as `matings` twice."""
+    found = meetings(nodes)
+    if not found.all:
+        return {}
+    finder, count = Finder(bodies(product, found.parts), found), len(found.all)
+    every = np.ones(count, bool)
+    slides = [levels_of(finder.along(axis, every), count)[0].max(axis=1) for axis in (0, 1)]
+    lowers = levels_of(finder.along(UPRIGHT, every), count)[0]
+    rows = zip(found.all, *(s.tolist() for s in slides), lowers.tolist(), strict=True)
+    return {m.label: Admitted((x, y), (first, last)) for m, x, y, (first, last) in rows}
+
+
+AMPLE = 5e-3
+"""More room than this [m] is not measured."""
+
+
+def rooms(
+    nodes: Mapping[str, Node], product: Product, chosen: Mapping[str, Approach]
+) -> Mapping[str, float]:
+    """The least room [m] between the inputs of each operation on the way that was chosen for it
+    (from all of its `sides`), by its label: less than 0 where parts overlap, infinite where it is
+    more than AMPLE. But for the last millimetre: finished parts may touch."""
+    found = meetings(nodes)
+    ways = [_way(meeting, chosen.get(meeting.label)) for meeting in found.all]
+    least = np.full(len(found.all), np.inf)
+    if not found.all:
+        return {}
+    finder = Finder(bodies(product, found.parts), found)
+    for axis in range(3):
+        wanted = np.array([way == axis for way, _ in ways])
+        if not wanted.any():
+            continue
+        other, one, room = finder.rooms(axis, AMPLE)
+        meeting = found.of(one, other)
+        rows = np.flatnonzero(wanted[meeting] & (other >= found.splits[meeting]))
+        sides = np.array([sides for _, sides in ways])[meeting[rows]]
+        np.minimum.at(least, meeting[rows], np.where(sides, room[rows], np.inf).min(axis=1))
+    least[least >= AMPLE] = np.inf
+    labels = [meeting.label for meeting in found.all]
+    return {label: float(r) for label, r in zip(labels, least, strict=True) if label in chosen}
+
+
+def _way(meeting: Meeting, approach: Approach | None) -> tuple[int, tuple[bool, bool]]:
+    """The axis, -1 for none, and the sides from which the last input comes. A lowered input comes
+    from above; if that is another input, the last one comes from below."""
+    if approach is None:
+        return -1, (False, False)
+    if approach.kind == "lower":
+        last = approach.lowered == meeting.inputs[-1]
+        return UPRIGHT, (not last, last)
+    low, high = (sign in approach.sides for sign in SIGNS)
+    return approach.axis, (low, high)

@@ -20,8 +20,16 @@ from factory.compiler.mating.bodies import ConvexBodies
 from factory.compiler.mating.depth import Difference, Polytope, exact, polytope
 from factory.compiler.mating.drawn import DrawnWays
 from factory.compiler.mating.meetings import Ints, Meetings
-from factory.compiler.mating.paths import CLEAR, LAST, SIGNS, TOLERANCE, Depths, depths_of
-from factory.compiler.mating.seeking import MANY, sought
+from factory.compiler.mating.paths import (
+    CLEAR,
+    LAST,
+    MANY,
+    SIGNS,
+    TOLERANCE,
+    Depths,
+    depths_of,
+    sought,
+)
 from factory.geometry import overlap
 from factory.geometry.meshes import Array
 from factory.support.cache import digest, load_arrays, program, store_arrays

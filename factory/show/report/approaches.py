@@ -7,7 +7,7 @@ from dataclasses import replace
 from html import escape
 
 from factory.compiler.expanding import nodes_of
-from factory.compiler.mating.rooms import AMPLE, rooms
+from factory.compiler.mating.mating import AMPLE, rooms
 from factory.plant.approaches import Approach, Pair
 from factory.plant.factory import Operation
 from factory.show.report.recording import Recording

@@ -9,7 +9,7 @@ from math import inf
 
 from factory.compiler.expanding import expand
 from factory.compiler.folding import Line
-from factory.compiler.mating.admitting import admitted
+from factory.compiler.mating.mating import admitted
 from factory.compiler.parallel import Branches
 from factory.layout.durations import Pace
 from factory.layout.shapes import payload_boxes

@@ -19,8 +19,8 @@ from math import inf
 from typing import Literal
 
 from factory.compiler.expanding import Node, expand, joins
-from factory.compiler.mating.admitting import Admitted
 from factory.compiler.mating.findings import BLOCKED, NO_DEEPER
+from factory.compiler.mating.mating import Admitted
 from factory.layout.durations import Pace
 from factory.layout.guidepath import Box
 from factory.problem.pag import NOPART, PAG
