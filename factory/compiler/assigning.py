@@ -107,7 +107,9 @@ def assigned(base: Factory, robots: Sequence[Robot], turns: Sequence[Sequence[in
     )
     programs: list[list[int]] = [[] for _ in robots]
     tours = sorted(
-        (when[tour[-1]], robot, tour) for robot, own in enumerate(base.tours) for tour in own
+        (when[tour[-1]], robot, tour)
+        for robot, tours_of in enumerate(base.tours)
+        for tour in tours_of
     )
     for turn, does in enumerate(turns):
         for _, robot, tour in tours:
@@ -143,11 +145,11 @@ def shared(base: Factory, plan: Plan, catalogue: Catalogue) -> Factory:
                 raise _bad(f"a robot cannot take two parts in '{o.label}'")
     types, first = dict[int, str](), dict[int, Robot]()
     for tour in tours:
-        own = base.robots[tour]
+        base_robot = base.robots[tour]
         for robot in dict.fromkeys(turn[tour] for turn in plan.turns):
-            first.setdefault(robot, own)
-            kind = types.setdefault(robot, own.type)
-            types[robot] = catalogue.meet(kind, own.type) or kind
+            first.setdefault(robot, base_robot)
+            kind = types.setdefault(robot, base_robot.type)
+            types[robot] = catalogue.meet(kind, base_robot.type) or kind
     if len(types) < len(every):
         raise _bad(f"{len(every)} robots are named, and {len(types)} have tours")
     lifts = plan.lifts or frozenset()

@@ -45,10 +45,10 @@ def deputies(factory: Factory, catalogue: Catalogue) -> tuple[tuple[int, ...], .
     siblings = Siblings(factory, catalogue)
     if not all(siblings.ascends(robot.operations) for robot in factory.robots):
         raise ValueError("the programs do not ascend in the postorder of the operations")
-    found = [set[int]() for _ in factory.robots]
+    rows = [set[int]() for _ in factory.robots]
     for dead, deputy in siblings.pairs():
-        found[dead].add(deputy)
-    return tuple(tuple(sorted(row)) for row in found)
+        rows[dead].add(deputy)
+    return tuple(tuple(sorted(row)) for row in rows)
 
 
 def moved_to(factory: Factory, dead: int, deputy: int, catalogue: Catalogue) -> Moved:
@@ -57,13 +57,13 @@ def moved_to(factory: Factory, dead: int, deputy: int, catalogue: Catalogue) -> 
     siblings = Siblings(factory, catalogue)
     top, twin = siblings.tops(dead, deputy)
     message = siblings.refusal(top, twin)
-    found: Moved = {top: twin}
+    moved: Moved = {top: twin}
     if not message and siblings.kids[top]:
-        found = siblings.twins(top, twin)
-        if found.get(dead) != deputy:
+        moved = siblings.twins(top, twin)
+        if moved.get(dead) != deputy:
             message = "what delivers to it cannot reach the other"
     if not message:
-        return found
+        return moved
     one, other = factory.robots[dead], factory.robots[deputy]
     text = f"{other.name} cannot take over the tours of {one.name}: {message}"
     hint = "`factory check --json` lists the deputies of each robot; one without needs a spare"
@@ -80,10 +80,10 @@ class Siblings:
     @cached_property
     def kids(self) -> list[list[int]]:
         """For each robot the robots that deliver to it, and its tools."""
-        found: list[list[int]] = [[] for _ in self.factory.robots]
+        kids: list[list[int]] = [[] for _ in self.factory.robots]
         for robot in self.factory.robots[1:]:
-            found[self._carrier(robot.index)].append(robot.index)
-        return found
+            kids[self._carrier(robot.index)].append(robot.index)
+        return kids
 
     @cached_property
     def _deliveries(self) -> list[frozenset[int]]:
@@ -175,14 +175,14 @@ class Siblings:
     def twins(self, top: int, twin: int) -> Moved:
         """For each robot of the branch below `top` the corresponding robot of the branch below
         `twin`; empty if that is not a twin."""
-        found, todo = dict[int, int](), [(top, twin)]
+        moved, todo = dict[int, int](), [(top, twin)]
         for one, other in todo:
             pairs = [sorted(self.kids[robot], key=self._signature) for robot in (one, other)]
             if self._signature(one) != self._signature(other) or len(pairs[0]) != len(pairs[1]):
                 return MappingProxyType({})
-            found[one] = other
+            moved[one] = other
             todo += zip(*pairs, strict=True)
-        return MappingProxyType(found)
+        return MappingProxyType(moved)
 
     def tops(self, dead: int, deputy: int) -> tuple[int, int]:
         """The robots at the top of the branches of two robots, which deliver to one carrier; the
@@ -199,8 +199,8 @@ class Siblings:
 
     def _signature(self, robot: int) -> tuple[str, ...]:
         """What robots in twins have in common: their type, and what they do, but for the unit."""
-        found = self.factory.robots[robot]
-        return (found.type, *(self.factory.operations[n].written for n in found.operations))
+        member = self.factory.robots[robot]
+        return (member.type, *(self.factory.operations[n].written for n in member.operations))
 
 
 Pair = tuple[int, int]
@@ -225,13 +225,13 @@ def chosen_pairs(factory: Factory, deputies: Sequence[Sequence[int]]) -> tuple[P
 
 def rounds_of(pairs: Iterable[Pair]) -> tuple[Mapping[int, int], ...]:
     """Pairs distributed over turns, such that no deputy of a turn rests in it."""
-    found: list[dict[int, int]] = []
+    turns: list[dict[int, int]] = []
     for robot, deputy in pairs:
-        fitting = (r for r in found if deputy not in r and robot not in r.values())
+        fitting = (r for r in turns if deputy not in r and robot not in r.values())
         if (chosen := next(fitting, None)) is None:
-            found.append(chosen := {})
+            turns.append(chosen := {})
         chosen[robot] = deputy
-    return tuple(found)
+    return tuple(turns)
 
 
 def standing_by(factory: Factory, pairs: Iterable[Pair]) -> Factory:

@@ -63,21 +63,21 @@ def folded(factory: Factory, lines: Iterable[Line], catalogue: Catalogue) -> Fac
 def _tool_lines(factory: Factory, lines: Sequence[Line]) -> list[Line]:
     """The tools that share a robot: those of one kind that come to one line."""
     on = line_of(len(factory.robots), lines)
-    found: dict[tuple[int, object], list[int]] = {}
+    groups: dict[tuple[int, object], list[int]] = {}
     for robot in factory.robots[1:]:
         kind = kind_of(factory, robot.index)
         if kind[0] == "tool":
-            found.setdefault((on[delivery(factory, robot.index).carrier], kind), []).append(
+            groups.setdefault((on[delivery(factory, robot.index).carrier], kind), []).append(
                 robot.index
             )
-    return [tuple(tools) for tools in found.values() if len(tools) > 1]
+    return [tuple(tools) for tools in groups.values() if len(tools) > 1]
 
 
 def count_of(factory: Factory, lines: Sequence[Line]) -> int:
     """Number of robots of a factory that is folded by these lines."""
-    found = [line for line in lines if len(line) > 1]
-    found += _tool_lines(factory, found) if found else []
-    return len(factory.robots) - sum(len(line) - 1 for line in found)
+    shared = [line for line in lines if len(line) > 1]
+    shared += _tool_lines(factory, shared) if shared else []
+    return len(factory.robots) - sum(len(line) - 1 for line in shared)
 
 
 def line_of(count: int, lines: Iterable[Line]) -> list[int]:
@@ -129,10 +129,10 @@ def delivery(factory: Factory, robot: int) -> Operation:
 
 def _type(factory: Factory, line: Sequence[int], catalogue: Catalogue) -> str:
     """The type of robot that fits all tours of a line."""
-    found = factory.robots[line[0]].type
+    kind = factory.robots[line[0]].type
     for robot in line[1:]:
-        found = catalogue.meet(found, factory.robots[robot].type) or found
-    return found
+        kind = catalogue.meet(kind, factory.robots[robot].type) or kind
+    return kind
 
 
 def _faults(

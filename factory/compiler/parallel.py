@@ -62,13 +62,13 @@ def _unrolled(factory: Factory, lines: Sequence[int], period: int) -> Factory:
 
 def _brings(factory: Factory, label: str) -> int:
     """The robot that brings a label to another, -1 for none."""
-    found = (
+    robots = (
         robot
         for o in factory.making
         for robot, brought in zip(o.robots, o.before, strict=True)
         if brought == label and robot != o.carrier
     )
-    return next(found, -1)
+    return next(robots, -1)
 
 
 def _faults(factory: Factory, branches: Branches) -> Iterator[Diagnostic]:
@@ -96,8 +96,8 @@ def _not_brought(factory: Factory, label: str) -> Diagnostic:
     """Why the branch of a label cannot be there several times that no robot brings to another."""
     made = factory.by_label.get(label)
     if made is None or factory.drops(made.index):
-        known = [o.label for o in factory.making]
-        return _fault(f"there is no label '{label}'", None, did_you_mean(label, known, "labels"))
+        labels = [o.label for o in factory.making]
+        return _fault(f"there is no label '{label}'", None, did_you_mean(label, labels, "labels"))
     robot = made.carrier
     if robot == 0:
         message = f"'{label}' is made by the output robot, which there is one of"

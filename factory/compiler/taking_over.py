@@ -120,15 +120,15 @@ def lost(factory: Factory, fired: Sequence[int], robots: Iterable[int]) -> tuple
     The material rule counts the contents of one pile: a part in a pile and another copy of it in
     the next hand are two.
     """
-    found, begun, marking = list[int](), set[int](), marking_after(factory.net, fired)
+    ends, begun, marking = list[int](), set[int](), marking_after(factory.net, fired)
     for robot in robots:
         o = _next(factory, marking, robot)
         label = o.before[o.robots.index(robot)]
         if label != NOPART:
-            found += _ends_in(factory, label)
+            ends += _ends_in(factory, label)
         elif fired[o.start] > fired[o.end]:
             begun.add(o.start)
-    return (*found, *sorted(begun))
+    return (*ends, *sorted(begun))
 
 
 def _ends_in(factory: Factory, label: str) -> list[int]:

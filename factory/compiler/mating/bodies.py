@@ -38,31 +38,31 @@ class ConvexBodies:
 
 def bodies(product: Product, parts: Sequence[str]) -> ConvexBodies:
     """The bodies of the parts, in their order, as the engine collides them."""
-    found: list[Array] = []
+    vertices_of: list[Array] = []
     part: list[int] = []
     for number, label in enumerate(parts):
         solid = product.solids[label]
         pieces = solid.pieces or (solid.corners,)
-        found.extend(pieces)
+        vertices_of.extend(pieces)
         part.extend([number] * len(pieces))
-    counts = np.array([len(vertices) for vertices in found], np.int64)
+    counts = np.array([len(vertices) for vertices in vertices_of], np.int64)
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    points = np.concatenate(found)
+    points = np.concatenate(vertices_of)
     low, high = np.minimum.reduceat(points, starts), np.maximum.reduceat(points, starts)
     boxes = _boxes(points, starts, counts, low, high)
     solids = tuple(product.solids[label] for label in parts)
-    return ConvexBodies(tuple(found), np.array(part, np.int64), low, high, boxes, solids)
+    return ConvexBodies(tuple(vertices_of), np.array(part, np.int64), low, high, boxes, solids)
 
 
 def _boxes(
     points: Array, starts: NDArray[np.int64], counts: NDArray[np.int64], low: Array, high: Array
 ) -> NDArray[np.bool_]:
     """Whether each body has eight vertices, one in each corner of its bounding box."""
-    found = counts == 8
-    chosen = np.flatnonzero(found)
+    boxes = counts == 8
+    chosen = np.flatnonzero(boxes)
     corners = points[starts[chosen][:, None] + np.arange(8)]
     at_low = np.abs(corners - low[chosen][:, None]) < ROUNDING
     at_high = np.abs(corners - high[chosen][:, None]) < ROUNDING
     which = np.sort(at_high @ np.array([1, 2, 4]), axis=1)
-    found[chosen] = (at_low ^ at_high).all(axis=(1, 2)) & (which == np.arange(8)).all(axis=1)
-    return np.asarray(found)
+    boxes[chosen] = (at_low ^ at_high).all(axis=(1, 2)) & (which == np.arange(8)).all(axis=1)
+    return np.asarray(boxes)

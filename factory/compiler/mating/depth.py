@@ -154,9 +154,9 @@ def summits(heights: Array, slopes: Array) -> tuple[Array, Array]:
         at = np.maximum(drop / (slopes[left, up] - slopes[left, down]), 0.0)
         value = heights[left] + at[:, None] * slopes[left]
         lowest = value.argmin(axis=1)
-        found = value[np.arange(len(left)), lowest]
-        depth[left], shift[left] = found, at
-        gain = heights[left, up] + at * slopes[left, up] - found
+        deepest = value[np.arange(len(left)), lowest]
+        depth[left], shift[left] = deepest, at
+        gain = heights[left, up] + at * slopes[left, up] - deepest
         climbs = slopes[left, lowest] > 0
         new = (gain > 1e-13) & (lowest != up) & (lowest != down)
         rising[left[climbs & new]] = lowest[climbs & new]

@@ -50,7 +50,7 @@ class DrawnWays:
 
     @cached_property
     def _meshes(self) -> NDArray[np.bool_]:
-        found = np.zeros((2, len(self._solids)), bool)
+        flags = np.zeros((2, len(self._solids)), bool)
         kinds: dict[int, tuple[bool, bool]] = {}
         for part, solid in enumerate(self._solids):
             if solid.mesh is not None:
@@ -59,8 +59,8 @@ class DrawnWays:
                     exact = is_exact(solid.mesh)
                     is_rough = not exact and self._body(part) is None
                     kinds[key] = is_rough, not exact and not is_rough
-                found[:, part] = kinds[key]
-        return found
+                flags[:, part] = kinds[key]
+        return flags
 
     @cached_property
     def _beyond(self) -> float:
@@ -87,13 +87,13 @@ class DrawnWays:
     def room(self, moving: Ints, standing: Ints, axis: int, most: float) -> Array:
         """The least room (n, 2) [m] on the ways of pairs of parts from either side, but for the
         last bit, up to `most`; less than 0 where the two overlap on it."""
-        found = np.empty((len(moving), 2))
+        rooms = np.empty((len(moving), 2))
         for row, (one, other) in enumerate(zip(moving.tolist(), standing.tolist(), strict=True)):
             for column, sign in enumerate(SIGNS):
                 depth = self._path(one, other, axis, sign)[0]
                 gap = self._gap(one, other, axis, sign, most) if depth <= TOLERANCE else -depth
-                found[row, column] = gap
-        return found
+                rooms[row, column] = gap
+        return rooms
 
     def near(self, one: Ints, other: Ints, gap: float) -> NDArray[np.bool_]:
         """Which pairs of parts (n,) are at most so far from each other in the finished product."""
@@ -124,31 +124,31 @@ class DrawnWays:
     def _path(self, moving: int, standing: int, axis: int, sign: int) -> tuple[float, float]:
         """How deep the first part gets into the second on its way, and where [m]. The depth of a
         clash that is deep may be found too small."""
-        found = self._cut(moving, standing, axis, sign, QUICK)
-        if found is None:
+        cut = self._cut(moving, standing, axis, sign, QUICK)
+        if cut is None:
             return 0.0, 0.0
         finished = self.finished(moving, standing)
-        if found.depth <= SURELY or finished > TOLERANCE:
+        if cut.depth <= SURELY or finished > TOLERANCE:
             both = [
                 self._cut(moving, standing, axis, sign, SAMPLES),
                 self._cut(standing, moving, axis, -sign, SAMPLES),
             ]
             depth = min(cut.depth if cut else 0.0 for cut in both)
         else:
-            depth = found.depth
-        return depth, self._shift(found, moving, axis, sign)
+            depth = cut.depth
+        return depth, self._shift(cut, moving, axis, sign)
 
     def _cut(self, moving: int, standing: int, axis: int, sign: int, samples: int) -> Common | None:
         """The volume that a part on its way cuts out of another; None if it is empty."""
         swept, body = self._swept(moving, axis, sign), self._body(standing)
-        found = common(swept, body, both=False, samples=samples)
-        return found if found.volume else None
+        cut = common(swept, body, both=False, samples=samples)
+        return cut if cut.volume else None
 
-    def _shift(self, found: Common, moving: int, axis: int, sign: int) -> float:
+    def _shift(self, cut: Common, moving: int, axis: int, sign: int) -> float:
         """How far the moving part has come where it meets the deepest point of a clash [m]."""
-        back = found.deepest - sign * self._beyond * np.eye(3)[axis]
-        hits = self._body(moving).ray_cast(found.deepest, back)
-        ends = [float(np.linalg.norm(hit.position - found.deepest)) for hit in hits[:2]]
+        back = cut.deepest - sign * self._beyond * np.eye(3)[axis]
+        hits = self._body(moving).ray_cast(cut.deepest, back)
+        ends = [float(np.linalg.norm(hit.position - cut.deepest)) for hit in hits[:2]]
         return float(np.mean(ends if len(hits) % 2 == 0 and ends else [0.0, *ends[:1]]))
 
     def _gap(self, moving: int, standing: int, axis: int, sign: int, most: float) -> float:

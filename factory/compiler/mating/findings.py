@@ -106,8 +106,8 @@ class Matings:
 
     def faults(self, allowed: Sequence[AllowedOverlap]) -> tuple[Diagnostic, ...]:
         """The warnings of blocked operations, except those whose clashes are all allowed."""
-        found = (m.approach.fault(m.label, m.inputs[-1], m.position, allowed) for m in self.all)
-        return tuple(fault for fault in found if fault is not None)
+        faults = (m.approach.fault(m.label, m.inputs[-1], m.position, allowed) for m in self.all)
+        return tuple(fault for fault in faults if fault is not None)
 
     def notes(self, allowed: Sequence[AllowedOverlap]) -> list[str]:
         """A note on the clashes that are allowed."""

@@ -35,17 +35,17 @@ UPRIGHT = 2
 def matings(nodes: Mapping[str, Node], product: Product, lifts: bool = True) -> Matings:
     """Judges every operation with two inputs or more, with `lifts` or without. Near-linear in the
     parts, except where very many lie behind one another."""
-    found = meetings(nodes)
-    if not found.all:
+    met = meetings(nodes)
+    if not met.all:
         return Matings((), {})
-    finder = Finder(bodies(product, found.parts), found)
-    judge = _Judge(found, product, {label: node.last for label, node in nodes.items()})
+    finder = Finder(bodies(product, met.parts), met)
+    judge = _Judge(met, product, {label: node.last for label, node in nodes.items()})
     for axis in (0, 1):
-        judge.slide(axis, finder.along(axis, found.axes == axis))
+        judge.slide(axis, finder.along(axis, met.axes == axis))
     unclean = judge.slides.max(axis=1) < STRICT
     if lifts and unclean.any():
         judge.lower(finder.along(UPRIGHT, unclean), unclean)
-    made = tuple(judge.mating(number) for number in range(len(found.all)))
+    made = tuple(judge.mating(number) for number in range(len(met.all)))
     return Matings(made, judge.contents(made))
 
 
@@ -54,9 +54,9 @@ def judged(factory: Factory, product: Product) -> Factory:
     to join: its robots have no lifts, so all inputs slide, or are blocked."""
     if all(o.approach is not None for o in factory.operations if len(o.inputs) > 1):
         return factory
-    found = matings(nodes_of(factory), product, lifts=False).approaches
+    approaches = matings(nodes_of(factory), product, lifts=False).approaches
     operations = tuple(
-        replace(o, approach=o.approach or found.get(o.label)) for o in factory.operations
+        replace(o, approach=o.approach or approaches.get(o.label)) for o in factory.operations
     )
     return replace(factory, operations=operations)
 
@@ -64,11 +64,9 @@ def judged(factory: Factory, product: Product) -> Factory:
 class _Judge:
     """The levels of all meetings, and the choice among them."""
 
-    def __init__(
-        self, found: Meetings, product: Product, at: Mapping[str, Position | None]
-    ) -> None:
-        self.meetings, self.product, self.at = found, product, at
-        count = len(found.all)
+    def __init__(self, met: Meetings, product: Product, at: Mapping[str, Position | None]) -> None:
+        self.meetings, self.product, self.at = met, product, at
+        count = len(met.all)
         self.slides = np.zeros((count, 2), np.int64)
         self.lowers = np.full((count, 2), BLOCKED)
         self.clashing = np.zeros((count, 2), np.int64)
@@ -122,9 +120,9 @@ class _Judge:
         stroke = self._strokes(meeting)
         columns = [c for c in (1, 0) if self.lowers[number, c] == level]
         column = min(columns, key=lambda c: stroke[c])
-        found = self._overlaps(number, UPRIGHT, column)
+        overlaps = self._overlaps(number, UPRIGHT, column)
         lowered = meeting.inputs[-1 if column else 0]
-        return Approach("lower", meeting.axis, SIGNS, lowered, stroke[column], (found, found))
+        return Approach("lower", meeting.axis, SIGNS, lowered, stroke[column], (overlaps, overlaps))
 
     def _strokes(self, meeting: Meeting) -> tuple[float, float]:
         """How high the first, or the last input is raised above its place, so that it clears the
@@ -149,7 +147,7 @@ class _Judge:
         """The pairs that clash from one side, the deepest first."""
         overlaps = self.overlaps[axis].of(number)
         depths, rows = overlaps.depths, np.flatnonzero(overlaps.clashing[:, column])
-        found = [
+        clashes = [
             Clash(
                 self._pair(overlaps, row),
                 float(depths.path[row, column]),
@@ -158,14 +156,14 @@ class _Judge:
             )
             for row in rows.tolist()
         ]
-        return tuple(sorted(found, key=lambda c: (-round(c.depth, 9), c.parts)))
+        return tuple(sorted(clashes, key=lambda c: (-round(c.depth, 9), c.parts)))
 
     def _overlaps(self, number: int, axis: int, column: int) -> tuple[Overlap, ...]:
         """What collides or scrapes as the inputs of an operation come from a side."""
         overlaps = self.overlaps[axis].of(number)
         rows = np.flatnonzero(overlaps.colliding.faulty[:, column]).tolist()
-        found = (self._overlap(overlaps, row, column) for row in rows)
-        return tuple(sorted(found, key=lambda overlap: overlap.parts))
+        listed = (self._overlap(overlaps, row, column) for row in rows)
+        return tuple(sorted(listed, key=lambda overlap: overlap.parts))
 
     def _overlap(self, overlaps: Overlaps, row: int, column: int) -> Overlap:
         parts = self._pair(overlaps, row)
@@ -182,11 +180,11 @@ class _Judge:
 
     def contents(self, made: tuple[Mating, ...]) -> dict[str, tuple[str, ...]]:
         """The parts of all inputs of blocked operations; piles count as one with their last."""
-        found: dict[str, tuple[str, ...]] = {}
+        parts: dict[str, tuple[str, ...]] = {}
         for mating, meeting in zip(made, self.meetings.all, strict=True):
             if mating.approach.kind == "blocked":
-                found[meeting.inputs[0]], found[meeting.inputs[-1]] = self._sides(meeting)
-        return found
+                parts[meeting.inputs[0]], parts[meeting.inputs[-1]] = self._sides(meeting)
+        return parts
 
 
 def levels_of(overlaps: Overlaps, count: int) -> tuple[Ints, Ints]:
@@ -198,8 +196,8 @@ def levels_of(overlaps: Overlaps, count: int) -> tuple[Ints, Ints]:
         )
         for fault in (overlaps.clashing, overlaps.deeper, overlaps.depths.faulty)
     )
-    found = [faulty == 0, deeper == 0, clashing == 0]
-    return np.select(found, [STRICT, NO_DEEPER, LEFT_OUT], BLOCKED), clashing
+    conditions = [faulty == 0, deeper == 0, clashing == 0]
+    return np.select(conditions, [STRICT, NO_DEEPER, LEFT_OUT], BLOCKED), clashing
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,14 +212,14 @@ class Admitted:
 def admitted(nodes: Mapping[str, Node], product: Product) -> Mapping[str, Admitted]:
     """The levels of each operation with two inputs or more, by its label, whichever robot holds the
     pile: the choice of forms is made from them. As costly as `matings` twice."""
-    found = meetings(nodes)
-    if not found.all:
+    met = meetings(nodes)
+    if not met.all:
         return {}
-    finder, count = Finder(bodies(product, found.parts), found), len(found.all)
+    finder, count = Finder(bodies(product, met.parts), met), len(met.all)
     every = np.ones(count, bool)
     slides = [levels_of(finder.along(axis, every), count)[0].max(axis=1) for axis in (0, 1)]
     lowers = levels_of(finder.along(UPRIGHT, every), count)[0]
-    rows = zip(found.all, *(s.tolist() for s in slides), lowers.tolist(), strict=True)
+    rows = zip(met.all, *(s.tolist() for s in slides), lowers.tolist(), strict=True)
     return {m.label: Admitted((x, y), (first, last)) for m, x, y, (first, last) in rows}
 
 
@@ -235,23 +233,23 @@ def rooms(
     """The least room [m] between the inputs of each operation on the way that was chosen for it
     (from all of its `sides`), by its label: less than 0 where parts overlap, infinite where it is
     more than AMPLE. But for the last millimetre: finished parts may touch."""
-    found = meetings(nodes)
-    ways = [_way(meeting, chosen.get(meeting.label)) for meeting in found.all]
-    least = np.full(len(found.all), np.inf)
-    if not found.all:
+    met = meetings(nodes)
+    ways = [_way(meeting, chosen.get(meeting.label)) for meeting in met.all]
+    least = np.full(len(met.all), np.inf)
+    if not met.all:
         return {}
-    finder = Finder(bodies(product, found.parts), found)
+    finder = Finder(bodies(product, met.parts), met)
     for axis in range(3):
         wanted = np.array([way == axis for way, _ in ways])
         if not wanted.any():
             continue
         other, one, room = finder.rooms(axis, AMPLE)
-        meeting = found.of(one, other)
-        rows = np.flatnonzero(wanted[meeting] & (other >= found.splits[meeting]))
+        meeting = met.of(one, other)
+        rows = np.flatnonzero(wanted[meeting] & (other >= met.splits[meeting]))
         sides = np.array([sides for _, sides in ways])[meeting[rows]]
         np.minimum.at(least, meeting[rows], np.where(sides, room[rows], np.inf).min(axis=1))
     least[least >= AMPLE] = np.inf
-    labels = [meeting.label for meeting in found.all]
+    labels = [meeting.label for meeting in met.all]
     return {label: float(r) for label, r in zip(labels, least, strict=True) if label in chosen}
 
 

@@ -72,13 +72,13 @@ class Meetings:
 
     def of(self, one: Ints, other: Ints) -> Ints:
         """The meetings at which the parts one[i] < other[i] do: the highest between them."""
-        found = np.empty(len(one), np.int64)
+        highest = np.empty(len(one), np.int64)
         row = np.frexp((other - one).astype(float))[1] - 1
         for k in sorted(set(row.tolist())):
             at = row == k
             table = self._table[k]
-            found[at] = np.minimum(table[one[at]], table[other[at] - 2**k])
-        return found % max(1, len(self.all))
+            highest[at] = np.minimum(table[one[at]], table[other[at] - 2**k])
+        return highest % max(1, len(self.all))
 
 
 def meetings(nodes: Mapping[str, Node]) -> Meetings:
@@ -95,20 +95,20 @@ def meetings(nodes: Mapping[str, Node]) -> Meetings:
         for name in nodes[label].inputs:
             turns[name] = turns[label] if name == held else 1 - turns[label]
             levels[name] = levels[label] + 1
-    found: list[Meeting] = []
+    made: list[Meeting] = []
     borders = np.zeros(max(0, len(parts) - 1), np.int64)
     for label, node in nodes.items():
         if len(node.inputs) < 2:
             continue
         first, end = spans[label]
         for name in node.inputs[1:]:
-            borders[spans[name][0] - 1] = len(found)
+            borders[spans[name][0] - 1] = len(made)
         split, either = spans[node.inputs[-1]][0], len(node.inputs) == 2 and not _held(node)
         axis = turns[label]
         meeting = Meeting(label, node.inputs, axis, first, split, end, either, node.position)
-        found.append(meeting)
-    depths = np.array([levels[m.label] for m in found], np.int64)
-    return Meetings(parts, tuple(found), borders, depths)
+        made.append(meeting)
+    depths = np.array([levels[m.label] for m in made], np.int64)
+    return Meetings(parts, tuple(made), borders, depths)
 
 
 def _spans(nodes: Mapping[str, Node]) -> tuple[dict[str, tuple[int, int]], tuple[str, ...]]:

@@ -111,9 +111,9 @@ class Finder:
     """Finds overlaps in one product; shapes are kept from one axis to the next, what is found in
     the user's cache."""
 
-    def __init__(self, found: ConvexBodies, where: Meetings) -> None:
-        self.bodies, self.meetings = found, where
-        self.drawn = DrawnWays(found.solids)
+    def __init__(self, convex: ConvexBodies, where: Meetings) -> None:
+        self.bodies, self.meetings = convex, where
+        self.drawn = DrawnWays(convex.solids)
         self._keys: dict[int, bytes] = {}
         self._shapes: dict[bytes, Array] = {}
         self._polytopes: dict[bytes, Polytope] = {}
@@ -144,9 +144,9 @@ class Finder:
     def _product(self) -> str:
         """A digest of all that overlaps depend on."""
         where = self.meetings.borders, self.meetings.levels, self.meetings.splits
-        own = program(Path(__file__).parent, "numpy", "scipy", "shapely", "manifold3d")
+        code = program(Path(__file__).parent, "numpy", "scipy", "shapely", "manifold3d")
         exact = program(Path(overlap.__file__).parent)
-        return digest(own, exact, self.bodies.part, *where, *self.bodies.vertices, *self._meshes)
+        return digest(code, exact, self.bodies.part, *where, *self.bodies.vertices, *self._meshes)
 
     def _search(self, axis: int, wanted: NDArray[np.bool_]) -> tuple[Pairs, Pairs, Flags]:
         """The bodies, moving and standing, that overlap or scrape, and the meetings at which they
@@ -165,8 +165,8 @@ class Finder:
         kept[first] = True
         by_parts = part[moving[first]], part[standing[first]]
         exact = self.drawn.depths(*by_parts, idle[first], axis)
-        found = meeting[kept], moving[kept], standing[kept], depths.at(np.flatnonzero(kept))
-        return found, (meeting[first], *by_parts, exact), self.drawn.rough
+        by_bodies = meeting[kept], moving[kept], standing[kept], depths.at(np.flatnonzero(kept))
+        return by_bodies, (meeting[first], *by_parts, exact), self.drawn.rough
 
     def _firsts(self, meeting: Ints, moving: Ints, standing: Ints) -> Ints:
         """The first row of each pair of parts."""
@@ -198,8 +198,8 @@ class Finder:
         """Pairs of parts that are at most so far [m] from each other in the finished product, the
         later one first. Bodies that meet with corners may be a little further apart."""
         one, other, depths = self.passing(2, gap, still=True)
-        found = depths.finished >= -gap
-        bodies = self.bodies.part[np.stack([one, other])[:, found]]
+        close = depths.finished >= -gap
+        bodies = self.bodies.part[np.stack([one, other])[:, close]]
         one, other = np.unique(bodies, axis=1)
         tested = np.flatnonzero(self.drawn.tested(one, other))
         near = np.ones(len(one), bool)
@@ -242,9 +242,9 @@ class Finder:
         """Those that meet at a wanted meeting and whose boxes come to overlap there: rows moving,
         standing, meeting (3, n)."""
         meeting = self.meetings.of(self.bodies.part[standing], self.bodies.part[moving])
-        found = np.stack([moving, standing, meeting])[:, wanted[meeting]]
-        depths = _box_depths(self.bodies, found[0], found[1], axis)
-        return np.asarray(found[:, depths.faulty.any(axis=1)])
+        pairs = np.stack([moving, standing, meeting])[:, wanted[meeting]]
+        depths = _box_depths(self.bodies, pairs[0], pairs[1], axis)
+        return np.asarray(pairs[:, depths.faulty.any(axis=1)])
 
     def _refine(self, moving: Ints, standing: Ints, axis: int, depths: Depths) -> None:
         """Replaces the depths of boxes by those of the bodies where these are no boxes."""
@@ -282,9 +282,9 @@ class Finder:
             self._shapes.setdefault(key, vertices)
         return self._keys[body]
 
-    def _by_parts(self, found: Pairs, exact: Pairs, rough: Flags) -> Overlaps:
+    def _by_parts(self, by_bodies: Pairs, exact: Pairs, rough: Flags) -> Overlaps:
         """Of all bodies of two parts the deepest, and how deep they are as drawn."""
-        meeting, moving, standing, depths = found
+        meeting, moving, standing, depths = by_bodies
         part = self.bodies.part
         order = np.lexsort((part[moving], part[standing], meeting))
         meeting, one, other = meeting[order], part[standing[order]], part[moving[order]]
@@ -314,8 +314,8 @@ class Finder:
         return Overlaps(meeting, one, other, as_drawn, colliding, hulls, bodies, ends)
 
 
-def _arrays(found: Pairs) -> tuple[NDArray[Any], ...]:
-    return (*found[:3], *astuple(found[3]))
+def _arrays(pairs: Pairs) -> tuple[NDArray[Any], ...]:
+    return (*pairs[:3], *astuple(pairs[3]))
 
 
 def _pairs(kept: Mapping[str, NDArray[Any]], keys: Sequence[str]) -> Pairs:

@@ -71,10 +71,10 @@ class Depths:
         """Those of some of the pairs."""
         return Depths(self.finished[rows], self.path[rows], self.shift[rows], self.graze[rows])
 
-    def put(self, rows: Ints | slice, found: Depths) -> None:
+    def put(self, rows: Ints | slice, depths: Depths) -> None:
         """Replaces those of some of the pairs."""
-        self.finished[rows], self.path[rows] = found.finished, found.path
-        self.shift[rows], self.graze[rows] = found.shift, found.graze
+        self.finished[rows], self.path[rows] = depths.finished, depths.path
+        self.shift[rows], self.graze[rows] = depths.shift, depths.graze
 
 
 def depths_of(heights: Array, slopes: Array) -> tuple[Depths, Array]:
@@ -92,8 +92,8 @@ def depths_of(heights: Array, slopes: Array) -> tuple[Depths, Array]:
         most, at = summits(lines.reshape(-1, len(slopes)), rows)
         depth[:, start : start + step] = most.reshape(4, -1)
         shift[:, start : start + step] = at.reshape(4, -1)
-    found = Depths(heights.min(axis=1), depth[:2].T, shift[:2].T, depth[2:].T)
-    return found, (begin[:, None] + shift) * ways[:, None]
+    depths = Depths(heights.min(axis=1), depth[:2].T, shift[:2].T, depth[2:].T)
+    return depths, (begin[:, None] + shift) * ways[:, None]
 
 
 MANY = 60_000
@@ -117,11 +117,11 @@ def sought(p: Array, q: Array, apart: Array, axis: int) -> Depths:
     """The depths of a body P (n, 3) on its way along an axis through Q (k, 3), its place being
     `apart` (m, 3) from that of Q. Those of pairs that are not faulty may be too large."""
     outside, tips = _touching(WAYS, p, q)
-    found, _ = depths_of(outside.heights(apart), outside.normals[:, axis])
-    for row in np.flatnonzero(found.faulty.any(axis=1)).tolist():
+    depths, _ = depths_of(outside.heights(apart), outside.normals[:, axis])
+    for row in np.flatnonzero(depths.faulty.any(axis=1)).tolist():
         here = slice(row, row + 1)
-        found.put(here, _closed_in(p, q, apart[here], axis, outside, tips))
-    return found
+        depths.put(here, _closed_in(p, q, apart[here], axis, outside, tips))
+    return depths
 
 
 def _closed_in(
@@ -131,7 +131,7 @@ def _closed_in(
     the points at which they touch it."""
     from scipy.spatial import ConvexHull, QhullError
 
-    found, _ = depths_of(outside.heights(apart), outside.normals[:, axis])
+    depths, _ = depths_of(outside.heights(apart), outside.normals[:, axis])
     try:
         hull = ConvexHull(tips, incremental=True)
         for _ in range(MOST):
@@ -140,14 +140,14 @@ def _closed_in(
             )
             touching, tips = _touching(binding.normals, p, q)
             outside = outside.and_those_of(touching)
-            found, _ = depths_of(outside.heights(apart), outside.normals[:, axis])
+            depths, _ = depths_of(outside.heights(apart), outside.normals[:, axis])
             further = touching.bounds > binding.bounds + NEAR
-            if not (further.any() and found.faulty.any()):
+            if not (further.any() and depths.faulty.any()):
                 break
             hull.add_points(tips[further])
     except QhullError:  # the difference is flat, or nearly: what touches it is known
         pass
-    return found
+    return depths
 
 
 def _touching(normals: Array, p: Array, q: Array) -> tuple[Difference, Array]:
