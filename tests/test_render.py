@@ -29,7 +29,7 @@ from factory.geometry.sight import Framing, fit, towards
 from factory.mjcf.mesh_files import corner_normals, face_normals, mesh_file
 from factory.record.log import LogWriter, read_log
 from factory.record.monitor.subject import subject_of_run
-from factory.render import Film, Picture, Still, camera_named, check_output, render_log
+from factory.render import Film, Picture, Still, check_output, render_log
 from factory.render.camera import from_above, overview
 from factory.render.caption import Caption
 from factory.render.painter import Painter, Renderer
@@ -411,11 +411,6 @@ def test_a_still_may_have_an_odd_size() -> None:
     assert not check_output("A.MP4", (64, 32), still=None)
     with pytest.raises(InputError, match=r"valid endings: \.png$"):
         check_output("a.mp4", (64, 32), still=True)
-
-
-def test_an_unknown_camera_is_refused_with_the_nearest() -> None:
-    with pytest.raises(InputError, match="did you mean 'overview'"):
-        camera_named("overvue")
 
 
 def test_the_ideal_world_has_no_picture(layout, tmp_path: Path) -> None:

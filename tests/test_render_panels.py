@@ -315,12 +315,8 @@ def test_cameras_may_look_where_a_label_is_taken() -> None:
 def test_cameras_may_follow_a_part() -> None:
     assert camera_named("part:lid", BOX) == "part:lid"
     assert camera_named("part:anything") == "part:anything"
-    with pytest.raises(InputError, match=r"there is no part 'lod'\n.*did you mean 'lid'"):
-        camera_named("part:lod", BOX)
     with pytest.raises(InputError, match="there is no part 'all'"):
         camera_named("part:all", BOX)
-    with pytest.raises(InputError, match="did you mean 'orbit'"):
-        camera_named("orbt")
 
 
 def test_panels_are_named_or_refused() -> None:
@@ -451,14 +447,6 @@ def test_what_cannot_be_shown_is_refused_and_nothing_written(
 
 
 @needs_gl
-def test_a_poster_is_of_a_film(run: Terminal, out: Path) -> None:
-    for words in (["run", PAPER], ["render", PAPER, "-o", out / "still.png"]):
-        done = run(*words, "--poster", out / "p.png", "--json")
-        assert (done.status, done.codes) == (2, ["Usage"])
-    assert files_in(out) == {}
-
-
-@needs_gl
 def test_a_still_with_panels_on_the_command_line(run: Terminal, out: Path) -> None:
     picture = out / "still.png"
     words = ["--with", "net,gantt", "--size", "560x480", "--title", "A title", "--at", "0.5"]
@@ -519,6 +507,6 @@ def test_a_wrong_camera_lists_the_right_ones() -> None:
         with pytest.raises(InputError) as caught:
             camera_named(name)
         assert caught.value.diagnostics[0].hint == hint
-    with pytest.raises(InputError) as caught:
+    with pytest.raises(InputError, match="there is no part 'lod'") as caught:
         camera_named("part:lod", BOX)
     assert caught.value.diagnostics[0].hint == "did you mean 'lid'? valid parts: lid, box"

@@ -1,5 +1,5 @@
-"""What moves in a factory, read from its model alone: cameras are fitted to it, not to what stands
-about."""
+"""The moving bodies of a factory, from its model alone: cameras are fitted to these, not to fixed
+ones."""
 
 from __future__ import annotations
 
@@ -38,16 +38,18 @@ class Action:
 def action_of(m: mujoco.MjModel, d: mujoco.MjData) -> Action:
     """The action of a model, with its state at the start."""
     points: defaultdict[Own, list[Array]] = defaultdict(list)
-    for own, found in (*_bodies(m, d), *_loads(m, d)):
-        points[own].append(found)
-    boxes = {own: box_of(np.concatenate(found)) for own, found in points.items()}
+    for own, corners_of in (*_bodies(m, d), *_loads(m, d)):
+        points[own].append(corners_of)
+    boxes = {own: box_of(np.concatenate(corners_of)) for own, corners_of in points.items()}
     beside = [placed(m, d, g) for g in range(m.ngeom) if _feeds(m, g)]
     robots: list[Array] = []
     for (body, _), box in boxes.items():
         way = _way(m, d, body, boxes.get((body, "load"), box))
         is_tray = m.body(body).name == names.OUTFEED_TRAY
         (beside if is_tray else robots).extend((box, box + way))
-    return Action(*(np.array(found).reshape(-1, 8, 3) for found in (robots or beside, beside)))
+    return Action(
+        *(np.array(corners_of).reshape(-1, 8, 3) for corners_of in (robots or beside, beside))
+    )
 
 
 def _feeds(m: mujoco.MjModel, geom: int) -> bool:
@@ -55,7 +57,7 @@ def _feeds(m: mujoco.MjModel, geom: int) -> bool:
 
 
 def _bodies(m: mujoco.MjModel, d: mujoco.MjData) -> Iterator[tuple[Own, Array]]:
-    """Points round each geom of what moves by itself."""
+    """Points around each geom of the moving bodies."""
     roots = m.body_rootid[m.geom_bodyid]
     slides = m.jnt_bodyid[m.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE]
     moving = [b for b in m.body_rootid[slides] if names.kind(m.body(int(b)).name) != "feeder"]
@@ -64,7 +66,7 @@ def _bodies(m: mujoco.MjModel, d: mujoco.MjData) -> Iterator[tuple[Own, Array]]:
 
 
 def _loads(m: mujoco.MjModel, d: mujoco.MjData) -> Iterator[tuple[Own, Array]]:
-    """Points round everything that is held, with lifts down and up. Bodies of parts never turn."""
+    """Points around all payloads, with lifts down and up. Bodies of parts never turn."""
     frames = WeldFrames.of(m, d)
     held = frames.at(d.qpos[frames.along])
     shapes: dict[int, Array] = {}
@@ -95,7 +97,7 @@ def box_of(points: Array) -> Array:
 
 
 def _stroke(m: mujoco.MjModel, holder: int) -> float:
-    """How far the lift goes up whose head holds something: as far as its column is long [m]."""
+    """Stroke of the lift with this head: the length of its column [m]."""
     robot, _, kind = m.body(holder).name.partition("/")
     return 2 * _half(m, f"{robot}/column", 1) if kind == "head" else 0.0
 
@@ -115,8 +117,8 @@ def _way(m: mujoco.MjModel, d: mujoco.MjData, body: int, load: Array) -> Array:
 
 def _half(m: mujoco.MjModel, geom: str, axis: int) -> float:
     """Half the size of a geom along one of its axes, 0 where there is none [m]."""
-    found = _geom(m, geom)
-    return float(m.geom_size[found, axis]) if found >= 0 else 0.0
+    number = _geom(m, geom)
+    return float(m.geom_size[number, axis]) if number >= 0 else 0.0
 
 
 def _geom(m: mujoco.MjModel, name: str) -> int:

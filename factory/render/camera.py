@@ -28,20 +28,20 @@ TURN = 8.0
 
 
 def camera_names(pag: PAG | None) -> tuple[Camera, ...]:
-    """The names of all cameras of a product; of those with a label none where it is None."""
+    """The names of all cameras of a product; without those of labels if it is None."""
     return (*CAMERAS, *(head + k for head, (_, ks) in _labels(pag).items() for k in sorted(ks)))
 
 
 def camera_named(name: str, pag: PAG | None = None) -> Camera:
-    """Raises InputError (BadValue) for a name that no camera has, and for a part or label that is
-    not in the product, if that is known. Both list what there is."""
+    """The camera of a name. Raises InputError (BadValue) for an unknown camera, and for an unknown
+    part or label if the product is given, with the valid names."""
     head, colon, label = name.partition(":")
     labels = _labels(pag)
     if head + colon in labels:
-        noun, found = labels[head + colon]
-        if pag is None or label in found:
+        noun, valid = labels[head + colon]
+        if pag is None or label in valid:
             return name
-        raise _none_of(noun, label, found)
+        raise _none_of(noun, label, valid)
     if name in CAMERAS:
         return name
     raise _none_of("camera", name, (*CAMERAS, *(f"{head}LABEL" for head in labels)))
@@ -54,10 +54,10 @@ def _labels(pag: PAG | None) -> dict[str, tuple[str, tuple[str, ...]]]:
     return {PART: ("part", parts), HANDOVER: ("label", tuple(node.label for node in nodes))}
 
 
-def _none_of(noun: str, found: str, valid: Sequence[str]) -> InputError:
-    near, every = (did_you_mean(word, valid, f"{noun}s") for word in (found, ""))
+def _none_of(noun: str, name: str, valid: Sequence[str]) -> InputError:
+    near, every = (did_you_mean(word, valid, f"{noun}s") for word in (name, ""))
     hint = every if near == every else f"{near} {every}"
-    return InputError(Diagnostic("BadValue", f"there is no {noun} '{found}'", None, hint))
+    return InputError(Diagnostic("BadValue", f"there is no {noun} '{name}'", None, hint))
 
 
 def overview(points: Array, framing: Framing) -> View:
@@ -100,8 +100,8 @@ def orbit(points: Array, framing: Framing) -> Callable[[float], View]:
 
 
 def _away(points: Array, axes: Array, at: Array, framing: Framing) -> float:
-    """How far a camera has to go back along `axes` from the plane through the origin, `at` (2,) to
-    the right and up in it, to have all points in the frame."""
+    """Distance that a camera has to go back along `axes` from the plane through the origin, `at`
+    (2,) to the right and up in it, to have all points in the frame."""
     _, side, low, high = tangents(framing)
     r, u, f = axes @ points.T - np.array([[at[0]], [at[1]], [0.0]])
     return float((np.maximum(np.abs(r) / side, np.maximum(u / high, -u / low)) - f).max())
@@ -112,14 +112,14 @@ CALM = 8
 
 
 def _calm(values: Array) -> Array:
-    """A closed row of values, each the mean of those about it, the nearer the heavier."""
+    """A closed row of values, smoothed by a weighted mean of neighbours."""
     weights = np.hanning(2 * CALM + 3)[1:-1]
     shifted = (w * np.roll(values, n - CALM, axis=0) for n, w in enumerate(weights))
     return np.asarray(sum(shifted) / weights.sum())
 
 
 def _most(values: Array) -> Array:
-    """A closed row of values, each the greatest of those about it."""
+    """A closed row of values, each the maximum of its neighbours."""
     return np.asarray(np.max([np.roll(values, n, axis=0) for n in range(-CALM, CALM + 1)], axis=0))
 
 

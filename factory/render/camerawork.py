@@ -1,5 +1,4 @@
-"""From moments to pictures, with the panels beside the 3-D: what films and stills of runs and of
-logs have in common."""
+"""From moments to pictures with panels, for films and stills of runs and of logs."""
 
 from __future__ import annotations
 
@@ -30,7 +29,8 @@ from factory.support.resource import Closing
 When = float | Literal["end"]
 
 JUMP = 0.03
-"""A coordinate that changes by more in one tick was set anew; no frame shows it on the way [m]."""
+"""A coordinate that changes by more than this in one tick was reset, so frames do not interpolate
+it [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,8 +52,8 @@ class Moment:
 
 @dataclass(frozen=True, slots=True)
 class Take:
-    """What pictures are of and how they are taken: the engine's model, the factory, the product's
-    name, the units asked for; `history` holds what has fired up to the moment of a picture."""
+    """The subject of pictures and how they are taken: the engine's model, the factory, the
+    product's name, the units to make; `history` holds the firings up to the moment of a picture."""
 
     m: mujoco.MjModel
     subject: MonitorSubject
@@ -64,7 +64,7 @@ class Take:
 
     @property
     def detail(self) -> str:
-        """What the title says of the factory."""
+        """The line below the title, about the factory."""
         factory = self.subject.factory
         parts, robots = len(factory.leaves), len(factory.robots)
         return f"{_count(parts, 'part')}, {_count(robots, 'robot')}, {_count(self.units, 'unit')}"
@@ -107,11 +107,11 @@ KINDS: dict[PanelName, type[NetPanel] | type[GanttPanel]] = {"net": NetPanel, "g
 
 
 SMALLEST = 0.75
-"""Of the scale, when rows are counted: words in them do not get smaller than that."""
+"""Smallest scale for the number of rows, so that words stay legible."""
 
 
 class Panels:
-    """Puts panels into their areas of a picture of a size, beside one of the 3-D."""
+    """Places panels into their areas of a picture, beside the 3-D view."""
 
     def __init__(
         self, m: mujoco.MjModel, size: Size, areas: dict[PanelName, Area], history: History
@@ -129,12 +129,12 @@ class Panels:
     def compose(self, scene: Pixels, time: float, qpos: Array, elapsed: float) -> Pixels:
         """The picture with its panels at a time; `elapsed` [s] since the last."""
         self.rows.advance(time, elapsed)
-        found = np.empty((self.size[1], self.size[0], 3), np.uint8)
-        found[: scene.shape[0], : scene.shape[1]] = scene
+        composed = np.empty((self.size[1], self.size[0], 3), np.uint8)
+        composed[: scene.shape[0], : scene.shape[1]] = scene
         for area, panel in self.shown:
             drawn = panel.draw(time, qpos[self.slides], elapsed)
-            found[area.top : area.top + area.height, area.left : area.left + area.width] = drawn
-        return found
+            composed[area.top : area.top + area.height, area.left : area.left + area.width] = drawn
+        return composed
 
 
 def _count(number: int, noun: str) -> str:
@@ -142,13 +142,13 @@ def _count(number: int, noun: str) -> str:
 
 
 def pictureless() -> InputError:
-    """Why there is nothing to see."""
+    """The error of a run or log of the ideal world."""
     message = "the ideal world has no bodies to picture"
     return InputError(Diagnostic("BadValue", message, None, "leave out --world ideal"))
 
 
 def past_the_end(at: float, what: str, end: float) -> InputError:
-    """Why there is no still of a time: the run, or the log, ended before."""
+    """The error of a still at a time after the end of the run or the log."""
     message = (
         f"--at {at:g} is past the end: the {what} ends at {floor(100 * end + 1e-6) / 100:.2f} s"
     )

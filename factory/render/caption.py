@@ -52,13 +52,13 @@ class Caption:
         ):
             at = x, middle
             draw.text(at, words, INK, self.font, anchor, stroke_width=halo, stroke_fill=HALO)
-        found = pixels.copy()
-        found[-self.strip :] = np.asarray(below)
-        return found
+        captioned = pixels.copy()
+        captioned[-self.strip :] = np.asarray(below)
+        return captioned
 
 
 def strength(time: float) -> float:
-    """How much of the title is to be seen at a time."""
+    """Opacity of the title at a time."""
     share = min(max((SHOWN + FADES - time) / FADES, 0.0), 1.0)
     return share * share * (3 - 2 * share)
 
@@ -110,8 +110,10 @@ def _notices(history: History, time: float) -> Iterator[tuple[str, Colour, float
         names = listing(robots[robot].name for robot in stands)
         yield f"{names} stand{'s' if len(stands) == 1 else ''} still", AMBER, 1.0
     failed = history.failed(time - TOLD - VANISHES, time)
-    told = {one.robot for one in failed if one.is_death}
-    if silent := [robots[robot].name for robot in sorted(dead) if robots[robot].name not in told]:
+    announced = {one.robot for one in failed if one.is_death}
+    if silent := [
+        robots[robot].name for robot in sorted(dead) if robots[robot].name not in announced
+    ]:
         yield f"{listing(silent)} {'is' if len(silent) == 1 else 'are'} dead", DEAD, 1.0
     for death in history.deaths():
         if death.end < time < death.end + TOLD + VANISHES:

@@ -43,7 +43,7 @@ EVEN = 12
 
 @dataclass(frozen=True)
 class ExplodedView:
-    """A product, and how it is taken apart."""
+    """A product and its explosion."""
 
     product: Product
     explosion: Explosion
@@ -58,20 +58,21 @@ class ExplodedView:
 
     @property
     def is_upright(self) -> bool:
-        """Whether it stands higher than it is wide, so that pictures of it are upright."""
+        """Whether it is higher than wide, so that its pictures are upright."""
         wide, deep, tall = np.ptp(self._points(0.0), axis=0)
         return bool(tall > 1.1 * max(wide, deep))
 
     def still(self, path: Path) -> None:
-        """Write it, all apart, as PNG. Raises InputError, MissingError where there is no GL."""
+        """Write a picture of all parts apart, as PNG. Raises InputError, MissingError where there
+        is no GL."""
         size = STILL[self.is_upright]
         check_output(path, size, still=True)
         with _Stage(self, size) as stage:
             write_still(path, stage.still())
 
     def film(self, path: Path, fps: float = FPS) -> int:
-        """Write the film, with so many frames a second or half as many where there is much to draw;
-        gives the number of its frames. Raises as `still` does."""
+        """Write the film, with `fps` frames a second, or half of that for a product of many faces;
+        returns the number of frames. Raises as `still` does."""
         size = FILM[self.is_upright]
         fps = fps if self.faces <= MANY else fps / 2
         check_output(path, size, fps)
@@ -87,7 +88,7 @@ class ExplodedView:
 
     @property
     def faces(self) -> int:
-        """How many triangles it has."""
+        """Number of triangles."""
         solids = (self.product.solids[label] for label in self.explosion.parts)
         return sum(12 if solid.mesh is None else len(solid.mesh.faces) for solid in solids)
 
@@ -131,17 +132,17 @@ class _Stage(LooseParts):
         angles = AZIMUTH + TURN * np.linspace(0.0, 1.0, len(done))
         turned = [towards(float(angle), ELEVATION) for angle in angles]
         moments = zip(turned, done, strict=True)
-        found = [fit(self.shown._points(float(now)), axes, self.framing) for axes, now in moments]
-        numbers = np.array([(*(v.axes @ v.position), v.distance, AROUND * v.depth) for v in found])
+        fitted = [fit(self.shown._points(float(now)), axes, self.framing) for axes, now in moments]
+        numbers = np.array([(*(v.axes @ v.position), v.distance, AROUND * v.depth) for v in fitted])
         calm = _evened(numbers)
         return [
             View(axes.T @ row[:3], axes, v.wide, v.tall, float(row[3]), float(row[4]))
-            for axes, v, row in zip(turned, found, calm, strict=True)
+            for axes, v, row in zip(turned, fitted, calm, strict=True)
         ]
 
 
 def _evened(values: Array) -> Array:
-    """Rows (n, k), each the mean of those about it; the ends stand."""
+    """Rows (n, k), each the mean of its neighbours; the ends are kept."""
     padded = np.pad(values, ((EVEN, EVEN), (0, 0)), mode="edge")
     weights = np.hanning(2 * EVEN + 3)[1:-1]
     weights /= weights.sum()

@@ -1,7 +1,8 @@
-"""What stands in front of the action fades: the posts and booms of feeders. Their housings do not,
-nor does the shed: what is in them is out of sight.
+"""Posts and booms of feeders fade where they hide the action. Housings and the shed do not fade,
+since their contents must stay out of sight.
 
-How much follows from the view alone, so a still, a film of a run and one of its log show the same.
+The opacity follows from the view alone, so a still, a film of a run and a film of its log show the
+same.
 """
 
 from __future__ import annotations
@@ -15,36 +16,36 @@ from factory.mjcf.replica import Replica, paint, shown
 from factory.render.subject import placed
 
 FAINT = 0.16
-"""How opaque something is that hides what it may not."""
+"""Opacity of a geom that hides the action."""
 
 SEEN, HIDDEN = 0.05, 0.20
-"""Shares of a box that may be hidden: below the one nothing fades, above the other all does."""
+"""Hidden shares of a box at which geoms begin to fade, and are fully faded."""
 
 ROUND = 0.03
 """How far about a box counts as that box [m]: what is thin is not hidden all of a sudden."""
 
 STANDS = ("post", "boom")
-"""What of a feeder fades."""
+"""Geoms of a feeder that fade."""
 
 
 class Fading:
-    """Fades geoms of a replica, which is not any run's."""
+    """Fades geoms of a replica of the model."""
 
     def __init__(self, replica: Replica) -> None:
         self.m, d = replica.m, replica.d
         self.last: View | None = None
-        found: list[tuple[int, str]] = []
+        stands: list[tuple[int, str]] = []
         for body in range(1, self.m.nbody):
             if names.kind(name := self.m.body(body).name) == "feeder":
                 geoms = shown(self.m, body)
-                found += [(g, name) for g in geoms if self.m.geom(g).name.endswith(STANDS)]
-        self.geoms = np.array([g for g, _ in found], np.intp)
-        self.groups = np.unique([group for _, group in found], return_inverse=True)[1]
+                stands += [(g, name) for g in geoms if self.m.geom(g).name.endswith(STANDS)]
+        self.geoms = np.array([g for g, _ in stands], np.intp)
+        self.groups = np.unique([group for _, group in stands], return_inverse=True)[1]
         self.paint = np.array([paint(self.m, g) for g in self.geoms]).reshape(-1, 4)
         self.boxes = np.array([placed(self.m, d, g) for g in self.geoms]).reshape(-1, 8, 3)
 
     def fade(self, view: View, watched: Array) -> None:
-        """Fade what hides much of any of the boxes `watched` (n, 8, 3) in a view."""
+        """Fade geoms that hide much of any of the boxes `watched` (n, 8, 3) in a view."""
         if view is self.last or not len(self.geoms):
             return
         self.last = view
@@ -66,9 +67,9 @@ class Fading:
         count = len(watched)
         pairs, number = np.unique(self.groups[one] * count + other, return_inverse=True)
         together = np.bincount(number, shared, len(pairs))
-        found = np.zeros(int(self.groups.max()) + 1)
-        np.maximum.at(found, pairs // count, together)
-        return found
+        greatest = np.zeros(int(self.groups.max()) + 1)
+        np.maximum.at(greatest, pairs // count, together)
+        return greatest
 
 
 def outlines(view: View, boxes: Array) -> tuple[Array, Array]:

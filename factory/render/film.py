@@ -1,5 +1,5 @@
-"""Films and stills: of a run as it goes on, by observers that don't disturb it, and of a log alone,
-the same pictures as of the run it is of."""
+"""Films and stills of a run, by observers that do not disturb it, and of a log, with the same
+pictures as those of its run."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 class _Observer(Recorder):
-    """What films and stills of a run have in common."""
+    """Base class of films and stills of a run."""
 
     def __init__(self, simulation: Simulation, picture: Picture) -> None:
         if simulation.model is None:
@@ -106,7 +106,7 @@ class Still(_Observer):
         self.path, self.at, self.held = Path(path), at, False
 
     def observe(self, world: Any, supervisor: Any) -> None:
-        """Keep the state if it may be the one."""
+        """Keep the state if the picture may be of it."""
         if self.at != "end" and self._has_come:
             return
         now = self._moment()
@@ -117,7 +117,7 @@ class Still(_Observer):
 
     @property
     def _has_come(self) -> bool:
-        """Whether the time of the picture has come, as far as is known."""
+        """Whether the time of the picture has come."""
         return self.at == "end" or self.last.time >= self.at - TIE
 
     def close(self) -> None:
@@ -160,7 +160,7 @@ def render_log(
 
 
 def take_of(log: Log, picture: Picture) -> Take:
-    """What pictures of a log are taken of, with nothing fired yet."""
+    """The take of a log, before its first firing."""
     if log.header["world"] == "ideal":
         raise pictureless()
     m, subject = model_of(log), recorded_subject(log.header)
@@ -180,7 +180,7 @@ def moment_of(log: Log, row: int) -> Moment:
 
 
 def _row(log: Log, take: Take, at: When) -> int:
-    """The row of a log that a still at that time shows."""
+    """Index of the row of a log that a still at a time shows."""
     last = len(log) - 1
     if at != "end":
         row = log.row_at(at)

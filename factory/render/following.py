@@ -29,16 +29,16 @@ NEAR = 0.02
 
 
 class Viewpoint:
-    """Where the camera is in pictures of a replica, in their order. Cameras that follow a product
-    need to know the factory. `watched` (n, 8, 3): boxes round what is to be seen in the last view,
-    by their corners [m]."""
+    """The camera in consecutive pictures of a replica. Cameras that follow a product need the
+    factory. `watched` (n, 8, 3): boxes around the subject of the last view, by their corners
+    [m]."""
 
     def __init__(
         self, replica: Replica, camera: Camera, framing: Framing, subject: MonitorSubject
     ) -> None:
         self.d, self.framing = replica.d, framing
-        found = action_of(replica.m, replica.d)
-        self.watched, self.points = found.robots, found.points
+        action = action_of(replica.m, replica.d)
+        self.watched, self.points = action.robots, action.points
         if camera.startswith(HANDOVER):
             label = camera.removeprefix(HANDOVER)
             self.watched, near = handover_view(replica, subject, label, framing)
@@ -81,17 +81,17 @@ class Viewpoint:
     def _wanted(self, followed: Followed, shown: Snapshot) -> tuple[Array, int]:
         """Where the camera should look, and the body it follows there. A product that no robot
         holds any more is let go: the camera stays until it is gone."""
-        found = followed.furthest(self.d, shown)
-        if found is None:
+        furthest = followed.furthest(self.d, shown)
+        if furthest is None:
             return (self.points.mean(axis=0) if self.wanted is None else self.wanted), self.body
-        body, rank = found
+        body, rank = furthest
         if rank == np.inf and body == self.body and self.wanted is not None:
             return self.wanted, body
         return followed.origin(self.d, body), body
 
 
 def _standing(camera: Camera, points: Array, framing: Framing) -> Callable[[float], View]:
-    """The view at each time [s] of a camera that follows nothing."""
+    """The view at each time [s] of a camera that follows no product."""
     if camera == "orbit":
         return orbit(points, framing)
     view = (from_above if camera == "top" else overview)(points, framing)
@@ -143,7 +143,7 @@ class Followed:
         return np.asarray((low + high) / 2 + SIGNS * (high - low) / 2)
 
     def origin(self, d: mujoco.MjData, body: int) -> Array:
-        """Where the frame of the product is that a body belongs to (3,) [m]."""
+        """Origin of the frame of the product that a body belongs to (3,) [m]."""
         return np.asarray(d.xpos[body] - np.array(self.places[self.labels[body]]))
 
     def furthest(self, d: mujoco.MjData, shown: Snapshot) -> tuple[int, float] | None:

@@ -32,7 +32,7 @@ STEPS = (1.0, 2.0, 5.0, 10.0)
 
 
 def _window(history: History) -> float:
-    """How much time is shown [s]."""
+    """Duration that is shown [s]."""
     progress, factory = OperationProgress(history.subject), history.factory
     times = [progress.expected(operation) for operation in factory.operations]
     busiest = max(sum(times[n] for n in robot.operations) for robot in factory.robots)
@@ -66,11 +66,11 @@ class GanttPanel:
         return ink.pixels
 
     def at(self, time: float, now: float) -> float:
-        """Where a time is across the panel."""
+        """Horizontal position of a time [px]."""
         return self.right - (now - time) / self.window * (self.right - self.left)
 
     def _legend(self, ink: Ink) -> None:
-        """The colours of the operations, from the right, and of what goes wrong."""
+        """The legend: colours of the operations, from the right, and of failures."""
         x, y, small = self.right, 20 * self.sheet.scale, self.sheet.points - 2
         colours = template_colours(self.factory)
         colours |= {"stands": AMBER} if self.history.standing else {}

@@ -24,7 +24,8 @@ TIE = 1e-9
 @dataclass(frozen=True, slots=True)
 class Spell:
     """A robot's stay at place `step` of its gear, from `start` to `end` [s]; `number` counts the
-    places that the robot has gone through, back where operations are `undone`, at that time [s]."""
+    places that the robot has passed, and goes back if operations are undone (`undone`: that time
+    [s])."""
 
     number: int
     step: int
@@ -97,14 +98,14 @@ class History:
         self.fired.subtract(events)
 
     def _go(self, robot: int, time: float, places: int) -> None:
-        """A robot is so many places further in its gear from a time on."""
+        """Move a robot by a number of places in its gear at a time."""
         spells, length = self.spells[robot], len(self.factory.net.gears[robot].places)
         last = spells[-1]
         spells[-1] = replace(last, end=time)
         spells.append(Spell(last.number + places, (last.step + places) % length, time))
 
     def stand(self, stood: Sequence[Stood]) -> None:
-        """Which robots stood up to now."""
+        """Note the robots that stood still up to now."""
         for start, names in stood[len(self.standing) :]:
             self.standing.append((start, frozenset(self.index[name] for name in names)))
 
@@ -114,21 +115,21 @@ class History:
         return {robot.name: robot.index for robot in self.factory.robots}
 
     def stood(self, robot: int, since: float, time: float) -> list[tuple[float, float]]:
-        """From when to when a robot stood, between two times [s]."""
-        found = list[tuple[float, float]]()
+        """Intervals in which a robot stood still, between two times [s]."""
+        spans = list[tuple[float, float]]()
         for number, (start, robots) in enumerate(self.standing):
             end = self.standing[number + 1][0] if number + 1 < len(self.standing) else inf
             if robot in robots and start < time - TIE and end > since:
-                found.append((max(start, since), min(end, time)))
-        return found
+                spans.append((max(start, since), min(end, time)))
+        return spans
 
     def stands(self, time: float) -> frozenset[int]:
-        """The robots that stand at a time."""
+        """The robots that stand still at a time."""
         before = bisect_right(self.standing, time - TIE, key=lambda pair: pair[0])
         return self.standing[before - 1][1] if before else frozenset()
 
     def deaths(self) -> list[Death]:
-        """All that are known."""
+        """All known deaths."""
         return deaths(self.failings, self.exchanges)
 
     def dead(self, time: float) -> frozenset[int]:
@@ -138,7 +139,7 @@ class History:
         )
 
     def gone(self, time: float) -> frozenset[int]:
-        """The robots that have been lifted out for good by a time."""
+        """The robots that have been removed by a time."""
         return frozenset(self.index[robot] for robot in gone(self.exchanges, time + TIE))
 
     def doer(self, robot: int, time: float) -> int:
@@ -158,7 +159,7 @@ class History:
                     yield tour, spell
 
     def failed(self, since: float, time: float) -> list[Failing]:
-        """What failed from one time and before another."""
+        """The failures from one time until before another."""
         return [one for one in self.failings if since <= one.t < time - TIE]
 
     def catch_up(self, entries: Sequence[tuple[float, Entry]], now: float) -> None:
@@ -183,23 +184,23 @@ class History:
         return spells[first:]
 
     def recent(self, since: float, time: float) -> list[tuple[float, int]]:
-        """What fired from one time and before another: when, and which transition."""
+        """The firings from one time until before another: time and transition."""
         first = bisect_right(self.times, since)
         last = bisect_right(self.times, time - TIE)
         return list(zip(self.times[first:last], self.events[first:last], strict=True))
 
     def counts(self, time: float) -> Counter[int]:
         """How often each transition has fired before a time, and was not undone."""
-        found = Counter(self.fired)
+        counts = Counter(self.fired)
         for event in self.events[bisect_right(self.times, time - TIE) :]:
-            found[event] -= 1
+            counts[event] -= 1
         for when, event in self.undone:
-            found[event] += when > time - TIE
-        return found
+            counts[event] += when > time - TIE
+        return counts
 
 
 class OperationProgress:
-    """How far each operation is, by the way its robots have still to go.
+    """Progress of each operation, from the remaining paths of its robots.
 
     An operation with a dwell takes the time it would take to get there, then the dwell; what its
     robots still have to go shows the one, the clock the other. Goes up to 1, and never back in a
@@ -216,8 +217,8 @@ class OperationProgress:
         """The share of an operation that is done, with robots at `x` [m] so long after its start
         [s]; `robots`: those that take part in it, where deputies do."""
         way, robots = self.ways[operation.index], robots or operation.robots
-        own = self.subject.goals[operation.index]
-        goals = self.subject.others.get((operation.index, robots), own)
+        usual = self.subject.goals[operation.index]
+        goals = self.subject.others.get((operation.index, robots), usual)
         left = max(abs(goal - x[r]) for goal, r in zip(goals, robots, strict=True))
         gone = 1.0 - min(left / way, 1.0) if way else 1.0
         travel = self.pace.rest(way)
@@ -227,12 +228,12 @@ class OperationProgress:
         return (travel * gone + operation.dwell * dwelt) / (travel + operation.dwell)
 
     def expected(self, operation: Operation) -> float:
-        """About how long an operation takes [s]."""
+        """Approximate duration of an operation [s]."""
         return self.pace.rest(self.ways[operation.index]) + operation.dwell
 
     @cached_property
     def ways(self) -> tuple[float, ...]:
-        """For each operation how far the robot with the longest way goes [m]."""
+        """Longest path of a robot in each operation [m]."""
         return tuple(
             max(abs(self.subject.goal(o, r) - self._from(o, r)) for r in o.robots)
             for o in self.factory.operations
@@ -255,9 +256,9 @@ def followed(factory: Factory, counts: Mapping[int, int]) -> Operation:
 
 
 def depths(factory: Factory) -> tuple[int, ...]:
-    """For each operation how many come after it up to the dropoff."""
-    found = [0] * len(factory.operations)
+    """Number of operations between each operation and the dropoff."""
+    depth = [0] * len(factory.operations)
     for operation in (*factory.dropoffs, *factory.making):
         parent = factory.parents[operation.index]
-        found[operation.index] = 0 if parent < 0 else found[parent] + 1
-    return tuple(found)
+        depth[operation.index] = 0 if parent < 0 else depth[parent] + 1
+    return tuple(depth)

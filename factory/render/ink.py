@@ -49,7 +49,7 @@ class Ink:
     def hatched(
         self, left: float, top: float, right: float, bottom: float, colour: Colour, pitch: float
     ) -> None:
-        """A box with only its edge and stripes that rise to the right, so far from each other."""
+        """A hatched box: its edge and stripes that rise to the right, at a pitch."""
         x, y = self._pixels_of(left, top, right, bottom)
         if not (x.size and y.size):
             return
@@ -107,13 +107,13 @@ class Ink:
 
 
 def width(text: str, points: int) -> int:
-    """How wide a line of text is [px]."""
+    """Width of a line of text [px]."""
     return _mask(text, points).shape[1] - 1 if text else 0
 
 
 def fitted(text: str, points: int, room: float) -> str:
-    """A text, or its beginning, as far as it fits; nothing where not even three letters, nor two
-    fifths of it, do. The end of a label that is numbered, as in `box/3`, stays."""
+    """A text, shortened to fit; "" if less than three letters or two fifths of it fit. The number
+    of a label such as `box/3` is kept."""
     if width(text, points) <= room:
         return text
     head, slash, number = text.rpartition("/")
@@ -126,7 +126,7 @@ def fitted(text: str, points: int, room: float) -> str:
 
 
 def mixed(one: Colour, other: Colour, share: float) -> Colour:
-    """A colour on the way from one to another."""
+    """A mixture of two colours."""
     red, green, blue = (round(a + share * (b - a)) for a, b in zip(one, other, strict=True))
     return red, green, blue
 
@@ -154,7 +154,7 @@ def _font(points: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
 
 @lru_cache(4096)
 def _mask(text: str, points: int) -> Coverage:
-    """What a line of text covers, with a column to spare on the right."""
+    """Coverage of a line of text, with a spare column on the right."""
     font = _font(points)
     reach = ImageDraw.Draw(Image.new("L", (1, 1))).textlength(text, font)
     picture = Image.new("L", (int(np.ceil(reach)) + 1, round(1.5 * points)))

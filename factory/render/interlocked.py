@@ -52,8 +52,8 @@ PAINTS: tuple[Colour, ...] = (
 
 @dataclass(frozen=True)
 class InterlockedView:
-    """A source, and units of it that interlock. `boxes` (n, 2, 3): from where to where each of the
-    interlocked units goes [m], in the order of `lock`."""
+    """A source with interlocked units. `boxes` (n, 2, 3): bounding boxes of these units [m], in the
+    order of `lock`."""
 
     source: InPlace
     lock: Interlock
@@ -63,25 +63,24 @@ class InterlockedView:
         units = dict(self.source.units())
         solids = [[part.solid for part in units[label]] for label in self.lock.labels]
         ends = [
-            (np.min([s.low for s in own], axis=0), np.max([s.high for s in own], axis=0))
-            for own in solids
+            (np.min([s.low for s in members], axis=0), np.max([s.high for s in members], axis=0))
+            for members in solids
         ]
         object.__setattr__(self, "boxes", np.array(ends))
 
     def drawn_out(self, axis: int) -> Array:
-        """How far each unit is moved (n, 3) [m], so that they stand one behind the other along an
-        axis, in the order in which they are there."""
+        """Offsets of the units (n, 3) [m] that line them up along an axis, in their order on it."""
         low, high = self.boxes[:, 0, axis], self.boxes[:, 1, axis]
         room = ROOM * float(np.ptp(self.boxes.reshape(-1, 3), axis=0).max())
         order = np.argsort(low + high, kind="stable")
         ends = np.cumsum(high[order] - low[order] + room)
-        found = np.zeros((len(low), 3))
-        found[order, axis] = ends - high[order]
-        found[:, axis] -= found[:, axis].mean()
-        return found
+        offsets = np.zeros((len(low), 3))
+        offsets[order, axis] = ends - high[order]
+        offsets[:, axis] -= offsets[:, axis].mean()
+        return offsets
 
     def met(self, axis: int, side: int) -> str:
-        """Who meets whom, in words, on the way out to one side of an axis: the first of them."""
+        """The first units that block each other on the way out to one side of an axis, in words."""
         circuit = dict(self.lock.circuits)[axis, side]
         shown = (*circuit, circuit[0]) if len(circuit) < MET else (*circuit[:MET], "...")
         return " meets ".join(shown)
@@ -113,7 +112,7 @@ class InterlockedView:
         write_still(path, pixels)
 
     def _titles(self, ink: Ink, axis: int, x: float, y: float) -> None:
-        """What is above the picture of an axis, or, for -1, of them all in place."""
+        """Draw the words above the picture of an axis, or for -1 above that of the product."""
         room = PANEL[0] - 2 * EDGES
         if axis < 0:
             count = len(self.lock.labels)
@@ -178,7 +177,7 @@ class _Parts(LooseParts):
         return self.renderer.mean(self._view(moved), SAMPLES)
 
     def _view(self, moved: Array) -> View:
-        """The nearest one of those that interlock."""
+        """The view that shows the interlocked units as large as possible."""
         bits = np.array([[n >> 2 & 1, n >> 1 & 1, n & 1] for n in range(8)])
         corners = self.shown.boxes[:, bits, [0, 1, 2]] + moved[:, None]
         return fit(corners.reshape(-1, 3), towards(AZIMUTH, ELEVATION), self.framing)

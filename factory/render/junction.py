@@ -1,4 +1,4 @@
-"""The view of one hand-over: where a label meets what takes it, from near by.
+"""The close-up view of one hand-over.
 
 Its operation is the one that takes the label: the next in the product, or the dropoff. The camera
 stands still, and sees the label as its carrier brings it there, with the hands of all robots that
@@ -36,14 +36,14 @@ are tried [degrees]."""
 
 
 TOUCH = 1e-4
-"""What reaches this far into each other touches [m]."""
+"""Penetration from which bodies count as touching [m]."""
 
 
 def handover_view(
     replica: Replica, subject: MonitorSubject, label: str, framing: Framing
 ) -> tuple[Array, View]:
-    """What is to be seen of the hand-over of a label, as boxes (n, 8, 3) by their corners [m], and
-    the view of it. The replica is left as it is found."""
+    """The subject of the hand-over of a label, as boxes (n, 8, 3) by their corners [m], and the
+    view of it. The state of the replica is restored."""
     factory, before = subject.factory, replica.d.qpos.copy()
     made = factory.by_label[label]
     taking = factory.operations[factory.parents[made.index]]
@@ -65,7 +65,7 @@ def handover_view(
 
 
 def _gather(replica: Replica, subject: MonitorSubject, operation: Operation) -> None:
-    """Put the robots of an operation where they have their goals in it, lifts down."""
+    """Put the robots of an operation at their goals, with lifts down."""
     m, qpos = replica.m, replica.d.qpos.copy()
     for robot in operation.robots:
         slide = m.joint(names.slide(subject.factory.robots[robot].name))
@@ -94,7 +94,7 @@ def _hands(
     held = zip(operation.robots, operation.before, operation.after, strict=True)
     for name in (subject.factory.robots[r].name for r, *k in held if set(k) != {NOPART}):
         foot = m.body(names.carriage(name)).id
-        for pad in (p for b, found in pads.items() if m.body_rootid[b] == foot for p in found):
+        for pad in (p for b, pads_of in pads.items() if m.body_rootid[b] == foot for p in pads_of):
             corners.append(placed(m, d, pad))
             arms.append((d.xpos[foot] - d.geom_xpos[pad])[:2])
     return corners, arms
@@ -116,8 +116,8 @@ def _stands(replica: Replica) -> Array:
     m, d = replica.m, replica.d
     bodies = [b for b in range(1, m.nbody) if names.kind(m.body(b).name) in ("feeder", "outfeed")]
     geoms = (g for b in bodies if m.body_weldid[b] == 0 for g in shown(m, b))
-    found = [placed(m, d, g) for g in geoms if not m.geom(g).name.endswith(STANDS)]
-    return np.array(found).reshape(-1, 8, 3)
+    boxes = [placed(m, d, g) for g in geoms if not m.geom(g).name.endswith(STANDS)]
+    return np.array(boxes).reshape(-1, 8, 3)
 
 
 def _others(

@@ -106,16 +106,16 @@ def neighbourhood(
     result goes to, the nearest first, and of those that make what joins it there; then of those
     that make what these need, and so on. In the order of their numbers."""
     chosen = list(_ahead(factory, focus))
-    found = set(focus.robots[:most])
+    robots = set(focus.robots[:most])
     for operation in chosen:
         if operation.index not in sight:
             continue
-        more = found | set(operation.robots)
+        more = robots | set(operation.robots)
         if len(more) > most:
             break
-        found = more
+        robots = more
         chosen += (factory.by_label[label] for label in operation.inputs)
-    return sorted(found)
+    return sorted(robots)
 
 
 def _ahead(factory: Factory, focus: Operation) -> Iterator[Operation]:

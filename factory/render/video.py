@@ -49,8 +49,8 @@ def check_output(
     ending = Path(path).suffix.lower()
     valid = STILLS if still else FILMS if still is False else FILMS + STILLS
     if ending not in valid:
-        found = f"'{ending}'" if ending else "no ending"
-        raise _bad(f"'{Path(path).name}' has {found}", f"valid endings: {', '.join(valid)}")
+        shown = f"'{ending}'" if ending else "no ending"
+        raise _bad(f"'{Path(path).name}' has {shown}", f"valid endings: {', '.join(valid)}")
     width, height = size
     if not all(SMALLEST <= n <= LARGEST for n in size):
         raise _bad(
