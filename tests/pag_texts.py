@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import factory
 from factory.compiler.compiler import compile_pag
 from factory.lang import read_pag, read_template
@@ -9,6 +11,7 @@ from factory.layout.layout import Layout
 from factory.pipeline import all_templates
 from factory.plant.factory import Factory
 from factory.problem.robot_types import Catalogue, load_catalogue
+from factory.support.errors import InputError
 
 PAPER = """6 parts; root = sub3; sub3 = mate ( sub2, part3 ); sub2 = weld ( sub1 );
 sub1 = mate ( part1, part2 ); part1 = atomic(); part2 = atomic(); part3 = atomic()"""
@@ -55,3 +58,15 @@ def compiled(text: str, *templates: str, catalogue: Catalogue | None = None) -> 
 def laid_out(text: str) -> Layout:
     """The layout of that factory, as `factory.lay_out` makes it."""
     return factory.lay_out(compiled(text))
+
+
+def read_or_refused(read: Callable[[str], object], text: str) -> None:
+    """Check that a reader accepts a text, or refuses it by an InputError with places and hints."""
+    try:
+        read(text)
+    except InputError as error:
+        for diagnostic in error.diagnostics:
+            assert diagnostic.hint
+            assert diagnostic.position
+            assert "\n" not in diagnostic.message
+            str(diagnostic).encode()

@@ -18,7 +18,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-from factory.commands.warnings import LISTED, told
+from factory.commands.warnings import LISTED, condensed
 from factory.compiler.expanding import expand
 from factory.compiler.mating import overlaps, paths
 from factory.compiler.mating.depth import Difference, exact, polytope, rough, summits
@@ -564,10 +564,10 @@ def test_run_and_build_tell_what_is_blocked_as_check_does(run: Terminal, closed:
 def test_of_many_blocked_operations_the_first_are_told_and_how_many_more() -> None:
     other, (shown, _) = Diagnostic("Size", "long"), LISTED["Blocked"]
     many = [Diagnostic("Blocked", f"b cannot come to r{i}: b and c 1.00 mm") for i in range(shown)]
-    assert told([other, *many], verbose=False) == [other, *many]
+    assert condensed([other, *many], verbose=False) == [other, *many]
     more = [*many, *many]
-    assert told([other, *more], verbose=True) == [other, *more]
-    *first, last = told([other, *more], verbose=False)
+    assert condensed([other, *more], verbose=True) == [other, *more]
+    *first, last = condensed([other, *more], verbose=False)
     assert first == [other, *many]
     assert str(last) == f"Blocked and {shown} more operations are blocked\n    list: -v"
 

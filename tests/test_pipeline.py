@@ -56,8 +56,8 @@ def test_a_project_of_default_boxes_has_no_matings() -> None:
 @SOURCE
 @MOTION
 @OUTPUT
-def shown(given: ProjectOptions, out: OutputOptions) -> None:
-    click.echo(repr((given, out)))
+def shown(options: ProjectOptions, out: OutputOptions) -> None:
+    click.echo(repr((options, out)))
 
 
 def test_a_command_gets_its_options_as_values() -> None:

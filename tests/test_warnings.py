@@ -11,7 +11,7 @@ import pytest
 import trimesh
 from command_line import Terminal
 
-from factory.commands.warnings import told
+from factory.commands.warnings import condensed
 from factory.support.errors import Diagnostic
 
 OPENED, TURNED = 4, 2
@@ -101,6 +101,6 @@ def test_import_counts_what_build_will_say(run: Terminal, tmp_path: Path) -> Non
 
 def test_what_is_said_once_is_said_in_full() -> None:
     one, two = Diagnostic("A", "a is so", None, "h", "are so"), Diagnostic("B", "b")
-    assert told([one, two, two], False) == [one, two, two]
-    assert told([one, two, one], False) == [Diagnostic("A", "2 are so; list: -v"), two]
-    assert told([one, two, one], True) == [one, two, one]
+    assert condensed([one, two, two], False) == [one, two, two]
+    assert condensed([one, two, one], False) == [Diagnostic("A", "2 are so; list: -v"), two]
+    assert condensed([one, two, one], True) == [one, two, one]

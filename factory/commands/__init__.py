@@ -6,16 +6,16 @@ import os
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from factory.commands.analyze import analyze
 from factory.commands.build import build
 from factory.commands.check import check
-from factory.commands.defaults import set_in_advance, with_defaults
 from factory.commands.doctor import doctor
-from factory.commands.explain import Code, tell_code
 from factory.commands.export import export
 from factory.commands.fidelity import fidelity
 from factory.commands.import_ import import_
@@ -26,6 +26,7 @@ from factory.commands.plan import plan
 from factory.commands.programs import programs
 from factory.commands.render import render
 from factory.commands.report import report
+from factory.commands.requests import PLANNED
 from factory.commands.run import run
 from factory.commands.sweep import sweep
 from factory.commands.templates import templates
@@ -38,10 +39,79 @@ from factory.support.errors import (
     MissingError,
     StoppedError,
     did_you_mean,
+    usage_error,
 )
 from factory.support.files import NO_ROOM
 from factory.support.interruption import interrupt, stop_on_signals
 from factory.support.version import __version__
+
+PARAMETERS = {"templates": "folders"}
+"""Names of parameters that are not those of their options."""
+
+META = "factory.toml"
+"""The key of the defaults in a click context."""
+
+
+def with_defaults(command: click.Command) -> click.Command:
+    """The command, whose options that are not given are taken from the environment (FACTORY_UNITS
+    and so on), or else from the `factory.toml` for its FILE."""
+    from factory.support.user_defaults import OPTIONS
+
+    parameters = {parameter.name: parameter for parameter in command.params}
+    for key in OPTIONS:
+        if parameter := parameters.get(PARAMETERS.get(key, key)):
+            parameter.envvar = f"FACTORY_{key.upper()}"
+    parameters["file"].callback = _read
+    return command
+
+
+def _read(context: click.Context, parameter: click.Parameter, file: Path) -> Path:
+    """FILE itself; values of its `factory.toml` become the defaults of all other options. Raises
+    InputError."""
+    from factory.support.files import is_plan
+    from factory.support.user_defaults import defaults_for
+
+    defaults = context.meta[META] = defaults_for(file)
+    planned = PLANNED if is_plan(file) else {}
+    named = {PARAMETERS.get(key, key): value for key, value in defaults.options().items()}
+    context.default_map = {key: value for key, value in named.items() if key not in planned}
+    return file
+
+
+def set_in_advance(error: click.BadParameter) -> Diagnostic | None:
+    """Error of a bad value from the environment or from `factory.toml`, with its place; None if it
+    was given as an option."""
+    parameter, context = error.param, error.ctx
+    if parameter is None or context is None or not parameter.name:
+        return None
+    source = context.get_parameter_source(parameter.name)
+    if source is ParameterSource.ENVIRONMENT:
+        message = f"{error.format_message()} It is in the environment: {parameter.envvar}."
+        return Diagnostic("Usage", message, None, f"see {context.command_path} --help")
+    if source is ParameterSource.DEFAULT_MAP:
+        key = next((k for k, name in PARAMETERS.items() if name == parameter.name), parameter.name)
+        return Diagnostic("BadValue", f"{key}: {error.message}", context.meta[META].at(key))
+    return None
+
+
+def code_names(ctx: click.Context, param: click.Parameter, begun: str) -> list[str]:
+    """Completions of --explain in a shell."""
+    from factory.support.explanations import codes
+
+    return [code for code in codes() if code.lower().startswith(begun.lower())]
+
+
+def print_code(code: str, as_json: bool) -> None:
+    """Print the meaning of a code, an example that provokes it, and the remedy. Raises InputError
+    for an unknown code."""
+    from factory.support.explanations import explain
+
+    explanation = explain(code)
+    if as_json:
+        emit({"code": explanation.code, "title": explanation.title, "text": explanation.text})
+    else:
+        say(f"{explanation.code}: {explanation.title}\n\n{explanation.text}")
+
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 
@@ -67,8 +137,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _open_streams() -> None:
-    """A stream that is closed swallows what is printed; one whose encoding lacks a sign shows
-    `?`."""
+    """Replace closed streams by ones that discard output; characters outside a stream's encoding
+    are printed as `?`."""
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
@@ -158,7 +228,7 @@ MEANT = {
     }.items()
     for word in words.split()
 }
-"""The commands that are meant by words that people write in their place."""
+"""The command that a mistaken word probably means."""
 
 
 class _Commands(click.Group):
@@ -175,12 +245,17 @@ class _Commands(click.Group):
             elif meant:
                 hint = f"did you mean 'factory {meant}'?"
             message = f"there is no command '{args[0]}'"
-            raise InputError(Diagnostic("Usage", message, None, hint)) from error
+            raise usage_error(message, hint) from error
 
 
 @click.group(cls=_Commands, context_settings=CONTEXT, invoke_without_command=True)
 @click.option("--version", is_flag=True, help="Show the version and exit.")
-@click.option("--explain", type=Code(), help="Explain the code of an error and exit.")
+@click.option(
+    "--explain",
+    metavar="CODE",
+    shell_complete=code_names,
+    help="Explain the code of an error and exit.",
+)
 @click.option("--json", "as_json", is_flag=True, hidden=True)
 @click.pass_context
 def cli(ctx: click.Context, version: bool, explain: str | None, as_json: bool) -> None:
@@ -189,7 +264,7 @@ def cli(ctx: click.Context, version: bool, explain: str | None, as_json: bool) -
         emit({"version": __version__}) if as_json else say(f"factory {__version__}")
         ctx.exit()
     if explain is not None:
-        tell_code(explain, as_json)
+        print_code(explain, as_json)
         ctx.exit()
     if ctx.invoked_subcommand is None:
         if not as_json:
@@ -200,7 +275,7 @@ def cli(ctx: click.Context, version: bool, explain: str | None, as_json: bool) -
 
 
 ON_A_FILE = check, build, run, render, view, fidelity, analyze, pareto, report, programs, export
-"""The commands whose options may be set in advance for a FILE."""
+"""The commands on a FILE whose options have defaults in its `factory.toml`."""
 
 for _command in (
     new,

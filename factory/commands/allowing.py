@@ -12,7 +12,7 @@ from factory.problem.pag import ANY_DEPTH, AllowedOverlap
 
 
 class OverlapOption(click.ParamType[AllowedOverlap]):
-    """An overlap that is meant: `a:b`, `a:b:0.5mm`, or `0.5mm` for all parts."""
+    """An overlap to accept: `a:b`, `a:b:0.5mm`, or `0.5mm` for all parts."""
 
     name = "[part:part][:depth]"
 
@@ -44,23 +44,23 @@ ALLOW = click.option(
 def allowed_in(
     words: Sequence[str], labels: Collection[str]
 ) -> tuple[list[AllowedOverlap], tuple[str, ...]]:
-    """Of the words of `plan --allow` those with a depth, as overlaps that are meant, and the
-    others: a label, or two, of what may pass through something."""
-    meant = {
+    """The words of `plan --allow` in two groups: those with a depth, as overlaps to accept, and
+    labels, or pairs of labels, of parts that may pass through others."""
+    lengths = {
         word
         for word in words
         if word not in labels
         and word.count(":") != 1
         and length_of(word.split(":")[-1]) is not None
     }
-    found = [OverlapOption().convert(word, None, None) for word in meant]
-    return found, tuple(word for word in words if word not in meant)
+    overlaps = [OverlapOption().convert(word, None, None) for word in lengths]
+    return overlaps, tuple(word for word in words if word not in lengths)
 
 
 def length_of(word: str) -> float | None:
-    """The length that a word with a unit, or none for metres, is [m]; None for no length."""
+    """Length [m] of a word such as `0.5mm`, in metres without a unit; None if it is none."""
     from factory.lang.words import UNITS, number
 
-    found = re.fullmatch(r"(.*?)\s*([a-z]*)", word)
-    unit = (found[2] or "m") if found else ""
-    return number(found[1], unit) if found and unit in UNITS else None
+    match = re.fullmatch(r"(.*?)\s*([a-z]*)", word)
+    unit = (match[2] or "m") if match else ""
+    return number(match[1], unit) if match and unit in UNITS else None

@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from factory.commands.given import for_a_pag
 from factory.commands.grouped import Grouped
-from factory.commands.logs import cut_off, read_partly
 from factory.commands.options import (
     DRAW,
     FLOOR,
@@ -24,12 +22,12 @@ from factory.commands.options import (
     WIP,
     gathered,
 )
-from factory.commands.outputs import writable
+from factory.commands.outputs import for_a_pag, writable
 from factory.commands.requests import OutputOptions, ProjectOptions, RunOptions
 from factory.commands.run import carry_out
-from factory.commands.warnings import announced
+from factory.commands.warnings import announced, cut_off, read_partly
 from factory.support.console import emit, say, table
-from factory.support.errors import Diagnostic, InputError, did_you_mean
+from factory.support.errors import Diagnostic, InputError, did_you_mean, usage_error
 
 if TYPE_CHECKING:
     from factory.pipeline import Project
@@ -41,7 +39,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class AnalyzeOptions:
-    """What an analysis is compared with, and the changes that it is to foresee."""
+    """The record that an analysis is compared with, and the changes whose effect it predicts."""
 
     measured: Path | None
     on_the_spot: bool
@@ -54,12 +52,11 @@ class AnalyzeOptions:
         if self.measured is None:
             return None
         if self.on_the_spot:
-            message = "--measured LOG and --run exclude each other"
-            raise InputError(Diagnostic("Usage", message, None, "leave one out"))
+            raise usage_error("--measured LOG and --run exclude each other", "leave one out")
         return read_partly(self.measured, silent)
 
     def change(self, factory: Factory) -> tuple[str, Change] | None:
-        """The change that is asked about, in words before it. Raises InputError."""
+        """The change of a what-if question and its description; None without. Raises InputError."""
         from factory.study.analysis import Change
 
         robots = {robot.name: robot.index for robot in factory.robots}
@@ -107,7 +104,7 @@ class AnalyzeOptions:
 @MOTION
 @OUTPUT
 def analyze(
-    given: ProjectOptions,
+    options: ProjectOptions,
     asked: RunOptions,
     study: AnalyzeOptions,
     out: OutputOptions,
@@ -117,13 +114,13 @@ def analyze(
     """Find the bottleneck of FILE.pag (or of a net in FILE.pnml), and what would relieve it."""
     from factory.support.files import is_net
 
-    if is_net(given.file):
-        for_a_pag(given.file, "a net in PNML", "delays", "output")
-        return _analyze_net(given.file, delays, output, out)
+    if is_net(options.file):
+        for_a_pag(options.file, "a net in PNML", "delays", "output")
+        return _analyze_net(options.file, delays, output, out)
     if delays is not None:
         message = "--delays is for a net in PNML; of a PAG, delays follow from its layout"
-        raise InputError(Diagnostic("Usage", message, None, "leave it out"))
-    return _analyze_pag(given, asked, study, output, out)
+        raise usage_error(message, "leave it out")
+    return _analyze_pag(options, asked, study, output, out)
 
 
 def _analyze_net(file: Path, delays: Path | None, output: Path | None, out: OutputOptions) -> int:
@@ -131,25 +128,24 @@ def _analyze_net(file: Path, delays: Path | None, output: Path | None, out: Outp
     from factory.study.analysis.general import analyse_net, net_document, net_tables, read_delays
 
     if output is not None:
-        message = "a net has no robots to draw"
-        raise InputError(Diagnostic("Usage", message, None, "leave out -o"))
+        raise usage_error("a net has no robots to draw", "leave out -o")
     if delays is None:
         message = "a net needs a table of delays"
         hint = '--delays FILE.toml, with lines as "p1" = 0.5'
-        raise InputError(Diagnostic("Usage", message, None, hint))
+        raise usage_error(message, hint)
     net = load_net(file)
-    found = analyse_net(net, read_delays(delays, net), str(file))
+    analysis = analyse_net(net, read_delays(delays, net), str(file))
     if out.as_json:
-        emit(net_document(file.stem, found))
+        emit(net_document(file.stem, analysis))
     else:
-        say(f"{file.stem}: cycle time {found.pace:.6g} s")
-        for made in net_tables(found, out.verbose):
+        say(f"{file.stem}: cycle time {analysis.pace:.6g} s")
+        for made in net_tables(analysis, out.verbose):
             table(made.title, made.columns, made.rows)
     return 0
 
 
 def _analyze_pag(
-    given: ProjectOptions,
+    options: ProjectOptions,
     asked: RunOptions,
     study: AnalyzeOptions,
     output: Path | None,
@@ -162,15 +158,15 @@ def _analyze_pag(
     from factory.study.analysis.picture import check_picture, picture
     from factory.support.files import write_bytes
 
-    writable(given.file, output)
+    writable(options.file, output)
     check_picture(output)
     log = study.log(out.silent)
     made = (
-        Conditions(given.settings(), asked.world, asked.seed, asked.jitter, asked.wip)
+        Conditions(options.settings(), asked.world, asked.seed, asked.jitter, asked.wip)
         if log is None
         else conditions(log.header)
     )
-    project = given.project(out.silent, made.settings)
+    project = options.project(out.silent, made.settings)
     layout = project.layout
     proved(layout.factory.net)
     warnings = announced(layout.product.warnings, out)
@@ -183,25 +179,25 @@ def _analyze_pag(
     elif study.on_the_spot:
         record, status = _run(project, timing, asked, out.silent)
     units = len(record.dropoffs) if record else asked.units
-    found = analyse(timing, units, made.wip, change, record)
+    analysis = analyse(timing, units, made.wip, change, record)
     if output is not None:
-        write_bytes(output, picture(found, output.suffix))
+        write_bytes(output, picture(analysis, output.suffix))
     if out.as_json:
         drawn = str(output) if output else None
-        emit({**document(found), "picture": drawn, "warnings": warnings, **cut_off(log)})
+        emit({**document(analysis), "picture": drawn, "warnings": warnings, **cut_off(log)})
     else:
-        _tell(found, out.verbose)
+        _print(analysis, out.verbose)
         if output is not None:
             say(f"wrote {output}")
     return status
 
 
-def _tell(found: Analysis, verbose: bool) -> None:
+def _print(analysis: Analysis, verbose: bool) -> None:
     from factory.study.analysis.tables import summary, tables
 
-    for line in summary(found):
+    for line in summary(analysis):
         say(line)
-    for made in tables(found, verbose):
+    for made in tables(analysis, verbose):
         table(made.title, made.columns, made.rows)
         if made.note:
             say(f"{made.note}\n")
@@ -210,7 +206,7 @@ def _tell(found: Analysis, verbose: bool) -> None:
 def _run(
     project: Project, timing: Timing, asked: RunOptions, silent: bool
 ) -> tuple[RunRecord, int]:
-    """A run on the spot, in which no parts fuse; status 1 where it failed."""
+    """A run without fused parts, and its exit status."""
     from factory.simulation.simulation import Simulation
     from factory.study.analysis.measured import record_of
 
@@ -224,7 +220,7 @@ def _run(
 def _robot(robots: dict[str, int], name: str) -> int:
     if name not in robots:
         hint = did_you_mean(name, list(robots), "robots")
-        raise InputError(Diagnostic("Usage", f"there is no robot '{name}'", None, hint))
+        raise usage_error(f"there is no robot '{name}'", hint)
     return robots[name]
 
 

@@ -1,4 +1,4 @@
-"""What only the user knows of a source, asked for on a terminal and refused elsewhere."""
+"""Questions to the user about a source: on a terminal they are asked, elsewhere they are errors."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ UNITS = ("m", "cm", "mm", "in", "ldu")
 
 
 def is_terminal() -> bool:
-    """Whether someone reads questions and can answer."""
+    """Whether the user can read a question and answer it."""
     return sys.stdin.isatty() and sys.stderr.isatty()
 
 
 def asked(
     read: Callable[[SourceOptions], InPlace], options: SourceOptions, silent: bool
 ) -> InPlace:
-    """What `read` makes of a source. Where its unit is not known, or its parts do not seem to be in
-    place, the user is asked, unless `silent` or not on a terminal. Raises InputError as `read`
-    does, also where the user says no."""
+    """The parts that `read` makes of a source. If its unit is unknown, or its parts do not seem to
+    be in place, the user is asked, unless `silent` or not on a terminal. Raises InputError as
+    `read` does, also if the user says no."""
     while True:
         try:
             return read(options)

@@ -15,7 +15,7 @@ from factory.commands.grouped import Grouped
 from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, RELAY, SOURCE, WIP
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
-from factory.commands.warnings import told
+from factory.commands.warnings import condensed
 from factory.support.collector import collector_paused
 from factory.support.console import POOL_BOUND, emit, say, warning
 from factory.support.errors import printed
@@ -44,7 +44,7 @@ SHOWN = 20
 @OUTPUT
 @collector_paused()
 def build(
-    given: ProjectOptions,
+    options: ProjectOptions,
     out: OutputOptions,
     mjcf: Path | None,
     output: Path | None,
@@ -55,11 +55,11 @@ def build(
     from factory.support.cache import build_name, find_build, keep_build
 
     begin = perf_counter()
-    writable(given.file, mjcf)
+    writable(options.file, mjcf)
     writable_folder(output)
     wanted = {"mjcf": mjcf, "output": output, "units": units, "wip": wip}
-    settings = given.settings()
-    name = build_name(given.file, {**asdict(given), **wanted, "settings": settings})
+    settings = options.settings()
+    name = build_name(options.file, {**asdict(options), **wanted, "settings": settings})
     kept = find_build(name)
     is_current = kept is not None
     if kept is None:
@@ -68,16 +68,16 @@ def build(
         from factory.nets.verify import proved
         from factory.record.plan_file import plan_and_layout
 
-        project = given.project(out.silent)
+        project = options.project(out.silent)
         with Waiting("reading the shapes and laying out", out.silent):
             verdict = proved(project.layout.factory.net)
         spent = perf_counter() - begin
-        plan = plan_and_layout(given.file) if is_plan(given.file) else ()
+        plan = plan_and_layout(options.file) if is_plan(options.file) else ()
         request = BuildRequest(mjcf, output, units, wip, plan)
         with Waiting("compiling the model", out.silent):
             built = build_files(project, verdict, request)
         kept = _printed(project, built, spent, wip)
-        inputs = (*files_read(project), *plan, *_shipped_and_own(given.folders))
+        inputs = (*files_read(project), *plan, *_shipped_and_own(options.folders))
         keep_build(name, inputs, built.files, kept)
     else:
         kept["document"]["compile_s"] = perf_counter() - begin
@@ -94,8 +94,8 @@ def build(
 
 
 def _listed(files: list[str], verbose: bool) -> list[str]:
-    """The files that have been written, what lies in further folders behind: all, or the first and
-    how many more."""
+    """Lines with the files that were written, those in sub-folders last: all, or the first ones and
+    the number of the others."""
     files = sorted(files, key=lambda path: path.count(os.sep))
     shown = files if verbose or len(files) <= SHOWN else files[: SHOWN - 1]
     more = len(files) - len(shown)
@@ -146,7 +146,8 @@ def _printed(project: Project, built: Built, spent: float, wip: int | None) -> d
         where = ", ".join(dict.fromkeys(bore.label for bore in drilled))
         lines.append(f"hands grip with pins in bores of {where} (positions: --json)")
     every, brief = (
-        printed([*map(warning, told(project.warnings, all_))], "warnings") for all_ in (True, False)
+        printed([*map(warning, condensed(project.warnings, all_))], "warnings")
+        for all_ in (True, False)
     )
     return {"document": document, "lines": lines, "all warnings": every, "warnings": brief}
 

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 import click
 
 from factory.commands.allowing import ALLOW
-from factory.commands.given import for_a_pag
 from factory.commands.grouped import Grouped
 from factory.commands.options import HANDS, OUTPUT, PATH, RELAY, SOURCE, WIP
-from factory.commands.outputs import writable, writable_folder
+from factory.commands.outputs import for_a_pag, writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced, say_allowed
 from factory.problem.shapes import is_shaped
@@ -54,7 +53,7 @@ POOLED = 8
 @OUTPUT
 @collector_paused()
 def check(
-    given: ProjectOptions,
+    options: ProjectOptions,
     out: OutputOptions,
     certificate: Path | None,
     against: Path | None,
@@ -65,16 +64,16 @@ def check(
     from factory.study.checking import check_net, check_project
     from factory.support.files import own_names, write_all, write_text
 
-    file = given.file
+    file = options.file
     if is_net(file):
         for_a_pag(file, "a net in PNML", "certificate", "against")
     writable(file, certificate)
     writable_folder(clashes)
-    project = None if is_net(file) else given.project(out.silent)
+    project = None if is_net(file) else options.project(out.silent)
     with Waiting("reading the shapes and proving", out.silent):
         asked = (
             out.verbose
-            or given.deputies
+            or options.deputies
             or (out.as_json and project is not None and _has_places(project))
         )
         checked = check_project(project, wip, asked, out.verbose) if project else check_net(file)
@@ -102,8 +101,8 @@ def check(
 
 
 def _proved(certificate: Path, checked: Checked) -> dict[str, bool | None]:
-    """What a certificate of the net that was checked proves (True), or refutes, by property. Raises
-    InputError, and RunError where it is refuted itself."""
+    """The claims of a certificate of the checked net: each property proved (True), refuted (False)
+    or open (None). Raises InputError, or RunError if the certificate is refuted."""
     from factory.export.certificate.listing import CLAIMS, TRAIN
     from factory.export.certificate.proof_file import check_against
 
@@ -113,18 +112,18 @@ def _proved(certificate: Path, checked: Checked) -> dict[str, bool | None]:
 
 
 def _claims(proved: dict[str, bool | None]) -> str:
-    """For people: what a certificate shows."""
+    """The claims of a certificate in words."""
     words = {True: "proves", False: "refutes", None: "leaves open"}
-    told = {c: v for c, v in proved.items() if c != "gear_net" or not proved.get("gear_train")}
-    said = {how: [c.replace("_", " ") for c, v in told.items() if v is how] for how in words}
+    shown = {c: v for c, v in proved.items() if c != "gear_net" or not proved.get("gear_train")}
+    said = {how: [c.replace("_", " ") for c, v in shown.items() if v is how] for how in words}
     return "; ".join(
         f"it {words[how]} {', '.join(claims)}" for how, claims in said.items() if claims
     )
 
 
 def _pictures(checked: Checked, folder: Path) -> dict[Path, bytes]:
-    """The files that `--clashes` writes, one for each blocked operation, and for each
-    sub-assembly that no hand can hold."""
+    """The files of `--clashes`: a picture of each blocked operation, and of each sub-assembly that
+    no hand can hold."""
     from factory.export import clash_picture, grip_picture
 
     found: dict[Path, bytes] = {}
@@ -138,7 +137,7 @@ def _pictures(checked: Checked, folder: Path) -> dict[Path, bytes]:
 
 
 def _describe(checked: Checked, verbose: bool) -> None:
-    """A summary for people: the gears, the counts and the verdict."""
+    """Print the gears, the counts and the verdict."""
     document = checked.as_json()
     gears = document["gears"]
     shown = gears if verbose else gears[:SHOWN]
@@ -182,7 +181,7 @@ def _describe(checked: Checked, verbose: bool) -> None:
 
 
 def _describe_coordinated(coordinated: CoordinatedNet) -> None:
-    """For people: the net that runs, with its order places."""
+    """Print the coordinated net with its order places."""
     net = coordinated.net
     live = "NO" if coordinated.deadlock else "yes"
     say(
@@ -195,7 +194,7 @@ def _describe_coordinated(coordinated: CoordinatedNet) -> None:
 
 
 def _by_property(faults: Sequence[Witness]) -> list[list[Witness]]:
-    """What speaks against each property; last what speaks against the shape of the net."""
+    """Witnesses grouped by the property that they refute; those of the gear structure last."""
     found: dict[str, list[Witness]] = {}
     for witness in faults:
         found.setdefault(witness.property, []).append(witness)
@@ -203,13 +202,12 @@ def _by_property(faults: Sequence[Witness]) -> list[list[Witness]]:
 
 
 def _has_places(project: Project) -> bool:
-    """Whether where robots come from is known without boxes, or matters: parts have shapes, or
-    robots serve several labels or branches."""
+    """Whether the layout matters for the check: parts have shapes, or robots have several tours."""
     return is_shaped(project.pag) or bool(project.plan.turns)
 
 
 def _describe_approaches(matings: Matings) -> None:
-    """For people: the figures in a line."""
+    """Print how many operations can be approached, and how."""
     strict, no_deeper, left_out = (matings.count(level) for level in (3, 2, 1))
     lowered, blocked = len(matings.of_kind("lower")), len(matings.of_kind("blocked"))
     say(
@@ -220,7 +218,7 @@ def _describe_approaches(matings: Matings) -> None:
 
 
 def _describe_deputies(deputies: Mapping[str, Sequence[str]]) -> None:
-    """For people: for how many robots another could take over, and which others need spares."""
+    """Print the number of robots with a deputy, and the robots that need spares."""
     alone = [robot for robot, found in deputies.items() if not found]
     listed = f"{', '.join(alone[:POOLED])}{', ...' if len(alone) > POOLED else ''}"
     say(

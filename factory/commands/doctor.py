@@ -66,7 +66,7 @@ def doctor(out: OutputOptions) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing looked at: whether it is well, what was found, and what mends it."""
+    """One check: its result, what was found, and a command that repairs it."""
 
     name: str
     ok: bool
@@ -75,7 +75,7 @@ class Finding:
 
 
 def examine() -> list[Finding]:
-    """Python, packages, assets, the engine and headless rendering."""
+    """The checks: Python, packages, assets, the engine and headless rendering."""
     engine = _engine()
     rendering = _rendering() if engine.ok else Finding("rendering", False, "no engine", engine.mend)
     return [_python(), *map(_package, PACKAGES), _assets(), engine, rendering]

@@ -10,13 +10,12 @@ import click
 from click.shell_completion import CompletionItem
 
 from factory.commands.grouped import Grouped
-from factory.commands.logs import cut_off, read_partly
 from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, RELAY, SOURCE
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
-from factory.commands.warnings import announced
+from factory.commands.warnings import announced, cut_off, read_partly
 from factory.support.console import emit, say
-from factory.support.errors import Diagnostic, InputError, did_you_mean
+from factory.support.errors import did_you_mean, usage_error
 
 if TYPE_CHECKING:
     from factory.export import Exporter, Made
@@ -47,7 +46,7 @@ class _Format(click.ParamType[str]):
     name = "format"
 
     def get_missing_message(self, param: click.Parameter, ctx: click.Context | None) -> str:
-        """What there is to choose from."""
+        """The list of formats."""
         from factory.export import exporters
 
         return f"There are: {', '.join(exporters())}."
@@ -75,7 +74,7 @@ class _Format(click.ParamType[str]):
 @MOTION
 @OUTPUT
 def export(
-    given: ProjectOptions, out: OutputOptions, form: str, output: Path | None, of: str
+    options: ProjectOptions, out: OutputOptions, form: str, output: Path | None, of: str
 ) -> int:
     """Write FILE.pag, a net in FILE.pnml or a LOG of a run for other tools."""
     from factory.export import Subject
@@ -85,10 +84,10 @@ def export(
 
     chosen = _exporter(form, of)
     whole = chosen.folder and output is not None and _is_folder(output)
-    _writable(given.file, output, whole, chosen)
-    source = _source(given, chosen, out.silent)
+    _writable(options.file, output, whole, chosen)
+    source = _source(options, chosen, out.silent)
     name = output.name if output else ""
-    made = chosen.export(Subject(given.file, source, of, name, whole))
+    made = chosen.export(Subject(options.file, source, of, name, whole))
     seen = source.product if isinstance(source, Project) and source.has_geometry else None
     warnings = announced(seen.warnings if seen else (), out)
     files = _files(made, output, whole)
@@ -108,13 +107,13 @@ def export(
     return 0
 
 
-def _source(given: ProjectOptions, chosen: Exporter, silent: bool) -> Source:
-    """What an exporter makes a file of. Raises InputError, of code Usage where the exporter does
-    not take such a file."""
+def _source(options: ProjectOptions, chosen: Exporter, silent: bool) -> Source:
+    """The input of an exporter. Raises InputError, of code Usage if the exporter does not take such
+    a file."""
     from factory.record.log import is_log
     from factory.support.files import is_net
 
-    file = given.file
+    file = options.file
     kind = "a log" if is_log(file) else "a net in PNML" if is_net(file) else "a PAG"
     wanted = TAKEN[chosen.takes]
     if kind not in wanted:
@@ -122,11 +121,11 @@ def _source(given: ProjectOptions, chosen: Exporter, silent: bool) -> Source:
         hint = f"give {wanted[0]}"
         if chosen.takes == "log":
             hint = "keep one first: `factory run FILE.pag --log OUT`"
-        raise InputError(Diagnostic("Usage", message, None, hint))
+        raise usage_error(message, hint)
     if kind == "a log":
         return read_partly(file, silent)
     if kind == "a PAG":
-        return given.project(silent)
+        return options.project(silent)
     from factory.foreign_nets.pnml_reader import load_net
 
     return load_net(file)
@@ -138,25 +137,23 @@ def _exporter(form: str, of: str) -> Exporter:
     known = exporters()
     if form not in known:
         hint = did_you_mean(form, list(known), "formats")
-        raise InputError(Diagnostic("Usage", f"unknown format '{form}'", None, hint))
+        raise usage_error(f"unknown format '{form}'", hint)
     if of and not known[form].of:
         some = ", ".join(f"{e.format} ({e.of})" for e in known.values() if e.of)
         message = f"format {form} offers no choice, so no --of"
-        raise InputError(Diagnostic("Usage", message, None, f"a choice is offered by {some}"))
+        raise usage_error(message, f"a choice is offered by {some}")
     return known[form]
 
 
 def _is_folder(output: Path) -> bool:
-    """Whether an output is meant as a folder: it is one, or nothing yet and without an ending."""
+    """Whether an output is a folder, or a new name without an ending."""
     return output.is_dir() or not (output.suffix or output.exists())
 
 
 def _writable(file: Path, output: Path | None, whole: bool, chosen: Exporter) -> None:
     if output is None and chosen.binary:
         message = f"{chosen.format} is binary and is not written to a terminal"
-        raise InputError(
-            Diagnostic("Usage", message, None, f"give -o OUT.{chosen.ending or chosen.format}")
-        )
+        raise usage_error(message, f"give -o OUT.{chosen.ending or chosen.format}")
     if whole:
         writable_folder(output)
     else:
@@ -164,12 +161,12 @@ def _writable(file: Path, output: Path | None, whole: bool, chosen: Exporter) ->
 
 
 def _files(made: Made, output: Path | None, whole: bool) -> dict[Path, bytes]:
-    """What is to be written where. Raises InputError (Usage) where several files have no place."""
+    """Content of each output file. Raises InputError (Usage) for several files without -o."""
     if not isinstance(made, Mapping):
         content = made.encode() if isinstance(made, str) else made
         return {} if output is None else {output: content}
     if output is None:
         message = f"this format writes {len(made)} files"
-        raise InputError(Diagnostic("Usage", message, None, "give -o OUT for the first of them"))
+        raise usage_error(message, "give -o OUT for the first of them")
     folder = output if whole else output.parent
     return {folder / name if name else output: content for name, content in made.items()}

@@ -59,7 +59,7 @@ if TYPE_CHECKING:
 @MOTION
 @OUTPUT
 def fidelity(
-    given: ProjectOptions,
+    options: ProjectOptions,
     out: OutputOptions,
     seeds: int,
     units: int | None,
@@ -81,8 +81,8 @@ def fidelity(
     check_report(output)
     if output is not None:
         is_file = output.suffix.lower() == ".json"
-        writable(given.file, output) if is_file else writable_folder(output)
-    project = given.project(out.silent)
+        writable(options.file, output) if is_file else writable_folder(output)
+    project = options.project(out.silent)
     layout, settings = project.layout, project.settings
     proved(layout.factory.net)
     warnings = announced(layout.product.warnings, out)
@@ -92,27 +92,27 @@ def fidelity(
         def done(finished: int) -> None:
             bar.advance()
 
-        found = measure(layout, range(seeds), units, jitter, settings, jobs, done, max_time)
+        measured = measure(layout, range(seeds), units, jitter, settings, jobs, done, max_time)
         case = Case(layout, units, jitter, settings, max_time)
         studied = study(case, 0, jobs, done) if convergence else None
-    written = [] if output is None else write_report(output, found, studied)
+    written = [] if output is None else write_report(output, measured, studied)
     if out.as_json:
-        emit({**document(found, studied), "warnings": warnings})
+        emit({**document(measured, studied), "warnings": warnings})
     else:
-        _tell(found, studied, out.verbose)
+        _print(measured, studied, out.verbose)
         for path in written:
             say(f"wrote {path}")
-    for trouble in (t for record in found.seeds for t in record.trouble):
+    for trouble in (t for record in measured.seeds for t in record.trouble):
         print(trouble, file=sys.stderr)
-    return 0 if found.passed else 1
+    return 0 if measured.passed else 1
 
 
-def _tell(found: Fidelity, studied: Study | None, verbose: bool) -> None:
-    """The figures as a table for people."""
+def _print(measured: Fidelity, studied: Study | None, verbose: bool) -> None:
+    """Print the figures as a table."""
     from factory.study.fidelity import QUANTITIES
     from factory.study.fidelity.report import remark, shown
 
-    worst, mean = found.worst(), found.mean()
+    worst, mean = measured.worst(), measured.mean()
     rows = [
         (
             key,
@@ -125,13 +125,13 @@ def _tell(found: Fidelity, studied: Study | None, verbose: bool) -> None:
         for key, q in QUANTITIES.items()
         if worst[key] is not None
     ]
-    title = f"{found.product}: {found.runs}, jitter {found.jitter:g}"
+    title = f"{measured.product}: {measured.runs}, jitter {measured.jitter:g}"
     table(title, ("figure", "worst", "mean", "unit", "limit", ""), rows)
     if verbose:
         for q in QUANTITIES.values():
             say(f"{q.key} [{q.unit}]: {q.definition}")
-    say("all runs passed" if found.passed else "SOME RUN FAILED")
-    for record in found.seeds:
+    say("all runs passed" if measured.passed else "SOME RUN FAILED")
+    for record in measured.seeds:
         for pair in record.contacts:
             say(f"  seed {record.seed}, contact: {pair}")
         for penetration in record.hidden if verbose else ():

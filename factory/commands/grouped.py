@@ -1,4 +1,4 @@
-"""Commands whose help lists their options by what these are about."""
+"""Commands whose help lists their options in sections."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ TITLES = {
     "Motion and physics": (MOTION,),
     "Printing": (OUTPUT,),
 }
-"""The options that several commands share, by the titles under which help lists them."""
+"""The shared options in each section of a help text."""
 
 
 class Grouped(click.Command):

@@ -99,7 +99,7 @@ def import_(
 
 
 def _shape_warnings(pag: Path, templates: Mapping[str, Template]) -> tuple[Diagnostic, ...]:
-    """What `build` will say of the shapes in a PAG that has been written."""
+    """The warnings that `build` will give about the shapes of a written PAG."""
     from factory.geometry.overlapping import overlaps_of
     from factory.geometry.product import product_geometry
     from factory.lang.pag_reader import load_pag

@@ -1,4 +1,4 @@
-"""What `plan` says, and draws, of parts that interlock."""
+"""The error of `plan` for parts that interlock, with its pictures."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ if TYPE_CHECKING:
     from factory.planning.plan import CannotAssemble
 
 DRAWN = 6
-"""So many sets of parts that interlock, the first ones, get a picture."""
+"""Maximum number of pictures, one for each set of interlocked parts."""
 
 
 def refuse(
-    found: InPlace, why: CannotAssemble, folder: Path, look: bool, out: OutputOptions
+    placed: InPlace, why: CannotAssemble, folder: Path, look: bool, out: OutputOptions
 ) -> int:
-    """Say that there is no tree, and why, with pictures; gives the exit status."""
+    """Print why there is no assembly tree, and draw it; returns the exit status."""
     from factory.support.console import fail
 
-    pictures = _interlocked(found, why, folder, out) if look else []
+    pictures = _interlocked(placed, why, folder, out) if look else []
     details = {
         "interlocks": [lock.as_json() for lock in why.interlocks],
         "removal": {"labels": list(why.removal.labels), "smallest": why.removal.smallest},
@@ -35,27 +35,27 @@ def refuse(
     return fail(InputError(cannot(why, pictures)), out.as_json, details)
 
 
-def cannot(found: CannotAssemble, pictures: list[Path]) -> Diagnostic:
-    """That parts interlock, what shows it, and what would help."""
-    stuck = "; ".join(map(_held, found.interlocks))
-    more = " and ".join(found.removal.labels)
-    fewest = "the fewest parts" if found.removal.smallest else "perhaps fewer suffice"
-    pairs = [":".join(lock.labels) for lock in found.interlocks if len(lock.labels) == 2]
-    every = len(pairs) == len(found.interlocks)
-    options = " ".join(f"--allow {name}" for name in (pairs if every else found.removal.labels))
+def cannot(why: CannotAssemble, pictures: list[Path]) -> Diagnostic:
+    """The error: the interlocked parts, their pictures, and a remedy."""
+    stuck = "; ".join(map(_held, why.interlocks))
+    more = " and ".join(why.removal.labels)
+    fewest = "the fewest parts" if why.removal.smallest else "perhaps fewer suffice"
+    pairs = [":".join(lock.labels) for lock in why.interlocks if len(lock.labels) == 2]
+    every = len(pairs) == len(why.interlocks)
+    options = " ".join(f"--allow {name}" for name in (pairs if every else why.removal.labels))
     shown = f" (see {listing(map(str, pictures), 2)})" if pictures else ""
     message = f"no straight motion along x, y or z separates these parts: {stuck}{shown}"
     hint = f"without {more} the rest can be joined ({fewest}); {options} accepts the clash"
-    if found.needs:
+    if why.needs:
         from factory.planning.posing import in_words
 
-        ways = [f"{listing(labels)} along {in_words(way)}" for labels, way in found.needs]
+        ways = [f"{listing(labels)} along {in_words(way)}" for labels, way in why.needs]
         hint = f"no orientation aligns all motions with axes ({'; '.join(ways)}); {hint}"
     return Diagnostic("CannotAssemble", message, None, hint)
 
 
 def _held(lock: Interlock) -> str:
-    """Parts that interlock, and the two of them that hold each other by least."""
+    """Interlocked parts, and the pair of them with the smallest overlap on the way out."""
     from factory.planning.cannot import named
 
     words = listing(lock.labels)
@@ -68,22 +68,22 @@ def _held(lock: Interlock) -> str:
 
 
 def _interlocked(
-    found: InPlace, why: CannotAssemble, folder: Path, out: OutputOptions
+    placed: InPlace, why: CannotAssemble, folder: Path, out: OutputOptions
 ) -> list[Path]:
-    """A picture of each of the first few sets of parts that interlock; none where the machine has
-    no GL, which is said."""
+    """Pictures of the first sets of interlocked parts; none, with a warning, on a machine without
+    GL."""
     from factory.importing.labels import file_stem
     from factory.render.interlocked import InterlockedView
     from factory.support.files import own_names
 
     locks = why.interlocks[:DRAWN]
     ends = ["", *(f"-{n}" for n in range(2, len(locks) + 1))]
-    paths = [folder / f"{file_stem(found.name)}-interlocked{end}.png" for end in ends]
+    paths = [folder / f"{file_stem(placed.name)}-interlocked{end}.png" for end in ends]
     own_names(folder, paths)
     try:
-        with Waiting("drawing what interlocks", out.silent):
+        with Waiting("drawing the interlocked parts", out.silent):
             for lock, path in zip(locks, paths, strict=True):
-                InterlockedView(found, lock).still(path)
+                InterlockedView(placed, lock).still(path)
     except MissingError as error:
         announced(error.diagnostics, out)
         return []

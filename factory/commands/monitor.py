@@ -75,8 +75,8 @@ def monitor(file: Path, lenient: bool, out: OutputOptions) -> int:
 
 
 def say_verdict(verdict: RunVerdict, verbose: bool = False) -> None:
-    """Whether a run succeeded and what of its verdict failed, the cause first and, unless it is
-    `verbose`, a line for each code."""
+    """Print whether a run succeeded, and its failures, the cause first; unless `verbose`, one line
+    for each code."""
     failures = verdict.failures if verbose else verdict.gathered
     lines = [f"{failure.code}: {failure.message}" for failure in failures]
     if verdict.succeeded:
@@ -91,7 +91,7 @@ def say_verdict(verdict: RunVerdict, verbose: bool = False) -> None:
 
 
 def found_by(report: Report, cut_off: CutOff | None) -> str:
-    """What a monitor found, in a line for people."""
+    """The result of a monitor in a line."""
     counts = f"{len(report.seen)} firings observed, {len(report.inferred)} inferred"
     judged = f"{len(report.violations)} VIOLATIONS"
     if report.refines_net:
@@ -102,7 +102,7 @@ def found_by(report: Report, cut_off: CutOff | None) -> str:
 
 
 def say_failures(failures: Failures, verbose: bool) -> None:
-    """What went wrong in a run, in a few lines."""
+    """Print the faults and failures of a run."""
     struck = ", ".join(f"{count} {kind}" for kind, count in failures.struck.items() if count)
     missed, alarms = failures.missed, failures.false_alarms
     say(f"faults: {struck or 'none'}; {missed} missed, {alarms} false alarms")
@@ -120,6 +120,6 @@ def say_failures(failures: Failures, verbose: bool) -> None:
 
 
 def tell_failures(verdict: RunVerdict, verbose: bool) -> None:
-    """What of a verdict failed, with where it comes from, on stderr."""
+    """Print the failures of a verdict, with their origin, to stderr."""
     for failure in verdict.failures if verbose else verdict.gathered:
         print(failure, file=sys.stderr)

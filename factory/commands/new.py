@@ -17,7 +17,7 @@ TEXTS = {"{name}.pag": "product.pag", "factory.toml": "factory.toml", "README.md
 """Files of the new folder, and the texts in `factory/starter` that they are made of."""
 
 LABELS = ("bell", "neck", "grip", "knob", "top", "stem")
-"""What the parts of the product are called."""
+"""Labels of the parts of the product."""
 
 BELL = "0 50, 17 50, 22 30, 36 0, 40 0, 40 4, 26 30, 22 52, 16 60, 0 60"
 GRIP = "0 0, 9 0, 12 15, 13 32, 10 52, 7 60, 0 60"
@@ -53,8 +53,8 @@ def _is_empty(folder: Path) -> bool:
 
 
 def starter(name: str) -> dict[str, bytes]:
-    """The files of a product called `name`, by their paths. Raises InputError (BadValue) for a name
-    that no product can have."""
+    """The files of a product called `name`, by their paths. Raises InputError (BadValue) for an
+    invalid name."""
     from factory.problem.pag import RESERVED
 
     if not re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_\-]{0,60}", name) or name in (*RESERVED, *LABELS):
@@ -71,7 +71,7 @@ def starter(name: str) -> dict[str, bytes]:
 
 
 def turned(outline: str) -> bytes:
-    """A binary STL of what a lathe makes of an outline, in millimetres."""
+    """Binary STL of the solid of revolution of an outline, in millimetres."""
     import numpy as np
     import trimesh
 

@@ -27,58 +27,35 @@ PATH = click.Path(path_type=Path, readable=False)
 """A path that is not checked here: the stage that opens it reports its faults."""
 
 
-class PagPath(click.Path):
-    """A path whose completions in the shell are PAG files and plans, and folders beside them; where
-    there are none of these files, whatever the shell completes paths to."""
-
-    def shell_complete(
-        self, ctx: click.Context, param: click.Parameter, incomplete: str
-    ) -> list[CompletionItem]:
-        folder, begun = os.path.split(incomplete)
-        try:
-            names = sorted(n for n in os.listdir(folder or ".") if n.startswith(begun))
-        except OSError:
-            names = []
-        shown = [os.path.join(folder, n) for n in names if begun or not n.startswith(".")]
-        found = [name for name in shown if name.endswith((".pag", "plan.json"))]
-        if not found:
-            return super().shell_complete(ctx, param, incomplete)
-        folders = [f"{name}/" for name in shown if os.path.isdir(name)]
-        return [CompletionItem(name) for name in (*found, *folders)]
+def pag_files(ctx: click.Context, param: click.Parameter, begun: str) -> list[CompletionItem]:
+    """Completions of FILE in a shell: PAG files, plans and folders; if there are no such files, any
+    path."""
+    folder, start = os.path.split(begun)
+    try:
+        names = sorted(n for n in os.listdir(folder or ".") if n.startswith(start))
+    except OSError:
+        names = []
+    shown = [os.path.join(folder, n) for n in names if start or not n.startswith(".")]
+    files = [name for name in shown if name.endswith((".pag", "plan.json"))]
+    if not files:
+        return [CompletionItem(begun, type="file")]
+    folders = [f"{name}/" for name in shown if os.path.isdir(name)]
+    return [CompletionItem(name) for name in (*files, *folders)]
 
 
-PAG_PATH = PagPath(path_type=Path, readable=False)
+def cameras(ctx: click.Context, param: click.Parameter, begun: str) -> list[str]:
+    """Completions of --camera in a shell: those of FILE, if that can be read."""
+    from factory.render.camera import camera_names
+
+    # Of a line that is not complete click keeps the arguments apart, and sets no parameter.
+    files = [ctx.params.get("file"), *map(Path, ctx.args)]
+    names = camera_names(_pag(next(filter(None, files), None), ctx.params["folders"]))
+    return [name for name in names if name.startswith(begun)]
 
 
-class Suggested(click.ParamType[str]):
-    """A text; its completions in the shell are some usual ones."""
-
-    name = "text"
-
-    def __init__(self, *words: str) -> None:
-        self.words = words
-
-    def shell_complete(
-        self, ctx: click.Context, param: click.Parameter, incomplete: str
-    ) -> list[CompletionItem]:
-        return [CompletionItem(word) for word in self.words if word.startswith(incomplete)]
-
-
-class CameraName(click.ParamType[str]):
-    """The name of a camera; its completions in the shell are those that FILE has, as far as FILE is
-    given before and can be read."""
-
-    name = "camera"
-
-    def shell_complete(
-        self, ctx: click.Context, param: click.Parameter, incomplete: str
-    ) -> list[CompletionItem]:
-        from factory.render.camera import camera_names
-
-        # Of a line that is not complete click keeps the arguments apart, and sets no parameter.
-        files = [ctx.params.get("file"), *map(Path, ctx.args)]
-        names = camera_names(_pag(next(filter(None, files), None), ctx.params["folders"]))
-        return [CompletionItem(name) for name in names if name.startswith(incomplete)]
+def panels(ctx: click.Context, param: click.Parameter, begun: str) -> list[str]:
+    """Completions of --with in a shell."""
+    return [words for words in ("net", "gantt", "net,gantt") if words.startswith(begun)]
 
 
 def _pag(file: Path | None, folders: Sequence[Path]) -> PAG | None:
@@ -114,14 +91,15 @@ def options(*decorators: Callable[[F], F]) -> Callable[[F], F]:
 
 
 def gathered(kind: type, name: str) -> Callable[[F], F]:
-    """Gives a command the options that are fields of a dataclass as one value, by this name."""
+    """A decorator that passes the options that are fields of a dataclass to a command as one value,
+    by this name."""
     names = [field.name for field in fields(kind)]
 
     def decorate(command: F) -> F:
         @wraps(command)
-        def call(**given: Any) -> Any:
-            own = {key: given.pop(key) for key in names if key in given}
-            return command(**given, **{name: kind(**own)})
+        def call(**values: Any) -> Any:
+            gathered_values = {key: values.pop(key) for key in names if key in values}
+            return command(**values, **{name: kind(**gathered_values)})
 
         return cast("F", call)
 
@@ -134,7 +112,7 @@ OUTPUT = options(
     click.option("-v", "--verbose", is_flag=True, help="Print more detail."),
     gathered(OutputOptions, "out"),
 )
-PROJECT = gathered(ProjectOptions, "given")
+PROJECT = gathered(ProjectOptions, "options")
 TEMPLATES = click.option(
     "--templates",
     "folders",
@@ -142,7 +120,7 @@ TEMPLATES = click.option(
     type=PATH,
     help="Folder of additional operation templates, searched first (repeatable).",
 )
-SOURCE = options(click.argument("file", type=PAG_PATH), TEMPLATES, PROJECT)
+SOURCE = options(click.argument("file", type=PATH, shell_complete=pag_files), TEMPLATES, PROJECT)
 
 
 class Number(click.FloatRange):
@@ -171,7 +149,7 @@ class Timestep(click.ParamType[float | str]):
 
 
 class Branch(click.ParamType[tuple[str, int]]):
-    """A label, and how often the branch that brings it is to be there: `sub2=3`."""
+    """A label and the number of its parallel branches: `sub2=3`."""
 
     name = "label=number"
 
@@ -328,15 +306,16 @@ PICTURE = options(
     click.option("--fps", type=click.IntRange(1, 120), default=30, help="Frames per second."),
     click.option(
         "--camera",
-        type=CameraName(),
         default="overview",
+        metavar="CAMERA",
+        shell_complete=cameras,
         help="overview, orbit, top, product, part:LABEL to follow a part, or handover:LABEL for a"
         " close-up of its hand-over.",
     ),
     click.option(
         "--with",
         "panels",
-        type=Suggested("net", "gantt", "net,gantt"),
+        shell_complete=panels,
         help="Panels beside the 3-D view: net, gantt (modes over time) or net,gantt.",
     ),
     click.option("--title", default="", help="Title at the start of a film."),

@@ -1,18 +1,23 @@
-"""Checks of the files and folders that a command is to write, before anything else is done."""
+"""Checks before a command starts: of its output files, and of options that do not apply to FILE."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
+import click
+from click.core import ParameterSource
+
+from factory.commands.options import OF_A_PICTURE
 from factory.support.claim import IN_USE, is_claimed
 from factory.support.errors import Diagnostic, InputError
 
 
 def writable(file: Path | None, *outputs: Path | None) -> None:
-    """Output files must be such that they can be written: their folder there and writable,
-    themselves no folder, all different, none the input, and none being written by a run. Raises
-    InputError (BadFile) with every fault."""
+    """Check that output files can be written: their folders exist and are writable, they are no
+    folders, all different, none is the input, and no run is writing them. Raises InputError
+    (BadFile) with every fault."""
     taken = {} if file is None else {os.path.realpath(file): "the input"}
     faults = []
     for path in outputs:
@@ -32,7 +37,7 @@ def writable(file: Path | None, *outputs: Path | None) -> None:
 
 
 def _unwritable(path: Path) -> tuple[str, str] | None:
-    """What is wrong with an output file, and what would mend it."""
+    """The fault of an output file and its remedy; None if it can be written."""
     folder = path.parent
     if path.is_dir():
         return f"'{path}' is a folder", "give the name of a file"
@@ -48,7 +53,7 @@ def _unwritable(path: Path) -> tuple[str, str] | None:
 
 
 def writable_folder(path: Path | None) -> None:
-    """A folder to be written into, or made. Raises InputError (BadFile)."""
+    """Check that a folder can be written to, or made. Raises InputError (BadFile)."""
     if path is None:
         return
     there = next(f for f in (path, *path.absolute().parents) if f.exists())
@@ -58,3 +63,31 @@ def writable_folder(path: Path | None) -> None:
     if not os.access(there, os.W_OK | os.X_OK):
         message, hint = f"'{there}' may not be written", "choose another place"
         raise InputError(Diagnostic("BadFile", message, None, hint))
+
+
+def for_a_pag(file: Path, kind: str, *but: str) -> None:
+    """Check that no option was given that applies only to a PAG, for a FILE of another `kind`: none
+    except `but` and those of OUTPUT. Raises InputError (Usage) with every one."""
+    but = (*but, "file", "as_json", "quiet", "verbose")
+    words, hint = f"applies to a PAG; '{file}' is {kind}", "leave it out"
+    _refuse_given(lambda name: name not in but, words, hint)
+
+
+def for_a_film() -> None:
+    """Check that no option of PICTURE was given, where nothing is filmed. Raises InputError (Usage)
+    with every one."""
+    words, hint = "applies to a film, and there is none", "add --video OUT.mp4"
+    _refuse_given(OF_A_PICTURE.__contains__, words, hint)
+
+
+def _refuse_given(which: Callable[[str], bool], words: str, hint: str) -> None:
+    context = click.get_current_context()
+    names = [
+        max(option.opts, key=len)
+        for option in context.command.params
+        if option.name is not None
+        and which(option.name)
+        and context.get_parameter_source(option.name) is ParameterSource.COMMANDLINE
+    ]
+    if names:
+        raise InputError(Diagnostic("Usage", f"{name} {words}", None, hint) for name in names)

@@ -16,7 +16,7 @@ from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced
 from factory.support.console import emit, say, table
-from factory.support.errors import Diagnostic, InputError, StoppedError
+from factory.support.errors import Diagnostic, StoppedError, usage_error
 
 if TYPE_CHECKING:
     from factory.pipeline import Project
@@ -58,7 +58,7 @@ PAGE_NAME = "pareto.html"
 @MOTION
 @OUTPUT
 def pareto(
-    given: ProjectOptions,
+    options: ProjectOptions,
     out: OutputOptions,
     trials: int,
     output: Path | None,
@@ -72,11 +72,11 @@ def pareto(
 
     if trials and not layouts:
         message = "without layouts there is nothing to run"
-        raise InputError(Diagnostic("Usage", message, None, "leave out --validate or --no-layouts"))
+        raise usage_error(message, "leave out --validate or --no-layouts")
     writable_folder(output)
-    project = given.project(out.silent)
+    project = options.project(out.silent)
     warnings = announced(project.warnings, out)
-    effort = Effort(layouts, given.effort, given.limit or inf, given.branches())
+    effort = Effort(layouts, options.effort, options.limit or inf, options.branches())
     front, stopped = _found(project, effort, trials, out)
     commands, files = _written(front, project, output)
     if out.as_json:
@@ -86,7 +86,7 @@ def pareto(
         errors = {"errors": [d.as_json() for d in stopped.diagnostics]} if stopped else {}
         emit({**document, "files": [*map(str, files)], "warnings": warnings, **errors})
     else:
-        _tell(front, commands)
+        _print(front, commands)
         if output is not None:
             say(f"wrote {output / PAGE_NAME}, and the files of {len(front.points)} points")
     if stopped is not None:
@@ -98,8 +98,8 @@ def pareto(
 def _found(
     project: Project, effort: Effort, trials: int, out: OutputOptions
 ) -> tuple[ParetoFront, StoppedError | None]:
-    """The front, with so many of its points tried; and that it was stopped by the user, if it was
-    after a point had been found."""
+    """The front, with the runs of `trials` of its points; and the error of an interruption, if the
+    user stopped the search after a first point."""
     from factory.study.pareto import FrontSweep
     from factory.study.pareto.trial import tried
     from factory.support.progress import StepBar
@@ -130,7 +130,7 @@ def _found(
 def _written(
     front: ParetoFront, project: Project, folder: Path | None
 ) -> tuple[Sequence[str | None], list[Path]]:
-    """Write the page, and the files of the points, where there is a folder for them. Gives the
+    """Write the page and the files of the points into a folder, if there is one. Returns the
     commands that build the points, and the files."""
     from factory.show.pareto import floor_plans, front_page
     from factory.study.pareto.point_files import commands_of, point_files
@@ -147,8 +147,8 @@ def _written(
     return commands, list(files)
 
 
-def _tell(front: ParetoFront, commands: Sequence[str | None]) -> None:
-    """The front as a table for people."""
+def _print(front: ParetoFront, commands: Sequence[str | None]) -> None:
+    """Print the front as a table."""
     heads = ["robots", "tools", "lines", "relays", "cycle [s]", "least [s]", "floor [m²]"]
     tried, built = bool(front.trials), any(commands)
     heads += ["measured [s]", "error"] * tried + ["command"] * built
@@ -185,7 +185,7 @@ def _row(point: FrontPoint) -> list[str]:
 
 
 def _measured(point: FrontPoint) -> tuple[str, str]:
-    """The cycle time of a run, and the error of what was predicted for it."""
+    """The measured cycle time of a point, and the error of its prediction."""
     trial = point.trial
     if trial is None:
         return "not run", ""

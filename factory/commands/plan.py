@@ -38,7 +38,7 @@ UPS = {
 """The directions that may be up: an axis and its side."""
 
 LOOKS = ("exploded.png", "assembly.mp4")
-"""How the names of the still and of the film end."""
+"""Suffixes of the names of the still and of the film."""
 STOPPING = "stopping: the best tree so far is laid out; interrupt again to stop at once"
 """The message after a signal."""
 
@@ -124,22 +124,22 @@ def plan(
             return read_source(source, templates, options)
 
     options = SourceOptions(unit, keep, replan, library, boxes, in_place)
-    found = asked(read_as, options, out.silent)
-    meant, allow = allowed_in(allow, {part.label for part in found.parts})
-    found = replace(found, allowed=(*found.allowed, *meant))
-    folder = output or Path(f"{found.name}-planned")
+    placed = asked(read_as, options, out.silent)
+    meant, allow = allowed_in(allow, {part.label for part in placed.parts})
+    placed = replace(placed, allowed=(*placed.allowed, *meant))
+    folder = output or Path(f"{placed.name}-planned")
     writable_folder(folder)
-    warnings = announced(found.warnings, out)
+    warnings = announced(placed.warnings, out)
     if not out.as_json:
-        for note in found.notes:
+        for note in placed.notes:
             say(f"  {note}")
     side = UPS[up] if up else None
     fast = None if no_screws else screws
     search = PlanOptions(aim, seconds, allow, hulls, side, base or "", fast, templates=templates)
-    planned, stopped = _sought(found, search, out)
+    planned, stopped = _sought(placed, search, out)
     if isinstance(planned, CannotAssemble):
-        return refuse(found, planned, folder, look, out)
-    made = planned_product(found, planned.tree, planned.orientation, source.name, allow, templates)
+        return refuse(placed, planned, folder, look, out)
+    made = planned_product(placed, planned.tree, planned.orientation, source.name, allow, templates)
     files = {folder / name: content for name, content in made.files.items()}
     own_names(folder, files, [source])
     write_all(files)
@@ -153,39 +153,39 @@ def plan(
     if not out.silent:
         say_allowed(project)
     if out.as_json:
-        emit(_document(found, planned, project, [*files, *looked], warnings))
+        emit(_document(placed, planned, project, [*files, *looked], warnings))
     else:
-        _tell(found, planned, project, [*files, *looked], out)
+        _print(placed, planned, project, [*files, *looked], out)
     return 0
 
 
 def _sought(
-    found: InPlace, asked: PlanOptions, out: OutputOptions
+    placed: InPlace, asked: PlanOptions, out: OutputOptions
 ) -> tuple[Planned | CannotAssemble, bool]:
-    """The best plan that is found in time, or until a signal, or why there is none; and whether
-    there was a signal. Before there is a tree a signal is raised at once."""
+    """The best plan found within the time or until a signal, or the reason why there is none; and
+    whether there was a signal. Before a first tree is found a signal is raised at once."""
     from factory.planning.plan import LAYING
     from factory.planning.plan import plan as sought
     from factory.planning.searching import usual_seconds
     from factory.support.interruption import Interruption
 
-    limit = asked.seconds or usual_seconds(len(found.units()))
+    limit = asked.seconds or usual_seconds(len(placed.units()))
     with (
         Interruption(False, lambda: print(STOPPING, file=sys.stderr)) as stop,
         StepBar("searching for a tree", out.silent, limit) as bar,
     ):
 
-        def told(what: str, done: int, total: int | None, words: str) -> None:
+        def show(what: str, done: int, total: int | None, words: str) -> None:
             stop.keeps = done > 0 and what != LAYING
             bar.show(what, done, total, words)
 
-        search = replace(asked, told=told, stopped=lambda: stop.noted)
-        return sought(found, search), stop.noted
+        search = replace(asked, told=show, stopped=lambda: stop.noted)
+        return sought(placed, search), stop.noted
 
 
 def _looks(project: Project, out: OutputOptions) -> list[Path]:
-    """The still and the film of the exploded view, written beside the PAG; none where the machine
-    has no GL, which is said."""
+    """The still and the film of the exploded view, written beside the PAG; none, with a warning, on
+    a machine without GL."""
     from factory.planning.exploding import explosion
     from factory.render.exploded import ExplodedView
     from factory.support.files import own_names
@@ -206,7 +206,7 @@ def _looks(project: Project, out: OutputOptions) -> list[Path]:
 
 
 def _document(
-    found: InPlace,
+    placed: InPlace,
     planned: Planned,
     project: Project,
     files: list[Path],
@@ -214,16 +214,16 @@ def _document(
 ) -> dict[str, Any]:
     """The keys of `plan --json`."""
     matings = project.matings
-    labels = {id(join): label for label, join in _by_label(found, planned, project).items()}
+    labels = {id(join): label for label, join in _by_label(placed, planned, project).items()}
     return {
         **({"hulls": [asdict(pair) for pair in planned.hidden]} if planned.hidden else {}),
         "pag": str(project.file),
         "product": project.pag.root,
-        "parts": len(found.parts),
-        "kinds": len({part.kind for part in found.parts}),
+        "parts": len(placed.parts),
+        "kinds": len({part.kind for part in placed.parts}),
         "labels": len(project.pag),
-        "kept": [keep.label for keep in found.kept],
-        "notes": [*found.notes, *planned.notes],
+        "kept": [keep.label for keep in placed.kept],
+        "notes": [*placed.notes, *planned.notes],
         "orientation": planned.orientation.tolist(),
         "figures": asdict(planned.figures),
         "optimal": planned.optimal,
@@ -234,12 +234,12 @@ def _document(
     }
 
 
-def _by_label(found: InPlace, planned: Planned, project: Project) -> dict[str, PlannedJoin]:
-    """The joins of a plan by the labels of the operations that they have become: those that make
-    the same of units, but for screws that are driven before, which joins leave out. Operations in
-    sub-trees that were kept have none."""
+def _by_label(placed: InPlace, planned: Planned, project: Project) -> dict[str, PlannedJoin]:
+    """The joins of a plan by the labels of their operations. The two are matched by the units that
+    they make, without screws that are driven earlier, which joins omit. Operations of sub-trees
+    that were kept have no join."""
     made = {frozenset((*join.pile, *join.come)): join for join in planned.operations}
-    inside = {part.label: frozenset([label]) for label, own in found.units() for part in own}
+    inside = {part.label: frozenset([label]) for label, own in placed.units() for part in own}
     matings = project.matings.all if project.matings else ()
     steps = {mating.label: mating.inputs for mating in matings}
     for node in project.pag.postorder():
@@ -255,10 +255,10 @@ def _by_label(found: InPlace, planned: Planned, project: Project) -> dict[str, P
     return joins
 
 
-def _tell(
-    found: InPlace, planned: Planned, project: Project, files: list[Path], out: OutputOptions
+def _print(
+    placed: InPlace, planned: Planned, project: Project, files: list[Path], out: OutputOptions
 ) -> None:
-    """What was planned and written."""
+    """Print the plan and the files."""
     parts = sum(1 for _ in project.pag.parts())
     matings = project.matings
     kinds = [(kind, len(matings.of_kind(kind))) for kind in KINDS] if matings else []
@@ -272,13 +272,13 @@ def _tell(
     cycle = f", cycle time about {figures.cycle or figures.expected:.2f} s"
     say(f"{figures.robots} robots{cycle}; {best}")
     if out.verbose and matings:
-        joins = _by_label(found, planned, project)
+        joins = _by_label(placed, planned, project)
         for mating in matings.all:
             way = _way(mating.approach, planned.orientation)
             words = f"{mating.label}: {' + '.join(mating.inputs)}, {way}"
             join = joins.get(mating.label)
             if join:
-                words += f", {_room(join.clearance)}{_for_hulls(_hidden_at(join, found, planned))}"
+                words += f", {_room(join.clearance)}{_for_hulls(_hidden_at(join, placed, planned))}"
             say(f"  {words}")
     for path in files if out.verbose else files[-2:]:
         say(f"  {path}")
@@ -286,7 +286,7 @@ def _tell(
 
 
 def _way(approach: Approach, orientation: Array) -> str:
-    """How an operation is done, in words: the directions are those of the source."""
+    """The approach of an operation in words, with directions in the frame of the source."""
     from factory.planning.posing import in_words
 
     if approach.kind == "lower":
@@ -295,9 +295,9 @@ def _way(approach: Approach, orientation: Array) -> str:
     return f"{'slides' if approach.kind == 'slide' else 'is blocked'} from {' or '.join(ways)}"
 
 
-def _hidden_at(join: PlannedJoin, found: InPlace, planned: Planned) -> list[Drawn]:
-    """The pairs of an operation of which hulls hide whether they overlap."""
-    units = {part.label: label for label, parts in found.units() for part in parts}
+def _hidden_at(join: PlannedJoin, placed: InPlace, planned: Planned) -> list[Drawn]:
+    """The pairs of parts of an operation whose overlap is hidden by convex hulls."""
+    units = {part.label: label for label, parts in placed.units() for part in parts}
     return [
         pair
         for pair in planned.hidden
@@ -307,13 +307,13 @@ def _hidden_at(join: PlannedJoin, found: InPlace, planned: Planned) -> list[Draw
 
 
 def _for_hulls(pairs: Sequence[Drawn]) -> str:
-    """That ways were found for hulls, in words."""
+    """The number of pairs that were planned with convex hulls, in words."""
     some = "a pair overlaps" if len(pairs) == 1 else f"{len(pairs)} pairs overlap"
     return f", for hulls only: {some}" if pairs else ""
 
 
 def _room(clearance: float) -> str:
-    """The least room on a way, in words."""
+    """The smallest clearance on an approach, in words."""
     if clearance == float("inf"):
         return "nothing near"
     room = round(1e3 * clearance, 2)

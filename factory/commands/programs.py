@@ -7,7 +7,7 @@ import click
 from factory.commands.options import HANDS, OUTPUT, RELAY, SOURCE
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.support.console import emit, say
-from factory.support.errors import Diagnostic, InputError, did_you_mean
+from factory.support.errors import did_you_mean, usage_error
 
 
 @click.command()
@@ -16,15 +16,15 @@ from factory.support.errors import Diagnostic, InputError, did_you_mean
 @RELAY
 @HANDS
 @OUTPUT
-def programs(given: ProjectOptions, out: OutputOptions, robot: str | None) -> int:
+def programs(options: ProjectOptions, out: OutputOptions, robot: str | None) -> int:
     """Print each robot's program, in the paper's form."""
     from factory.plant.programs import program_of, write_program
 
-    factory = given.project(out.silent).factory
+    factory = options.project(out.silent).factory
     names = [r.name for r in factory.robots]
     if robot is not None and robot not in names:
         hint = did_you_mean(robot, names, "robots")
-        raise InputError(Diagnostic("Usage", f"there is no robot '{robot}'", None, hint))
+        raise usage_error(f"there is no robot '{robot}'", hint)
     chosen = [r for r in factory.robots if robot in (None, r.name)]
     texts = {r.name: write_program(program_of(factory, r.index)) for r in chosen}
     if out.as_json:

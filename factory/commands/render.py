@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from factory.commands.given import for_a_pag
 from factory.commands.grouped import Grouped
-from factory.commands.logs import cut_off, read_partly
 from factory.commands.options import (
     FLOOR,
     MOTION,
@@ -21,12 +19,12 @@ from factory.commands.options import (
     RUN,
     SOURCE,
 )
-from factory.commands.outputs import writable
+from factory.commands.outputs import for_a_pag, writable
 from factory.commands.requests import OutputOptions, PictureOptions, ProjectOptions, RunOptions
 from factory.commands.run import carry_out
-from factory.commands.warnings import announced
+from factory.commands.warnings import announced, cut_off, read_partly
 from factory.support.console import emit, say, warn
-from factory.support.errors import Diagnostic, InputError
+from factory.support.errors import Diagnostic, InputError, usage_error
 
 if TYPE_CHECKING:
     Moment = float | Literal["end"]
@@ -49,7 +47,7 @@ if TYPE_CHECKING:
 @MOTION
 @OUTPUT
 def render(
-    given: ProjectOptions,
+    options: ProjectOptions,
     asked: RunOptions,
     shown: PictureOptions,
     out: OutputOptions,
@@ -61,7 +59,7 @@ def render(
     from factory.render import Film, Still, check_output, render_log
     from factory.support.gl import probe
 
-    file = given.file
+    file = options.file
     if is_log(file):
         for_a_pag(file, "a log", "output", "at", *OF_A_PICTURE)
     writable(file, output, shown.poster)
@@ -69,8 +67,7 @@ def render(
     is_still = check_output(output, size, shown.fps, still=None)
     picture = shown.picture()
     if is_still and shown.poster is not None:
-        message = "--poster applies to a film; this is a still"
-        raise InputError(Diagnostic("Usage", message, None, "leave out --poster"))
+        raise usage_error("--poster applies to a film; this is a still", "leave out --poster")
     probe()
     log = None
     warnings: list[dict[str, object]] = []
@@ -80,7 +77,7 @@ def render(
     else:
         from factory.simulation.simulation import Simulation
 
-        project = given.project(out.silent)
+        project = options.project(out.silent)
         warnings = announced(project.layout.product.warnings, out)
         made = Simulation(project.layout, asked.request(project))
         films: list[Film] = []

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from factory.commands.given import for_a_pag
 from factory.commands.grouped import Grouped
 from factory.commands.options import (
     DRAW,
@@ -25,7 +24,7 @@ from factory.commands.options import (
     SOURCE,
     WIP,
 )
-from factory.commands.outputs import writable
+from factory.commands.outputs import for_a_pag, writable
 from factory.commands.requests import OutputOptions, ProjectOptions, RunOptions
 from factory.commands.run import run_project, summarise
 from factory.commands.warnings import announced
@@ -56,7 +55,7 @@ if TYPE_CHECKING:
 @RELAY
 @MOTION
 @OUTPUT
-def report(given: ProjectOptions, asked: RunOptions, out: OutputOptions, output: Path) -> int:
+def report(options: ProjectOptions, asked: RunOptions, out: OutputOptions, output: Path) -> int:
     """Write one HTML page about a run of FILE.pag, or about the run in a LOG of `run --log`.
 
     The page is always written. The exit status is 1 if the run failed, or was cut off before its
@@ -65,14 +64,14 @@ def report(given: ProjectOptions, asked: RunOptions, out: OutputOptions, output:
     from factory.show.report import page, recording_of
     from factory.support.files import write_text
 
-    writable(given.file, output)
+    writable(options.file, output)
     run = None
     warnings: list[dict[str, object]] = []
-    if is_log(given.file):
-        for_a_pag(given.file, "a log", "output", "lenient")
-        recording = recording_of(given.file)
+    if is_log(options.file):
+        for_a_pag(options.file, "a log", "output", "lenient")
+        recording = recording_of(options.file)
     else:
-        recording, run, warnings = _run(given, asked, out)
+        recording, run, warnings = _run(options, asked, out)
     text = page(recording)
     write_text(output, text)
     size, cut = len(text.encode()), recording.log.cut_off
@@ -96,18 +95,18 @@ def report(given: ProjectOptions, asked: RunOptions, out: OutputOptions, output:
         if run is not None and out.verbose:
             summarise(run, recording.factory, out.verbose)
     if cut and run is None:
-        print(cut.diagnostic(given.file), file=sys.stderr)
+        print(cut.diagnostic(options.file), file=sys.stderr)
     for failure in verdict.failures if run else verdict.failures[bool(cut) :]:
         print(failure, file=sys.stderr)
     return 0 if verdict.succeeded else 1
 
 
-def _run(given: ProjectOptions, asked: RunOptions, out: OutputOptions) -> _Made:
-    """A run in which no parts fuse, as the report follows each part by itself; its log is in a
-    folder that is removed afterwards. Gives the warnings too."""
+def _run(options: ProjectOptions, asked: RunOptions, out: OutputOptions) -> _Made:
+    """A run without fused parts, since the report follows each part; its log is temporary. Returns
+    the warnings too."""
     from factory.show.report import recording_of
 
-    project = given.project(out.silent)
+    project = options.project(out.silent)
     warnings = announced(project.layout.product.warnings, out)
     with TemporaryDirectory(prefix="factory-") as folder:
         log = Path(folder) / "run.log"

@@ -1,4 +1,4 @@
-"""What the options that several commands share ask for, as values."""
+"""The options that several commands share, as values."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from math import inf, prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from factory.support.errors import Diagnostic, InputError, did_you_mean
+from factory.support.errors import Diagnostic, InputError, did_you_mean, usage_error
 
 if TYPE_CHECKING:
     from factory.layout.request import Ground
@@ -33,23 +33,22 @@ APART = (
         "robots that run their own programs do not recover",
     ),
 )
-"""Options that exclude others, with the reason. All other pairs go together, but for --relay where
-robots have several tours, which is seen when the factory is laid out."""
+"""Options that exclude others, with the reason. All other pairs can be combined, except --relay and
+robots with several tours, which is refused at the layout."""
 
 
-def check_together(given: Mapping[str, bool]) -> None:
+def check_together(values: Mapping[str, bool]) -> None:
     """Raises InputError (BadValue) for options that exclude each other."""
     for one, others, reason in APART:
         for other in others:
-            if given.get(one) and given.get(other):
+            if values.get(one) and values.get(other):
                 message = f"{one} cannot be combined with {other}: {reason}"
                 raise InputError(Diagnostic("BadValue", message, None, "leave out one of the two"))
 
 
 @dataclass(frozen=True, slots=True)
 class OutputOptions:
-    """What a command prints: one JSON document, or lines for people; `quiet`: neither progress nor
-    warnings."""
+    """The kind of output: one JSON document, or text; `quiet`: neither progress nor warnings."""
 
     as_json: bool = False
     quiet: bool = False
@@ -57,14 +56,14 @@ class OutputOptions:
 
     @property
     def silent(self) -> bool:
-        """Whether there is no progress to be shown."""
+        """Whether no progress is shown."""
         return self.quiet or self.as_json
 
 
 @dataclass(frozen=True, slots=True)
 class ProjectOptions:
-    """A PAG's file, folders of further operations, and the options of SOURCE, FLOOR, RELAY and
-    MOTION that a command has; None for what was not given."""
+    """A PAG's file, folders of additional operations, and the options of SOURCE, FLOOR, RELAY and
+    MOTION that a command has; None if not given."""
 
     file: Path = Path()
     folders: tuple[Path, ...] = ()
@@ -88,21 +87,21 @@ class ProjectOptions:
     allow: tuple[AllowedOverlap, ...] = ()
 
     def settings(self) -> Settings:
-        """Options before the environment, that before what is in a plan or, for a PAG, before the
-        `factory.toml` beside it or in the current folder. Raises InputError."""
+        """The settings: from options, else from the environment, else from the plan or, for a PAG,
+        from the `factory.toml` beside it or in the current folder. Raises InputError."""
         from factory.support.settings import environment
         from factory.support.user_defaults import defaults_for
 
         names = ("speed", "acceleration", "force", "timestep", "substeps", "clearance", "overlap")
-        given = {name: getattr(self, name) for name in names}
-        given["stage"] = None if self.stage is None else int(self.stage)
-        given["hands"] = None if self.hands is None else int(self.hands)
+        values = {name: getattr(self, name) for name in names}
+        values["stage"] = None if self.stage is None else int(self.stage)
+        values["hands"] = None if self.hands is None else int(self.hands)
         plan = self._plan()
         settings = plan.settings if plan else defaults_for(self.file).settings()
-        return settings.with_options(environment()).with_options(given)
+        return settings.with_options(environment()).with_options(values)
 
     def ground(self) -> Ground:
-        """What FLOOR and RELAY ask for. Raises InputError (BadValue)."""
+        """The request of FLOOR and RELAY. Raises InputError (BadValue)."""
         from factory.layout.request import Ground
         from factory.support.user_defaults import defaults_for
 
@@ -119,15 +118,12 @@ class ProjectOptions:
         return Ground(floor, self.relay, self.cycle, self.deputies)
 
     def _allowing(self, pag: PAG) -> PAG:
-        """The PAG with the overlaps that are allowed. Raises InputError (Usage) for names that are
-        no parts."""
+        """The PAG with the overlaps of --allow. Raises InputError (Usage) for unknown parts."""
         parts = [node.label for node in pag.parts()]
         for label in (label for allowed in self.allow for label in allowed.parts):
             if label not in parts:
                 hint = did_you_mean(label, parts, "parts")
-                raise InputError(
-                    Diagnostic("Usage", f"--allow: there is no part '{label}'", None, hint)
-                )
+                raise usage_error(f"--allow: there is no part '{label}'", hint)
         return replace(pag, allowed=(*pag.allowed, *self.allow))
 
     def project(self, silent: bool = True, settings: Settings | None = None) -> Project:
@@ -156,15 +152,15 @@ class ProjectOptions:
         return project.with_branches(several) if several else project
 
     def branches(self) -> tuple[tuple[str, int], ...]:
-        """The labels whose branches are to be there several times, and how often."""
+        """The labels that are made in parallel branches, with the number of branches."""
         from factory.support.user_defaults import defaults_for
 
         asked = {**defaults_for(self.file).parallel(), **dict(self.parallel)}
         return tuple((label, k) for label, k in asked.items() if k > 1)
 
     def _plan(self) -> PlanFile | None:
-        """The plan in the file, None where that is a PAG. Raises InputError, of code Usage for
-        options that say what a plan says."""
+        """The plan in the file, None for a PAG. Raises InputError, of code Usage for options that
+        the plan already fixes."""
         from factory.support.files import is_plan
 
         if not is_plan(self.file):
@@ -183,7 +179,7 @@ class ProjectOptions:
         return read_plan(self.file)
 
     def _with_few_robots(self, project: Project, silent: bool) -> Project:
-        """The project with the plan that is found for the robots and the cycle time asked for."""
+        """The project with the plan that is found for --robots and --cycle."""
         from factory.study.allocation.aim import Aim, usual_effort
         from factory.study.allocation.search import allocated
         from factory.support.console import warn
@@ -224,7 +220,7 @@ class RunOptions:
 
     @property
     def recovers(self) -> bool:
-        """Whether the run is asked to go on when things go wrong."""
+        """Whether the run recovers from failures."""
         return self.faults is not None or self.spares > 0
 
     def campaign(self, factory: Factory) -> Campaign:
@@ -235,12 +231,12 @@ class RunOptions:
         swap = SWAP if self.swap is None else self.swap
         if self.faults is None:
             return Campaign(seed=self.seed, spares=self.spares, swap=swap)
-        found = read_campaign(self.faults, self.spares, swap)
-        check_names(found, factory)
-        return found
+        campaign = read_campaign(self.faults, self.spares, swap)
+        check_names(campaign, factory)
+        return campaign
 
     def request(self, project: Project, shown: bool = True) -> RunRequest:
-        """The run that is asked for, and whether it is to be `shown`. Raises InputError."""
+        """The request of a run; `shown`: whether it is filmed or logged. Raises InputError."""
         from factory.nets.history import legal_marking
         from factory.plant.fused_bodies import fusing_pays
         from factory.simulation.request import RunRequest
@@ -286,9 +282,9 @@ class PictureOptions:
         return pair(self.size, "--size", "1280x720", int, LARGEST)
 
     def picture(self, pag: PAG | None = None) -> Picture:
-        """The picture that is asked for, whose camera may be of any label in a product, or of any
-        where that is None. Raises InputError (BadValue) for a name that does not exist, a size
-        without room for the panels, or a poster that cannot be a still."""
+        """The picture that the options describe; `pag`: the product whose labels cameras may name,
+        None for any. Raises InputError (BadValue) for an unknown name, a size without room for
+        the panels, or a poster that cannot be a still."""
         from factory.render import Picture, camera_named, check_output, panels_named
         from factory.render.picture import shared
 
@@ -311,7 +307,7 @@ PLANNED = {
     "deputies": "--deputies",
     "allow": "--allow",
 }
-"""The options that say what a plan says, by the fields that they are."""
+"""The options that a plan already fixes, by their fields."""
 
 OF_A_PLAN = "leave it out, or give the PAG and make another plan: `factory build FILE.pag -o DIR`"
 
@@ -320,7 +316,7 @@ WIDEST, LARGEST = 10**5, 10**5
 
 
 def pair(text: str, option: str, example: str, number: type, most: int) -> tuple[Any, Any]:
-    """`4x3` as two positive numbers of at most so much. Raises InputError (BadValue)."""
+    """`4x3` as two positive numbers of at most `most`. Raises InputError (BadValue)."""
     try:
         width, depth = (number(word) for word in text.lower().split("x"))
         if "_" in text or not (0 < width <= most and 0 < depth <= most):
@@ -334,8 +330,7 @@ def pair(text: str, option: str, example: str, number: type, most: int) -> tuple
 
 
 def check_ideal(fuse: bool | None, monitor: bool = False) -> None:
-    """Raises InputError (Usage) for options that the ideal world has no bodies for."""
-    for given, purpose in ((monitor, "for a monitor to observe"), (fuse, "that could become one")):
-        if given:
-            message = f"the ideal world has no bodies {purpose}"
-            raise InputError(Diagnostic("Usage", message, None, "leave out --world ideal"))
+    """Raises InputError (Usage) for options that need bodies, which the ideal world lacks."""
+    for wanted, purpose in ((monitor, "for a monitor to observe"), (fuse, "that could become one")):
+        if wanted:
+            raise usage_error(f"the ideal world has no bodies {purpose}", "leave out --world ideal")

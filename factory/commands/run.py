@@ -1,4 +1,4 @@
-"""The command `run`, and how a simulation is carried out for any command."""
+"""The command `run`, and the execution of a simulation for any command."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import click
 
 from factory.commands.allowing import ALLOW
-from factory.commands.given import for_a_film
 from factory.commands.grouped import Grouped
 from factory.commands.monitor import found_by, say_failures, say_verdict, tell_failures
 from factory.commands.options import (
@@ -27,7 +26,7 @@ from factory.commands.options import (
     RUN,
     SOURCE,
 )
-from factory.commands.outputs import writable
+from factory.commands.outputs import for_a_film, writable
 from factory.commands.requests import (
     OutputOptions,
     PictureOptions,
@@ -38,7 +37,7 @@ from factory.commands.requests import (
 from factory.commands.resuming import resumed
 from factory.commands.warnings import announced, say_allowed
 from factory.support.console import POOL_BOUND, emit, say, table
-from factory.support.errors import Diagnostic, InputError, StoppedError
+from factory.support.errors import Diagnostic, StoppedError, usage_error
 from factory.support.progress import Progress, Waiting
 
 if TYPE_CHECKING:
@@ -52,7 +51,7 @@ if TYPE_CHECKING:
 
     Filming = Callable[[Simulation], Film]
     Opening = Callable[[], Recorder]
-    """Opens what records a run within a context, such as a log."""
+    """Opens a recorder of a run, such as a log, as a context."""
 
 
 @click.command(cls=Grouped)
@@ -78,7 +77,7 @@ if TYPE_CHECKING:
 @MOTION
 @OUTPUT
 def run(
-    given: ProjectOptions,
+    options: ProjectOptions,
     asked: RunOptions,
     shown: PictureOptions,
     out: OutputOptions,
@@ -95,10 +94,10 @@ def run(
     With --resume, FILE is a log: its run is repeated up to the end of the log, compared with it,
     and continued in the same log."""
     if resume:
-        going = resumed(given.file, asked.max_time, out)
-        return 0 if going is None else _go_on(going, asked, monitor, out)
-    writable(given.file, video, log, shown.poster)
-    project = given.project(out.silent)
+        going = resumed(options.file, asked.max_time, out)
+        return 0 if going is None else _continue(going, asked, monitor, out)
+    writable(options.file, video, log, shown.poster)
+    project = options.project(out.silent)
     with Waiting("reading the shapes and laying out", out.silent):
         layout = project.layout
     warnings = announced(project.warnings, out)
@@ -109,30 +108,30 @@ def run(
         check_ideal(asked.fuse, bool(monitor))
     film = _film(project, asked, video, shown)
     record = run_project(project, asked, out.silent, log, film, monitor)
-    status = _told(record, layout.factory, warnings, monitor, out)
+    status = _print(record, layout.factory, warnings, monitor, out)
     if not out.as_json:
         say_files(film=video, poster=shown.poster, log=log)
     return status
 
 
-def _go_on(going: Resumed, asked: RunOptions, monitor: bool | None, out: OutputOptions) -> int:
-    """Let the run in a log go on to its end. Gives the status."""
+def _continue(going: Resumed, asked: RunOptions, monitor: bool | None, out: OutputOptions) -> int:
+    """Continue the run in a log to its end; returns the exit status."""
     made = going.simulation
     record = _judged(made, asked, out.silent, going.path, [going.recorder], monitor)
-    status = _told(record, made.layout.factory, [], monitor, out)
+    status = _print(record, made.layout.factory, [], monitor, out)
     if not out.as_json:
         say_files(log=going.path)
     return status
 
 
-def _told(
+def _print(
     record: Run,
     factory: Factory,
     warnings: Sequence[object],
     monitor: bool | None,
     out: OutputOptions,
 ) -> int:
-    """Tell what a run was; gives the status."""
+    """Print the result of a run; returns the exit status."""
     if out.as_json:
         document = record.as_json()
         document.pop("schema")
@@ -149,14 +148,13 @@ def _told(
 def _film(
     project: Project, asked: RunOptions, video: Path | None, shown: PictureOptions
 ) -> Filming | None:
-    """What films a run as the options ask; None without a film. Raises InputError for what cannot
-    be filmed, MissingError where there is no GL."""
+    """The film that the options describe; None without --video. Raises InputError for a run that
+    cannot be filmed, MissingError without GL."""
     if video is None:
         for_a_film()
         return None
     if asked.world == "ideal":
-        message = "the ideal world has no bodies to film"
-        raise InputError(Diagnostic("Usage", message, None, "leave out --world ideal"))
+        raise usage_error("the ideal world has no bodies to film", "leave out --world ideal")
     from factory.render import Film, check_output
     from factory.support.gl import probe
 
@@ -174,8 +172,8 @@ def run_project(
     film: Filming | None = None,
     monitor: bool | None = None,
 ) -> Run:
-    """One run, with the log and the film that are asked for, and with a monitor: one that looks in
-    every tick where `monitor` is true, none where it is false."""
+    """One run, with a log and a film if options. `monitor`: True for a monitor that observes every
+    tick, False for none, None for one that observes events."""
     from factory.nets.verify import proved
     from factory.simulation.simulation import Simulation
 
@@ -205,7 +203,7 @@ def _judged(
     recorders: Sequence[Opening],
     monitor: bool | None,
 ) -> Run:
-    """A run that is carried out, and judged as the options ask."""
+    """A run with its verdict, as the options describe."""
     record = carry_out(made, silent, asked.max_time, recorders, monitor, log)
     account = made.world.hooks.account
     failures = None if account is None else account.report()
@@ -226,9 +224,9 @@ def carry_out(
     monitor: bool | None = None,
     log: Path | None = None,
 ) -> Run:
-    """A run with a progress bar. A signal ends it at the end of a tick, so that the recorders'
-    files are complete; StoppedError then says how far it came, and how the run in a `log` goes
-    on. Up to the time of which a recorder asks for more it is not shown every tick."""
+    """A run with a progress bar. A signal stops it at the end of a tick, so that the recorders'
+    files are complete; StoppedError then says how far it came and how to continue the run in a
+    `log`. Recorders see every tick only from their `since` on."""
     from factory.record.ending import CutOff
     from factory.simulation.watched import watched
     from factory.support.interruption import Interruption
@@ -257,12 +255,12 @@ def carry_out(
 
 
 def not_tested(physics: PhysicsFigures) -> str:
-    """How many pairs of parts had no contact, of how many."""
+    """The number of pairs of parts without collision checks, in words."""
     return f"{physics.pairs_excluded} of {physics.pairs} pairs of parts not checked for collisions"
 
 
 def summarise(record: Run, factory: Factory, verbose: bool) -> None:
-    """A run in a few lines for people; of one that failed, the first says why."""
+    """Print a run in a few lines; the first line of a failed run says why."""
     if not record.succeeded:
         say_verdict(record.verdict, verbose)
     cycle = f"{record.cycle_time_s:.3f} s" if record.cycle_time_s is not None else "not yet steady"
@@ -328,7 +326,7 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
 
 
 def say_files(**files: Path | None) -> None:
-    """Where the files are that a run has left, by what they are."""
+    """Print the files that a run has written, by their kinds."""
     for kind, path in files.items():
         if path is not None:
             say(f"{kind}: {path}")

@@ -29,7 +29,7 @@ from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions, check_ideal
 from factory.commands.warnings import announced
 from factory.support.console import emit, say, table
-from factory.support.errors import Diagnostic, InputError
+from factory.support.errors import usage_error
 
 if TYPE_CHECKING:
     from factory.study.sweep.summary import Summary
@@ -41,7 +41,7 @@ SHOWN = 8
 
 @dataclass(frozen=True, slots=True)
 class SweepOptions:
-    """What all runs of a sweep share, None where it is not given, and how they are carried out."""
+    """The values that all runs of a sweep share, None if not options, and how runs are executed."""
 
     world: str | None
     units: int | None
@@ -84,7 +84,7 @@ class SweepOptions:
 @MOTION
 @OUTPUT
 def sweep(
-    given: ProjectOptions,
+    options: ProjectOptions,
     runs: SweepOptions,
     out: OutputOptions,
     source: Path | None,
@@ -108,19 +108,17 @@ def sweep(
     failed = False
     if vary:
         if source is None:
-            raise InputError(Diagnostic("Usage", "there is no FILE.pag", None, "see sweep --help"))
+            raise usage_error("there is no FILE.pag", "see sweep --help")
         if database is None:
-            message, hint = "there is no database for the results", "for example -o results.db"
-            raise InputError(Diagnostic("Usage", message, None, hint))
-        tally, warnings = _carry_out(replace(given, file=source), runs, database, vary, out)
+            raise usage_error("there is no database for the results", "for example -o results.db")
+        tally, warnings = _carry_out(replace(options, file=source), runs, database, vary, out)
         failed = tally.failed + tally.there_failed > 0
         document = {"database": str(database), "on": runs.on, **tally.as_json()}
         document["warnings"] = warnings
         if not out.as_json:
-            _tell(tally, database)
+            _print(tally, database)
     elif not is_summary:
-        message, hint = "there is nothing to vary", "for example --vary seed=0:100"
-        raise InputError(Diagnostic("Usage", message, None, hint))
+        raise usage_error("there is nothing to vary", "for example --vary seed=0:100")
     if is_summary:
         document |= _summarise(database or source, plots, out)
     if out.as_json:
@@ -129,13 +127,13 @@ def sweep(
 
 
 def _carry_out(
-    given: ProjectOptions,
+    options: ProjectOptions,
     runs: SweepOptions,
     database: Path,
     vary: tuple[str, ...],
     out: OutputOptions,
 ) -> tuple[Tally, list[dict[str, object]]]:
-    """Plan, prove and run. Gives the warnings too. Raises InputError for what cannot be."""
+    """Plan, prove and run a sweep. Returns the warnings too. Raises InputError."""
     from factory.nets.verify import proved
     from factory.study.pool import cores
     from factory.study.sweep.grid import DEFAULTS, SETTINGS, read_axes
@@ -146,17 +144,16 @@ def _carry_out(
         from factory.study.sweep.cluster import address_of
 
         address_of(runs.on)
-    writable(given.file, database)
+    writable(options.file, database)
     axes = read_axes(vary)
-    asked = asdict(given) | asdict(runs)
+    asked = asdict(options) | asdict(runs)
     for axis in axes:
         if asked.get(axis.key) is not None:
-            message = f"{axis.key} is both given and varied"
-            raise InputError(Diagnostic("Usage", message, None, "leave one of them out"))
+            raise usage_error(f"{axis.key} is both given and varied", "leave one of them out")
     worlds = next((axis.values for axis in axes if axis.key == "world"), (runs.world,))
     if set(worlds) == {"ideal"}:
         check_ideal(runs.fuse)
-    project = given.project(out.silent)
+    project = options.project(out.silent)
     varies = any(axis.key == "clearance" for axis in axes)
     # a factory that does not fit its floor is refused before the first run
     factory = project.plain if varies else project.layout.factory
@@ -171,8 +168,8 @@ def _carry_out(
     return sweep(recipe, axes, database, jobs, runs.on, runs.retry, out.silent), warnings
 
 
-def _tell(tally: Tally, database: Path) -> None:
-    """What a sweep did, for people."""
+def _print(tally: Tally, database: Path) -> None:
+    """Print the result of a sweep."""
     there = f"{tally.there} of {tally.runs} already done"
     if tally.there_failed:
         there += f", of which {tally.there_failed} failed; --retry runs them again"
@@ -186,34 +183,33 @@ def _tell(tally: Tally, database: Path) -> None:
 
 
 def _summarise(database: Path | None, folder: Path | None, out: OutputOptions) -> dict[str, Any]:
-    """Summarise a database, and draw it. Gives the keys of `sweep --summary --json`."""
+    """Summarise a database, and draw it. Returns the keys of `sweep --summary --json`."""
     from factory.study.sweep.summary import summarise
     from factory.support.files import write_all
 
     if database is None:
-        message, hint = "there is no database", "factory sweep RESULTS --summary"
-        raise InputError(Diagnostic("Usage", message, None, hint))
-    found = summarise(database)
+        raise usage_error("there is no database", "factory sweep RESULTS --summary")
+    result = summarise(database)
     drawn: dict[Path, bytes] = {}
     if folder is not None:
         from factory.study.sweep.summary import plots
 
-        drawn = {folder / name: picture for name, picture in plots(found).items()}
+        drawn = {folder / name: picture for name, picture in plots(result).items()}
         write_all(drawn)
     if not out.as_json:
-        _tell_summary(found, out.verbose)
+        _print_summary(result, out.verbose)
         for path in drawn:
             say(f"wrote {path}")
-    return {"summary": found.as_json(), "files": [str(path) for path in drawn]}
+    return {"summary": result.as_json(), "files": [str(path) for path in drawn]}
 
 
-def _tell_summary(found: Summary, verbose: bool) -> None:
+def _print_summary(result: Summary, verbose: bool) -> None:
     """A table for each group: figure, mean, spread, confidence interval."""
     from factory.study.sweep.summary import CONFIDENCE
 
     heads = ("figure", "mean", "deviation", f"{CONFIDENCE:.0%} from", "to", "least", "greatest")
-    for group in found.groups:
-        at = ", ".join(f"{key} {value}" for key, value in group.values) or found.product
+    for group in result.groups:
+        at = ", ".join(f"{key} {value}" for key, value in group.values) or result.product
         failed = f", {group.failed} failed" if group.failed else ""
         rows = [
             (key, *map(_shown, astuple(s)[1:]))
@@ -222,7 +218,7 @@ def _tell_summary(found: Summary, verbose: bool) -> None:
         ]
         title = f"{at}: {group.done} runs{failed}"
         table(title, heads, rows) if rows else say(title)
-    for reason, count in list(found.reasons.items())[:SHOWN]:
+    for reason, count in list(result.reasons.items())[:SHOWN]:
         print(f"{count} failed: {reason}", file=sys.stderr)
 
 

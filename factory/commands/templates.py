@@ -20,7 +20,7 @@ def templates(folders: tuple[Path, ...], out: OutputOptions) -> int:
     from factory.pipeline import all_templates
     from factory.problem.robot_types import load_catalogue
 
-    found, catalogue = all_templates(folders), load_catalogue()
+    operations, catalogue = all_templates(folders), load_catalogue()
     if out.as_json:
         emit(
             {
@@ -37,7 +37,7 @@ def templates(folders: tuple[Path, ...], out: OutputOptions) -> int:
                         "geometry": t.geometry,
                         "text": write_template(t),
                     }
-                    for t in found.values()
+                    for t in operations.values()
                 ],
                 "robots": [
                     {"name": r.name, "extends": r.extends or None, "summary": r.summary}
@@ -53,7 +53,7 @@ def templates(folders: tuple[Path, ...], out: OutputOptions) -> int:
             f"{len(t.inputs)}{'+' if t.further else ''}",
             ", ".join(f"{k} = {v}" for k, v in t.parameters) or ("geometry" if t.geometry else ""),
         )
-        for t in found.values()
+        for t in operations.values()
     )
     table("Operations", ("name", "robots", "inputs", "parameters"), rows)
     table(
@@ -62,6 +62,6 @@ def templates(folders: tuple[Path, ...], out: OutputOptions) -> int:
         ((r.name, r.extends, r.summary) for r in catalogue.types.values()),
     )
     if out.verbose:
-        for template in found.values():
+        for template in operations.values():
             say(write_template(template))
     return 0

@@ -44,7 +44,7 @@ FOR_EVER = 10**9
 @MOTION
 @OUTPUT
 def view(
-    given: ProjectOptions,
+    options: ProjectOptions,
     asked: RunOptions,
     out: OutputOptions,
     port: int,
@@ -64,11 +64,11 @@ def view(
     from factory.support.interruption import Interruption
 
     check_server(host, expose)
-    project = given.project(out.silent)
+    project = options.project(out.silent)
     layout = project.layout
     proved(layout.factory.net)
     warnings = announced(layout.product.warnings, out)
-    fails = asked.recovers or given.deputies
+    fails = asked.recovers or options.deputies
     endless = replace(asked, units=FOR_EVER, fuse=False).request(project)
     request = replace(endless, recovers=fails)
     campaign = asked.campaign(layout.factory) if fails else None
@@ -79,13 +79,13 @@ def view(
             where = {"address": server.address, "host": host, "port": server.port}
             emit({**where, "warnings": warnings})
         else:
-            _tell(server, host, expose)
+            _print(server, host, expose)
         sys.stdout.flush()
         session.run(stop.observe)
     return 0
 
 
-def _tell(server: Server, host: str, expose: bool) -> None:
+def _print(server: Server, host: str, expose: bool) -> None:
     """The address; printed with --quiet too, since it cannot be guessed."""
     say(f"{server.address}  (Ctrl-C to stop)")
     if not expose:

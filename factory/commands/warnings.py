@@ -1,30 +1,33 @@
-"""The warnings that a command prints."""
+"""The warnings that a command prints, those of an incomplete log included."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import chain
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from factory.commands.requests import OutputOptions
 from factory.support.console import say, warn
 from factory.support.errors import Diagnostic
-from factory.support.order import natural
+from factory.support.files import natural
 
 if TYPE_CHECKING:
     from factory.pipeline import Project
+    from factory.record.log import Log
+
 
 LISTED = {"Overlap": (6, "pairs overlap"), "Blocked": (24, "operations are blocked")}
-"""The most of each code that are listed, unless `-v` asks for all, and what more there are."""
+"""Maximum number of warnings of a code without `-v`, and the noun for the others."""
 
 NAMED = 12
 """The most labels that a line names."""
 
 
-def told(warnings: Sequence[Diagnostic], verbose: bool) -> list[Diagnostic]:
-    """All warnings. Unless `verbose`: those of one cause as one line, that counts them, and names
-    what they are about; of some codes the first, and how many more there are."""
+def condensed(warnings: Sequence[Diagnostic], verbose: bool) -> list[Diagnostic]:
+    """The warnings to print. Unless `verbose`, those of one cause become one line with their number
+    and their labels, and only the first ones of some codes are listed."""
     if verbose:
         return list(warnings)
     causes: dict[object, list[Diagnostic]] = {}
@@ -54,15 +57,32 @@ def _as_one(alike: list[Diagnostic]) -> Diagnostic:
 
 
 def announced(warnings: Sequence[Diagnostic], out: OutputOptions) -> list[dict[str, object]]:
-    """Print warnings for people; gives all of them, as the document of `--json` lists them."""
-    warn(told(warnings, out.verbose), out.silent)
+    """Print warnings as text; returns all of them for the document of `--json`."""
+    warn(condensed(warnings, out.verbose), out.silent)
     return [warning.as_json() for warning in warnings]
 
 
 def say_allowed(project: Project) -> None:
-    """Say which overlaps of parts are there, when finished or on the way, and allowed."""
+    """Print the overlaps that exist and are allowed, in the product or on the way."""
     allowed = project.pag.allowed
     if allowed:
         ways = project.matings.notes(allowed) if project.matings else []
         for note in (*project.overlaps.notes(allowed), *ways):
             say(note)
+
+
+def read_partly(file: Path, silent: bool) -> Log:
+    """The log in a file, with a warning where its run was cut off. Raises InputError (BadLog)."""
+    from factory.record.log import read_log
+
+    log = read_log(file)
+    if log.cut_off:
+        warn([log.cut_off.diagnostic(file)], silent)
+    return log
+
+
+def cut_off(log: Log | None) -> dict[str, object]:
+    """The key `cut_off` of a `--json` document about a log; nothing without one."""
+    if log is None:
+        return {}
+    return {"cut_off": log.cut_off and log.cut_off.as_json()}

@@ -22,8 +22,7 @@ from factory.importing.scene_file import MESHES, SCENES, read_one, read_scene
 from factory.lang.source import quoted
 from factory.problem.pag import PAG, Assembly, Parameter
 from factory.support.errors import Diagnostic, InputError, Position
-from factory.support.files import MESH, read_bytes
-from factory.support.order import natural
+from factory.support.files import MESH, natural, read_bytes
 
 
 def bodies_in(path: Path) -> Bodies:

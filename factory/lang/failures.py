@@ -1,7 +1,7 @@
-"""The clause `failure` of a template: what is tested, and what is done about it.
+"""The clause `failure` of a template: tests of an operation, and responses to a failed test.
 
-An operation that fails is done again so many times on end, and then what it was to join is scrapped
-or the run stops. So the retries of one operation on one sub-assembly are bounded.
+A failed operation is repeated a limited number of times; then its inputs are scrapped or the
+run stops. So the retries of one operation on one sub-assembly are bounded.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ _FORM = "again 2 then scrap"
 
 @dataclass(frozen=True, slots=True)
 class FailureReader:
-    """Reads the cases of a template which `takes` sub-assemblies, or makes a part, and which has
-    `tools` or not; errors (BadFailure) go to the findings."""
+    """Reads the cases of a template; errors (BadFailure) go to the findings. `takes`: whether it
+    takes sub-assemblies, or else makes a part; `tools`: whether it has tools."""
 
     findings: Findings
     takes: bool
@@ -42,16 +42,16 @@ class FailureReader:
 
     def read(self, cases: Sequence[FailureCase]) -> tuple[Failure, ...]:
         """The failures of the cases, in their order, each test once."""
-        found: dict[str, Failure] = {}
+        failures: dict[str, Failure] = {}
         for case in cases:
             word = case.test[0]
-            if word in found:
+            if word in failures:
                 self._bad(f"{quoted(word)} is tested twice", word, "remove one of the two")
                 continue
             failure = self._failure(case)
             if failure is not None:
-                found[failure.test] = failure
-        return tuple(found.values())
+                failures[failure.test] = failure
+        return tuple(failures.values())
 
     def _bad(self, message: str, at: Token, hint: str) -> None:
         self.findings.add("BadFailure", message, at, hint)
@@ -73,26 +73,26 @@ class FailureReader:
         return Failure(test, limit, responses, self.findings.source.at(word))
 
     def _limit(self, words: Words) -> float | None:
-        """The limit of a test that has one [m], above 0."""
+        """Limit of a test [m], above 0; None for a test without one, or after an error."""
         test, usual = words[0], LIMITS.get(words[0])
         if len(words) == 1:
             if usual:
                 hint = f"say from how many metres on it fails: {test} > {usual}"
                 self._bad(f"{quoted(test)} has no limit", test, hint)
             return None
-        found = words[1]
-        value = number(found)
+        limit = words[1]
+        value = number(limit)
         if usual is None:
-            self._bad(f"{quoted(test)} takes no limit", found, f"write it alone: {test} : scrap")
+            self._bad(f"{quoted(test)} takes no limit", limit, f"write it alone: {test} : scrap")
             return None
         if value is None or value <= 0:
             hint = f"a limit is a positive number of metres: {test} > {usual}"
-            self._bad(f"{quoted(found)} is no limit", found, hint)
+            self._bad(f"{quoted(limit)} is no limit", limit, hint)
             return None
         return value
 
     def _check_place(self, test: Test, at: Token) -> None:
-        """A test needs what it looks at."""
+        """Note a test of something that the operation does not have."""
         if test == "misplaced" and self.takes:
             hint = "leave it out, or test residual; misplaced is for what makes a part"
             self._bad("no part comes from a feeder here", at, hint)
@@ -103,12 +103,12 @@ class FailureReader:
     def _responses(self, words: Words) -> tuple[Response, ...]:
         """The responses between `then`s: one `again` at most, then a `scrap` or a `stop`, which is
         added where there is none. () after an error."""
-        found: list[Response] = []
+        made: list[Response] = []
         for first, *more in _steps(words):
             kind = KINDS.get(first)
-            if found and found[-1].kind != "again":
+            if made and made[-1].kind != "again":
                 hint = f"leave out what follows it; again comes first: {_FORM}"
-                self._bad(f"nothing is left to do after {found[-1]}", first, hint)
+                self._bad(f"nothing is left to do after {made[-1]}", first, hint)
                 return ()
             if kind is None:
                 hint = did_you_mean(first, list(KINDS), "responses")
@@ -116,17 +116,17 @@ class FailureReader:
                     hint = f"responses are joined by one 'then': {_FORM}"
                 self._bad(f"there is no response {quoted(first)}", first, hint)
                 return ()
-            if kind == "again" and found:
-                hint = f"write one number: again {found[-1].times} then scrap"
+            if kind == "again" and made:
+                hint = f"write one number: again {made[-1].times} then scrap"
                 self._bad("'again' is said twice", first, hint)
                 return ()
             response = self._response(kind, first, more)
             if response is None:
                 return ()
-            found.append(response)
-        if found[-1].kind == "again":
-            found.append(Response("stop"))
-        return tuple(found)
+            made.append(response)
+        if made[-1].kind == "again":
+            made.append(Response("stop"))
+        return tuple(made)
 
     def _response(self, kind: Kind, first: Token, more: Words) -> Response | None:
         counted = kind == "again"
@@ -150,7 +150,7 @@ class FailureReader:
     def _check_responses(
         self, test: Test, responses: Sequence[Response], case: FailureCase
     ) -> None:
-        """What is done must be possible: with what is there."""
+        """Note responses that the operation cannot carry out."""
         kinds = {response.kind for response in responses}
         at = {str(word): word for word in reversed(case.responses)}
         if test == "jammed" and not self.takes and "scrap" in kinds:

@@ -23,7 +23,7 @@ from factory.support.settings import DWELL
 
 
 def _words(meant: Mapping[str, str]) -> Mapping[str, str]:
-    """What each word means, of names with the words that are written in their place."""
+    """The name for each of its synonyms."""
     return MappingProxyType({word: name for name, line in meant.items() for word in line.split()})
 
 
@@ -84,7 +84,7 @@ def signature(template: Template) -> Signature:
 
 
 class AssemblyReader:
-    """Makes assemblies of definitions, whose lengths are in a unit; errors go to the findings.
+    """Makes assemblies from definitions, whose lengths are in a unit; errors go to the findings.
     `folder` is where mesh paths start; they are not followed where it is None."""
 
     def __init__(
@@ -180,10 +180,10 @@ class AssemblyReader:
         return kept
 
     def _unknown(self, operation: Token, label: Token, inputs: Sequence[Token]) -> None:
-        known = sorted({*self.signatures} - RESERVED)
+        names = sorted({*self.signatures} - RESERVED)
         meant = MEANT_OPERATIONS.get(operation.lower(), "")
-        near = meant in known
-        hint = f"did you mean '{meant}'?" if near else did_you_mean(operation, known, "operations")
+        near = meant in names
+        hint = f"did you mean '{meant}'?" if near else did_you_mean(operation, names, "operations")
         message = f"there is no operation {quoted(operation)}"
         if operation in SHAPES:
             value = f"( {', '.join(inputs)} )" if inputs else GEOMETRY[operation].example

@@ -2,25 +2,39 @@
 
 It reports every error of a text at once, in the order of the text. A PAG that it returns is one
 tree over its labels, each made by a known operation with the inputs and values that it takes.
+
+Copies are written out here: `screw[4] = atomic ( ... ) at ( 0, 0, 0 ), ...` is four definitions and
+its name among the inputs of an operation is all four. Overlaps that the text allows are read too:
+`allow ( peg, frame, 0.0005 );` of two parts, `allow ( 0.0005 );` of all.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from itertools import chain, product, repeat
 
-from factory.lang.allowances import allowances_of
-from factory.lang.copies import written_out
+from lark import Token
+
 from factory.lang.operations import AssemblyReader, signature
 from factory.lang.pag_syntax import read_statements
 from factory.lang.source import STDIN, Findings, quoted, read_text, source_of
-from factory.lang.statements import Statements
+from factory.lang.statements import (
+    COPIES,
+    CopiedLabel,
+    Definition,
+    Keyword,
+    Permission,
+    Statements,
+    labels_of,
+)
 from factory.lang.tree import TreeCheck
-from factory.lang.words import UNITS
-from factory.problem.pag import PAG
+from factory.lang.words import UNITS, number
+from factory.problem.pag import PAG, AllowedOverlap, Assembly
 from factory.problem.template import Template
 from factory.support.collector import collector_paused
-from factory.support.errors import Diagnostic, InputError, did_you_mean
+from factory.support.errors import did_you_mean, usage_error
 
 KINDS = {
     ".pnml": (
@@ -36,7 +50,7 @@ KINDS = {
     ".op": ("an operation", "give the PAG, and the folder of this file to --templates"),
     ".toml": ("a file of settings", "give the PAG beside it"),
 }
-"""Files that are no PAGs, by their endings: what each is, and what can be done with it."""
+"""Files of other kinds, by their endings: the kind, and how it can be used."""
 
 WORDS = {
     "mm": "mm millimeter millimetre millimeters millimetres",
@@ -45,6 +59,10 @@ WORDS = {
     "in": "in inch inches zoll",
 }
 """Words that mean a unit."""
+
+COPIES_FORM = "screw[2] = atomic ( ... ) at ( 0, 0, 0 ), ( 0, 0, 0.1 )"
+
+ALLOW_FORM = "write: allow ( peg, frame, 0.0005 ); or, for all pairs: allow ( 0.0005 );"
 
 
 @collector_paused()
@@ -67,7 +85,7 @@ def read_pag(
 
 
 def unit_of(statements: Statements, findings: Findings) -> str:
-    """The unit of the lengths of a text: the one it says, else metres."""
+    """The unit of the lengths of a text, metres by default."""
     for unit in statements.units:
         if unit not in UNITS:
             near = next((u for u, words in WORDS.items() if unit.lower() in words.split()), "")
@@ -80,8 +98,8 @@ def unit_of(statements: Statements, findings: Findings) -> str:
 
 
 def load_pag(path: str | os.PathLike[str], templates: Mapping[str, Template]) -> PAG:
-    """The PAG in a file, or in what comes in for `-`. Raises InputError, also if the file cannot be
-    read (BadFile), or is something else (Usage)."""
+    """The PAG in a file, or on stdin for `-`. Raises InputError, also if the file cannot be read
+    (BadFile) or is of another kind (Usage)."""
     name = os.fspath(path)
     _check_kind(name)
     shown = "<stdin>" if name == STDIN else name
@@ -89,9 +107,143 @@ def load_pag(path: str | os.PathLike[str], templates: Mapping[str, Template]) ->
 
 
 def _check_kind(name: str) -> None:
-    """Raises InputError (Usage) for a file that is something else by its ending."""
+    """Raises InputError (Usage) for a file whose ending says that it is of another kind."""
     ending = os.path.splitext(name)[1].lower()
-    kind, hint = next((told for ends, told in KINDS.items() if ending in ends.split()), ("", ""))
+    kind, hint = next((row for ends, row in KINDS.items() if ending in ends.split()), ("", ""))
     if kind and os.path.isfile(name):
         message = f"{quoted(name)} is {kind}, not the PAG of a product"
-        raise InputError(Diagnostic("Usage", message, None, hint.format(*[name] * 2)))
+        raise usage_error(message, hint.format(*[name] * 2))
+
+
+def written_out(statements: Statements, findings: Findings) -> list[Definition]:
+    """The definitions without copies and places, in which a label is one Token. Errors (Syntax,
+    DuplicateLabel, WrongInputs, BadValue) go to the findings."""
+    definitions = statements.definitions
+    if not any(isinstance(one.label, CopiedLabel) or one.places for one in definitions):
+        return list(definitions)
+    copied = [one.label for one in definitions if isinstance(one.label, CopiedLabel)]
+    groups = {str(label.name): label.labels() for label in copied}
+    wrong = {str(label.name) for label in copied if not 1 <= label.number <= COPIES}
+    twice = groups.keys() & {one.label for one in definitions if isinstance(one.label, Token)}
+    for name in groups.keys() & (statements.broken | wrong):
+        statements.broken.update(groups[name])
+    statements.broken |= twice
+    made: list[Definition] = []
+    for definition in definitions:
+        made += _each(_with_groups(definition, groups, findings), findings)
+    return made
+
+
+def _with_groups(
+    definition: Definition, groups: Mapping[str, Sequence[Token]], findings: Findings
+) -> Definition:
+    """A definition in which the name of copies among the inputs is replaced by their labels."""
+    label = definition.label
+    if not isinstance(label, CopiedLabel) and label in groups:
+        message = f"{quoted(label)} is the name of copies, and a label"
+        findings.add("DuplicateLabel", message, label, "rename one of the two")
+        return definition
+    arguments: list[Token | Keyword] = []
+    for index, argument in enumerate(definition.arguments):
+        twice = argument in definition.arguments[:index]
+        if isinstance(argument, Token) and argument in groups and twice:
+            message = f"{quoted(argument)} means all its copies, and is there twice"
+            hint = f"name it once, or its copies one by one: {argument}[1]"
+            findings.add("PagNotTree", message, argument, hint)
+        elif isinstance(argument, Token) and argument in groups:
+            place = partial(Token.new_borrow_pos, borrow_t=argument)
+            arguments += [place("WORD", str(copy)) for copy in groups[argument]]
+        else:
+            arguments.append(argument)
+    return definition._replace(arguments=arguments)
+
+
+def _each(definition: Definition, findings: Findings) -> list[Definition]:
+    """The definitions that a definition with copies or places stands for."""
+    labels, places = labels_of(definition.label), definition.places
+    if isinstance(definition.label, CopiedLabel):
+        _check_copies(definition, definition.label, findings)
+    if places is None:
+        return [definition._replace(label=label) for label in labels]
+    if places.word != "at":
+        hint = "a statement ends with ';' behind its last parenthesis; places of copies: "
+        message = f"unexpected {quoted(places.word)} after ')'"
+        findings.add("Syntax", message, places.word, hint + COPIES_FORM)
+    elif len(places.vectors) != len(labels):
+        _refuse_places(definition, len(labels), len(places.vectors), findings)
+    name = Token.new_borrow_pos("WORD", "pos", places.word)
+    last = repeat(places.vectors[-1], len(labels))
+    return [
+        Definition(label, definition.operation, [*definition.arguments, Keyword(name, vector)])
+        for label, vector in zip(labels, chain(places.vectors, last), strict=False)
+    ]
+
+
+def _refuse_places(definition: Definition, labels: int, places: int, findings: Findings) -> None:
+    assert definition.places is not None
+    label = definition.label
+    name = label.name if isinstance(label, CopiedLabel) else label
+    copies = f"{labels} cop{'y' if labels == 1 else 'ies'}"
+    message = f"{places} place{'s' * (places != 1)} for {copies} of {quoted(name)}"
+    hint = f"a place for each copy: {name}[{places}] = {definition.operation} ( ... ) at ..."
+    findings.add("BadValue", message, definition.places.word, hint)
+
+
+def _check_copies(definition: Definition, label: CopiedLabel, findings: Findings) -> None:
+    if not 1 <= label.number <= COPIES:
+        message = f"{label.name}{label.brackets} is no number of copies"
+        hint = f"a whole number from 1 to {COPIES}: {COPIES_FORM}"
+        findings.add("BadValue", message, label.brackets, hint)
+    inputs = [argument for argument in definition.arguments if isinstance(argument, Token)]
+    if inputs:
+        message = f"copies of {quoted(label.name)}, which has the input {quoted(inputs[0])}"
+        hint = "a sub-assembly is used once, so only parts have copies: write one statement each"
+        findings.add("WrongInputs", message, inputs[0], hint)
+
+
+def allowances_of(
+    statements: Statements, nodes: Sequence[Assembly], unit: str, findings: Findings
+) -> tuple[AllowedOverlap, ...]:
+    """The overlaps that a text allows, with depths in a unit; the name of copies stands for each
+    copy. Errors (BadValue, UndefinedLabel) go to the findings."""
+    copied = [one.label for one in statements.definitions if isinstance(one.label, CopiedLabel)]
+    groups = {str(label.name): [str(copy) for copy in label.labels()] for label in copied}
+    parts = {node.label: not node.inputs for node in nodes}
+    overlaps: list[AllowedOverlap] = []
+    for permission in statements.permissions:
+        overlaps += _allowed(permission, groups, parts, unit, statements.broken, findings)
+    return tuple(overlaps)
+
+
+def _allowed(
+    permission: Permission,
+    groups: Mapping[str, Sequence[str]],
+    parts: Mapping[str, bool],
+    unit: str,
+    broken: set[str],
+    findings: Findings,
+) -> Iterator[AllowedOverlap]:
+    *labels, last = permission.words
+    at, depth = findings.source.at(permission.word), number(last, unit)
+    pairs = [
+        pair for pair in product(*(groups.get(x, [str(x)]) for x in labels)) if len({*pair}) > 1
+    ]
+    if len(labels) not in (0, 2) or depth is None or depth < 0 or (labels and not pairs):
+        words = ", ".join(permission.words)
+        message = f"an overlap is allowed of two parts, or of all, up to a depth, not ( {words} )"
+        findings.add("BadValue", message, last if len(labels) == 2 else permission.word, ALLOW_FORM)
+        return
+    for label in labels:
+        if label not in groups and not parts.get(label) and label not in broken:
+            _refuse_label(label, label in parts, [part for part in parts if parts[part]], findings)
+            return
+    yield from (AllowedOverlap(depth, pair, at) for pair in pairs or [()])
+
+
+def _refuse_label(label: Token, made: bool, parts: Sequence[str], findings: Findings) -> None:
+    if made:
+        hint = "name the parts of it that overlap"
+        findings.add("BadValue", f"{quoted(label)} is no part, it is made of some", label, hint)
+        return
+    hint = did_you_mean(label, parts, "parts")
+    findings.add("UndefinedLabel", f"there is no part {quoted(label)}", label, hint)

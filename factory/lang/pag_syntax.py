@@ -101,7 +101,7 @@ def _apart(token: Token) -> Iterator[Token]:
 
 
 def spelled(token: Token) -> Vector:
-    """A VECTOR token as the vector it is."""
+    """The vector of a VECTOR token."""
     _, opening, *rest = _apart(token)
     return Vector(opening, [part for part in rest if part.type == "WORD"])
 
@@ -119,7 +119,7 @@ def read_statements(findings: Findings) -> Statements:
 
 
 def _sort_in(statement: Any, made: Statements, findings: Findings) -> None:
-    """Put a statement where it belongs; `pair` and `equation` may yet lack a sign."""
+    """Add a statement to its list; `pair` and `equation` may still turn out to be malformed."""
     if isinstance(statement, Definition):
         made.definitions.append(statement)
         return

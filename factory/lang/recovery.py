@@ -24,8 +24,8 @@ SIGNS = frozenset(";,()=<>{}~.+-")
 
 @dataclass(frozen=True, slots=True)
 class Stuck:
-    """Where the parse of a piece stopped: the token, its index, the parser's state, and the kinds
-    of token that it would have taken."""
+    """The place where the parse of a piece stopped: the token, its index, the parser's state, and
+    the kinds of token that would have been valid."""
 
     index: int
     token: Token
@@ -46,7 +46,7 @@ class Lesson:
 
 
 def open_grammar(name: str, start: list[str], builder: Transformer[Token, Any]) -> Lark:
-    """The parser of a grammar in this folder, whose rules `builder` takes while it parses."""
+    """The parser of a grammar in this folder; `builder` transforms its rules during the parse."""
     return Lark.open(
         name,
         rel_to=__file__,
@@ -111,7 +111,7 @@ def _way_out(character: str) -> str:
 
 
 def _plain(character: str) -> str:
-    """The sign that a typographic variant (full width, dash, curly quote) stands for, or ""."""
+    """The plain sign of a typographic variant (full width, dash, curly quote), or ""."""
     folded = unicodedata.normalize("NFKC", character)
     if folded != character and folded in SIGNS:
         return folded

@@ -9,15 +9,15 @@ from pathlib import Path
 
 from lark import Token
 
-from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
+from factory.support.errors import Diagnostic, InputError, Position, did_you_mean, usage_error
 from factory.support.files import LOG, TEXT, head_of, read_bytes
 
 FILES = 1000
-"""The most names of a folder that are compared with a missing one."""
+"""Maximum number of names of a folder that are compared with a missing one."""
 
 
 STDIN = "-"
-"""The name of a file that stands for what comes in."""
+"""The name that stands for stdin."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,13 +73,13 @@ def _place(diagnostic: Diagnostic) -> tuple[int, int]:
 
 
 def where(first: Position, second: Position) -> str:
-    """Where the first of two places is, as seen from the second: `in line 3`, `at column 5`."""
+    """The first of two places relative to the second, in words: `in line 3`, `at column 5`."""
     return f"in line {first.line}" if first.line != second.line else f"at column {first.column}"
 
 
 def read_text(path: str | os.PathLike[str], most: int = TEXT) -> str:
     """The text of a UTF-8 file of at most so many bytes. Raises InputError (BadFile, Syntax where
-    it is not UTF-8, or Usage for a log). `-` is what comes in."""
+    it is not UTF-8, or Usage for a log). `-` is stdin."""
     name = os.fspath(path)
     try:
         data = head_of(Path(name), len(LOG))
@@ -93,7 +93,7 @@ def read_text(path: str | os.PathLike[str], most: int = TEXT) -> str:
         raise InputError(_unreadable(name, error)) from None
     message = f"{quoted(name)} is a log of a run, not the PAG of a product"
     hint = "logs are for `monitor`, `report`, `render`, `export` and `analyze --measured`"
-    raise InputError(Diagnostic("Usage", message, None, hint))
+    raise usage_error(message, hint)
 
 
 def _unreadable(name: str, error: Exception) -> Diagnostic:
@@ -138,9 +138,9 @@ def near_file(folder: str, path: str) -> str:
     return did_you_mean(path, shown, f"'{suffix}' files there") if alike else ""
 
 
-def quoted(found: str, width: int = 60) -> str:
+def quoted(text: str, width: int = 60) -> str:
     """A found text in quotes, on one line: unprintable characters escaped, long texts cut."""
-    cut = found if len(found) <= width else found[: width - 3] + "..."
+    cut = text if len(text) <= width else text[: width - 3] + "..."
     shown = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in cut)
     if shown.startswith('"'):
         return shown

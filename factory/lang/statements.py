@@ -32,7 +32,7 @@ class CopiedLabel(NamedTuple):
         return int(digits) if len(digits) < 9 else COPIES + 1
 
     def labels(self) -> list[Token]:
-        """The labels screw1 to screw4, which all stand where the name does."""
+        """The labels screw1 to screw4, all at the position of the name."""
         numbers = range(1, min(self.number, COPIES) + 1)
         return [Token.new_borrow_pos("WORD", f"{self.name}{n}", self.name) for n in numbers]
 
@@ -45,7 +45,7 @@ class Keyword(NamedTuple):
 
 
 class PlaceList(NamedTuple):
-    """`at ( 0, 0, 0 ), ( 0, 0, 1 )`: its word, whichever it is, and its vectors."""
+    """`at ( 0, 0, 0 ), ( 0, 0, 1 )`: its word, which may be wrong, and its vectors."""
 
     word: Token
     vectors: Sequence[Vector]
@@ -83,8 +83,8 @@ class Permission(NamedTuple):
 
 @dataclass(slots=True)
 class Statements:
-    """The statements of a text. `broken`: the words of those that did not parse; `nameless`: one
-    of those does not even start with the label it defines."""
+    """The statements of a text. `broken`: the words of statements that did not parse; `nameless`:
+    whether one of these does not start with the label that it defines."""
 
     definitions: list[Definition] = field(default_factory=list)
     permissions: list[Permission] = field(default_factory=list)

@@ -1,4 +1,5 @@
-"""From the clauses of a template to its value: what would break Theorem 5.1 is refused."""
+"""From the clauses of a template to its value; templates that would break Theorem 5.1 are
+refused."""
 
 from __future__ import annotations
 
@@ -38,8 +39,8 @@ class TemplateMaker:
         classes = [
             [self._point(words, count) for words in points] for points in contents.get("~", ())
         ]
-        given: ParameterClause = contents.get("parameters", ParameterClause(False))
-        parameters = self._parameters(given)
+        clause: ParameterClause = contents.get("parameters", ParameterClause(False))
+        parameters = self._parameters(clause)
         law = self._law(contents.get("F"), count, parameters)
         further: Token | None = contents.get("further")
         instead: Token | None = contents.get("instead")
@@ -47,7 +48,7 @@ class TemplateMaker:
             self._check_name(name)
         if labels is not None:
             self._check_labels(labels, count, carrier)
-            self._check_kind(labels, given.geometry, further)
+            self._check_kind(labels, clause.geometry, further)
             self._check_instead(labels, carrier, instead)
         failures = self._failures(labels, carrier)
         if name is None or robots is None or carrier is None or labels is None or law is None:
@@ -64,7 +65,7 @@ class TemplateMaker:
             str(further or ""),
             str(instead or ""),
             tuple(parameters.items()),
-            given.geometry,
+            clause.geometry,
             failures,
             at(name),
             at(further) if further else None,
@@ -98,15 +99,15 @@ class TemplateMaker:
                 self._bad(f"{quoted(robot)} is no robot type", robot, LABEL_HINT)
         return len(robots)
 
-    def _carrier(self, found: Token | None, count: int | None) -> int | None:
+    def _carrier(self, word: Token | None, count: int | None) -> int | None:
         """j, if 1 <= j <= k."""
-        if found is None:
+        if word is None:
             return None
-        j = int(found) if re.fullmatch("[0-9]{1,6}", found) else 0
+        j = int(word) if re.fullmatch("[0-9]{1,6}", word) else 0
         if j < 1 or (count is not None and j > count):
             most = count or "the number of robots in R"
             hint = f"j counts the robots from 1: write a whole number from 1 to {most}"
-            self._bad(f"j = {found} names no robot of R", found, hint)
+            self._bad(f"j = {word} names no robot of R", word, hint)
             return None
         return j
 
@@ -144,55 +145,55 @@ class TemplateMaker:
         reached = tuple(point for point in points if point)
         return Law(str(raw.name), reached, eps, dwell, self.findings.source.at(raw.name))
 
-    def _radius(self, found: Token) -> float | str:
+    def _radius(self, word: Token) -> float | str:
         """eps: a positive number, or the word."""
-        value = number(found)
-        if found == "eps":
+        value = number(word)
+        if word == "eps":
             return "eps"
         if value is None or value <= 0:
             hint = "the goal ball needs a radius: write eps, or a positive number of metres"
-            self._bad(f"{quoted(found)} is no radius", found, hint)
+            self._bad(f"{quoted(word)} is no radius", word, hint)
             return "eps"
         return value
 
-    def _dwell(self, found: Token, parameters: Mapping[str, Value]) -> float | str | None:
+    def _dwell(self, word: Token, parameters: Mapping[str, Value]) -> float | str | None:
         """A number of seconds, or the name of a parameter that is one."""
-        if is_number(found):
-            value = number(found)
+        if is_number(word):
+            value = number(word)
             if value is None or not 0 <= value <= DWELL:
                 hint = f"write seconds, from 0 to {DWELL:g}, or the name of a parameter"
-                self._bad(f"{quoted(found)} is no time to dwell", found, hint)
+                self._bad(f"{quoted(word)} is no time to dwell", word, hint)
             return value
-        default = parameters.get(found)
+        default = parameters.get(word)
         if "parameters" in self.draft.broken:
-            return str(found)
+            return str(word)
         if not isinstance(default, float) or not 0 <= default <= DWELL:
             what = "is no parameter" if default is None else "is no time to dwell"
-            hint = did_you_mean(found, list(parameters))
+            hint = did_you_mean(word, list(parameters))
             if not hint.startswith("did"):
-                hint = f"add the clause: parameters = ( {found} = 1.0 );"
+                hint = f"add the clause: parameters = ( {word} = 1.0 );"
             if default is not None:
-                hint = f"its default is seconds, from 0 to {DWELL:g}: {found} = 1.0"
-            self._bad(f"{quoted(found)} {what}", found, hint)
-        return str(found)
+                hint = f"its default is seconds, from 0 to {DWELL:g}: {word} = 1.0"
+            self._bad(f"{quoted(word)} {what}", word, hint)
+        return str(word)
 
-    def _parameters(self, given: ParameterClause) -> dict[str, Value]:
+    def _parameters(self, clause: ParameterClause) -> dict[str, Value]:
         made: dict[str, Value] = {}
         values = ValueReader(self.findings)
-        for name, found in given.values:
+        for name, default in clause.values:
             if not is_label(name):
                 self.findings.add("Syntax", f"{quoted(name)} is no name", name, LABEL_HINT)
             elif name in made:
                 self._bad(f"{quoted(name)} is given twice", name, "remove one of the two")
-            elif given.geometry and name in GEOMETRY:
+            elif clause.geometry and name in GEOMETRY:
                 hint = "choose another name: geometry brings " + ", ".join(GEOMETRY)
                 self._bad(f"{quoted(name)} is a parameter of geometry", name, hint)
-            elif (value := values.any(name, found)) is not None:
+            elif (value := values.any(name, default)) is not None:
                 made[str(name)] = value
         return made
 
     def _failures(self, labels: Labels | None, carrier: int | None) -> tuple[Failure, ...]:
-        """What is tested; LOST without a clause."""
+        """The failures that are tested; LOST without a clause."""
         clause = self.draft.clauses.get("failure")
         if clause is None:
             return LOST
@@ -216,7 +217,7 @@ class TemplateMaker:
             self._bad(message, further, hint)
 
     def _check_instead(self, labels: Labels, carrier: int | None, instead: Token | None) -> None:
-        """One robot fewer will do only where two robots bring what a third one takes."""
+        """`instead` needs a carrier that takes what two other robots bring."""
         brought = [label for label in labels.before if label != NOPART]
         held = carrier is not None and labels.before[carrier - 1 : carrier] != (NOPART,)
         if instead is not None and (len(brought) != 2 or held):
@@ -256,7 +257,7 @@ class TemplateMaker:
             else:
                 seen[int(match[1])] = word
         wanted = next(i for i in range(1, len(seen) + 2) if i not in seen)
-        if not odd and any(found > wanted for found in seen):
+        if not odd and any(number_of > wanted for number_of in seen):
             message = f"no robot brings LAB{wanted}: that sub-assembly would be lost"
             hint = f"number the labels in a from LAB1 to LAB{len(seen)}"
             self.findings.add("LostSubtree", message, seen[max(seen)], hint)

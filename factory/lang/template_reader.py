@@ -44,12 +44,12 @@ def load_templates(folders: Sequence[Folder]) -> Mapping[str, Template]:
     merged: dict[str, Template] = {}
     diagnostics: list[Diagnostic] = []
     for folder in folders:
-        found: dict[str, Template] = {}
+        here: dict[str, Template] = {}
         for template in _templates_in(folder, diagnostics):
-            if template.name in found:
-                diagnostics.append(_twice(template, found[template.name]))
-            found.setdefault(template.name, template)
-        merged |= {name: t for name, t in found.items() if name not in merged}
+            if template.name in here:
+                diagnostics.append(_twice(template, here[template.name]))
+            here.setdefault(template.name, template)
+        merged |= {name: t for name, t in here.items() if name not in merged}
     if not diagnostics:
         diagnostics.extend(_check_others(merged))
     if diagnostics:
@@ -81,8 +81,7 @@ def _twice(second: Template, first: Template) -> Diagnostic:
 
 
 def _check_others(templates: Mapping[str, Template]) -> Iterator[Diagnostic]:
-    """What is wrong with the templates that others name: those that take their further inputs, and
-    those that do the same with one robot fewer."""
+    """Errors of the templates that others name as `further` or `instead`."""
     for template in templates.values():
         if template.further:
             at = template.further_position or template.position
@@ -104,7 +103,7 @@ def _check_others(templates: Mapping[str, Template]) -> Iterator[Diagnostic]:
 def _check_other(
     name: str, at: Position | None, why: str, templates: Mapping[str, Template]
 ) -> Iterator[Diagnostic]:
-    """What is wrong with a template that takes one input more than its carrier holds."""
+    """Errors of a template that must take one input in addition to that of its carrier."""
     other = templates.get(name)
     if other is None:
         hint = did_you_mean(name, list(templates), "templates")

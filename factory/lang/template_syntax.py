@@ -178,10 +178,10 @@ def _report_unknown(piece: list[Token], draft: TemplateDraft, findings: Findings
 
 def _has_unlawful(piece: list[Token], findings: Findings) -> bool:
     """Whether a token that no template contains is in a piece; the first one is noted."""
-    found = next((token for token in piece if token.type in UNLAWFUL), None)
-    if found is not None:
-        report_unlawful(found, findings)
-    return found is not None
+    unlawful = next((token for token in piece if token.type in UNLAWFUL), None)
+    if unlawful is not None:
+        report_unlawful(unlawful, findings)
+    return unlawful is not None
 
 
 def _parse(piece: list[Token], start: str, form: str, findings: Findings) -> Any | None:
@@ -192,10 +192,10 @@ def _parse(piece: list[Token], start: str, form: str, findings: Findings) -> Any
     if not isinstance(result, Stuck):
         return result
     at_end = result.token.type == END
-    found = "the end" if at_end else quoted(result.token)
+    shown = "the end" if at_end else quoted(result.token)
     at = findings.source.after(piece[-1]) if at_end else result.token
     hint = f"it is written like this: {form}"
-    findings.add("Syntax", f"expected {_names(result.expected)}, not {found}", at, hint)
+    findings.add("Syntax", f"expected {_names(result.expected)}, not {shown}", at, hint)
     return None
 
 

@@ -25,8 +25,8 @@ CANDIDATES = 1000
 class TreeCheck:
     """Checks nodes against each other; errors go to the findings.
 
-    A label in a statement that did not parse (`statements.broken`) may be defined or used there, so
-    nothing is said of it. `users`: the node that uses each label, and as which input; `excused`:
+    Labels in statements that did not parse (`statements.broken`) may be defined or used there, so
+    they are not reported. `users`: the node that uses each label, and as which input; `excused`:
     labels suggested for undefined ones.
     """
 
@@ -108,8 +108,8 @@ class TreeCheck:
                 hint = "the shortest text: root = part; part = atomic();"
                 self.findings.add("Root", message, start, hint)
             return
-        known = self.users.keys() | self.statements.broken
-        tops = [label for label in self.defined if label not in known]
+        used = self.users.keys() | self.statements.broken
+        tops = [label for label in self.defined if label not in used]
         hint = "name the finished product: root = label;"
         if len(tops) == 1:
             hint = f"name the finished product, which no other uses: root = {tops[0]};"
@@ -123,13 +123,13 @@ class TreeCheck:
     def _check_undefined(self, free: Sequence[str]) -> None:
         """Labels that are used but not defined; suggestions are those defined but not used."""
         broken = self.statements.broken
-        known = [label for label in free if label not in broken]
-        known += sorted(broken - self.users.keys())
+        candidates = [label for label in free if label not in broken]
+        candidates += sorted(broken - self.users.keys())
         taken = {diagnostic.position for diagnostic in self.findings.diagnostics}
         for number, (label, positions) in enumerate(self.undefined.items()):
             near: list[str] = []
             if number < SUGGESTIONS:
-                near = [other for other in known if abs(len(other) - len(label)) <= 2]
+                near = [other for other in candidates if abs(len(other) - len(label)) <= 2]
             hint = did_you_mean(label, near[:CANDIDATES])
             if hint.startswith("did you mean"):
                 self.excused.update(other for other in near if f"'{other}'" in hint)
@@ -189,17 +189,17 @@ class TreeCheck:
             self.findings.add("Syntax", message, count, "remove one of the two")
         if not counts or self.statements.broken or not RESERVED.isdisjoint(self.defined):
             return
-        found, right = counts[0], len(self.defined)
-        if str(right) == found.lstrip("0") or right < len(self.nodes):
+        count, right = counts[0], len(self.defined)
+        if str(right) == count.lstrip("0") or right < len(self.nodes):
             return
-        if self.undefined and str(right + len(self.undefined)) == found:
+        if self.undefined and str(right + len(self.undefined)) == count:
             return
-        message = f"the text says {quoted(found)} parts, but defines {right} labels"
+        message = f"the text says {quoted(count)} parts, but defines {right} labels"
         hint = f"write: {right} parts; (every label counts) or leave the number out"
-        self.findings.add("WrongPartCount", message, found, hint)
+        self.findings.add("WrongPartCount", message, count, hint)
 
 
 def _place(node: Assembly) -> Position:
-    """Where a node that was read is defined."""
+    """The position of a node's definition."""
     assert node.position is not None
     return node.position

@@ -178,7 +178,7 @@ class ValueReader:
 
 
 def _better(kind: Kind, words: Sequence[Token]) -> str:
-    """A hint for a turn, or a colour of three numbers; "" for anything else."""
+    """A hint for a rotation, or for a colour of three numbers; "" for other values."""
     if kind is GEOMETRY["quat"]:
         return "(w, x, y, z): a turn by 90 degrees about z is quat = ( 0.7071, 0, 0, 0.7071 )"
     levels = [value for word in words if (value := number(word)) is not None and value >= 0]

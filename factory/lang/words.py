@@ -23,8 +23,8 @@ def is_number(word: str) -> bool:
 
 
 def number(word: str, unit: str = "m") -> float | None:
-    """The finite number that a word is, in metres if it is a length in `unit`: as exact as if it
-    were written in metres. None if it is none or overflows."""
+    """The finite number of a word, converted to metres from `unit` as exactly as if it were written
+    in metres. None if it is not a number or overflows."""
     if not is_number(word):
         return None
     value = float(word)

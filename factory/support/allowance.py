@@ -1,5 +1,5 @@
-"""What a search may spend: so many candidates, which are the same on any machine; and, as a mere
-bound, so much time."""
+"""The budget of a search: a number of candidates, the same on any machine, and an upper bound on
+time."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from time import monotonic
 
 @dataclass(slots=True)
 class Allowance:
-    """At most `effort` candidates are looked at, and none is begun after `seconds`. `spent`: how
-    many were; `cut_off`: whether the time ended the search first, so that on a faster machine, or a
-    quieter one, more would have been looked at."""
+    """At most `effort` candidates are examined, and none is begun after `seconds`. `spent`: their
+    number so far; `cut_off`: whether time ended the search first, so that a faster machine would
+    have examined more."""
 
     effort: float
     seconds: float = inf
@@ -22,15 +22,15 @@ class Allowance:
 
     @property
     def left(self) -> float:
-        """The time that is left [s]."""
+        """Remaining time [s]."""
         return max(0.0, self.seconds - (monotonic() - self.begun))
 
     def spend(self) -> None:
-        """One more candidate is looked at."""
+        """Count one more candidate."""
         self.spent += 1
 
     def over(self, share: float = 1.0) -> bool:
-        """Whether a share of the candidates was looked at, or the time is over."""
+        """Whether a share of the candidates has been examined, or the time is over."""
         if self.spent >= share * self.effort:
             return True
         self.cut_off = self.cut_off or monotonic() - self.begun > self.seconds

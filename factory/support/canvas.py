@@ -87,8 +87,10 @@ def hull(points: NDArray[Any]) -> list[Point]:
     from shapely import MultiPoint
     from shapely.geometry.polygon import orient
 
-    found = MultiPoint(points).convex_hull
-    around = orient(found).exterior.coords[:-1] if found.geom_type == "Polygon" else found.coords
+    outline = MultiPoint(points).convex_hull
+    around = (
+        orient(outline).exterior.coords[:-1] if outline.geom_type == "Polygon" else outline.coords
+    )
     return [(float(x), float(y)) for x, y in around]
 
 
@@ -212,22 +214,22 @@ class Canvas:
         """A label about `off` away from a point, where it covers least of what is blocked; gives
         its middle. A grid of cells keeps it near linear."""
         half = len(shortened(words)) * size * LETTER / 2, size / 2
-        found = [
+        middles = [
             (self._hidden(_about(middle, half)), number, middle)
             for number, middle in enumerate(_around(at, half, off))
         ]
-        middle = min(found)[2]
+        middle = min(middles)[2]
         self.block(_about(middle, half))
         self.label(middle, words, size, style)
         return middle
 
     def _hidden(self, box: Box) -> float:
         """How much of a box is blocked."""
-        found = {other for key in _cells(box) for other in self._taken.get(key, ())}
+        blocked = {other for key in _cells(box) for other in self._taken.get(key, ())}
         return sum(
             max(0.0, min(box[1], b[1]) - max(box[0], b[0]))
             * max(0.0, min(box[3], b[3]) - max(box[2], b[2]))
-            for b in sorted(found)
+            for b in sorted(blocked)
         )
 
     # --- signs -----------------------------------------------------------------------------------
@@ -266,11 +268,11 @@ class Canvas:
         return y + 1.2 * unit
 
 
-def _attributes(given: dict[str, object]) -> str:
+def _attributes(attributes: dict[str, object]) -> str:
     """Attributes in their order; those that are None, or no style, are left out."""
     shown = {
         name.replace("_", "-"): number(value) if isinstance(value, float) else str(value)
-        for name, value in given.items()
+        for name, value in attributes.items()
         if value is not None and (name, value) != ("class", "")
     }
     return "".join(f" {name}={quoteattr(value)}" for name, value in shown.items())

@@ -1,4 +1,4 @@
-"""Files that are written as long as a run takes, by one process at a time."""
+"""Files that one process at a time writes during a run."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from pathlib import Path
 from factory.support.errors import Diagnostic, InputError
 
 IN_USE = "is being written by another run", "give another name, or wait until that run ends"
-"""What is wrong with a file that is claimed, and what would mend it."""
+"""The fault of a claimed file, and its remedy."""
 
 
 def claimed(path: Path) -> FileIO:
-    """A file to append to, empty, that no other process can claim as long as it is open.
+    """An empty file to append to, which no other process can claim while it is open.
 
     The claim is a lock of the operating system, which ends with the process, however that ends. A
     pipe or a device is not claimed. Raises InputError (BadFile) where another process holds it,
@@ -25,7 +25,7 @@ def claimed(path: Path) -> FileIO:
 
 
 def claimed_again(path: Path) -> FileIO:
-    """A file that is there, to be written on, at its beginning, with its content as it is. It is
+    """An existing file opened for writing at its beginning, with its content kept. It is
     claimed as by `claimed`, which raises the same."""
     return _claimed(path, "r+")
 
@@ -40,7 +40,7 @@ def _claimed(path: Path, mode: str) -> FileIO:
 
 
 def is_claimed(path: Path) -> bool:
-    """Whether another process, or this one, holds a file at the moment, as far as can be seen."""
+    """Whether a process, this one included, holds a file at the moment."""
     try:
         if not path.is_file():
             return False

@@ -9,8 +9,8 @@ from contextlib import contextmanager
 
 @contextmanager
 def collector_paused() -> Iterator[None]:
-    """No collection inside, or inside a function that this decorates. Repeated walks over all
-    values would make a linear stage take three times as long."""
+    """A context, or decorator, without garbage collection, which would make a linear stage take
+    three times as long."""
     enabled = gc.isenabled()
     gc.disable()
     try:

@@ -19,17 +19,18 @@ from factory.support.errors import SHOWN, Diagnostic, FactoryError, one_line, pr
 SCHEMA = 1
 
 POOL_BOUND = "a larger pool of parts has too many bodies for the engine; --wip overrides this"
-"""Why the factory bounds the units inside at once."""
+"""The reason why the factory limits the units inside at once."""
 
 CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
-"""Characters that command a terminal, or turn the direction of what it shows."""
+"""Control characters of terminals and of text direction."""
 
 STDOUT = "what is printed"
 """The name of stdout in messages."""
 
 
 def emit(document: Mapping[str, Any]) -> None:
-    """One JSON document on stdout, in ASCII whatever the locale; null for what is not finite."""
+    """Print one JSON document to stdout, in ASCII whatever the locale, with null for numbers that
+    are not finite."""
     document = {"schema": SCHEMA, **document}
     try:
         text = json.dumps(document, allow_nan=False)
@@ -48,14 +49,14 @@ def finite(value: Any) -> Any:
 
 
 def say(text: str = "") -> None:
-    """Lines on stdout; control codes, which a file may have brought, do not reach the terminal."""
+    """Print lines to stdout, without control characters that come from files."""
     with _named():
         print(CONTROL.sub(" ", text))
 
 
 @contextmanager
 def _named() -> Iterator[None]:
-    """Errors of stdout within it name that."""
+    """A context in which errors of stdout name it."""
     try:
         yield
     except OSError as error:
@@ -71,26 +72,26 @@ def warn(diagnostics: Iterable[Diagnostic], quiet: bool = False) -> None:
 
 
 def warning(diagnostic: Diagnostic) -> Diagnostic:
-    """A diagnostic that says of itself that it is a warning."""
+    """A diagnostic marked as a warning."""
     return replace(diagnostic, message=f"warning: {diagnostic.message}")
 
 
 def fail(error: FactoryError, as_json: bool, details: Mapping[str, Any] | None = None) -> int:
-    """Print an error to stderr, with `as_json` also to stdout, there with `details` as further
-    keys, as far as they can be written; gives the exit status."""
+    """Print an error to stderr and, with `as_json`, to stdout with `details` as further keys;
+    returns the exit status. Errors of the streams are ignored."""
     with suppress(OSError):
         if as_json:
             errors = [d.as_json() for d in error.diagnostics[:SHOWN]]
-            told = {"errors": errors, **(details or {})}
+            document = {"errors": errors, **(details or {})}
             more = len(error.diagnostics) - SHOWN
-            emit({**told, "errors_left_out": more} if more > 0 else told)
+            emit({**document, "errors_left_out": more} if more > 0 else document)
     with suppress(OSError):
         print(error, file=sys.stderr)
     return error.exit_status
 
 
 def table(title: str, columns: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> None:
-    """A table on stdout, as wide as the terminal, 160 columns elsewhere."""
+    """Print a table to stdout, as wide as the terminal, or 160 columns elsewhere."""
     from rich import box
     from rich.console import Console
     from rich.markup import escape

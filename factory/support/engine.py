@@ -37,7 +37,7 @@ def _warn(words: str) -> None:
 
 @contextmanager
 def unwarned() -> Iterator[None]:
-    """Warnings of the engine, and of its Python binding, are not printed."""
+    """A context without warnings of the engine and of its Python binding."""
     mujoco.set_mju_user_warning(lambda words: None)
     try:
         with warnings.catch_warnings(action="ignore"):
@@ -48,7 +48,7 @@ def unwarned() -> Iterator[None]:
 
 @contextmanager
 def by_name() -> Iterator[None]:
-    """Raises InputError (Engine) where a model lacks what is looked up in it by its name."""
+    """A context in which a name that a model lacks raises InputError (Engine)."""
     try:
         yield
     except KeyError as error:

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def environment(name: str, value: str) -> Iterator[None]:
-    """An environment variable set for a while, then as it was."""
+    """A context in which an environment variable is set; it is restored afterwards."""
     before = os.environ.get(name)
     os.environ[name] = value
     try:

@@ -1,6 +1,6 @@
 """Errors, with codes and places in the user's file.
 
-A `Diagnostic` says where, what was found and what would have been valid; a `FactoryError`
+A `Diagnostic` has a position, what was found and what would have been valid; a `FactoryError`
 carries every diagnostic of one stage. The command line prints them and takes its exit status
 from the class.
 """
@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 
 SHOWN = 100
-"""The most diagnostics that are printed at once; the others are counted."""
+"""Maximum number of diagnostics that are printed; the others are counted."""
 
 LONGEST = 1000
-"""The most characters of a message or a hint that are printed."""
+"""Maximum number of characters of a message or a hint."""
 
 WORD = 200
 """A longer word is not compared with valid ones, which would take memory and time."""
@@ -36,9 +36,9 @@ class Position:
 
 @dataclass(frozen=True, slots=True)
 class Diagnostic:
-    """One error or warning: a documented code, what was found, where, and a way out. `many`: how
-    several of the same cause are counted, "meshes are open: ..."; "" where each is told. `about`:
-    the label it is about, by which one of many is named in a line, without what the hint says."""
+    """One error or warning: a documented code, what was found, its position, and a remedy as hint.
+    `many`: the words for several of the same cause, as in "4 meshes are open: ..."; "" if each is
+    listed. `about`: the label by which it is named in such a line."""
 
     code: str
     message: str
@@ -90,8 +90,8 @@ def _window(source: str, caret: int, width: int = 100) -> tuple[str, int]:
 
 
 class FactoryError(Exception):
-    """What a stage of the factory refuses, as one or more diagnostics, of which the first SHOWN are
-    printed. Exit status 2."""
+    """The errors of a stage, as one or more diagnostics, of which the first SHOWN are printed. Exit
+    status 2."""
 
     exit_status = 2
 
@@ -109,6 +109,11 @@ class FactoryError(Exception):
 
 class InputError(FactoryError):
     """Bad input: a PAG, a template, a net, a log, an option. Exit status 2."""
+
+
+def usage_error(message: str, hint: str) -> InputError:
+    """A wrong use of the command line (code Usage)."""
+    return InputError(Diagnostic("Usage", message, None, hint))
 
 
 class RunError(FactoryError):
@@ -136,9 +141,9 @@ def printed(diagnostics: Sequence[Diagnostic], noun: str) -> list[str]:
     return [*map(str, diagnostics[:SHOWN]), *last]
 
 
-def did_you_mean(found: str, valid: Sequence[str], noun: str = "") -> str:
+def did_you_mean(word: str, valid: Sequence[str], noun: str = "") -> str:
     """A hint that suggests the nearest valid name, or lists what there is (at most twelve)."""
-    near = get_close_matches(found, valid, n=1, cutoff=0.6) if len(found) <= WORD else []
+    near = get_close_matches(word, valid, n=1, cutoff=0.6) if len(word) <= WORD else []
     if near:
         return f"did you mean '{near[0]}'?"
     if not valid:

@@ -32,7 +32,7 @@ def installs(extra: str) -> str:
 
 def optional(module: str, package: str, what: str, extra: str, otherwise: str = "") -> Any:
     """A module of an optional package, which `what` needs. Raises MissingError with the command
-    that installs it, or how to do without."""
+    that installs it, or with an alternative."""
     try:
         with put_off():
             return import_module(module)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import mmap
 import os
+import re
 import select
 import shutil
 import stat
@@ -190,8 +191,8 @@ def is_plan(file: Path) -> bool:
 
 def user_cache() -> Path:
     """The user's folder for files that can be made again: in $XDG_CACHE_HOME, or ~/.cache."""
-    given = os.environ.get("XDG_CACHE_HOME", "")
-    base = Path(given) if os.path.isabs(given) else Path(os.path.expanduser("~")) / ".cache"
+    folder = os.environ.get("XDG_CACHE_HOME", "")
+    base = Path(folder) if os.path.isabs(folder) else Path(os.path.expanduser("~")) / ".cache"
     return base / "klavins-factory"
 
 
@@ -208,3 +209,9 @@ def _remove(files: Iterable[Path], folders: list[Path]) -> None:
     for folder in reversed(folders):
         with suppress(OSError):
             folder.rmdir()
+
+
+def natural(name: str) -> tuple[tuple[int, str], ...]:
+    """Sort key of names with numbers: `part2` comes before `part10`."""
+    words = re.split(r"(\d+)", name.lower())
+    return tuple((int(word), "") if word.isdigit() else (-1, word) for word in words)

@@ -48,18 +48,18 @@ def context(width: int, height: int) -> Any:
     module = {"egl": "mujoco.egl", "osmesa": "mujoco.osmesa"}.get(prepare(), "mujoco.glfw")
     with put_off():
         made: Any = import_module(module).GLContext
-    found = made(width, height)
-    found.make_current()
-    return found
+    made_context = made(width, height)
+    made_context.make_current()
+    return made_context
 
 
 def probe() -> None:
     """Render a tiny picture in a subprocess, once in this process for the same environment. Raises
     MissingError (NoGL) with the command that helps."""
     prepare()
-    found = _probed(tuple((name, os.environ.get(name)) for name in ("MUJOCO_GL", *_DETOURS)))
-    if found is not None:
-        raise MissingError(found)
+    fault = _probed(tuple((name, os.environ.get(name)) for name in ("MUJOCO_GL", *_DETOURS)))
+    if fault is not None:
+        raise MissingError(fault)
 
 
 @cache
@@ -149,7 +149,8 @@ def trial() -> None:
 
 
 def import_mujoco() -> Any:
-    """The engine, whatever MUJOCO_GL says. Raises MissingError where it cannot be loaded."""
+    """The engine, for rooms that may not import it. Raises MissingError where it cannot be
+    loaded."""
     from factory.support.engine import mujoco
 
     return mujoco

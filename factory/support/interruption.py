@@ -73,12 +73,12 @@ def interrupt(number: int, frame: FrameType | None) -> None:
 
 def _importer(frame: FrameType | None) -> FrameType | None:
     """The outermost frame that imports something, None within no import."""
-    found = None
+    importer = None
     while frame is not None:
         if frame.f_code.co_filename == "<frozen importlib._bootstrap>":
-            found = frame.f_back
+            importer = frame.f_back
         frame = frame.f_back
-    return found
+    return importer
 
 
 def awaited(work: Callable[[], T]) -> T:

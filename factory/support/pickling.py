@@ -11,5 +11,5 @@ def _locked(contents: dict[object, object]) -> MappingProxyType[object, object]:
 
 
 def pickle_locked_mappings() -> None:
-    """From now on pickle copies a locked mapping."""
+    """Teach pickle to copy locked mappings."""
     copyreg.pickle(MappingProxyType, lambda proxy: (_locked, (dict(proxy),)))

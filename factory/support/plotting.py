@@ -23,8 +23,8 @@ STYLE: dict[str, Any] = {
 
 
 def require_matplotlib(what: str, otherwise: str) -> None:
-    """Raises MissingError where there is no matplotlib, which `what` needs; `otherwise`: how to do
-    without."""
+    """Raises MissingError if matplotlib, which `what` needs, is not installed; `otherwise`: an
+    alternative."""
     optional("matplotlib.figure", "matplotlib", what, "plots", otherwise)
 
 

@@ -25,8 +25,8 @@ LINES = 30.0
 
 
 class ProgressBar(Closing):
-    """A bar that is shown within its context; not where `quiet`, or where stderr is no terminal.
-    `told`: lines take its place there."""
+    """A progress bar that is shown within its context, unless `quiet` or stderr is not a terminal.
+    `told`: whether lines are printed instead."""
 
     def __init__(self, quiet: bool) -> None:
         self.shown = not quiet and sys.stderr.isatty()
@@ -51,29 +51,16 @@ class ProgressBar(Closing):
         raise NotImplementedError
 
 
-def counter(after: str, before: str = "") -> Bar:
-    """A bar between words, with the number done, the number in all and the time left."""
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeRemainingColumn,
-    )
+def counter(words: str) -> Bar:
+    """A bar with the number done, the total, words and the time left."""
+    from rich import progress as rich
 
-    return Progress(
-        *([TextColumn(before)] if before else []),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn(after),
-        TimeRemainingColumn(),
-        console=_stderr(),
-        transient=True,
-    )
+    done = rich.BarColumn(), rich.MofNCompleteColumn(), rich.TextColumn(words)
+    return rich.Progress(*done, rich.TimeRemainingColumn(), console=_stderr(), transient=True)
 
 
 class Waiting(ProgressBar):
-    """Says `what` goes on within its context, and since when."""
+    """A spinner that shows `what` is in progress within its context, and the time elapsed."""
 
     def __init__(self, what: str, quiet: bool = False) -> None:
         super().__init__(quiet)
@@ -95,7 +82,7 @@ class Waiting(ProgressBar):
         return bar, bar.add_task(self.what)
 
     def close(self) -> None:
-        """Remove the spinner; nothing is said any more."""
+        """Remove the spinner and stop printing."""
         self.over.set()
         if self._teller.is_alive():
             self._teller.join()
@@ -107,8 +94,8 @@ class Waiting(ProgressBar):
 
 
 class StepBar(Waiting):
-    """Waiting in steps: says what goes on, how many of how many are done, and the time left; of a
-    step with an unknown end that until a `limit` [s]."""
+    """A bar of a task in steps, with their number and the time left; for a step with an unknown
+    number, the time until a `limit` [s]."""
 
     def __init__(self, what: str, quiet: bool = False, limit: float | None = None) -> None:
         super().__init__(what, quiet)
@@ -116,21 +103,17 @@ class StepBar(Waiting):
 
     def drawn(self) -> tuple[Bar, TaskID]:
         """What goes on before the bar, words behind, the time gone by and the time left."""
-        from rich.progress import (
-            BarColumn,
-            Progress,
-            TextColumn,
-            TimeElapsedColumn,
-            TimeRemainingColumn,
-        )
+        from rich import progress as rich
 
-        before, behind = TextColumn("{task.description}"), TextColumn("{task.fields[words]}")
-        times = TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn()
-        bar = Progress(before, BarColumn(), behind, *times, console=_stderr(), transient=True)
+        before = rich.TextColumn("{task.description}")
+        behind = rich.TextColumn("{task.fields[words]}")
+        times = rich.TimeElapsedColumn(), rich.TextColumn("left"), rich.TimeRemainingColumn()
+        columns = before, rich.BarColumn(), behind, *times
+        bar = rich.Progress(*columns, console=_stderr(), transient=True)
         return bar, bar.add_task(self.what, total=None, words="")
 
     def show(self, what: str, done: int, total: int | None, words: str = "") -> None:
-        """So many are `done` of a `total`, None where that is not known."""
+        """Show that `done` of a `total` are done, None for an unknown total."""
         count = f"{done}" if total is None else f"{done} of {total}"
         words = f"{count}, {words}" if words else count
         if self.bar is not None:
@@ -144,8 +127,8 @@ class StepBar(Waiting):
 
 
 class Progress(ProgressBar):
-    """The bar of a run, which it observes. `seconds`: a bound on its length [simulated s], from
-    which the time left is told."""
+    """The bar of a run, which it observes. `seconds`: an upper bound on its duration [simulated s],
+    from which the time left is estimated."""
 
     def __init__(self, units: int, quiet: bool = False, seconds: float = 0.0) -> None:
         super().__init__(quiet)

@@ -1,4 +1,4 @@
-"""Resources that are closed at the end: a film, a log, a painter."""
+"""Resources that must be closed: a film, a log, a painter."""
 
 from __future__ import annotations
 

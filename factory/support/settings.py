@@ -27,36 +27,36 @@ RANGES = {
 """Least and greatest value of each setting; beyond them a run overflows or never ends."""
 
 LONGEST = 1e9
-"""Upper bound on a time that is asked for [s]: 30 years."""
+"""Upper bound on a time given by the user [s]: 30 years."""
 
 DWELL = 86_400.0
 """Upper bound on the dwell of an operation [s]: a day."""
 
 MOST_BRANCHES = 60
-"""The most branches that serve in turn, and the most units of a period."""
+"""Maximum number of parallel branches, and of units of a period."""
 
 LEAST: Literal["least"] = "least"
-"""As few robots as found."""
+"""The fewest robots that are found."""
 
 AUTO: Literal["auto"] = "auto"
-"""The timestep of settings that leave it to the factory."""
+"""The timestep that the factory chooses."""
 
 TICK = 0.01
-"""Period of the supervisor [s] where nothing else is asked for; no other period is greater but that
-of a greater timestep, or where both timestep and substeps are given."""
+"""Default period of the supervisor [s]. Other periods are not longer, except that of a longer
+timestep, or if both timestep and substeps are given."""
 
 LOOK = 0.1
-"""Longest time between two checks of what is not checked in every tick [s]."""
+"""Longest time between two of the checks that are not made in every tick [s]."""
 
 MOST = 10
-"""The most ticks that the engine takes at once."""
+"""Maximum number of ticks that the engine takes at once."""
 
 WHOLE = ("substeps", "stage", "hands")
 """Settings that are whole numbers."""
 
 
 EXAMPLES: Mapping[str, str] = MappingProxyType({"timestep": '0.002, or "auto"', "substeps": "5"})
-"""Values of the settings whose default is no number."""
+"""Examples of settings whose default is not a number."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,8 +124,8 @@ class Settings:
 
     @property
     def stride(self) -> int:
-        """Ticks between two checks of what is not checked in every tick; the engine takes no more
-        at once."""
+        """Ticks between two of the checks that are not made in every tick; the engine takes at most
+        these at once."""
         return min(max(1, int(LOOK / self.tick * (1 + 1e-9))), MOST)
 
     @property
@@ -139,17 +139,17 @@ class Settings:
 
         Raises InputError (BadValue) with every number that is not within its range.
         """
-        given = {name: value for name, value in options.items() if value is not None}
-        faults = [_out_of_range(name, value) for name, value in given.items()]
+        values = {name: value for name, value in options.items() if value is not None}
+        faults = [_out_of_range(name, value) for name, value in values.items()]
         if any(faults):
             raise InputError(fault for fault in faults if fault)
-        return replace(self, **given)  # type: ignore[arg-type]
+        return replace(self, **values)  # type: ignore[arg-type]
 
 
 def environment() -> dict[str, float | str]:
     """The settings in the environment: `FACTORY_SPEED` and so on; an empty variable sets nothing.
     Raises InputError (BadValue) with every one that is no number within its range."""
-    found, faults = dict[str, float | str](), []
+    values, faults = dict[str, float | str](), []
     for name in RANGES:
         variable = f"FACTORY_{name.upper()}"
         text = os.environ.get(variable, "").strip()
@@ -160,10 +160,10 @@ def environment() -> dict[str, float | str]:
         if fault is not None:
             faults.append(replace(fault, message=f"in the environment {variable}: {fault.message}"))
         elif value is not None:
-            found[name] = value
+            values[name] = value
     if faults:
         raise InputError(faults)
-    return found
+    return values
 
 
 def _number(text: str, kind: type[int] | type[float]) -> float | None:
@@ -174,13 +174,13 @@ def _number(text: str, kind: type[int] | type[float]) -> float | None:
 
 
 def is_auto(name: str, value: object) -> bool:
-    """Whether the value of a setting leaves it to the factory."""
+    """Whether a setting is AUTO, which lets the factory choose."""
     return name == "timestep" and value == AUTO
 
 
 def wrong_type(name: str, value: object) -> Diagnostic | None:
-    """What is wrong with the value of a setting, if it is no number within its range, nor AUTO
-    where that may be."""
+    """The error of the value of a setting that is neither a number within its range nor AUTO where
+    that is valid; None for a valid value."""
     if is_auto(name, value):
         return None
     kind = "whole number" if name in WHOLE else "number"

@@ -1,7 +1,7 @@
-"""Values as tables: frozen dataclasses as what JSON holds, and back, by the types of their fields.
+"""Values as tables: frozen dataclasses to JSON values and back, by the types of their fields.
 
-A field that has its default is left out of a table. Numbers keep their last bit. A table may come
-from anyone: what is read is of the type that its place asks for, or refused with that place.
+A field that has its default is left out of a table. Numbers keep their last bit. Tables are not
+trusted: each value must have the type of its place, or is refused with that place.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ WORDS = {bool: "true or false", str: "a text", NoneType: "null"} | {
     int: "a whole number within ±2^63",
     float: f"a number within ±{LARGE:g}",
 }
-"""What values of a simple type are called."""
+"""Values of simple types in words."""
 
 
 def table_of(value: Any) -> Any:
-    """What JSON holds of a value: a table of a dataclass, with the fields that do not have their
-    defaults, or of a mapping; a list of a tuple or a set."""
+    """The JSON value of a value: a table for a dataclass, with the fields that differ from their
+    defaults, or for a mapping; a list for a tuple or a set."""
     if is_dataclass(value):
         held = ((field, getattr(value, field.name)) for field in fields(value))
         return {f.name: table_of(v) for f, v in held if not _is_default(f, v)}
@@ -76,15 +76,15 @@ def _value(kind: Any, table: Any, place: str) -> Any:
 
 
 def _record(kind: Any, table: Any, place: str) -> Any:
-    """A dataclass; what it refuses itself is refused with its place."""
+    """A dataclass; a ValueError of its own gets the place."""
     if not isinstance(table, dict):
         raise _wrong(place, "a table", table)
-    known = {field.name: field for field in fields(kind)}
+    valid = {field.name: field for field in fields(kind)}
     for name in table:
-        if name not in known:
-            hint = did_you_mean(str(name), [*known], "keys")
+        if name not in valid:
+            hint = did_you_mean(str(name), [*valid], "keys")
             raise ValueError(f"{_named(place)} has no key {shortened(name)}: {hint}")
-    for name, field in known.items():
+    for name, field in valid.items():
         if name not in table and field.default is field.default_factory is MISSING:
             raise ValueError(f"{_named(place)} lacks the key '{name}'")
     kinds, start = _types(kind), f"{place}." if place else ""
@@ -96,8 +96,7 @@ def _record(kind: Any, table: Any, place: str) -> Any:
 
 
 def _one_of(kinds: tuple[Any, ...], table: Any, place: str) -> Any:
-    """A value of one of several types: nothing where that is one of them, else the first that
-    fits."""
+    """A value of a union: None if that is valid, else of the first type that fits."""
     others = [kind for kind in kinds if kind is not NoneType]
     if table is None and len(others) < len(kinds):
         return None

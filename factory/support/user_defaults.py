@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -61,25 +61,25 @@ class Defaults:
     values: Mapping[str, Any] = field(default_factory=dict)
 
     def settings(self) -> Settings:
-        """The settings of the file, and the built-in ones where it has none."""
-        given = {k: v for k, v in self.values.items() if k in RANGES}
+        """The settings of the file, with the built-in defaults for the others."""
+        values = {k: v for k, v in self.values.items() if k in RANGES}
         return Settings().with_options(
-            {k: v if k in WHOLE or is_auto(k, v) else float(v) for k, v in given.items()}
+            {k: v if k in WHOLE or is_auto(k, v) else float(v) for k, v in values.items()}
         )
 
     def options(self) -> dict[str, Any]:
         """The values of options; folders are those beside the file."""
-        found = {k: v for k, v in self.values.items() if k in OPTIONS}
-        if "templates" in found:
-            found["templates"] = tuple(self.path.parent / folder for folder in found["templates"])
-        return found
+        values = {k: v for k, v in self.values.items() if k in OPTIONS}
+        if "templates" in values:
+            values["templates"] = tuple(self.path.parent / folder for folder in values["templates"])
+        return values
 
     def lines(self) -> tuple[tuple[str, ...], ...]:
         """The labels that share a robot, line by line."""
         return tuple(map(tuple, self.values.get(LINES, {}).values()))
 
     def parallel(self) -> dict[str, int]:
-        """How often the branch that brings a label is there, by the label."""
+        """The number of parallel branches of each label."""
         return dict(self.values.get(PARALLEL, {}))
 
     def at(self, key: str) -> Position:
@@ -101,15 +101,15 @@ def load_defaults(path: Path) -> Defaults:
     """
     if not path.is_file():
         return Defaults(path)
-    found = Defaults(path, *read_toml(path, "see https://toml.io"))
+    defaults = Defaults(path, *read_toml(path, "see https://toml.io"))
     faults = []
-    for key, value in found.values.items():
+    for key, value in defaults.values.items():
         fault = _fault(key, value)
         if fault is not None:
-            faults.append(replace(fault, position=found.at(key)))
+            faults.append(replace(fault, position=defaults.at(key)))
     if faults:
         raise InputError(faults)
-    return found
+    return defaults
 
 
 def _fault(key: str, value: object) -> Diagnostic | None:
@@ -117,9 +117,11 @@ def _fault(key: str, value: object) -> Diagnostic | None:
     if key in RANGES:
         return wrong_type(key, value)
     if key == LINES:
-        return _fault_of_lines(value)
+        example = 'side = ["part2", "part3"]'
+        return _fault_of_table(key, value, _is_line, "lists of labels", example)
     if key == PARALLEL:
-        return _fault_of_branches(value)
+        what = f"labels with whole numbers from 1 to {MOST_BRANCHES}"
+        return _fault_of_table(key, value, _is_number, what, "sub2 = 3")
     if key not in OPTIONS:
         hint = did_you_mean(key, [*RANGES, *OPTIONS, LINES, PARALLEL], "keys")
         return Diagnostic("UnknownParameter", f"unknown key '{key}'", None, hint)
@@ -134,38 +136,35 @@ def _fault(key: str, value: object) -> Diagnostic | None:
     return Diagnostic("BadValue", message, None, f"for example {key} = {example}")
 
 
-def _fault_of_lines(value: object) -> Diagnostic | None:
-    """What is wrong with the table of lines."""
-    rows = [*value.values()] if isinstance(value, dict) else [None]
-    if all(isinstance(row, list) and all(isinstance(x, str) for x in row) for row in rows):
+def _fault_of_table(
+    key: str, value: object, valid: Callable[[Any], bool], what: str, example: str
+) -> Diagnostic | None:
+    """What is wrong with a table, whose values must be `valid`."""
+    if isinstance(value, dict) and all(map(valid, value.values())):
         return None
-    message = f"{LINES} must be a table of lists of labels"
-    hint = f'for example a line [{LINES}], and below it side = ["part2", "part3"]'
-    return Diagnostic("BadValue", message, None, hint)
+    hint = f"for example a line [{key}], and below it {example}"
+    return Diagnostic("BadValue", f"{key} must be a table of {what}", None, hint)
 
 
-def _fault_of_branches(value: object) -> Diagnostic | None:
-    """What is wrong with the table of parallel branches."""
-    numbers = [*value.values()] if isinstance(value, dict) else [None]
-    if all(type(k) is int and 1 <= k <= MOST_BRANCHES for k in numbers):
-        return None
-    message = f"{PARALLEL} must be a table of labels with whole numbers from 1 to {MOST_BRANCHES}"
-    hint = f"for example a line [{PARALLEL}], and below it sub2 = 3"
-    return Diagnostic("BadValue", message, None, hint)
+def _is_line(row: object) -> bool:
+    return isinstance(row, list) and all(isinstance(label, str) for label in row)
+
+
+def _is_number(number: object) -> bool:
+    return type(number) is int and 1 <= number <= MOST_BRANCHES
 
 
 def key_position(path: Path, text: str, key: str) -> Position:
-    """The place of a key in TOML: its first mention at the start of a line, or in a header."""
+    """Position of a key in TOML: its first occurrence at the start of a line or in a header."""
     for number, line in enumerate(text.splitlines(), 1):
-        if found := re.match(rf"""\s*\[*\s*["']?({re.escape(key)})\b""", line):
-            return Position(str(path), number, found.start(1) + 1, line)
+        if match := re.match(rf"""\s*\[*\s*["']?({re.escape(key)})\b""", line):
+            return Position(str(path), number, match.start(1) + 1, line)
     return Position(str(path), 1, 1)
 
 
 def read_toml(path: Path, hint: str) -> tuple[str, dict[str, Any]]:
-    """A TOML file, and what it says. Raises InputError, with the hint: BadFile where it cannot be
-    read, Syntax where it is no TOML."""
-    start = Position(str(path), 1, 1)
+    """Text and content of a TOML file. Raises InputError, with the hint: BadFile if it cannot be
+    read, Syntax if it is not TOML."""
     try:
         content = read_bytes(path, TABLE)
     except OSError as error:
@@ -176,22 +175,20 @@ def read_toml(path: Path, hint: str) -> tuple[str, dict[str, Any]]:
         return text, tomllib.loads(text)
     except UnicodeDecodeError as error:
         words = f"byte 0x{content[error.start]:02x} is not UTF-8 text"
-        raise InputError(Diagnostic("Syntax", words, start, hint)) from None
     except tomllib.TOMLDecodeError as error:
         raise InputError(_broken(path, text, str(error), hint)) from None
     except RecursionError:
         words = "the file is nested too deeply"
-        raise InputError(Diagnostic("Syntax", words, start, hint)) from None
     except ValueError:
         words = "a number has too many digits"
-        raise InputError(Diagnostic("Syntax", words, start, hint)) from None
+    raise InputError(Diagnostic("Syntax", words, Position(str(path), 1, 1), hint))
 
 
 def _broken(path: Path, text: str, words: str, hint: str) -> Diagnostic:
-    """The error of tomllib, at the place that it names."""
-    found = re.search(r" \(at line (\d+), column (\d+)\)", words)
-    if found is None:
+    """The error of tomllib, at its position."""
+    match = re.search(r" \(at line (\d+), column (\d+)\)", words)
+    if match is None:
         return Diagnostic("Syntax", words, Position(str(path), 1, 1), hint)
-    line, column = int(found[1]), int(found[2])
+    line, column = int(match[1]), int(match[2])
     at = Position(str(path), line, column, text.splitlines()[line - 1])
-    return Diagnostic("Syntax", words.replace(found[0], ""), at, hint)
+    return Diagnostic("Syntax", words.replace(match[0], ""), at, hint)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from factory.support.errors import Diagnostic, InputError, did_you_mean
+from factory.support.errors import did_you_mean, usage_error
 
 FOLDER = Path(__file__).resolve().parent
 
@@ -25,23 +25,23 @@ class CodeExplanation:
 
 @cache
 def codes() -> tuple[str, ...]:
-    """Every code, in the order of the alphabet."""
+    """All codes in alphabetical order."""
     return tuple(sorted(path.stem for path in FOLDER.glob("*.txt")))
 
 
 def explain(code: str) -> CodeExplanation:
-    """The explanation of a code, in upper or lower case. Raises InputError (Usage) with the codes
-    like it where there is none."""
-    known = {name.lower(): name for name in codes()}
-    name = known.get(code.strip().lower())
+    """The explanation of a code, in upper or lower case. Raises InputError (Usage) with similar
+    codes for an unknown one."""
+    names = {name.lower(): name for name in codes()}
+    name = names.get(code.strip().lower())
     if name is None:
-        raise InputError(Diagnostic("Usage", f"there is no code '{code}'", None, _near(code)))
+        raise usage_error(f"there is no code '{code}'", _near(code))
     title, _, text = (FOLDER / f"{name}.txt").read_text("utf-8").partition("\n\n")
     return CodeExplanation(name, title, text.rstrip("\n"))
 
 
 def _near(code: str) -> str:
-    """A few codes that have the word in them, or the one most like it."""
+    """The codes that contain the word, or the most similar one."""
     inside = [name for name in codes() if len(code) > 2 and code.lower() in name.lower()]
     if inside:
         return "there are " + ", ".join(inside) if len(inside) > 1 else f"there is {inside[0]}"
