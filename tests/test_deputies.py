@@ -194,7 +194,7 @@ def test_the_reasons() -> None:
     branch, part2 = (robot_of(factory, label) for label in ("sub3", "part2"))
     assert "different robots" in refused(factory, part2, branch)
     tool = next(r.index for r in factory.robots if r.type == "tool")
-    assert "no type of robot is fit" in refused(factory, part2, tool)
+    assert "no robot type fits" in refused(factory, part2, tool)
 
 
 def test_what_delivers_to_it_must_reach_the_other() -> None:

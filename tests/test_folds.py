@@ -536,7 +536,7 @@ def test_the_output_robot_and_tools_share_no_line() -> None:
     part = robot_of(factory, "part2")
     for line, message in (
         ((0, part), "the output robot has a line of its own"),
-        ((tool, part), "no type of robot is fit for both"),
+        ((tool, part), "no robot type fits both"),
     ):
         with pytest.raises(InputError, match=message):
             fold(factory, [line], catalogue())
@@ -608,7 +608,7 @@ def test_what_keeps_lines_apart_is_why_they_are_no_fold_as_one() -> None:
     [
         ("sides_of", lambda *_: {-1, +1}),
         ("mismatch", lambda *_: ""),
-        ("mismatch", lambda *_: "no type of robot is fit for both"),
+        ("mismatch", lambda *_: "no robot type fits both"),
     ],
 )
 def test_what_is_wrongly_said_to_keep_lines_apart_is_found(

@@ -192,7 +192,7 @@ def mismatch(
     if on[ends[0].carrier] != on[ends[1].carrier]:
         return "they deliver to different robots"
     if catalogue.meet(factory.robots[one].type, factory.robots[other].type) is None:
-        return "no type of robot is fit for both"
+        return "no robot type fits both"
     if kind_of(factory, one) != kind_of(factory, other):
         return "they begin or end in different ways"
     return ""

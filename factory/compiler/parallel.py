@@ -82,12 +82,12 @@ def _faults(factory: Factory, branches: Branches) -> Iterator[Diagnostic]:
             continue
         other, number = times.setdefault(robot, (label, k))
         if (other, number) != (label, k):
-            message = f"one robot brings '{other}', {number} times, and '{label}', {k} times"
+            message = f"one robot brings both '{other}' ({number} branches) and '{label}' ({k})"
             yield _fault(message, factory.robots[robot].position, "name one of the two")
         if k > 1:
             yield from _not_inserted(factory, robot)
     if taken and any(k > 1 for _, k in branches):
-        message = f"the label '{taken[0]}' looks like one for a further unit"
+        message = f"the label '{taken[0]}' is reserved for further units"
         position = factory.by_label[taken[0]].position
         yield _fault(message, position, "give it a name without '@'")
 
@@ -100,8 +100,8 @@ def _not_brought(factory: Factory, label: str) -> Diagnostic:
         return _fault(f"there is no label '{label}'", None, did_you_mean(label, labels, "labels"))
     robot = made.carrier
     if robot == 0:
-        message = f"'{label}' is made by the output robot, which there is one of"
-        hint = "end its line before: let a third robot carry what is slow, by `mate`"
+        message = f"'{label}' is made by the output robot, of which there is only one"
+        hint = "let a third robot carry the slow sub-assembly, by `mate`"
         return _fault(message, made.position, hint)
     brought = factory.deliveries(robot)[0]
     message = f"no robot brings '{label}' to another: it becomes '{brought}' on its robot"
@@ -117,12 +117,12 @@ def _not_inserted(factory: Factory, robot: int) -> Iterator[Diagnostic]:
         hint = f"write it with `insert`, '{label}' last: then there is a station for each branch"
         if o.before[carrier] == NOPART:
             message = (
-                f"'{label}' comes to the beginning of a robot's way in '{o.label}', where there is"
+                f"'{label}' comes to the start of a robot's path in '{o.label}', where there is"
                 " room for one"
             )
             yield _fault(message, o.position, hint)
         elif len(o.robots) > 2:
-            message = f"'{o.label}' takes '{label}' together with others, at one place"
+            message = f"'{o.label}' takes '{label}' and other inputs at the same place"
             yield _fault(message, o.position, hint)
 
 
