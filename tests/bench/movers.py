@@ -92,7 +92,7 @@ def section(results: dict[str, Any]) -> str:
             " checks of collisions that its examples make in every timestep. Our robots are in"
             " steady production and carry parts: one body per part, the whole pool, contact between"
             " payloads on, a supervisor that ticks every five timesteps. Times real time, median"
-            f" (least–greatest) of {results['runs']} processes each, which took turns; MagBotSim"
+            f" (least–greatest) of {results['runs']} interleaved processes each; MagBotSim"
             f" for {results['wall_s']:g} s of wall time each after 0.1 s simulated. The ratio is"
             " the median of those within each turn, to MagBotSim without its checks.",
             table(head, rows),

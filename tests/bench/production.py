@@ -143,7 +143,7 @@ def section(results: dict[str, Any]) -> str:
             "## Production",
             "A balanced tree of mates of parts without geometry, contact between payloads on,"
             " jitter 0, neither filmed nor logged. Each figure is the median (least–greatest) of"
-            f" {results['runs']} processes, which took turns. *Units* are made from the empty"
+            f" {results['runs']} interleaved processes. *Units* are made from the empty"
             " factory, as most runs do. The *steady* window begins when production repeats itself:"
             " a cycle has gone by, after the second product, in which no reference did anything new"
             f" ({PATIENCE} cycles at most). It lasts one cycle of the ideal world under the same"

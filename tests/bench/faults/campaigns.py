@@ -64,7 +64,7 @@ def section(results: dict[str, Any]) -> str:
         for kind in KINDS
     ]
     head = ("product", "fault", "runs", "struck", "units made", "stalled", "error [mm]", "contacts")
-    more = ("missed", "false alarms", "undone", "longest [s]", "all as it should be")
+    more = ("missed", "false alarms", "undone", "longest [s]", "passed")
     good = sum(map(is_good, rows))
     return "\n\n".join(
         [

@@ -53,7 +53,7 @@ def section(results: dict[str, Any]) -> str:
             f" inputs slip, {100 * LOST:g} % of all that robots carry is dropped, at each"
             " operation. The ideal world has the same faults, and nothing that lies about.",
             table(
-                (*head, *more, "all as it should be"),
+                (*head, *more, "passed"),
                 [
                     (
                         {"ideal": "ideal", "mujoco": "MuJoCo"}[row["world"]],
