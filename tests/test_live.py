@@ -208,7 +208,7 @@ def test_a_blocked_feeder_stops_the_net_and_frees_it_again(running: Running) -> 
     running.until(lambda f: f.products > quiet.products + 1 and not f.note)
 
 
-def test_begin_anew(running: Running) -> None:
+def test_restart(running: Running) -> None:
     send = running.session.send
     send(Command("speed", factor=0.0))
     send(Command("slow", robot=2, factor=0.5))
@@ -223,7 +223,7 @@ def test_begin_anew(running: Running) -> None:
 def test_it_says_when_the_engine_gives_up(running: Running) -> None:
     running.session.simulation.world.d.qvel[:] = np.nan
     note = running.until(lambda f: bool(f.note)).note
-    assert "unstable" in note and "begin anew" in note
+    assert "unstable" in note and "restart it" in note
     running.session.send(Command("restart"))
     running.until(lambda f: f.run == 1 and not f.note and f.time > 0.1)
 
@@ -379,7 +379,7 @@ def test_a_push_answers() -> None:
         running.close()
 
 
-ANSWER = r"r3 was pushed back with \d+ N and gave way by [1-9]\d*\.\d mm"
+ANSWER = r"r3 was pushed back with \d+ N and displaced by [1-9]\d*\.\d mm"
 
 
 # --- the command -------------------------------------------------------------------------------

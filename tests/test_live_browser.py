@@ -12,7 +12,7 @@ import pytest
 from factory.layout.layout import Layout
 from factory.show.live import Server
 from factory.show.live.page import page
-from factory.simulation.recovery import Campaign
+from factory.simulation.recovery import Campaign, WorldFault
 from tests import failing_runs
 from tests.live_sessions import Running, a_session
 from tests.test_takeovers import laid_out
@@ -116,13 +116,13 @@ def test_buttons_step_slow_push_and_block(watched: Watched) -> None:
     watched.press("r2 at 25 % ✕")
     watched.until("!f.slowed['1']")
     watched.page.locator("#tree [data-label] b", has_text="part1").click()
-    watched.press("is blocked")
+    watched.press("blocked")
     watched.page.locator("#speed").select_option("10")
     watched.until("f.note.includes('feeder of part1')")
     watched.seen("note => !note.hidden", "document.getElementById('note')")
-    watched.press("gives parts")
+    watched.press("open")
     watched.until("!f.note")
-    watched.press("Begin anew")
+    watched.press("Restart")
     watched.until("f.run === 1")
     assert watched.trouble == []
 
@@ -153,10 +153,8 @@ def assert_marked(watched: Watched, state: str, *marks: str) -> None:
 
 
 def test_what_is_out_of_order_is_marked_and_said(browser: Any) -> None:
-    watched = Watched(browser, Campaign(clear=10.0, spares=1, swap=60.0))
-    watched.until("f.products > 0")
-    watched.page.locator("#gantt button[data-robot='5']").click()
-    watched.press("drop what it holds")
+    drop = WorldFault("drop", robot="r6", at=5.0)
+    watched = Watched(browser, Campaign((drop,), clear=10.0, spares=1, swap=60.0))
     watched.until("f.outages.zones.length && f.outages.closed.includes('r6')")
     watched.press("Pause")
     watched.until("!f.playing")
@@ -172,7 +170,7 @@ def test_what_is_out_of_order_is_marked_and_said(browser: Any) -> None:
     watched.seen("n => n === 0", "factoryView.zones")
     assert watched.page.locator("#outages").is_hidden()
     watched.page.locator("#gantt button[data-robot='1']").click()
-    watched.press("die")
+    watched.press("Kill")
     watched.until("f.outages.dead.length")
     watched.press("Pause")
     watched.until("!f.playing")
@@ -180,7 +178,7 @@ def test_what_is_out_of_order_is_marked_and_said(browser: Any) -> None:
     told = watched.page.locator("#said .failed span").all_inner_texts()
     assert [words.partition(": ")[0] for words in told] == ["r2 is dead", "r6 lost part2"]
     said = watched.page.locator("#outages .dead").inner_text()
-    assert said.startswith("r2 is dead: a spare comes in ")
+    assert said.startswith("r2 is dead: a spare replaces it in ")
     assert watched.page.locator("#gantt .stood.dead").count() == 1
     watched.press("Play")
     watched.until("!f.outages.dead.length")
@@ -189,30 +187,29 @@ def test_what_is_out_of_order_is_marked_and_said(browser: Any) -> None:
     assert watched.trouble == []
 
 
-def test_every_fault_is_a_click(browser: Any) -> None:
-    """Of a part, of what is joined, and of all sensors."""
-    watched = Watched(browser, Campaign(clear=1.0, spares=1, swap=2.0), failing_runs.paper_layout())
-    watched.until("f.products > 0")
-    parts = [watched.page.locator("#tree button", has_text=n).first for n in ("part1", "sub1")]
-    watched.press("tell nothing for 5 s")
+def test_a_robot_is_paused_and_other_faults_are_shown(browser: Any) -> None:
+    """A robot by a click; a part, what is joined, a feeder and all sensors by a list of faults."""
+    faults = (
+        WorldFault("blackout", at=4.0, seconds=2.0),
+        WorldFault("no_part", label="part1", at=8.0, seconds=5.0),
+        WorldFault("bad_part", label="part1", at=20.0),
+        WorldFault("misplaced", label="part1", at=30.0),
+        WorldFault("bad_joint", label="sub1", at=40.0),
+    )
+    campaign = Campaign(faults, clear=1.0, spares=1, swap=2.0)
+    watched = Watched(browser, campaign, failing_runs.paper_layout())
     watched.until("f.outages.told.some(([mark]) => mark === 'dark')")
-    watched.until("f.outages.told.length === 0")
-    parts[0].click()
-    watched.press("is empty for 5 s")
     watched.until("f.outages.told.some(([mark]) => mark === 'empty')")
     assert "part1 is empty" in watched.page.locator("#outages .empty").inner_text()
-    watched.until("f.outages.told.length === 0")
-    watched.press("is no good")
-    watched.until("f.failed === 1")
-    watched.press("lies askew")
-    watched.until("f.failed === 2")
-    parts[1].click()
-    watched.press("slips")
+    watched.page.locator("#gantt button[data-robot='1']").click()
+    watched.press("Pause for 5 s")
+    watched.until("f.outages.standing.includes('r2')")
+    watched.page.locator("#speed").select_option("0")
     watched.until("f.failed === 3")
     watched.seen("n => n === 3", "document.querySelectorAll('#said .failed').length")
-    told = watched.page.locator("#said .failed span").all_inner_texts()
+    messages = watched.page.locator("#said .failed span").all_inner_texts()
     words = ["sub1 does not fit", "part1 lies askew in its feeder", "part1 is no good"]
-    assert [one.partition(":")[0] for one in told] == words
+    assert [message.partition(":")[0] for message in messages] == words
     watched.close()
     assert watched.trouble == []
 
@@ -223,7 +220,7 @@ def test_a_robot_whose_deputy_took_over_is_not_drawn(browser: Any) -> None:
     watched.until("f.products > 1")
     assert watched.page.evaluate("factoryView.isDrawn(3)")
     watched.page.locator("#gantt button[data-robot='3']").click()
-    watched.press("die")
+    watched.press("Kill")
     watched.until("f.outages.gone.length")
     watched.seen("drawn => !drawn", "factoryView.isDrawn(3)")
     assert watched.page.evaluate("factoryView.isDrawn(1)")
@@ -236,7 +233,7 @@ def test_a_robot_whose_deputy_took_over_is_not_drawn(browser: Any) -> None:
     bars = "document.querySelectorAll('.rolling .row')[{}].querySelectorAll('.op').length"
     watched.seen("n => n === 0", bars.format(4))
     assert watched.page.evaluate(bars.format(2)) > 0
-    watched.press("Begin anew")
+    watched.press("Restart")
     watched.until("f.run === 1")
     watched.seen("drawn => drawn", "factoryView.isDrawn(3)")
     watched.close()
@@ -254,13 +251,13 @@ def test_things_are_found_by_name(watched: Watched) -> None:
     assert watched.trouble == []
 
 
-def test_it_comes_back_when_the_socket_does(watched: Watched) -> None:
+def test_it_comes_back_when_the_connection_does(watched: Watched) -> None:
     watched.until("f.count > 2")
     (connection,) = watched.server._server.connections
     connection.close()
-    said = "document.getElementById('socket').textContent"
+    said = "document.getElementById('connection').textContent"
     watched.seen("words => words === 'closed'", said)
-    watched.seen("words => words === 'open'", said)
+    watched.seen("words => words === 'live'", said)
 
 
 def test_a_phone_shows_it_in_one_column(browser: Any) -> None:

@@ -339,7 +339,7 @@ def test_a_live_view_says_what_was_dropped(monkeypatch: pytest.MonkeyPatch) -> N
     with pytest.raises(Stopped):
         session.run(observe)
     assert session.frame.note.startswith("r3 drops 'sub1' at ")
-    assert session.frame.note.endswith(": begin anew")
+    assert session.frame.note.endswith(": restart it")
 
 
 # --- what is said ---------------------------------------------------------------------------------

@@ -54,8 +54,8 @@ def view(
 ) -> int:
     """Run FILE.pag endlessly in a browser, where you can pause it, push robots and block feeders.
 
-    With --spares, --deputies or --faults the run recovers from failures: you can make robots drop
-    parts or die, and make parts defective."""
+    With --spares, --deputies or --faults the run recovers from failures: you can pause or kill
+    robots."""
     from factory.nets.verify import proved
     from factory.show.live import Server, Session
     from factory.show.live.page import page

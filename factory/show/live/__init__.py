@@ -1,4 +1,4 @@
-"""A running factory in the browser, with commands to pause, push, slow down and block."""
+"""A running factory in the browser, with commands to pause, push, slow down, kill and block."""
 
 from factory.show.live.server import Server
 from factory.show.live.session import LiveFrame, Session

@@ -1,5 +1,5 @@
-"""What is out of order in a factory that goes on after failures, at an instant: as the page marks
-it, and in words."""
+"""Outages of a factory that recovers from failures: robots that stand or are dead, zones closed by
+fallen parts, feeders and sensors that are off."""
 
 from __future__ import annotations
 
@@ -13,19 +13,18 @@ from factory.nets.verdict import listing
 from factory.render.marks import Zone, Zones
 from factory.simulation.recovery import Recovery
 
-Told = tuple[str, str]
-"""A mark of the page, `dead`, `closed`, `standing`, `gone`, `dark` or `empty`, and what it says, in
-words."""
+Message = tuple[str, str]
+"""A mark of the page, `dead`, `closed`, `standing`, `gone`, `dark` or `empty`, and its text."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outages:
-    """Robots, by name: those that are known to be `dead`, each with how long still [s], inf where
-    nothing takes its place, and the deputy that then does its tours, "" for a spare; `closed`,
-    which may not move while something lies near, for so long still [s], `lying`; `standing` for
-    another reason; `gone`, lifted out for good, each with its deputy and when that took over [s].
-    `zones`: where no robot may come, round what lies about. `dark`: for so long still no sensor
-    tells anything [s]; `empty`: feeders, by label, with how long each gives nothing still [s]."""
+    """Robots, by name: those detected as `dead`, each with its remaining outage [s], inf where
+    nothing replaces it, and the deputy that then does its tours, "" for a spare; `closed`, which
+    must not move while a fallen part lies nearby, for `lying` [s] more; `standing` for another
+    reason; `gone`, removed for good, each with its deputy and the time of the takeover [s].
+    `zones`: around fallen parts, closed to robots. `dark`: remaining time without sensors [s];
+    `empty`: feeders without parts, by label, each with the remaining time [s]."""
 
     dead: Mapping[str, tuple[float, str]] = field(default_factory=dict)
     closed: tuple[str, ...] = ()
@@ -36,51 +35,47 @@ class Outages:
     dark: float = 0.0
     empty: Mapping[str, float] = field(default_factory=dict)
 
-    @property
-    def told(self) -> list[Told]:
-        """All this in words."""
-        return [*self._told()]
-
-    def _told(self) -> Iterator[Told]:
+    def messages(self) -> Iterator[Message]:
+        """One for each outage."""
         for robot, (left, deputy) in self.dead.items():
-            then = f"{deputy} does its tours" if deputy else "a spare comes"
-            when = f"{then} {_in(left)}" if isfinite(left) else "nothing takes its place"
+            then = f"{deputy} does its tours" if deputy else "a spare replaces it"
+            when = f"{then} {_in(left)}" if isfinite(left) else "nothing replaces it"
             yield "dead", f"{robot} is dead: {when}"
         if self.closed:
             stand = f"{listing(self.closed)} stand{_s(self.closed)} still"
-            yield "closed", f"{stand}: something lies near, and is cleared away {_in(self.lying)}"
+            yield "closed", f"{stand}: a fallen part nearby is cleared away {_in(self.lying)}"
         elif self.zones:
-            yield "closed", f"something lies about, and is cleared away {_in(self.lying)}"
+            yield "closed", f"a fallen part is cleared away {_in(self.lying)}"
         if self.standing:
             yield "standing", f"{listing(self.standing)} stand{_s(self.standing)} still"
         if self.dark:
-            yield "dark", f"no sensor tells anything: that is over {_in(self.dark)}"
+            yield "dark", f"all sensors are off: they return {_in(self.dark)}"
         for label, left in self.empty.items():
-            yield "empty", f"the feeder of {label} is empty: it gives parts again {_in(left)}"
+            yield "empty", f"the feeder of {label} is empty: it is refilled {_in(left)}"
         for robot, (deputy, _) in self.gone.items():
             yield "gone", f"{robot} is gone: {deputy} does its tours"
 
     def as_json(self) -> dict[str, object]:
-        """As the page is told it."""
+        """The key `outages` of a frame for the page."""
         return {
             "dead": [*self.dead],
             "closed": self.closed,
             "standing": self.standing,
             "gone": [[robot, round(t, 4), deputy] for robot, (deputy, t) in self.gone.items()],
             "zones": [[round(v, 4) for v in zone] for zone in self.zones],
-            "told": self.told,
+            "told": [*self.messages()],
         }
 
 
 class Watch:
-    """Tells what is out of order, as a recovery knows it. One whose world has bodies."""
+    """Reads the outages from a recovery in a world with bodies."""
 
     def __init__(self, recovery: Recovery) -> None:
         self._recovery, self._world = recovery, recovery.simulation.physical
         self._zones = Zones(self._world.m)
 
     def now(self) -> Outages:
-        """What is now."""
+        """The present outages."""
         recovery, world = self._recovery, self._world
         dead, closed, lying = recovery.responding.dead, recovery.plant.closed, recovery.plant.lying
         deputies, time = recovery.responding.deputising.by_robot, world.time
@@ -106,10 +101,10 @@ class Watch:
 
 
 def _in(seconds: float) -> str:
-    """When something is that is so far off."""
+    """A remaining time in words."""
     return f"in {ceil(seconds)} s" if seconds > 0 else "soon"
 
 
 def _s(robots: tuple[str, ...]) -> str:
-    """The ending of what one robot does."""
+    """The ending of a verb, for one robot or several."""
     return "s" if len(robots) == 1 else ""

@@ -48,7 +48,6 @@ def page(session: Session, command: str = "factory view FILE.pag") -> bytes:
         "parts": [o.label for o in factory.leaves],
         "factors": FACTORS,
         "fails": session.fails,
-        "joints": session.joints or [],
         "scene": scene(stage, labels, pack),
         "frames": {
             "parents": {},

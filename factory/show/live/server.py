@@ -12,7 +12,7 @@ from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 from factory.show.live.commands import command_of
-from factory.show.live.session import LiveFrame, Session, Told
+from factory.show.live.session import LiveEvent, LiveFrame, Session
 from factory.support.errors import Diagnostic, InputError
 from factory.support.extras import optional
 from factory.support.resource import Closing
@@ -43,7 +43,7 @@ HEADERS = {
 
 
 def is_loopback(host: str) -> bool:
-    """Whether an address is reached from this machine only."""
+    """Whether an address can be reached from this machine only."""
     try:
         return ip_address(host.strip("[]")).is_loopback
     except ValueError:
@@ -52,10 +52,10 @@ def is_loopback(host: str) -> bool:
 
 def check_server(host: str, exposed: bool) -> Any:
     """The module that serves sockets. Raises InputError (BadValue) for a host other than loopback
-    that is not to be exposed, MissingError without the package `websockets`."""
+    unless it is exposed, MissingError without the package `websockets`."""
     if not is_loopback(host) and not exposed:
-        message = f"'{host}' can be reached from other machines, who could then run this one"
-        hint = "give --expose if that is meant, or use `ssh -L` and the host 127.0.0.1"
+        message = f"'{host}' can be reached from other machines, which could control this factory"
+        hint = "add --expose to allow this, or use `ssh -L` and the host 127.0.0.1"
         raise InputError(Diagnostic("BadValue", message, None, hint))
     return optional("websockets.sync.server", "websockets", "a page in the browser", "live")
 
@@ -111,15 +111,15 @@ class Server(Closing):
         host = request.headers.get("Host", "")
         name = host.rpartition(":")[0] if not host.endswith("]") and ":" in host else host
         if not self._exposed and not is_loopback(name):
-            return connection.respond(HTTPStatus.FORBIDDEN, "not by this name\n")
+            return connection.respond(HTTPStatus.FORBIDDEN, "unknown host name\n")
         if request.path == f"/{self._secret}/live":
             if request.headers.get("Origin") not in (f"http://{host}", None):
-                return connection.respond(HTTPStatus.FORBIDDEN, "not from another page\n")
+                return connection.respond(HTTPStatus.FORBIDDEN, "wrong origin\n")
             if self._watchers >= MOST:
-                return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "too many watch\n")
+                return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "too many watchers\n")
             return None
         if request.path != f"/{self._secret}/":
-            return connection.respond(HTTPStatus.NOT_FOUND, "there is nothing here\n")
+            return connection.respond(HTTPStatus.NOT_FOUND, "not found\n")
         from websockets.datastructures import Headers
         from websockets.http11 import Response
 
@@ -135,31 +135,31 @@ class Server(Closing):
         self._watchers += 1
         try:
             hearing.start()
-            number, run, told, known = 0, -1, 0, 0
+            number, run, events, failures = 0, -1, 0, 0
             while True:
                 frame = self._session.wait(number, PATIENCE)
                 if frame.run != run:
-                    run, told, known = frame.run, max(0, frame.count - RECENT), 0
-                fired = self._session.fired(run, told, frame.count)
-                failed = self._session.failed(run, known, frame.failed)
-                connection.send(packed(frame, sorted([*failed, *fired], key=lambda one: one[0])))
-                number, told, known = frame.number, frame.count, frame.failed
+                    run, events, failures = frame.run, max(0, frame.count - RECENT), 0
+                fired = self._session.fired(run, events, frame.count)
+                failed = self._session.failed(run, failures, frame.failed)
+                in_order = sorted([*failed, *fired], key=lambda event: event[0])
+                connection.send(packed(frame, in_order))
+                number, events, failures = frame.number, frame.count, frame.failed
         except ConnectionClosed:
             pass
         finally:
             self._watchers -= 1
 
     def _hear(self, connection: ServerConnection) -> None:
-        """Pass commands on; the sender gets the error of a message that is not one."""
+        """Pass commands on to the session; an invalid one is answered with its error."""
         from websockets.exceptions import ConnectionClosed
 
         factory = self._session.simulation.layout.factory
-        parts = {o.label for o in factory.leaves}
-        joints = self._session.joints
+        robots, parts = len(factory.robots), {o.label for o in factory.leaves}
         try:
             for message in connection:
                 try:
-                    command = command_of(message, len(factory.robots), parts, joints)
+                    command = command_of(message, robots, parts, self._session.fails)
                 except ValueError as error:
                     connection.send(json.dumps({"error": str(error)}))
                 else:
@@ -169,17 +169,17 @@ class Server(Closing):
 
 
 def _silent() -> logging.Logger:
-    """A logger that writes nothing: connections that fail are usual."""
+    """A logger without output: failed connections are normal."""
     logger = logging.Logger("factory.live")
     logger.addHandler(logging.NullHandler())
     return logger
 
 
-def packed(frame: LiveFrame, fired: list[Told]) -> bytes:
-    """A frame as the page reads it: the length of a JSON text (4 bytes, little-endian), the text,
-    padded to a multiple of 4, and the poses."""
-    told = {**asdict(frame), "outages": frame.outages.as_json(), "fired": fired}
-    del told["number"], told["poses"]
-    text = json.dumps(told, separators=(",", ":")).encode()
+def packed(frame: LiveFrame, fired: list[LiveEvent]) -> bytes:
+    """A frame in the format of the page: the length of a JSON text (4 bytes, little-endian), the
+    text, padded to a multiple of 4, and the poses."""
+    document = {**asdict(frame), "outages": frame.outages.as_json(), "fired": fired}
+    del document["number"], document["poses"]
+    text = json.dumps(document, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     return len(text).to_bytes(4, "little") + text + frame.poses

@@ -1,4 +1,4 @@
-"""A factory that runs in step with real time, and obeys commands between ticks."""
+"""A factory that runs in step with real time, and executes commands between ticks."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from factory.nets.undo import marking_after
 from factory.nets.undone import Undone
 from factory.record.failures import Failing
-from factory.show.live.commands import FAULTS, LASTS, PUSH, Command
+from factory.show.live.commands import LASTS, PUSH, Command
 from factory.show.live.outages import Outages, Watch
 from factory.simulation.disturbance.interventions import Interventions
 from factory.simulation.recovery import Campaign
@@ -26,30 +26,28 @@ RATE = 30.0
 """Frames a second."""
 
 BEHIND = 0.25
-"""A run that is further behind the clock than this [s] does not catch up."""
+"""Largest lag behind the clock that a run catches up with [s]."""
 
 QUIET = 3.0
-"""Where nothing has fired for so many times the longest delay, a note says what waits for what."""
+"""A note lists the waiting robots after this many times the longest delay without a firing."""
 
 LOOK = 0.05
-"""Interval at which a session that is paused looks for commands [s]."""
+"""Interval at which a paused session looks for commands [s]."""
 
+SHOWN = 6.0
+"""How long a failure, and the effect of a push, is shown [s]."""
 
-SAID = 6.0
-"""How long a failure, and what a push did, is told [s]."""
-
-Told = tuple[float, int | list[int] | str]
-"""When [s], and which transition fired, or which were undone, or what failed, in words."""
+LiveEvent = tuple[float, int | list[int] | str]
+"""A time [s], and the transition that fired, the transitions undone, or a failure in words."""
 
 
 @dataclass(frozen=True, slots=True)
 class LiveFrame:
-    """The state at an instant, as the page is told it. `number`: of the frame; `run`: number of
+    """The state at an instant, as sent to the page. `number`: of the frame; `run`: number of
     restarts; `poses`: positions [m] and quaternions (bodies, 7) as float32; `marked` places;
-    `count`: how often something has fired, or was undone; `failed`: how often something has failed;
-    `rhythm`: between the last two products [s]; `pace`: simulated seconds in a second; `outages`:
-    what is out of order; `note`: what has just gone wrong, if anything; `pushed`: what the last
-    push did."""
+    `count`: number of events (firings and undos); `failed`: number of failures; `rhythm`: interval
+    between the last two products [s]; `pace`: simulated seconds per second; `note`: the present
+    trouble or the last failures, if any; `pushed`: the effect of the last push."""
 
     number: int
     run: int
@@ -71,14 +69,14 @@ class LiveFrame:
 
 
 class WallClock:
-    """Real time against simulated time, which passes `speed` times as fast; 0: as fast as it goes.
-    `begun`, `marks`: pairs of both [s], at the start and recently."""
+    """Real time against simulated time, which passes `speed` times as fast; 0: without limit.
+    `begun`, `marks`: pairs (real, simulated) [s], at the start and recently."""
 
     def __init__(self, speed: float = 1.0) -> None:
         self.speed = speed
 
     def start(self, time: float) -> None:
-        """Start anew at a simulated time."""
+        """Restart at a simulated time."""
         self.begun = perf_counter(), time
         self.marks = deque([self.begun], maxlen=int(RATE))
 
@@ -99,9 +97,9 @@ class WallClock:
 
 
 class Session:
-    """Runs what `make` gives, anew after each restart; with a `campaign` it goes on after failures,
-    and can be made to fail. `run` ends with an exception of an observer. `frame` may be read,
-    `send` and `wait` called from any thread."""
+    """Runs the simulation that `make` returns, a new one after each restart; with a `campaign` it
+    recovers from failures, and robots can be paused and killed. `run` ends with an exception of an
+    observer. `frame` may be read, `send` and `wait` called from any thread."""
 
     def __init__(
         self,
@@ -127,37 +125,31 @@ class Session:
 
     @property
     def simulation(self) -> Simulation:
-        """What runs."""
+        """The running simulation."""
         return self.interventions.simulation
 
     @property
     def fails(self) -> bool:
-        """Whether it goes on after failures."""
+        """Whether it recovers from failures."""
         return self.interventions.recovery is not None
 
     @property
-    def joints(self) -> list[str] | None:
-        """The labels of what is joined, where it goes on after failures; else None."""
-        made = self.simulation.layout.factory.making
-        return [o.label for o in made if len(o.inputs) > 1] if self.fails else None
-
-    @property
     def bodies(self) -> NDArray[np.intp]:
-        """The bodies that can move, by number."""
+        """Numbers of the bodies that can move."""
         return np.flatnonzero(self.simulation.physical.m.body_treeid >= 0)
 
     def send(self, command: Command) -> None:
-        """Give a command, which is obeyed between ticks."""
+        """Queue a command, which is executed between ticks."""
         self._commands.put(command)
 
     def wait(self, number: int, timeout: float) -> LiveFrame:
-        """The newest frame, as soon as there is one after `number`."""
+        """The newest frame, as soon as one later than `number` exists."""
         with self._changed:
             self._changed.wait_for(lambda: self.frame.number > number, timeout)
             return self.frame
 
-    def fired(self, run: int, since: int, until: int) -> list[Told]:
-        """What fired in a run and what was undone, some of it; none of a run that is over."""
+    def fired(self, run: int, since: int, until: int) -> list[LiveEvent]:
+        """A slice of the firings and undos of a run; empty for a run that is over."""
         if run != self._runs:
             return []
         numbers = self.simulation.layout.factory.net.threaded.net.transition_index
@@ -169,18 +161,18 @@ class Session:
             for e in events
         ]
 
-    def failed(self, run: int, since: int, until: int) -> list[Told]:
-        """What failed in a run, some of it; nothing of a run that is over."""
-        found = self._found[since:until] if run == self._runs else ()
-        return [(round(one.t, 4), str(one)) for one in found]
+    def failed(self, run: int, since: int, until: int) -> list[LiveEvent]:
+        """A slice of the failures of a run; empty for a run that is over."""
+        failures = self._failures[since:until] if run == self._runs else ()
+        return [(round(failing.t, 4), str(failing)) for failing in failures]
 
     @property
-    def _found(self) -> Sequence[Failing]:
+    def _failures(self) -> Sequence[Failing]:
         account = self.simulation.world.hooks.account
         return account.found if account else ()
 
     def run(self, observe: Observer) -> None:
-        """Run for ever; `observe` is called after every tick, and repeatedly while it is paused."""
+        """Run without end; `observe` is called after every tick, and repeatedly while paused."""
         while True:
             begun = perf_counter()
             ran = self._advance(begun, observe) if self._goes else 0
@@ -188,7 +180,7 @@ class Session:
             if ran:
                 self._publish()
             rest = 1 / RATE - (perf_counter() - begun) if self._clock.speed else 0.0
-            if self._obey(max(rest, 0.0) if self._goes else LOOK):
+            if self._execute(max(rest, 0.0) if self._goes else LOOK):
                 self._publish()
 
     @property
@@ -196,8 +188,7 @@ class Session:
         return (self._playing or self._stepping) and not self._trouble
 
     def _advance(self, begun: float, observe: Observer) -> int:
-        """Run ticks until simulated time is what it should be, or a frame is due; gives their
-        number."""
+        """Run ticks until simulated time has caught up, or a frame is due; returns their number."""
         supervisor, world, clock = self.simulation.supervisor, self.simulation.world, self._clock
         count = 0
         while self._goes:
@@ -213,30 +204,30 @@ class Session:
             observe(world, supervisor)
             count += 1
             if reason := world.unstable():
-                self._trouble = f"{reason}: begin anew"
+                self._trouble = f"{reason}: restart it"
                 break
             for act in world.hooks.ticks:
                 act()
             if (trouble := world.hooks.trouble) is not None:
-                self._trouble = f"{trouble.message}: begin anew"
+                self._trouble = f"{trouble.message}: restart it"
             elif (drop := world.dropped) and world.time >= drop.time + FALL:
-                self._trouble = f"{drop.diagnostic.message}: begin anew"
+                self._trouble = f"{drop.diagnostic.message}: restart it"
             elif self._stepping and len(supervisor.events) > before:
                 self._stepping = self._playing = False
         clock.mark(world.time)
         return count
 
-    def _obey(self, timeout: float) -> bool:
-        """Obey the commands given, waiting for one up to `timeout` [s]; gives whether there was
-        one."""
-        obeyed = False
+    def _execute(self, timeout: float) -> bool:
+        """Execute the queued commands, waiting for one up to `timeout` [s]; returns whether there
+        was one."""
+        executed = False
         while True:
             try:
-                command = self._commands.get(not obeyed and timeout > 0, timeout)
+                command = self._commands.get(not executed and timeout > 0, timeout)
             except Empty:
-                return obeyed
+                return executed
             self._do(command)
-            obeyed = True
+            executed = True
 
     def _do(self, command: Command) -> None:
         hands = self.interventions
@@ -259,8 +250,7 @@ class Session:
             case "block":
                 (hands.block if command.blocked else hands.free)(command.part)
             case kind:
-                robot = command.robot if "robot" in FAULTS[kind] else None
-                hands.fail(kind, robot, command.part or command.joint, LASTS)
+                hands.fail(kind, command.robot, seconds=LASTS)
         self._clock.start(self.simulation.world.time)
 
     def _publish(self) -> None:
@@ -281,7 +271,7 @@ class Session:
             poses.astype("<f4").tobytes(),
             self._marked(),
             len(supervisor.events),
-            len(self._found),
+            len(self._failures),
             world.delivered(),
             round(left[-1] - left[-2], 4) if len(left) > 1 else None,
             self._playing or self._stepping,
@@ -290,7 +280,7 @@ class Session:
             dict(self.interventions.slowed),
             tuple(sorted(self.interventions.blocked)),
             outages,
-            self._trouble or self._failed() or ("" if outages.told else self._waits()),
+            self._trouble or self._failed() or ("" if any(outages.messages()) else self._waits()),
             self._pushed(),
         )
         with self._changed:
@@ -298,9 +288,9 @@ class Session:
             self._changed.notify_all()
 
     def _marked(self) -> tuple[int, ...]:
-        """The places of the net that the page draws: that which the run began with. A deputy does
-        the tours of a robot that is gone in their order, so the counts lead to a marking of it,
-        with a token for either robot's tours."""
+        """The marked places of the net that the page draws, that of the start of the run. A deputy
+        does the tours of a removed robot in their order, so the counts of firings lead to a marking
+        of this net, with a token for the tours of either robot."""
         supervisor, account = self.simulation.supervisor, self.simulation.world.hooks.account
         if not (account and account.exchanges and isinstance(supervisor, Supervisor)):
             return tuple(np.flatnonzero(np.frombuffer(supervisor.marked, np.uint8)).tolist())
@@ -308,24 +298,25 @@ class Session:
         return tuple(sorted(marking_after(net, supervisor.fired)))
 
     def _failed(self) -> str:
-        """What has failed lately, and when, the latest last."""
-        late = self.simulation.world.time - SAID
-        return "; ".join(f"{one.t:.2f} s: {one}" for one in self._found[-3:] if one.t > late)
+        """The failures of the last SHOWN seconds, the latest last."""
+        since = self.simulation.world.time - SHOWN
+        recent = (failing for failing in self._failures[-3:] if failing.t > since)
+        return "; ".join(f"{failing.t:.2f} s: {failing}" for failing in recent)
 
     def _pushed(self) -> str:
-        """Which robot was pushed lately, with what force, and how far it gave way."""
+        """The effect of a recent push: robot, force and displacement."""
         push = self.interventions.pushed
-        if push is None or self.simulation.world.time > push.end + SAID:
+        if push is None or self.simulation.world.time > push.end + SHOWN:
             return ""
         name = self.simulation.layout.factory.robots[push.robot].name
         way = "ahead" if push.force > 0 else "back"
         pushed = f"pushed {way} with {abs(push.force):.0f} N"
         if not self._goes:
-            return f"{name} is {pushed} as soon as the factory goes on"
-        return f"{name} was {pushed} and gave way by {1000 * push.gave:.1f} mm"
+            return f"{name} is {pushed} when the run continues"
+        return f"{name} was {pushed} and displaced by {1000 * push.gave:.1f} mm"
 
     def _waits(self) -> str:
-        """Which robots wait for what, where nothing has fired for a long time."""
+        """The waiting robots, where nothing has fired for a long time."""
         supervisor, silent = self.simulation.supervisor, self.simulation.silent
         if silent < QUIET * max(self.simulation.delays):
             return ""
@@ -335,4 +326,4 @@ class Session:
             for o in supervisor.awaited()[:4]
         ]
         waiting = "; ".join(words) or "no robot can start"
-        return f"nothing has fired for {silent:.0f} s: waiting are {waiting}"
+        return f"nothing has fired for {silent:.0f} s; waiting: {waiting}"

@@ -1,5 +1,5 @@
 'use strict';
-// The page of a running factory: frames come from a socket, commands go there.
+// The page of a running factory: receives frames from a socket and sends commands to it.
 
 // Where every body is in the newest frame.
 class LiveMotion {
@@ -74,24 +74,23 @@ class Acts {
     document.querySelectorAll('[data-label]').forEach((e) => e.classList.toggle('blocked', labels.has(Number(e.dataset.label))));
   }
 
-  // The robot, the part with a feeder, and what is joined, that the selection is about.
+  // The robot, and the part with a feeder, of the selection.
   get meant() {
     const { chosen } = this.selection;
     if (!chosen) return {};
     const link = DATA.links[chosen.kind][chosen.number];
     const labels = chosen.kind === 'label' ? [DATA.labels[chosen.number]] : link.labels.map((n) => DATA.labels[n]);
     const robot = chosen.kind === 'robot' ? chosen.number : link.robots[0];
-    const first = (kind) => labels.find((label) => kind.includes(label));
-    return { robot, part: first(DATA.parts), joint: first(DATA.joints) };
+    return { robot, part: labels.find((label) => DATA.parts.includes(label)) };
   }
 
   draw() {
-    const { robot, part, joint } = this.meant;
+    const { robot, part } = this.meant;
     const made = [];
     const name = DATA.robots[robot];
     const deputy = robot === undefined ? robot : doer(robot, Infinity);
     if (deputy !== robot) {
-      made.push(this.words('h3', `Robot ${name}`), this.words('p', `It has been lifted out: ${DATA.robots[deputy]} does its tours.`));
+      made.push(this.words('h3', `Robot ${name}`), this.words('p', `Removed: ${DATA.robots[deputy]} does its tours.`));
     } else if (robot !== undefined) {
       const now = this.slowed[robot] || 1;
       made.push(this.words('h3', `Robot ${name}`));
@@ -105,30 +104,18 @@ class Acts {
         [factor === 1 ? 'full' : `${100 * factor} %`, { do: 'slow', robot, factor }, factor === now])));
     }
     if (robot !== undefined && deputy === robot && DATA.fails)
-      made.push(this.group('Let it', [
-        ['drop what it holds', { do: 'drop', robot }],
-        ['stand for 5 s', { do: 'down', robot }],
-        ['die', { do: 'dead', robot }],
+      made.push(this.group('Failure', [
+        ['Pause for 5 s', { do: 'down', robot }],
+        ['Kill', { do: 'dead', robot }],
       ]));
     if (part !== undefined) {
       const stopped = this.blocked.includes(part);
-      made.push(this.words('h3', `Feeder of ${part}`));
-      made.push(this.group('It', [
-        ['gives parts', { do: 'block', part, blocked: false }, !stopped],
-        ['is blocked', { do: 'block', part, blocked: true }, stopped],
-        ...(DATA.fails ? [['is empty for 5 s', { do: 'no_part', part }]] : []),
+      made.push(this.words('h3', part), this.group('Feeder:', [
+        ['open', { do: 'block', part, blocked: false }, !stopped],
+        ['blocked', { do: 'block', part, blocked: true }, stopped],
       ]));
-      if (DATA.fails)
-        made.push(this.group('The next', [
-          ['is no good', { do: 'bad_part', part }],
-          ['lies askew', { do: 'misplaced', part }],
-        ]));
     }
-    if (joint !== undefined)
-      made.push(this.words('h3', `Joint of ${joint}`), this.group('The next', [['slips', { do: 'bad_joint', joint }]]));
-    if (!made.length) made.push(this.words('p', `Choose a robot to push it${DATA.fails ? ', slow it down or let it fail' : ' or slow it down'}, or a part to block its feeder${DATA.fails ? ' or let the next be no good, or what is joined to let it slip' : ''}: in the picture, the net, the plan or the tree.`));
-    if (DATA.fails)
-      made.push(this.group('Sensors', [['tell nothing for 5 s', { do: 'blackout' }]]));
+    if (!made.length) made.push(this.words('p', `Choose a robot to push it, slow it down${DATA.fails ? ', pause it or kill it' : ''}, or a part to block its feeder: in the picture, the net, the plan or the tree.`));
     const changes = [
       ...Object.entries(this.slowed).map(([n, factor]) => [`${DATA.robots[n]} at ${100 * factor} % ✕`, { do: 'slow', robot: Number(n), factor: 1 }]),
       ...this.blocked.map((label) => [`${label} blocked ✕`, { do: 'block', part: label, blocked: false }]),
@@ -225,7 +212,7 @@ class Live {
   connect() {
     this.socket = new WebSocket(new URL('live', location.href.replace(/^http/, 'ws')));
     this.socket.binaryType = 'arraybuffer';
-    this.socket.addEventListener('open', () => this.state('open', true));
+    this.socket.addEventListener('open', () => this.state('live', true));
     this.socket.addEventListener('message', ({ data }) => (typeof data === 'string' ? this.refused(data) : this.take(data)));
     this.socket.addEventListener('close', () => {
       this.state('closed', false);
@@ -234,7 +221,7 @@ class Live {
   }
 
   state(words, good) {
-    const shown = document.getElementById('socket');
+    const shown = document.getElementById('connection');
     shown.textContent = words;
     shown.className = `value ${good ? 'good' : 'bad'}`;
     document.getElementById('gone').hidden = good;
