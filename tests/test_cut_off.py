@@ -84,7 +84,7 @@ def assert_told(run: Terminal, log: Path, html: Path) -> None:
     assert str(cut) == f"cut off at {cut.t:.2f} s: {cut.products} of {cut.units} units"
     told = run("monitor", log)
     assert told.status == 1
-    assert f"consistent with the net as far as it goes, {cut}\n" in told.out
+    assert f"consistent with the net up to its end, {cut}\n" in told.out
     assert f"CutOff '{log}' is {cut.told}\n" in told.err
     document = run("monitor", log, "--json")
     assert document.status == 1 and document.json["refines_net"]
@@ -141,7 +141,7 @@ def test_the_longest_time(run: Terminal, out: Path) -> None:
     words = "run", PAPER, "--units", 50, "--max-time", 1.5, "--monitor", "--log", log
     done = run(*words)
     assert done.status == 1
-    assert f"consistent with the net as far as it goes, {cut_off(log)}\n" in done.out
+    assert f"consistent with the net up to its end, {cut_off(log)}\n" in done.out
     assert cut_off(log).t == pytest.approx(1.5, abs=0.011)
     assert cut_off(log).code == "Timeout" and "r3 in weld(sub2)" in cut_off(log).message
     assert_told(run, log, out / "a.html")
@@ -312,7 +312,7 @@ def test_two_runs_do_not_write_one_log(run: Terminal, out: Path) -> None:
         with pytest.raises(InputError, match="is being written by another run"):
             LogWriter(log, Simulation(paper_layout(), RunRequest("ideal")))
         assert log.stat().st_size >= before
-        assert "its run is still going on" in cut_off(log).message
+        assert "its run is still in progress" in cut_off(log).message
         assert run("monitor", log).status == 1
         process.kill()
         process.communicate(timeout=60)

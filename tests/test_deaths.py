@@ -15,8 +15,7 @@ from factory.compiler.taking_over import taken_over
 from factory.mjcf.replica import Replica
 from factory.nets.undo import tokens_after
 from factory.nets.undone import Undone
-from factory.record.deaths import Death, deaths, gone
-from factory.record.failures import Failing
+from factory.record.failures import Death, Failing, deaths, gone
 from factory.record.log import Log
 from factory.record.log.model import model_of
 from factory.record.monitor.record import recorded_subject

@@ -13,7 +13,7 @@ import pytest
 
 from factory.record.log import MAGIC, LogWriter, read_log
 from factory.record.log.blocks import HEAD, LENGTH, Arrays, block, unpacked
-from factory.record.log.header import LogHeader
+from factory.record.log.checks import LogHeader
 from factory.record.log.model import model_of
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError

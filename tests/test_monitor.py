@@ -223,7 +223,7 @@ def test_a_weld_that_is_never_released(paper: Layout) -> None:
     run, report = watched(simulation, 3)
     t = next(e.t for e in run.events if e.transition == "sub1_e")
     assert_caught(report, "TwoHolders", "r5", "part1", 6, t)
-    assert "r3 and r5 hold part1#1 both" in report.violations[0].message
+    assert "r3 and r5 both hold part1#1" in report.violations[0].message
 
 
 def test_a_part_that_is_let_go(paper: Layout) -> None:
@@ -357,7 +357,7 @@ def test_a_weld_ended_on_the_way_to_it(paper: Layout) -> None:
     _, report = watched(simulation, 4)
     assert_caught(report, "Order", "r2", "sub3", 3, done[0])
     assert_caught(report, "Early", "r3", "sub2", 4, done[0], late=1.0)
-    assert "for sub2_e comes first" in report.violations[0].message
+    assert "since sub2_e must come first" in report.violations[0].message
 
 
 def test_a_robot_whose_drive_does_nothing(paper: Layout) -> None:
@@ -403,7 +403,7 @@ def test_more_parts_let_in_than_allowed(paper: Layout) -> None:
     run, report = watched(simulation)
     t = [e.t for e in run.events if e.transition == "part1_s"][1]
     assert_caught(report, "Order", "r5", "part1", 6, t)
-    assert "for dropoff_e comes first" in report.violations[0].message
+    assert "since dropoff_e must come first" in report.violations[0].message
 
 
 def test_parts_that_the_marking_does_not_account_for(paper: Layout) -> None:
@@ -432,7 +432,7 @@ def test_firings_in_an_impossible_order(paper: Layout) -> None:
     explanation.saw(events["sub3_s"], 0, 0.0, 4.0, 4.0, "r2")
     _, _, found = explanation.solve(0.0, 9.0)
     assert [v.label for v in found] == ["sub2", "sub3"]
-    assert "part3_e comes first, and was not seen" in found[1].message
+    assert "part3_e must come first, and was not observed" in found[1].message
 
 
 def test_a_feeder_that_presents_while_its_robot_still_works_there() -> None:
@@ -504,7 +504,7 @@ def test_logs_that_cannot_be_watched(paper: Layout, tmp_path: Path, run: Termina
         header = {k: v for k, v in log.header.items() if k != key}
         with pytest.raises(InputError, match="BadLog"):
             watch_log(factory_log(log, header))
-    with pytest.raises(InputError, match="not of the factory in its header"):
+    with pytest.raises(InputError, match="differs from the factory in its header"):
         watch_log(factory_log(log, {**log.header, "transitions": ["x_s"]}))
 
 

@@ -247,7 +247,7 @@ def test_a_plan_is_read_in_place_of_its_pag(name: str, tmp_path: Path) -> None:
     assert plan_files(again, folder) == plan_files(project, folder)
     (folder / "layout.json").unlink()
     anew = plan.project(plan.settings, plan.ground, said.append)
-    assert [d.code for d in said] == ["BadPlan"] and "laid out anew" in said[0].message
+    assert [d.code for d in said] == ["BadPlan"] and "laid out again" in said[0].message
     assert_same(anew.layout, project.layout)
 
 
@@ -296,7 +296,7 @@ def test_what_does_not_go_with_a_plan(run: Terminal, built: Path, tmp_path: Path
         done = run("check", plan, *words, "--json")
         assert done.status == 2 and done.codes == ["Usage"]
         assert f"{words[0]} applies to a PAG" in done.json["errors"][0]["message"]
-    assert "laid out anew" not in run("run", plan, "--world", "ideal", "--speed", 1).err
+    assert "laid out again" not in run("run", plan, "--world", "ideal", "--speed", 1).err
     assert "other settings" in run("run", plan, "--world", "ideal", "--clearance", 0.03).err
     assert "other settings" in run("run", plan, "--world", "ideal", "--floor", "9x9").err
     done = run("build", plan, "-o", built)
@@ -311,7 +311,7 @@ def test_what_does_not_go_with_a_plan(run: Terminal, built: Path, tmp_path: Path
 @pytest.mark.parametrize(
     ("change", "code", "words"),
     [
-        (lambda t: "{", "BadPlan", "plan.json:1:2: BadPlan it is no JSON"),
+        (lambda t: "{", "BadPlan", "plan.json:1:2: BadPlan it is not JSON"),
         (lambda t: "[" * 10**5, "BadPlan", ""),
         (lambda t: "[]", "BadPlan", "its schema must be 'factory.plan.1'"),
         (lambda t: {**t, "schema": 1}, "BadPlan", "its schema must be 'factory.plan.1', not 1"),

@@ -13,8 +13,7 @@ from factory.mjcf.replica import Replica
 from factory.nets.undo import marking_after, undo
 from factory.nets.undone import Undone
 from factory.plant.material import joins_of
-from factory.record.deaths import Death
-from factory.record.failures import Failing
+from factory.record.failures import Death, Failing
 from factory.record.log import Log
 from factory.record.log.model import model_of
 from factory.record.monitor.record import recorded_subject

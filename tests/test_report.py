@@ -22,8 +22,7 @@ from factory.show.report.drawings import floor_plan
 from factory.show.report.fidelity import fidelity
 from factory.show.report.links import data, labels_of, links
 from factory.show.report.pace import measured
-from factory.show.report.packing import json_inside
-from factory.show.report.page import SCRIPTS
+from factory.show.report.page import SCRIPTS, json_inside
 from factory.show.report.sections import assembly_tree
 from factory.show.report.words import proof
 from factory.simulation.request import RunRequest
@@ -374,7 +373,9 @@ def test_a_log_that_was_cut_off_is_told_as_far_as_it_goes(log: Path, tmp_path: P
     assert not kept.complete and kept.cut_off is not None
     found = Page(page(recording_of(cut)))
     assert kept.cut_off.told in found.words
-    assert any("they explain the run, as far as it goes." in words for words in found.words)
+    assert any(
+        "consistent with the net up to the end of the log." in words for words in found.words
+    )
 
 
 def test_bodies_that_replace_others_are_no_hand_overs(tmp_path: Path) -> None:

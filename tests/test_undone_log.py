@@ -16,7 +16,7 @@ from factory.nets.undone import Undone
 from factory.plant.factory import Factory
 from factory.record.log.reader import Log, read_log
 from factory.record.monitor.record import recorded_subject, verdict_on, watch_log
-from factory.study.analysis.measured import logged_record
+from factory.study.analysis.recorded import logged_record
 from factory.support.errors import InputError
 from tests.command_line import PAPER, Terminal, spawn
 from tests.test_log import block_ends
@@ -132,7 +132,7 @@ def test_the_monitor_on_a_log_with_failures(run: Terminal, tmp_path: Path) -> No
     assert log.undone
     found = run("monitor", tmp_path / "log", "--json").json
     assert found["refines_net"] and found["violations"] == []
-    assert "without a failure or a repair" in run("monitor", tmp_path / "log").out
+    assert "without failure or recovery" in run("monitor", tmp_path / "log").out
     after, undone = log.undone[0]
     less = replace(undone, transitions=undone.transitions[1:])
     report, _ = watch_log(replace(log, undone=((after, less), *log.undone[1:])))

@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 @LENIENT
 @OUTPUT
 def monitor(file: Path, lenient: bool, out: OutputOptions) -> int:
-    """Check the run in a LOG, written by `run --log`, against its net, from the recorded states;
-    after failures, from the states between these, and from what fired and was undone.
+    """Judge the run in a LOG that `run --log` has kept against its net, from its states; where
+    something failed, from those between failures, and from what fired and was undone.
 
-    The exit status is 1 if the run does not follow its net, moves bodies other than the net says,
-    or was cut off before its units were made, and 2 if the LOG ends before there is anything to
-    check."""
+    The status is 1 for a run that does not follow its net, in which bodies did otherwise than the
+    net says, or that was cut off before its units were made, and 2 for a LOG that ends before there
+    is anything to judge."""
     from factory.record.log import read_log
     from factory.record.monitor.record import verdict_on, watch_log
     from factory.simulation.remade import model_faults
@@ -59,7 +59,7 @@ def monitor(file: Path, lenient: bool, out: OutputOptions) -> int:
             say_verdict(verdict, out.verbose)
         say(found_by(report, log.cut_off))
         if why:
-            say(f"the model was not compared with that of the PAG: {why}")
+            say(f"its model was not compared with that of its PAG: {why}")
         if log.failures is not None:
             say_failures(log.failures, out.verbose)
         if verdict.succeeded:
@@ -75,12 +75,12 @@ def monitor(file: Path, lenient: bool, out: OutputOptions) -> int:
 
 
 def say_verdict(verdict: RunVerdict, verbose: bool = False) -> None:
-    """Print whether a run succeeded, and its failures, the cause first; unless `verbose`, one line
-    for each code."""
+    """Whether a run succeeded and what of its verdict failed, the cause first and, unless it is
+    `verbose`, a line for each code."""
     failures = verdict.failures if verbose else verdict.gathered
     lines = [f"{failure.code}: {failure.message}" for failure in failures]
     if verdict.succeeded:
-        say("the run succeeded" + (", with --lenient, in spite of:" if lines else ""))
+        say("the run succeeded" + (", as --lenient leaves this out:" if lines else ""))
     else:
         say(f"the run FAILED: {lines.pop(0)}")
     for line in lines:
@@ -91,35 +91,35 @@ def say_verdict(verdict: RunVerdict, verbose: bool = False) -> None:
 
 
 def found_by(report: Report, cut_off: CutOff | None) -> str:
-    """The result of a monitor in a line."""
+    """The findings of a monitor, in one line."""
     counts = f"{len(report.seen)} firings observed, {len(report.inferred)} inferred"
     judged = f"{len(report.violations)} VIOLATIONS"
     if report.refines_net:
-        judged = f"consistent with the net{' as far as it goes' if cut_off else ''}"
+        judged = f"consistent with the net{' up to its end' if cut_off else ''}"
     if report.calm_s is not None:
-        judged += f" in the {report.calm_s:.1f} s without a failure or a repair"
+        judged += f" in the {report.calm_s:.1f} s without failure or recovery"
     return f"monitor: {counts}; {judged}" + (f", {cut_off}" if cut_off else "")
 
 
 def say_failures(failures: Failures, verbose: bool) -> None:
-    """Print the faults and failures of a run."""
+    """What went wrong in a run, in a few lines."""
     struck = ", ".join(f"{count} {kind}" for kind, count in failures.struck.items() if count)
     missed, alarms = failures.missed, failures.false_alarms
     say(f"faults: {struck or 'none'}; {missed} missed, {alarms} false alarms")
     say(
         f"{len(failures.found)} failures, {failures.undone} transitions undone,"
         f" {failures.scrapped} scrapped, {failures.spares} spares used,"
-        f" {failures.contacts} contacts with fallen or misplaced parts"
+        f" {failures.contacts} contacts with what fell or lay askew"
     )
     if failures.binned or failures.spilled:
         spilled = ", ".join(failures.spilled)
-        none = f"; no bin for the scrap of {spilled}" if spilled else ""
+        none = f"; no bin for that of {spilled}" if spilled else ""
         say(f"scrap in bins: {failures.binned}{none}")
     for one in failures.found if verbose else ():
         say(f"  {one.t:.2f} s: {one}")
 
 
 def tell_failures(verdict: RunVerdict, verbose: bool) -> None:
-    """Print the failures of a verdict, with their origin, to stderr."""
+    """What of a verdict failed, with where it comes from, on stderr."""
     for failure in verdict.failures if verbose else verdict.gathered:
         print(failure, file=sys.stderr)

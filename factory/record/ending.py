@@ -1,4 +1,4 @@
-"""How far a run came that was cut off."""
+"""The end of a run that was cut off."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ from factory.support.errors import Diagnostic
 
 @dataclass(frozen=True, slots=True)
 class CutOff:
-    """The end of a run, or of the record of one, before its units were made: at `t` [s], with
-    `products` of `units`. `code` and `message` say what ended it, as far as that is known: those of
-    a diagnostic, such as Timeout, Stalled or Interrupted, or BadLog where the record ends and not
-    the run."""
+    """The end of a run, or of its record, before all units were made: at `t` [s], with `products`
+    of `units`. `code` and `message`: those of the diagnostic that ended it, such as Timeout,
+    Stalled or Interrupted, or BadLog where only the record ended; "" where unknown."""
 
     t: float
     products: int
@@ -26,12 +25,12 @@ class CutOff:
 
     @property
     def told(self) -> str:
-        """The same, and what ended it."""
+        """The same, with the cause."""
         return f"{self}; {self.message}" if self.message else str(self)
 
     @property
     def failure(self) -> Diagnostic:
-        """What ended it, as a failure of the run."""
+        """The cause, as a failure of the run."""
         return Diagnostic(self.code or "CutOff", self.message or str(self))
 
     def as_json(self) -> dict[str, object]:
@@ -46,5 +45,5 @@ class CutOff:
 
     def diagnostic(self, file: object) -> Diagnostic:
         """The message about the log in a file."""
-        hint = "what is said of it holds until then"
+        hint = "all results cover the time until then"
         return Diagnostic("CutOff", f"'{file}' is {self.told}", None, hint)

@@ -1,21 +1,58 @@
-"""What went wrong in a run, and what was done about it."""
+"""What failed in a run, what was done about it, and the robots that died or were exchanged."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from math import isfinite
+from math import inf, isfinite
 from typing import Protocol
 
-from factory.record.exchange import Exchange
+from factory.nets.gears import GearNet
+from factory.nets.undone import Entry, exchanges
+from factory.plant.factory import Factory
+
+
+@dataclass(frozen=True, slots=True)
+class Exchange:
+    """A `deputy` that took over the tours of a robot that is `dead`, by their names, at time t [s].
+
+    `fired`: n', the counts from which the run went on in another `net`, which was proved before;
+    `crew`: its factory, in which all robots keep their numbers; `cycle_time`: what is predicted for
+    it [s].
+    """
+
+    t: float
+    dead: str
+    deputy: str
+    fired: tuple[int, ...] = field(repr=False)
+    net: GearNet = field(repr=False)
+    crew: Factory = field(repr=False)
+    cycle_time: float
+
+    def __str__(self) -> str:
+        return (
+            f"{self.deputy} takes over the tours of {self.dead} (deputy);"
+            f" predicted from then on: {self.cycle_time:.3f} s"
+        )
+
+    def as_json(self) -> dict[str, object]:
+        """As `run --json` prints it, the counts by the names of transitions."""
+        names = (transition.name for transition in self.net.threaded.transitions)
+        return {
+            "t": round(self.t, 6),
+            "dead": self.dead,
+            "deputy": self.deputy,
+            "predicted_cycle_time_s": self.cycle_time,
+            "fired": dict(zip(names, self.fired, strict=True)),
+        }
 
 
 @dataclass(frozen=True, slots=True)
 class Failing:
-    """A failure that was found at `t` [s]: the `test` that failed, in which `operation` (its
-    label), of which `robot`, "" for none; the `response`, and what was `scrapped`, by label.
-    `until`: when a dead robot is replaced [s], None where none is; `deputy`: the robot that then
-    takes over its tours, "" for none."""
+    """A failure detected at `t` [s]: the failed `test`, the `operation` (its label), the `robot`,
+    "" for none; the `response`, and the labels that were `scrapped`. `until`: when a dead robot is
+    replaced [s], None where it is not; `deputy`: the robot that takes over its tours, "" for
+    none."""
 
     t: float
     test: str
@@ -46,7 +83,7 @@ class Failing:
 
     @property
     def what(self) -> str:
-        """What failed, in words."""
+        """The failure, in words."""
         things = ", ".join(self.scrapped) or self.operation
         in_feeder = self.scrapped == (self.operation,)
         match self.test:
@@ -64,7 +101,7 @@ class Failing:
 
     @property
     def done(self) -> str:
-        """What is done about it, in words."""
+        """The response, in words."""
         if self.is_death:
             if self.until is None or not isfinite(self.until):
                 return "a spare comes" if self.response == "spare" else "there is no spare"
@@ -84,17 +121,17 @@ class Failing:
 
 
 Stood = tuple[float, tuple[str, ...]]
-"""From when on [s] which robots stand, by name, and no others."""
+"""A time [s], and the names of all robots that stand still from then on."""
 
 
 @dataclass(frozen=True)
 class Failures:
-    """All of a run. `struck`: faults of the world, by kind; `missed`: those that no sensor told of;
-    `false_alarms`: failures that nothing caused; `undone`: how many transitions were fired
-    backwards; `spares`: how many were used; `contacts`: of what fell, which are no unintended
-    ones; `stood`: from when on [s] which robots stood, by name; `binned`: how often scrap has
-    fallen into a bin; `spilled`: the robots, by name, that have let some fall elsewhere, since
-    there is no room for a bin."""
+    """All failures of a run. `struck`: number of faults of each kind; `missed`: of those that no
+    sensor detected; `false_alarms`: of failures without a fault; `undone`: of transitions fired
+    backwards; `spares`: of spares used; `contacts`: of contacts with fallen parts, which do not
+    count as unintended; `stood`: the robots that stood still over time; `binned`: number of times
+    that scrap fell into a bin; `spilled`: names of robots that dropped scrap elsewhere, where there
+    is no space for a bin."""
 
     found: tuple[Failing, ...] = ()
     struck: Mapping[str, int] = field(default_factory=dict)
@@ -110,7 +147,7 @@ class Failures:
     @property
     def scrapped(self) -> int:
         """How many parts and sub-assemblies were scrapped."""
-        return sum(len(one.scrapped) for one in self.found)
+        return sum(len(failing.scrapped) for failing in self.found)
 
     def as_json(self) -> dict[str, object]:
         """As `run --json` prints it."""
@@ -126,14 +163,13 @@ class Failures:
             "binned": self.binned,
             "spilled": list(self.spilled),
             "standing": [{"t": round(t, 6), "robots": list(robots)} for t, robots in self.stood],
-            "failures": [one.as_json() for one in self.found],
+            "failures": [failing.as_json() for failing in self.found],
         }
 
 
 class Account(Protocol):
-    """What a run that goes on after failures tells of them: those that it has `found`, which robots
-    `stood` and were exchanged so far, and all of it; `given`: the faults that it was asked for, as
-    values of JSON."""
+    """The failures of a run that recovers from them: those `found` so far, the robots that `stood`
+    still or were exchanged, and the `report` of all; `given`: the requested faults, as JSON."""
 
     @property
     def given(self) -> Mapping[str, object]: ...
@@ -145,3 +181,44 @@ class Account(Protocol):
     @property
     def exchanges(self) -> Sequence[Exchange]: ...
     def report(self) -> Failures: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Death:
+    """Outage of a `robot` from its detection at `start` to `end` [s], inf where nothing replaces
+    it; from then on its `deputy` does its tours or, where that is "", a spare replaces it."""
+
+    robot: str
+    start: float
+    end: float
+    deputy: str = ""
+
+    @property
+    def then(self) -> str:
+        """The situation after its end, in words."""
+        if self.deputy:
+            return f"{self.robot} is gone: {self.deputy} does its tours"
+        return f"a spare is in the place of {self.robot}"
+
+
+def gone(entries: Iterable[Entry], time: float = inf) -> dict[str, str]:
+    """The robots removed for good up to a time [s], each with the deputy that does its tours, by
+    name: those exchanged by the entries of a record."""
+    return {undone.robots[0]: undone.robots[1] for undone in exchanges(entries) if undone.t <= time}
+
+
+def deaths(failings: Iterable[Failing], entries: Iterable[Entry]) -> list[Death]:
+    """The deaths among the failures of a record. One with a deputy ends when an entry exchanges
+    the two: a deputy that dies before that never takes over."""
+    exchanged = {undone.robots: undone.t for undone in exchanges(entries)}
+    return [
+        Death(failing.robot, failing.t, _end(failing, exchanged), failing.deputy)
+        for failing in failings
+        if failing.is_death
+    ]
+
+
+def _end(death: Failing, exchanged: dict[tuple[str, ...], float]) -> float:
+    if death.deputy:
+        return exchanged.get((death.robot, death.deputy), inf)
+    return inf if death.until is None else death.until

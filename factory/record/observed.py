@@ -1,4 +1,4 @@
-"""What a recorder needs of a simulation: of its factory, how it is run, and its two worlds."""
+"""The interface between a simulation and its recorders."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class ObservedRequest(Protocol):
-    """What was asked of a run; `simulation.RunRequest` is one."""
+    """The request of a run, such as `simulation.RunRequest`."""
 
     @property
     def world(self) -> str: ...
@@ -36,7 +36,7 @@ class ObservedRequest(Protocol):
 
 
 class Observed(Protocol):
-    """A simulation that a log or a monitor is kept of; `simulation.Simulation` is one.
+    """A simulation with a log or a monitor, such as `simulation.Simulation`.
 
     `asked`: the request before anything was chosen for it; `model`: None in the ideal world;
     `start`: the marking the run began from; `before`: products delivered before that. `world` has
@@ -63,8 +63,8 @@ class Observed(Protocol):
 
 
 class Recorder(Closing):
-    """What keeps a run in a file: an observer of it, and a context manager. `since`: until then [s]
-    it need not see every tick."""
+    """An observer that records a run in a file, and a context manager. `since`: time [s] before
+    which it need not observe every tick."""
 
     since = 0.0
 
@@ -73,4 +73,4 @@ class Recorder(Closing):
         raise NotImplementedError
 
     def end(self, trouble: Diagnostic | None) -> None:
-        """The run is over; `trouble`: what ended it early."""
+        """The run is over; `trouble`: the diagnostic that ended it early, if any."""

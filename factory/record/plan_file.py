@@ -1,5 +1,5 @@
 """The files of a plan: `plan.json`, a project with its plan, which is read in place of a PAG, and
-`layout.json` beside it, how that was laid out."""
+`layout.json` beside it, its layout."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ class PlanFile:
                 table = _table(path, LAYOUT_SCHEMA)
                 if table["plan"] == _digest(made.pag, self.table, made.settings, made.ground.floor):
                     return replace(made, laid=value_of(LayoutTable, table["layout"], "layout"))
-            why = f"'{path}' is of another plan, or for other settings, meshes or another floor"
+            why = f"'{path}' is of another plan, or for other settings, meshes or floor"
         hint = "`factory build` with `-o DIR` writes both files"
-        warn(Diagnostic("BadPlan", f"{why}: the plan is laid out anew", None, hint))
+        warn(Diagnostic("BadPlan", f"{why}: the plan is laid out again", None, hint))
         return made
 
 
@@ -92,16 +92,16 @@ def plan_files(
         digest = _digest(pag, table, project.settings, project.ground.floor)
         layout = table_of(LayoutTable.of(project.layout))
         named[LAYOUT_NAME] = {"schema": LAYOUT_SCHEMA, "plan": digest, "layout": layout}
-    return {folder / name: (json.dumps(own) + "\n").encode() for name, own in named.items()}
+    return {folder / name: (json.dumps(table) + "\n").encode() for name, table in named.items()}
 
 
 def _digest(
     pag: PAG, table: Mapping[str, Any], settings: Settings, floor: tuple[float, float] | None
 ) -> str:
-    """Of all that a layout depends on: text, templates and plan of a table, the content of the
-    meshes that its PAG names, settings, floor."""
-    own = [table["pag"]["text"], table["templates"], table["plan"], table_of(floor)]
-    made = sha256(json.dumps([own, [getattr(settings, n) for n in LAID_FOR]]).encode())
+    """Digest of the inputs of a layout: text, templates and plan of a table, the content of the
+    meshes of its PAG, settings, floor."""
+    values = [table["pag"]["text"], table["templates"], table["plan"], table_of(floor)]
+    made = sha256(json.dumps([values, [getattr(settings, n) for n in LAID_FOR]]).encode())
     for mesh in dict.fromkeys(filter(None, (part.parameter("mesh") for part in pag.parts()))):
         made.update(sha256(read_bytes(Path(pag.folder) / str(mesh), MESH)).digest())
     return made.hexdigest()
@@ -126,7 +126,9 @@ def _of_a_plan(path: Path) -> Iterator[None]:
         raise InputError(Diagnostic("BadFile", message, None, AGAIN)) from error
     except json.JSONDecodeError as error:
         at = Position(str(path), error.lineno, error.colno)
-        raise InputError(Diagnostic("BadPlan", f"it is no JSON: {error.msg}", at, AGAIN)) from error
+        raise InputError(
+            Diagnostic("BadPlan", f"it is not JSON: {error.msg}", at, AGAIN)
+        ) from error
     except (ValueError, KeyError, RecursionError) as error:
         words = f"it has no {error}" if isinstance(error, KeyError) else str(error)
         raise InputError(Diagnostic("BadPlan", words, Position(str(path), 1, 1), AGAIN)) from error

@@ -47,8 +47,8 @@ class PagTable:
 
 @dataclass(frozen=True, slots=True)
 class ProjectTable:
-    """What the table of a project holds: the name of its `product`, the texts of its `templates` by
-    their names."""
+    """The table of a project: the name of its `product`, the texts of its `templates` by name, and
+    its other inputs."""
 
     product: str
     pag: PagTable
@@ -64,7 +64,7 @@ class ProjectTable:
 
     @classmethod
     def of(cls, table: Mapping[str, Any]) -> ProjectTable:
-        """That in a table, which may have other keys. Raises ValueError."""
+        """The fields in a table, which may have other keys. Raises ValueError."""
         return value_of(cls, {f.name: table[f.name] for f in fields(cls) if f.name in table})
 
 
@@ -103,9 +103,9 @@ def project_of(
     settings: Settings | None = None,
     ground: Ground = Ground(),  # noqa: B008 (frozen)
 ) -> Project:
-    """The project in a table that a file in the folder `beside` has, for its `settings` unless
-    others are given, with the layout that is kept there, if any. Raises InputError where its PAG
-    cannot be read, or meshes are missing, ValueError where it is no such table."""
+    """The project in a table of a file in the folder `beside`, with its layout, if any; `settings`
+    replace those of the table. Raises InputError where its PAG cannot be read, or meshes are
+    missing, ValueError where the table is not valid."""
     made, kept = ProjectTable.of(table), table.get("layout")
     templates = _templates(made)
     pag = _pag(made.pag, templates, beside)
@@ -121,7 +121,8 @@ def settings_of(table: Mapping[str, Any]) -> Settings:
 
 @contextmanager
 def of_its_factory() -> Iterator[None]:
-    """Raises InputError (BadLog) for the errors of a log that is not of its header's factory."""
+    """Raises InputError (BadLog) for the errors of a log that differs from the factory in its
+    header."""
     try:
         yield
     except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
@@ -152,13 +153,13 @@ def factory_of(header: Mapping[str, Any]) -> Factory:
 def check_names(factory: Factory, header: Mapping[str, Any]) -> None:
     """Raises ValueError where a factory has other names than those in the header of a log."""
     net = factory.net.threaded
-    made = [[x.name for x in found] for found in (net.transitions, net.places, factory.robots)]
-    if made != [header["transitions"], header["places"], header["robots"]]:
+    names = [[x.name for x in items] for items in (net.transitions, net.places, factory.robots)]
+    if names != [header["transitions"], header["places"], header["robots"]]:
         raise ValueError("its net is not that of its PAG")
 
 
 def _of_another(words: str) -> InputError:
-    message = f"the log is not of the factory in its header: {words}"
+    message = f"the log differs from the factory in its header: {words}"
     return InputError(Diagnostic("BadLog", message, None, AGAIN))
 
 

@@ -1,9 +1,9 @@
-"""Whether a run succeeded: what its record must show, and what its bodies must.
+"""The verdict on a run: conditions on its record and on its bodies.
 
 A run succeeds if all its units were made, its record refines the net, and the bodies agree: the
-model was that of the factory, what a monitor reconstructs from the engine's state is what the
-record says, and no figure of the bodies exceeds its limit. What failed is told in the order of
-time: what comes first is the cause."""
+model was that of the factory, the reconstruction of a monitor from the engine's state agrees with
+the record, and no figure of the bodies exceeds its limit. Failures are in the order of time: the
+first is the cause."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from factory.record.monitor.report import Report
 from factory.support.errors import Diagnostic
 
 SHOWN = 4
-"""So many names are listed in a verdict."""
+"""Number of names that are listed in a failure."""
 
 
 @dataclass(frozen=True, slots=True)
 class FigureLimit:
-    """The most that a figure of the bodies may be in a run that succeeds; `code` and `words` say
-    that it is more, with the figure in place of `{}`. `names`: the figure, a list of texts, that
-    says what of; `at`: the figure that says when [s]."""
+    """Upper bound on a figure of the bodies in a run that succeeds; `code` and `words`: the
+    failure, with the figure in place of `{}`. `names`: the figure that lists the bodies concerned;
+    `at`: the figure with the time [s]."""
 
     code: str
     figure: str
@@ -34,7 +34,7 @@ class FigureLimit:
     at: str = ""
 
     def exceeded(self, figures: Mapping[str, Any]) -> Diagnostic | None:
-        """What is said where the figure is more; a log of an older version may lack it."""
+        """The failure where the figure exceeds the bound; an older log may lack the figure."""
         value = figures.get(self.figure)
         if value is None or value <= self.most:
             return None
@@ -58,7 +58,7 @@ LIMITS = (
     FigureLimit("EngineWarning", "engine_warnings", 0, "{:g} engine warnings"),
     FigureLimit("HandOffGap", "handoff_gap_max_mm", 1.0, "a hand-off with a gap of {:.2f} mm"),
     FigureLimit("HandOffTurn", "handoff_angle_max_deg", 0.1, "a hand-off turned by {:.2f}°"),
-    FigureLimit("GripGap", "grip_gap_max_mm", 0.5, "a pad {:.2f} mm from what it takes"),
+    FigureLimit("GripGap", "grip_gap_max_mm", 0.5, "a pad {:.2f} mm from the part it takes"),
     FigureLimit(
         "ProductError",
         "product_error_max_mm",
@@ -74,37 +74,37 @@ LIMITS = (
         names="misplaced",
     ),
 )
-"""What is judged of the bodies, beside what the monitor finds."""
+"""The bounds on the bodies, in addition to the findings of the monitor."""
 
 NAMES = tuple(dict.fromkeys(limit.names for limit in LIMITS if limit.names))
-"""The figures that name what was in contact or out of place."""
+"""The figures that list bodies in contact or out of place."""
 
 STRENGTH = "grip_strength_share_max"
-"""A figure that is kept to be shown: where it is too large the run has ended by that (Dropped)."""
+"""A figure without a bound here: a run in which it is too large has ended by that (Dropped)."""
 
 DROPPED = "dropped_s"
-"""The figure that says when a load was dropped, which ends a run a little later [s]."""
+"""The figure with the time at which a load was dropped, which ends a run a little later [s]."""
 
 FIGURES = (
     *(limit.figure for limit in LIMITS),
     *(limit.at for limit in LIMITS if limit.at),
     *(STRENGTH, DROPPED),
 )
-"""The figures that are numbers, or none."""
+"""The figures that are numbers or None."""
 
 FAULTS = "faults"
-"""The figure that lists what was wrong with the model of a run, code and message of each."""
-
+"""The figure that lists the faults of the model of a run, as pairs of code and message."""
 
 BLOCKED = "Blocked"
+"""The code of an operation in which parts passed through each other."""
 
 
 @dataclass(frozen=True, slots=True)
 class RunVerdict:
-    """The verdict on a run: what ended it early, whether its record refines the net, and what is
-    wrong with its `bodies`, in the order of time, so many of which came `before` what ended it.
-    `lenient`: the bodies do not count. `blocked`: operations in which parts passed through each
-    other on their way, which is no failure of the run, but of the order of assembly."""
+    """The verdict on a run: the `trouble` that ended it early, whether its record refines the net,
+    and the failures of its `bodies`, in the order of time, of which `before` is the number that
+    precede the trouble. `lenient`: the bodies do not count. `blocked`: operations in which parts
+    passed through each other, a failure of the order of assembly and not of the run."""
 
     trouble: Diagnostic | None = None
     refines: bool = True
@@ -115,31 +115,30 @@ class RunVerdict:
 
     @property
     def follows(self) -> bool:
-        """Whether nothing is wrong with it, as far as it goes."""
+        """Whether it has no failures up to its end."""
         return self.refines and not self.bodies
 
     @property
     def succeeded(self) -> bool:
-        """Whether nothing is wrong that counts."""
+        """Whether the run has no failure that counts."""
         return self.trouble is None and self.refines and (self.lenient or not self.bodies)
 
     @property
     def failures(self) -> tuple[Diagnostic, ...]:
-        """All that is wrong, the cause first."""
-        found = [] if self.trouble is None else [self.trouble]
+        """All failures, the cause first."""
+        ending = [] if self.trouble is None else [self.trouble]
         if not self.refines:
-            found.append(Diagnostic("NotRefined", "the record does not refine the net"))
-        return (*self.bodies[: self.before], *found, *self.bodies[self.before :])
+            ending.append(Diagnostic("NotRefined", "the record does not refine the net"))
+        return (*self.bodies[: self.before], *ending, *self.bodies[self.before :])
 
     @property
     def gathered(self) -> tuple[Diagnostic, ...]:
-        """The first failure of each code, with how many more there are. What would mend a
-        consequence is not said."""
-        found: dict[str, list[Diagnostic]] = {}
+        """The first failure of each code, with the number of others; hints only for the cause."""
+        by_code: dict[str, list[Diagnostic]] = {}
         for failure in self.failures:
-            found.setdefault(failure.code, []).append(failure)
+            by_code.setdefault(failure.code, []).append(failure)
         lines = list[Diagnostic]()
-        for code, (first, *more) in found.items():
+        for code, (first, *more) in by_code.items():
             words = first.message + (f" (and {len(more)} more)" if more else "")
             lines.append(Diagnostic(code, words, first.position, "" if lines else first.hint))
         return tuple(lines)
@@ -161,24 +160,24 @@ def judged(
     report: Report | None,
     lenient: bool = False,
 ) -> RunVerdict:
-    """The verdict on a run: `trouble` is what ended it early, `refines` whether its record refines
-    the net; `figures` of its bodies, as `kept_figures` gives them, and a monitor's `report`, where
-    there are any."""
-    found = sorted(_failures(figures or {}, report), key=lambda failure: failure[0])
+    """The verdict on a run: `trouble` ended it early, `refines`: whether its record refines the
+    net; `figures` of its bodies, from `kept_figures`, and the `report` of a monitor, where there
+    are any."""
+    timed = sorted(_failures(figures or {}, report), key=lambda failure: failure[0])
     dropped = (figures or {}).get(DROPPED)
     ended = inf if dropped is None else dropped
-    before = sum(t < ended for t, _ in found)
+    before = sum(t < ended for t, _ in timed)
     faults = [Diagnostic(code, words) for code, words in (figures or {}).get(FAULTS, [])]
     blocked = tuple(fault for fault in faults if fault.code == BLOCKED)
-    bodies = tuple(failure for _, failure in found)
+    bodies = tuple(failure for _, failure in timed)
     return RunVerdict(trouble, refines, bodies, lenient, before, blocked)
 
 
 def _failures(
     figures: Mapping[str, Any], report: Report | None
 ) -> Iterator[tuple[float, Diagnostic]]:
-    """What is wrong with the bodies of a run, each with its time [s]: that of the model is before
-    all, that of figures without a time and of the product's drawing after all."""
+    """The failures of the bodies of a run, each with its time [s]: those of the model first, those
+    of figures without a time and of overlapping parts last."""
     for code, words in figures.get(FAULTS, []):
         if code != BLOCKED:
             yield inf if code == "Overlap" else -inf, Diagnostic(code, words)
@@ -192,31 +191,31 @@ def _failures(
 
 
 def kept_figures(physics: Any) -> dict[str, Any]:
-    """What a verdict rests on, of the figures of a run's bodies, and what no log shows else."""
-    found = {figure: getattr(physics, figure) for figure in (*FIGURES, *NAMES)}
-    found[FAULTS] = [[fault.code, fault.message] for fault in physics.faults]
-    asked = {limit.figure for limit in LIMITS}
-    return {figure: value for figure, value in found.items() if value or figure in asked}
+    """The figures of the bodies of a run that a verdict needs, or that a log lacks otherwise."""
+    kept = {figure: getattr(physics, figure) for figure in (*FIGURES, *NAMES)}
+    kept[FAULTS] = [[fault.code, fault.message] for fault in physics.faults]
+    judged_figures = {limit.figure for limit in LIMITS}
+    return {figure: value for figure, value in kept.items() if value or figure in judged_figures}
 
 
 def check_figures(figures: Any) -> None:
-    """Raises ValueError where these are not as `kept_figures` gives them."""
+    """Raises ValueError where the figures do not have the form of `kept_figures`."""
     if not isinstance(figures, dict):
-        raise ValueError("its figures are no table")
+        raise ValueError("its figures are not a table")
     for figure in FIGURES:
         value = figures.get(figure)
         if value is not None and type(value) not in (int, float):
-            raise ValueError(f"its figure '{figure}' is no number")
+            raise ValueError(f"its figure '{figure}' is not a number")
     for figure in NAMES:
         if not _are_texts(figures.get(figure, [])):
-            raise ValueError(f"its figure '{figure}' is no list of texts")
+            raise ValueError(f"its figure '{figure}' is not a list of texts")
     faults = figures.get(FAULTS, [])
     if not isinstance(faults, list) or not all(_are_texts(f) and len(f) == 2 for f in faults):
-        raise ValueError(f"its figure '{FAULTS}' is no list of pairs of texts")
+        raise ValueError(f"its figure '{FAULTS}' is not a list of pairs of texts")
 
 
 def _of(geom: str) -> str:
-    """What a geom is of: a part by its label, anything else by its own name."""
+    """The name of the body of a geom: the label of a part, or else its own name."""
     return names.label_of(geom) if names.kind(geom) == "part" else geom
 
 

@@ -13,8 +13,7 @@ from factory.control.mode import Array
 from factory.layout.durations import Pace
 from factory.nets.undone import Entry, Undone
 from factory.plant.factory import Factory, Operation
-from factory.record.deaths import Death, deaths, gone
-from factory.record.failures import Failing, Stood
+from factory.record.failures import Death, Failing, Stood, deaths, gone
 from factory.record.monitor.subject import MonitorSubject
 
 TIE = 1e-9

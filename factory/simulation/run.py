@@ -11,8 +11,7 @@ from factory.nets.undone import Entry, Undone, lasting
 from factory.plant.approaches import Pair
 from factory.plant.factory import Factory
 from factory.record.ending import CutOff
-from factory.record.exchange import Exchange
-from factory.record.failures import Failures
+from factory.record.failures import Exchange, Failures
 from factory.record.monitor.report import Report
 from factory.record.verdict import RunVerdict, judged, kept_figures
 from factory.support.errors import Diagnostic

@@ -1,17 +1,16 @@
-"""The log of a run, `run --log OUT`: its whole state after every tick, in one file that is only
-appended to.
+"""The log of a run, `run --log OUT`: its state after every tick, in one append-only file.
 
     factory-log 2\\n          magic
     <I length>{...}          header, JSON: versions, command line, world, seed, jitter, units,
                              wip, numbers of the places marked at the start, settings, names of
                              robots, places and transitions, the PAG's name, text and SHA-256, its
                              plan and the templates that it uses (`record.project_table`), its
-                             layout (`layout.saved`), what a monitor knows of that, nq, nv
+                             layout (`layout.saved`), the data of a monitor, nq, nv
     blocks                   see blocks.py: a letter, length, CRC-32, compressed arrays
 
     M  the model, once: `xml`, and `mesh/NAME` for each mesh file, bytes (mujoco only)
-    T  ticks, about a simulated second of them, and the ends of operations (mujoco only), each
-       before the engine goes on, in the order of time:
+    T  about a simulated second of ticks, and the ends of operations (mujoco only), each before
+       the engine continues, in the order of time:
        time (n,) [s], delivered (n,)      products that have left since the run began
        qpos (n, nq), qvel (n, nv)         the engine's; in the ideal world arc lengths and speeds
        ctrl (n, nu)                       the engine's setpoints; these and qvel to a nanometre
@@ -21,18 +20,18 @@ appended to.
        contact_dist                       their distances [m]
        fired_at, fired, fired_t           row, number and time [s] of the transitions fired
        ended_at                           the rows that are ends of operations, not ticks
-       undone, bytes                      what was undone, JSON, where anything was
-       failures, bytes                    what went wrong so far, JSON as in `run --json` with lists
-                                          of what is new, where anything is and the run goes on
+       undone, bytes                      undos, JSON, where there are any
+       failures, bytes                    failures so far, JSON as in `run --json`, whose lists
+                                          have only new entries, where there are any
     E  the end: the file was closed properly
-       figures, bytes (mujoco only)       what its verdict rests on, JSON: see `record.verdict`
-       failures, bytes                    what went wrong, JSON as in `run --json`, where the run
-                                          goes on after failures
-       code, message, bytes               what ended the run, as a diagnostic has it, where it
-                                          ended before its units were made
+       figures, bytes (mujoco only)       the figures of its verdict, JSON: see `record.verdict`
+       failures, bytes                    all failures, JSON as in `run --json`, where the run
+                                          recovers from failures
+       code, message, bytes               those of the diagnostic that ended the run, where it
+                                          ended before all units were made
 
-Every block stands for itself and is written at once, so a file that ends in the middle of one lacks
-at most the last second. Readers pass over blocks of other letters. While it is written it is locked
+Every block is self-contained and is written at once, so a file that ends within one lacks at most
+the last second. Readers skip blocks of other letters. The file is locked while it is written
 (`flock`)."""
 
 from factory.record.log.blocks import MAGIC

@@ -1,5 +1,4 @@
-"""The log of a run that is made again: compared with it up to where the log ends, then written
-on."""
+"""Resuming a log: the run is repeated, compared with the log up to its end, and then appended."""
 
 from __future__ import annotations
 
@@ -21,9 +20,9 @@ HINT = (
 
 
 def last_full(data: memoryview, rows: int) -> tuple[int, float]:
-    """The byte after the last block of ticks that the end of its run did not cut short, and the
-    time there [s]; the byte after the model, and 0, where there is none. `rows`: what such a block
-    has at least. Raises ValueError for what is no log."""
+    """End of the last complete block of ticks: its byte and time [s]; the byte after the model and
+    0 where there is none. `rows`: least number of rows of a complete block. Raises ValueError where
+    the data are not a log."""
     end, time = header_in(data)[1], 0.0
     for kind, arrays, after in blocks(data, end):
         if kind == b"M":
@@ -35,11 +34,11 @@ def last_full(data: memoryview, rows: int) -> tuple[int, float]:
 
 
 class Continued(Recorder):
-    """Compares a simulation with its `log` up to the time `since` [s]: its events and, in the ticks
-    that have some and at the end, its positions. Then it writes the log on from byte `end`. `file`:
-    the log, claimed; until then it stays as it is.
+    """Compares a simulation with its `log` up to the time `since` [s]: its events and, in ticks
+    with events and at the end, its positions. Then it appends to the log from byte `end`. `file`:
+    the claimed log, unchanged until then.
 
-    `observe` and `end` raise InputError (BadLog) where the simulation is not the run in the log.
+    `observe` and `end` raise InputError (BadLog) where the simulation differs from the log.
     """
 
     def __init__(
@@ -112,7 +111,7 @@ class Continued(Recorder):
             self.writer.__exit__(*raised)
 
     def close(self) -> None:
-        """Write what is left, and the end, where the log was written on."""
+        """Close the log, with its last block where it was continued."""
         (self.writer or self.file).close()
 
 

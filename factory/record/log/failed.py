@@ -1,49 +1,50 @@
-"""What went wrong in a run, as a log keeps it, where the run goes on after failures: the table of
-`Failures` in its last block, and in blocks of ticks so far as it was known then."""
+"""Failures and undos in a log, as JSON: the table of `Failures` in the last block, its additions
+and the undos in blocks of ticks."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from factory.nets.undone import Undone
 from factory.record.failures import Account, Failures
 from factory.record.log.blocks import Arrays
 from factory.support.tables import table_of, value_of
 
 LISTS = "found", "stood"
-"""What becomes longer: a block of ticks has what is new of it."""
+"""The lists of an account: a block of ticks has the entries that were added to them."""
 
 
 @dataclass(slots=True)
-class Told:
-    """How much of a run has been written: so many `events`; of its account so many failures `found`
-    and changes of which robots `stood`, -1 where nothing of it has."""
+class Written:
+    """Counts of what has been written of a run: `events`; of its account the failures `found`, -1
+    before the first block, and the changes of which robots `stood`."""
 
     events: int
     found: int = -1
     stood: int = 0
 
-    def goes_on(self, account: Account | None) -> None:
-        """All has been written."""
+    def complete(self, account: Account | None) -> None:
+        """Mark all of an account as written."""
         if account is not None:
             self.found, self.stood = len(account.found), len(account.stood)
 
     def news(self, account: Account | None) -> bytes:
-        """What is to be written now, nothing where there is nothing new."""
+        """The additions to an account since the last call as JSON; empty where there are none."""
         if account is None or (self.found, self.stood) == (len(account.found), len(account.stood)):
             return b""
-        told = table_of(account.report())
-        for name, known in zip(LISTS, (self.found, self.stood), strict=True):
-            told[name] = told.get(name, [])[max(known, 0) :]
-        self.goes_on(account)
-        return json.dumps(told).encode()
+        table = table_of(account.report())
+        for name, count in zip(LISTS, (self.found, self.stood), strict=True):
+            table[name] = table.get(name, [])[max(count, 0) :]
+        self.complete(account)
+        return json.dumps(table).encode()
 
 
 def failures_so_far(ticks: Sequence[Arrays], robots: frozenset[str]) -> Failures | None:
-    """What went wrong up to the end of some blocks of ticks, None where these do not tell. Raises
-    ValueError where a text is not what `Told.news` gives."""
+    """The failures up to the end of some blocks of ticks, None where these have none. Raises
+    ValueError where a text is not what `Written.news` gives."""
     news = [json.loads(arrays["failures"].tobytes()) for arrays in ticks if "failures" in arrays]
     if not news:
         return None
@@ -55,8 +56,8 @@ def failures_so_far(ticks: Sequence[Arrays], robots: frozenset[str]) -> Failures
 
 
 def failures_in(content: bytes, robots: frozenset[str]) -> Failures:
-    """What went wrong in the run of a log whose robots have these names. Raises ValueError where
-    the text is not the table of `Failures`."""
+    """The failures in the last block of a log whose robots have these names. Raises ValueError
+    where the text is not the table of `Failures`."""
     return failures_of(json.loads(content), robots)
 
 
@@ -72,3 +73,34 @@ def failures_of(table: Any, robots: frozenset[str]) -> Failures:
     if any(not t >= 0 for t in (*(one.t for one in found.found), *(t for t, _ in found.stood))):
         raise ValueError("failures: times must be from 0")
     return found
+
+
+Placed = tuple[int, Undone]
+"""An undo, after the number of transitions that had fired before it. In a log: its `table_of`."""
+
+
+def undone_in(ticks: Sequence[Arrays], header: Mapping[str, Any]) -> tuple[Placed, ...]:
+    """The undos in the blocks of a log. Raises ValueError for an entry that is not one, that names
+    an unknown transition or robot, or that is out of order."""
+    tables = [json.loads(arrays["undone"].tobytes()) for arrays in ticks if "undone" in arrays]
+    entries = tuple(entry for table in tables for entry in _entries(table))
+    fired = sum(len(arrays["fired"]) for arrays in ticks)
+    transitions, robots, last = {*header["transitions"]}, {*header["robots"]}, 0
+    for after, undone in entries:
+        unknown = {*undone.asked, *undone.transitions} - transitions
+        if unknown:
+            raise ValueError(f"'{min(unknown)}' is undone, which is no transition")
+        if strange := {*undone.robots} - robots:
+            raise ValueError(f"'{min(strange)}' is exchanged, which is no robot")
+        if not last <= after <= fired:
+            raise ValueError(f"something is undone after {after} firings, not {last} to {fired}")
+        if undone.t < 0:
+            raise ValueError(f"something is undone at {undone.t} s, before the run")
+        last = after
+    return entries
+
+
+def _entries(table: Any) -> tuple[Placed, ...]:
+    kind: Any = tuple[Placed, ...]
+    made: tuple[Placed, ...] = value_of(kind, table, "undone")
+    return made

@@ -17,8 +17,8 @@ from factory.nets.undone import Entry, lasting
 from factory.record.ending import CutOff
 from factory.record.failures import Failures
 from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, blocks, check_magic, is_cut
-from factory.record.log.failed import failures_in, failures_so_far
-from factory.record.log.header import check_header
+from factory.record.log.checks import check_block, check_course, check_header, state_bytes
+from factory.record.log.failed import Placed, failures_in, failures_so_far, undone_in
 from factory.record.log.states import (
     StateRows,
     StoredRows,
@@ -27,8 +27,6 @@ from factory.record.log.states import (
     locked,
     without_states,
 )
-from factory.record.log.ticks import check_block, check_course, state_bytes
-from factory.record.log.undone import Placed, undone_in
 from factory.record.verdict import check_figures
 from factory.support.claim import is_claimed
 from factory.support.errors import InputError
@@ -37,11 +35,11 @@ from factory.support.files import LOG, RECORD, head_of, mapped
 Index = NDArray[np.int32]
 
 ROOM, WIDEST = 1 << 29, 1 << 27
-"""Upper bounds on the bytes of the states that are unpacked at once, of all blocks and of one. A
-day of the paper's example takes 30 times the first, its blocks, of a second, 200 kB each."""
+"""Upper bounds on the bytes of unpacked states, of all blocks and of one. A day of the paper's
+example takes 30 times the first; its blocks, of a second, take 200 kB each."""
 
 ROUNDING = 1e-9
-"""Times that differ by less are one [s]."""
+"""Times that differ by less are equal [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,15 +54,14 @@ class Ragged:
         return self.values[self.starts[row] : self.ends[row]]
 
     def chosen(self, rows: NDArray[np.bool_]) -> Ragged:
-        """That of some rows."""
+        """The values of some rows."""
         return Ragged(self.values, self.starts[rows], self.ends[rows])
 
 
 @dataclass(frozen=True, slots=True)
 class Ends:
-    """The state where operations had ended and parts had changed hands, before the engine went on:
-    between the ticks `row` - 1 and `row`, in the order of time; the other fields are as in `Log`.
-    """
+    """The states as operations ended and parts changed hands, before the engine continued, in the
+    order of time: each between the ticks `row` - 1 and `row`; other fields as in `Log`."""
 
     row: NDArray[np.int64] = field(repr=False)
     time: NDArray[np.float64] = field(repr=False)
@@ -76,16 +73,16 @@ class Ends:
 
 @dataclass(frozen=True)
 class Log:
-    """A log, read: locked arrays over n ticks, the first before the run began.
+    """The content of a log: locked arrays over n ticks, the first before the run began.
 
     `marking[i]`: numbers of the marked places; `active[i]` (k, 3): active constraints, and the two
     bodies each joins; `contacts[i]` (k, 2) geoms, `distances[i]` (k,) [m]; `fired` and `fired_t`:
     transitions by number and time [s]. `ctrl`: the setpoints; None in the ideal world. `complete`:
-    whether the file was closed properly; `cut_off`: how far the run came, None where all of its
-    units were made and the log has all of it. `ends`: the state as operations ended, and `figures`
-    of the bodies, as `kept_figures` gives them; None in the ideal world. `undone`: what was undone,
-    each with how many transitions had fired before it. `failures`: what went wrong, in a run that
-    goes on when something does; of one that was killed what was known as the last was found.
+    whether the file was closed properly; `cut_off`: the early end of the run or the log, None where
+    all units were made and logged. `ends`: the states as operations ended, and `figures` of the
+    bodies, from `kept_figures`; None in the ideal world. `undone`: each undo with the number of
+    transitions that had fired before it. `failures`: of a run that recovers from them; where it was
+    killed, those up to the last detection.
     """
 
     header: Mapping[str, Any] = field(repr=False)
@@ -113,8 +110,7 @@ class Log:
         return len(self.time)
 
     def row_at(self, time: float) -> int:
-        """The first row from a time on [s], len(self) after the last. Times may be off by what
-        rounding takes."""
+        """The first row from a time on [s], up to rounding; len(self) after the last."""
         return int(np.searchsorted(self.time, time - ROUNDING))
 
     @cached_property
@@ -125,16 +121,16 @@ class Log:
 
     @cached_property
     def timed_entries(self) -> tuple[tuple[float, Entry], ...]:
-        """Time [s] and name of every transition that fired, and in between what was undone."""
-        found, begin = list[tuple[float, Entry]](), 0
+        """Time [s] and name of every transition that fired, with the undos in between."""
+        entries, begin = list[tuple[float, Entry]](), 0
         for after, undone in self.undone:
-            found += [*self.events[begin:after], (undone.t, undone)]
+            entries += [*self.events[begin:after], (undone.t, undone)]
             begin = after
-        return (*found, *self.events[begin:])
+        return (*entries, *self.events[begin:])
 
     @property
     def entries(self) -> tuple[Entry, ...]:
-        """The same without times, as a replay takes them."""
+        """The timed entries without their times, for a replay."""
         return tuple(entry for _, entry in self.timed_entries)
 
     @cached_property
@@ -147,7 +143,7 @@ class Log:
 
 
 def read_log(path: Path | str) -> Log:
-    """The log in a file, whole or cut off. Raises InputError (BadLog) where it is not one."""
+    """The log in a file, whole or cut off. Raises InputError (BadLog) where it is not a log."""
     path = Path(path)
     try:
         written, data = is_claimed(path), mapped(path, RECORD)
@@ -171,7 +167,7 @@ def is_log(path: Path | str) -> bool:
 
 def header_in(data: memoryview) -> tuple[dict[str, Any], int]:
     """The header of a log, and the byte at which its blocks begin. Raises ValueError where it is
-    none."""
+    not a valid header."""
     begin = len(MAGIC) + LENGTH.size
     kept = begin + (LENGTH.unpack_from(data, len(MAGIC))[0] if begin <= len(data) else 0)
     if kept > len(data) or begin > len(data):
@@ -182,8 +178,8 @@ def header_in(data: memoryview) -> tuple[dict[str, Any], int]:
 
 
 def log_in(data: memoryview, written: bool = False) -> Log:
-    """The log in the bytes of a file; `written`: its run is still going on. Raises ValueError,
-    KeyError, IndexError, TypeError, OverflowError or RecursionError where they are none."""
+    """The log in the bytes of a file; `written`: its run is still in progress. Raises ValueError,
+    KeyError, IndexError, TypeError, OverflowError or RecursionError where it is not a log."""
     header, kept = header_in(data)
     xml, files, complete = "", {}, False
     trouble: Arrays = {}
@@ -201,7 +197,7 @@ def log_in(data: memoryview, written: bool = False) -> Log:
             ticks.append(arrays)
             begins.append(kept)
             size += more
-            if size > ROOM:  # from here on they are unpacked when they are asked for
+            if size > ROOM:  # from here on they are unpacked on demand
                 first = 0 if size - more <= ROOM else -1
                 ticks[first:] = [*map(without_states, ticks[first:])]
         complete, kept = kind == b"E", end
@@ -272,14 +268,14 @@ def _at_end(ticks: Sequence[Arrays], counts: Sequence[int]) -> NDArray[np.bool_]
 
 
 def _figures(content: NDArray[Any]) -> Mapping[str, Any]:
-    """The figures in the last block. Raises ValueError where they are none."""
-    found = json.loads(content.tobytes())
-    check_figures(found)
-    return MappingProxyType(found)
+    """The figures in the last block. Raises ValueError where they are not valid."""
+    figures = json.loads(content.tobytes())
+    check_figures(figures)
+    return MappingProxyType(figures)
 
 
 def _failures(end: Arrays, ticks: Sequence[Arrays], header: Mapping[str, Any]) -> Failures | None:
-    """What went wrong: all, as the last block tells, or what was known as far as a log goes."""
+    """All failures, from the last block, or those up to the end of a log that lacks it."""
     robots = frozenset(header["robots"])
     if "failures" in end:
         return failures_in(end["failures"].tobytes(), robots)
@@ -287,9 +283,9 @@ def _failures(end: Arrays, ticks: Sequence[Arrays], header: Mapping[str, Any]) -
 
 
 def _broken(data: memoryview, kept: int, written: bool) -> str:
-    """Why a file that was read up to byte `kept` has no end, and where it stops."""
+    """The reason why a file that was read up to byte `kept` lacks its last block."""
     if written:
-        return f"its run is still going on, and has written {kept} bytes"
+        return f"its run is still in progress, and has written {kept} bytes"
     if kept == len(data):
         return f"its run was killed: the log ends at byte {kept} and was not closed"
     if is_cut(data, kept):
@@ -314,7 +310,7 @@ def _spans(
 
 
 def _lasting(name: str, ticks: Sequence[Arrays], counts: Sequence[int]) -> Ragged:
-    """Values that hold from a row until the next are recorded."""
+    """Values that are valid from their row until the next recorded row."""
     at, starts, ends = _spans(name, ticks, counts)
     values = np.concatenate([a[name] for a in ticks]) if ticks else np.zeros((0,), np.int32)
     if not len(at):
@@ -327,7 +323,7 @@ def _lasting(name: str, ticks: Sequence[Arrays], counts: Sequence[int]) -> Ragge
 
 
 def _single(name: str, values: str, ticks: Sequence[Arrays], counts: Sequence[int]) -> Ragged:
-    """Values that hold for one row."""
+    """Values that are valid for one row."""
     at, first, last = _spans(name, ticks, counts)
     starts, ends = np.zeros(sum(counts), int), np.zeros(sum(counts), int)
     starts[at], ends[at] = first, last

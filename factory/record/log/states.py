@@ -1,5 +1,5 @@
-"""The states in a log: as arrays where they fit the memory that a reader may take, else unpacked
-block by block as they are asked for."""
+"""The states in a log: arrays where they fit the memory of a reader, else blocks unpacked on
+demand."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from factory.record.log.blocks import HEAD, Arrays, unpack_rows, unpacked
 STATES = ("qpos", "qvel", "ctrl")
 
 KEPT = 4
-"""So many unpacked blocks are kept at most, about a simulated second each."""
+"""Upper bound on the unpacked blocks in memory, of about a simulated second each."""
 
 
 class Unpacking:
-    """The states in blocks of ticks that begin at some bytes of a file, with the numbers of the
-    first row of each."""
+    """Unpacks the states in the blocks of ticks that begin at the given bytes of a file, with the
+    numbers of rows of each."""
 
     def __init__(self, data: memoryview, begins: Sequence[int], counts: Sequence[int]) -> None:
         self._data, self._begins = data, begins
@@ -29,7 +29,7 @@ class Unpacking:
         self._block = lru_cache(maxsize=KEPT)(self._unpack)
 
     def row(self, name: str, number: int) -> NDArray[np.float64]:
-        """A state (width,) in a row of the whole log."""
+        """The state (width,) in a row of the whole log."""
         block = int(np.searchsorted(self._first, number, side="right")) - 1
         found: NDArray[np.float64] = self._block(block)[name][number - self._first[block]]
         return found
@@ -45,8 +45,7 @@ class Unpacking:
 
 @dataclass(frozen=True, slots=True)
 class StoredRows:
-    """The rows of a state, by `numbers` (n,) of those of the whole log, each unpacked when it is
-    asked for."""
+    """The rows of a state, by `numbers` (n,) of rows of the whole log, unpacked on demand."""
 
     unpacking: Unpacking = field(repr=False)
     name: str
@@ -55,7 +54,7 @@ class StoredRows:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """How many rows, and how wide."""
+        """Number of rows, and width."""
         return len(self.numbers), self.width
 
     def __len__(self) -> int:
@@ -76,11 +75,11 @@ def all_rows(name: str, width: int, ticks: Sequence[Arrays]) -> NDArray[np.float
 
 
 def without_states(arrays: Arrays) -> Arrays:
-    """What a block of ticks has besides, copied: views would hold all of the block."""
+    """The other arrays of a block, copied: views would keep the whole block in memory."""
     return {k: v.copy() for k, v in arrays.items() if k.partition("_")[0] not in STATES}
 
 
 def locked(values: Any) -> Any:
-    """An array that nothing writes to any more."""
+    """The array, read-only from now on."""
     values.setflags(write=False)
     return values

@@ -19,7 +19,7 @@ from factory.layout.saved import LayoutTable
 from factory.nets.undone import Undone
 from factory.pipeline import Project
 from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, block, pack_rows
-from factory.record.log.failed import Told
+from factory.record.log.failed import Written
 from factory.record.log.states import STATES
 from factory.record.monitor.observation import EngineView
 from factory.record.monitor.subject import subject_of_run
@@ -42,9 +42,8 @@ noise, which takes half of a log. Positions are kept to the last bit."""
 
 
 class _Ticks:
-    """The ticks of a block: lists with an entry for each, or with a row number and what is recorded
-    of that row; rows of the ends of operations; what was undone; the marking and the active
-    constraints recorded last."""
+    """The ticks of a block: lists with an entry for each tick, or with a row number and the values
+    of that row; the rows that are ends of operations; undos; the last marking and constraints."""
 
     def __init__(self) -> None:
         self.time: list[float] = []
@@ -84,14 +83,12 @@ class _Ticks:
 
 
 class LogWriter(Recorder):
-    """Writes a log; to be closed, or used as a context manager. Other processes cannot write the
-    same file meanwhile.
+    """Writes a log, which it locks; to be closed, or used as a context manager.
 
-    `project`: what the factory was made from, where there is one; `command`: the
-    command line, that of this process unless given; `going_on`: the log itself, claimed, of a run
-    that has come to where it ends, at the place to write on. `trouble`: what ended the run early,
-    if something has. Raises InputError where the file cannot be written (BadLog), another run
-    writes it, or there is no more room for it (BadFile)."""
+    `project`: the project of the factory, where there is one; `command`: the command line, by
+    default that of this process; `going_on`: the claimed file of a log that is continued, at its
+    end. `trouble`: what ended the run early, if anything. Raises InputError where the file cannot
+    be written (BadLog), is locked by another run, or the disk is full (BadFile)."""
 
     def __init__(
         self,
@@ -107,9 +104,9 @@ class LogWriter(Recorder):
         net = simulation.layout.factory.net.threaded
         self.numbers = {t.name: n for n, t in enumerate(net.transitions)}
         self.most = rows_of_a_block(simulation.request.settings.tick)
-        self.ticks, self.told = _Ticks(), Told(len(self.supervisor.events))
+        self.ticks, self.written = _Ticks(), Written(len(self.supervisor.events))
         if going_on is not None and self.world.time:
-            self.told.goes_on(self.world.hooks.account)
+            self.written.complete(self.world.hooks.account)
         self.trouble: Diagnostic | None = None
         self.file = self._begun(simulation, project, command) if going_on is None else going_on
         if going_on is None or not self.world.time:
@@ -139,7 +136,7 @@ class LogWriter(Recorder):
         return file
 
     def ended(self) -> None:
-        """Operations have ended: record what is there before the engine goes on."""
+        """Record the state in which operations have ended, before the engine continues."""
         if not self.file.closed:
             self.ticks.ended.append(len(self.ticks.time))
             self._record(self.world, self.supervisor)
@@ -167,20 +164,20 @@ class LogWriter(Recorder):
             if self.view.d.ncon:
                 ticks.contacts.append((row, contact.geom.copy(), contact.dist.copy()))
         for number, event in enumerate(
-            supervisor.events[self.told.events :], start=self.told.events
+            supervisor.events[self.written.events :], start=self.written.events
         ):
             if isinstance(event, Undone):
                 before = sum(not isinstance(e, Undone) for e in supervisor.events[:number])
                 ticks.undone.append(table_of((before, event)))
                 continue
             ticks.fired.append((row, self.numbers[event.transition], event.t))
-        self.told.events = len(supervisor.events)
+        self.written.events = len(supervisor.events)
 
     def flush(self) -> None:
         """Write the ticks since the last block."""
         ticks, self.ticks = self.ticks, _Ticks()
         if ticks.time:
-            news = self.told.news(self.world.hooks.account)
+            news = self.written.news(self.world.hooks.account)
             failures = {"failures": np.frombuffer(news, "u1")} if news else {}
             self._append(block(b"T", {**ticks.arrays(), **failures}))
 
@@ -198,7 +195,7 @@ class LogWriter(Recorder):
         self.close()
 
     def close(self) -> None:
-        """Write what is left, and the end."""
+        """Write the remaining ticks and the last block."""
         if self.file.closed:
             return
         try:
@@ -219,7 +216,7 @@ class LogWriter(Recorder):
         return {name: _text(text) for name, text in texts.items()}
 
     def _append(self, content: bytes) -> None:
-        """Write all of it or, where there is no room, nothing, so that the file can be closed."""
+        """Append all of it or, where the disk is full, nothing, so that the file can be closed."""
         left = memoryview(content)
         try:
             while left:
@@ -237,8 +234,8 @@ class LogWriter(Recorder):
 
 
 def rows_of_a_block(tick: float) -> int:
-    """At least so many rows has a block that the end of its run did not cut short: those of about a
-    simulated second, in ticks of so many [s]."""
+    """Least number of rows of a block, except the last of a run: about a simulated second, in
+    ticks of this duration [s]."""
     return max(1, round(1.0 / tick))
 
 
@@ -310,6 +307,6 @@ def _header(
 
 
 def versions() -> dict[str, str]:
-    """Of the packages that a run depends on."""
+    """The installed versions of the packages that a run depends on."""
     names = ("klavins-factory", "mujoco", "numpy")
     return {name: found for name in names if (found := release(name))}

@@ -1,7 +1,8 @@
-"""A monitor that does not trust the supervisor: from what can be observed in the engine alone it
-finds out what each robot does and what holds each part, and judges the run against the net.
+"""A monitor that is independent of the supervisor: from observations of the engine alone it
+reconstructs the operation of each robot and the holder of each part, and compares them with the
+net.
 
-It sees positions, speeds, setpoints and active constraints; it never reads the supervisor, its
+It observes positions, speeds, setpoints and active constraints, and never reads the supervisor, its
 events or its marking. It works beside a run, or on a log (`factory.record.monitor.record`)."""
 
 from factory.record.monitor.anatomy import Anatomy
@@ -12,9 +13,9 @@ from factory.record.observed import Observed
 
 
 def beside(simulation: Observed) -> EngineMonitor:
-    """A monitor that watches the engine of a simulation: `observe` is an observer of its run, and
-    `glance` one that need not be called after every tick. Of the simulation it takes the engine,
-    the layout, where it starts and when operations end, and nothing else that goes on."""
+    """A monitor of the engine of a simulation: `observe` is an observer of its run, and `glance`
+    one that need not be called after every tick. It uses only the engine, the layout, the start of
+    the simulation, and the times at which operations end."""
     m, d = simulation.world.m, simulation.world.d
     anatomy = Anatomy.of(m, simulation.layout.factory)
     monitor = EngineMonitor(subject_of_run(simulation), anatomy, m, d)

@@ -1,4 +1,4 @@
-"""Whether the record of a run is what was seen of it: each firing of the one is in the other."""
+"""Agreement of the record of a run with the firings that a monitor observed, and with itself."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from factory.record.monitor.report import Firing, Violation
 from factory.record.monitor.subject import MonitorSubject
 
 ROUNDING = 1e-9
-"""Times that differ by less are one [s]."""
+"""Times that differ by less are equal [s]."""
 
 Recorded = Sequence[tuple[float, str]]
-"""Time [s] and name of every transition that fired, as a supervisor says."""
+"""Time [s] and name of every transition that fired, from a supervisor."""
 
 
 def disagreements(
     subject: MonitorSubject, found: Iterable[Firing], recorded: Recorded
 ) -> Iterator[Violation]:
-    """The firings that only one of the two has, or that have another time in the other. Where the
-    run ends, those need not have been seen yet that move no parts."""
+    """The firings that are in only one of the two, or that differ in time. At the end of the run,
+    firings that move no parts may not have been observed yet."""
     names = subject.factory.net.threaded.transitions
     count = {t.name: subject.counts.get(number, 0) for number, t in enumerate(names)}
     label = {t.name: subject.factory.operations[n // 2].label for n, t in enumerate(names)}
@@ -37,15 +37,15 @@ def disagreements(
         firing = left.pop((name, unit), None)
         what = f"the record has {name}, in unit {unit}, at {t:.3f} s"
         if t < last:
-            yield _violation(subject, t, label[name], f"{what}, after what came later")
+            yield _violation(subject, t, label[name], f"{what}, after a later firing")
         elif firing is None and name in shown:
-            yield _violation(subject, t, label[name], f"{what}, and it was not seen to fire")
+            yield _violation(subject, t, label[name], f"{what}, which was not observed")
         elif firing and not firing.earliest - ROUNDING <= t <= firing.latest + ROUNDING:
             when = f"between {firing.earliest:.3f} and {firing.latest:.3f} s"
-            yield _violation(subject, t, label[name], f"{what}, and it was seen to fire {when}")
+            yield _violation(subject, t, label[name], f"{what}, but it was observed {when}")
         last = t
     for firing in left.values():
-        words = f"{firing.transition} was seen to fire, in unit {firing.unit}, and is not recorded"
+        words = f"{firing.transition} was observed in unit {firing.unit}, but is not recorded"
         yield _violation(subject, firing.latest, label[firing.transition], words)
 
 
@@ -54,9 +54,9 @@ def contradictions(
     entries: Iterable[tuple[float, Entry]],
     markings: Iterable[tuple[float, Sequence[int]]],
 ) -> Iterator[Violation]:
-    """The first marking in a log that its own entries do not lead to: what fired, and what was
-    undone. Each marking is given with the time [s] of its tick; what was undone after that tick is
-    in it. Where robots were exchanged the net is another one from then on."""
+    """The first marking in a log that does not follow from its entries, firings and undos. Each
+    marking has the time [s] of its tick, and includes the undos after that tick. An exchange of
+    robots changes the net."""
     left, gears = deque(entries), subject.factory.net
     nets = nets_after(subject.factory, [entry for _, entry in left])
     tokens = [int(place in subject.start) for place in range(len(gears.threaded.places))]
@@ -72,7 +72,7 @@ def contradictions(
         if marked != set(marking):
             places = sorted(marked.symmetric_difference(marking))
             names = ", ".join(gears.threaded.places[place].name for place in places[:4])
-            words = f"its firings do not lead to the marking of that time: {names}"
+            words = f"the recorded marking does not follow from the firings: {names}"
             yield _violation(subject, time, "", words)
             return
 
@@ -82,7 +82,7 @@ def _is_undone(entry: Entry) -> bool:
 
 
 def _play(net: PetriNet, tokens: list[int], fired: list[int], entry: Entry) -> None:
-    """Fire a transition, or fire what was undone backwards, and count it."""
+    """Fire a transition, or the transitions of an undo backwards, and count it."""
     names, sign = (entry.transitions, -1) if isinstance(entry, Undone) else ((entry,), 1)
     for name in names:
         event = net.transition_index[name]

@@ -1,6 +1,5 @@
-"""Where in the engine's model a monitor looks: robots, copies of parts, welds and their frames.
-
-Everything is found by the names in the model and by its kinematic tree."""
+"""Addresses in the engine's model of robots, copies of parts, welds and their frames, from the
+names in the model and its kinematic tree."""
 
 from __future__ import annotations
 
@@ -25,8 +24,8 @@ class Anatomy:
     Robots (R,): `slide`, `dof` and `drive`, of their position, speed and setpoint. Actuators (A,):
     `joint`, `setpoint`, and `owner`, a robot's index or -1 for the outfeed. Copies of parts (C,):
     `copies`, their names, `label`, and `body` in qpos; `copy_of` (nbody,): the copy that a body is,
-    or -1. Constraints (E,): `holder`, None for one that holds no part, and `part`, the label it is
-    for; `frames`, where they keep it.
+    or -1. Constraints (E,): `holder`, None for one that holds no part, `part`, its label, and
+    `frames`, the place of the part.
     """
 
     slide: Index = field(repr=False)
@@ -45,7 +44,7 @@ class Anatomy:
 
     @classmethod
     def of(cls, m: Any, factory: Factory) -> Anatomy:
-        """The anatomy of an engine's model. Raises ValueError where it is not of that factory."""
+        """The anatomy of a model. Raises ValueError where the model is not of that factory."""
         from factory.support.engine import mujoco  # logs are written and read without the engine
 
         robots = {r.name: r.index for r in factory.robots}

@@ -1,15 +1,15 @@
-"""The monitor on a log in which something failed: judging what lies between failures.
+"""The monitor on a log with failures: it judges the spells between them.
 
-States alone do not tell what was undone, so each *spell* of a run is judged by itself, from the
-marking in which it begins. What a spell leaves out: from when that began which failed until every
-robot that was sent back has fired again, nothing lies about, and none stands. Whether what was
-undone is the least that had to be is judged apart, from the record (`factory.nets.replay`).
+States do not show undos, so each *spell* of a run is judged by itself, from the marking in which it
+begins. A spell excludes the time from the beginning of a failed operation until every robot that
+was sent back has fired again, no part lies about, and no robot stands still. That an undo is the
+least possible is checked separately, from the record (`factory.nets.replay`).
 """
 
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import islice
 from typing import Any
@@ -30,32 +30,32 @@ from factory.record.monitor.report import Firing, Report
 from factory.record.monitor.subject import MonitorSubject
 
 SHORT = 0.2
-"""Nothing is judged in a spell that is shorter [s]."""
+"""Shorter spells are not judged [s]."""
 
 FELT = 1.0
-"""What failed began so long before it was found, or when its operation did, if that is earlier
-[s]."""
+"""Assumed delay of the detection of a failure [s]; it began with its operation if that is
+earlier."""
 
 Span = tuple[float, float]
 
 
 class Crews:
-    """The subjects of a run, in which deputies may have taken over, and their factories with all
-    robots: one from each exchange on."""
+    """The subjects of a run, one from each exchange of robots on, and their factories with all
+    robots."""
 
     def __init__(self, log: Log, subject: MonitorSubject) -> None:
-        undone = [one for _, one in log.undone]
-        crews = [*crews_after(subject.factory, undone)]
-        self._since = [one.t for one in exchanges(undone)]
+        undos = [undo for _, undo in log.undone]
+        crews = [*crews_after(subject.factory, undos)]
+        self._since = [undo.t for undo in exchanges(undos)]
         self._subjects = [subject, *map(subject.after, crews)]
         self._factories = [subject.factory, *crews]
 
     def subject(self, t: float) -> MonitorSubject:
-        """What is under watch at a time [s]."""
+        """The subject at a time [s]."""
         return self._subjects[bisect_left(self._since, t + ROUNDING)]
 
     def factory(self, t: float) -> Factory:
-        """Its factory, with all robots."""
+        """The factory at a time [s], with all robots."""
         return self._factories[bisect_left(self._since, t + ROUNDING)]
 
 
@@ -64,7 +64,7 @@ Seen = Callable[[int, int], Iterator[Observation]]
 
 
 def judge_calm(log: Log, subject: MonitorSubject, m: Any, seen: Seen) -> Report:
-    """The verdict of a monitor on each spell of a run, from its observations, all in one."""
+    """The combined verdict of monitors on the spells of a run, from its observations."""
     rows, times = [], log.time
     crews, units = Crews(log, subject), _Units(log, subject)
     for begin, end in spells(log, crews, m):
@@ -74,10 +74,10 @@ def judge_calm(log: Log, subject: MonitorSubject, m: Any, seen: Seen) -> Report:
     at = ((span, crews.subject(float(times[span[0]]))) for span in rows)
     reports = [_judged(log, subject, m, seen, units, span) for span, subject in at]
     return Report(
-        tuple(f for one in reports for f in one.seen),
-        tuple(f for one in reports for f in one.inferred),
-        tuple(v for one in reports for v in one.violations)[:MOST],
-        sum(one.time_s for one in reports),
+        tuple(firing for report in reports for firing in report.seen),
+        tuple(firing for report in reports for firing in report.inferred),
+        tuple(violation for report in reports for violation in report.violations)[:MOST],
+        sum(report.time_s for report in reports),
         sum(float(times[last - 1] - times[first]) for first, last in rows),
     )
 
@@ -99,23 +99,17 @@ def _judged(
     for observation in inside:
         monitor.see(observation)
     first, last = np.searchsorted(log.fired_t, [begin - ROUNDING, end - ROUNDING]).tolist()
-    recorded = [*log.events[first:last]]
-    found = monitor.report(recorded)
-    offset = units.more(here, begin)
+    report, offset = monitor.report(log.events[first:last]), units.more(here, begin)
 
-    def counted(one: Firing) -> Firing:
-        return replace(one, unit=one.unit + offset)
+    def counted(firings: Sequence[Firing]) -> tuple[Firing, ...]:
+        return tuple(replace(firing, unit=firing.unit + offset) for firing in firings)
 
-    return replace(
-        found,
-        seen=tuple(counted(one) for one in found.seen),
-        inferred=tuple(counted(one) for one in found.inferred),
-    )
+    return replace(report, seen=counted(report.seen), inferred=counted(report.inferred))
 
 
 class _Units:
-    """How many units have been begun, by the record of a run: the first transition fires once for
-    each."""
+    """Number of units begun over time, from the record of a run: the first transition fires once
+    for each."""
 
     def __init__(self, log: Log, subject: MonitorSubject) -> None:
         first = subject.factory.net.threaded.transitions[0].name
@@ -127,13 +121,13 @@ class _Units:
                 self._begun.append(self._begun[-1] + more)
 
     def more(self, subject: MonitorSubject, begin: float) -> int:
-        """How many more a spell begins with [s] than its first marking tells."""
+        """Number of units begun before a spell [s], less that counted from its first marking."""
         at = bisect_left(self._times, begin - ROUNDING)
         return self._begun[at] - subject.counts.get(0, 0)
 
 
 def spells(log: Log, crews: Crews, m: Any) -> Iterator[Span]:
-    """From when to when nothing fails and nothing is put right [s], in order."""
+    """The intervals without failure or recovery [s], in order."""
     troubles, now = sorted(_troubles(log, crews, m)), 0.0
     for begin, end in troubles:
         if begin > now:
@@ -144,7 +138,7 @@ def spells(log: Log, crews: Crews, m: Any) -> Iterator[Span]:
 
 
 def _troubles(log: Log, crews: Crews, m: Any) -> Iterator[Span]:
-    """From when to when something fails or is put right [s]."""
+    """The intervals of failures and recoveries [s]."""
     end, factory = float(log.time[-1]), crews.factory(0.0)
     by_robot = {robot.name: robot.index for robot in factory.robots}
     number = factory.net.threaded.net.transition_index
@@ -155,11 +149,12 @@ def _troubles(log: Log, crews: Crews, m: Any) -> Iterator[Span]:
         robots |= {by_robot[name] for name in undone.robots}
         yield _since(log, undone.t, undone.operation), _gone_on(log, crews, robots, undone.t, end)
     failures = log.failures
-    for one in failures.found if failures else ():
-        robots = {*crews.factory(one.t).by_label[one.operation].robots}
-        robots |= {by_robot[one.robot]} if one.robot else set()
-        until = _gone_on(log, crews, robots, one.t, end)
-        yield _since(log, one.t, one.operation), max(until, min(one.until or 0.0, end))
+    for failing in failures.found if failures else ():
+        t = failing.t
+        robots = {*crews.factory(t).by_label[failing.operation].robots}
+        robots |= {by_robot[failing.robot]} if failing.robot else set()
+        until = _gone_on(log, crews, robots, t, end)
+        yield _since(log, t, failing.operation), max(until, min(failing.until or 0.0, end))
     stood = failures.stood if failures else ()
     for place, (t, names_) in enumerate(stood):
         if names_:
@@ -169,15 +164,17 @@ def _troubles(log: Log, crews: Crews, m: Any) -> Iterator[Span]:
 
 
 def _since(log: Log, t: float, label: str) -> float:
-    """When that began which was found to fail at t [s]: with the last that fired of the operation
-    before, so that what a feeder shows is left out from the beginning."""
-    own = (f"{label}_s", f"{label}_e")
+    """Beginning of a failure detected at t [s]: the last firing of its operation before, so that
+    the part in a feeder is excluded from its presentation on."""
+    transitions = (f"{label}_s", f"{label}_e")
     before = reversed(log.events[: int(np.searchsorted(log.fired_t, t))])
-    return min(t - FELT, next((when for when, name in before if name in own), 0.0)) - ROUNDING
+    return (
+        min(t - FELT, next((when for when, name in before if name in transitions), 0.0)) - ROUNDING
+    )
 
 
 def _gone_on(log: Log, crews: Crews, robots: set[int], t: float, end: float) -> float:
-    """When each of the robots has fired again after t [s], or is gone."""
+    """Time at which each of the robots has fired again after t [s], or is gone."""
     number, left = crews.factory(t).net.threaded.net.transition_index, set(robots)
     for when, name in islice(log.events, int(np.searchsorted(log.fired_t, t, "right")), None):
         factory = crews.factory(when)
@@ -189,7 +186,7 @@ def _gone_on(log: Log, crews: Crews, robots: set[int], t: float, end: float) -> 
 
 
 def _lying(log: Log, m: Any) -> Iterator[Span]:
-    """When parts are held by nothing [s]."""
+    """The intervals in which some part is not held [s]."""
     parts = {b for b in range(m.nbody) if names.kind(m.body(b).name) == "part" and m.body_dofnum[b]}
     for row in range(len(log)):
         if not parts <= {*log.active[row][:, 2].tolist()}:

@@ -1,9 +1,9 @@
-"""Whether some legal firing sequence explains what was seen.
+"""Consistency of the observed firings with some legal firing sequence.
 
 The compiled net is a live marked graph: the k-th firing of a transition e needs, for each place
 [d; e] with n initial tokens, the (k - n)-th firing of d, and nothing else. So each firing has an
-interval of times, what was seen bounds some of them, and there is a legal firing sequence if and
-only if no interval is empty. All bounds are found in one pass along the firings and one back.
+interval of times, observations bound some of them, and there is a legal firing sequence if and only
+if no interval is empty. All bounds follow from one pass forwards and one backwards.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from factory.timing.pool import with_wip
 
 @dataclass(slots=True)
 class _Seen:
-    """What was seen of a firing: it fired in [earliest, latest]; `t`: when it showed."""
+    """An observed firing: in [earliest, latest], observed at `t` [s] on a robot."""
 
     earliest: float
     latest: float
@@ -30,8 +30,8 @@ class _Seen:
 
 @dataclass(slots=True)
 class SeenFirings:
-    """What was seen of each firing, by transition and number (from 0, since m_0). `slack` [s]: how
-    far times may be off."""
+    """The observed firings, by transition and number (from 0, since m_0). `slack` [s]: tolerance of
+    times."""
 
     subject: MonitorSubject
     slack: float
@@ -40,8 +40,8 @@ class SeenFirings:
     def saw(
         self, event: int, unit: int, earliest: float, latest: float, t: float, robot: str
     ) -> None:
-        """A transition has fired for the `unit`-th time in [earliest, latest], as a robot showed at
-        `t`."""
+        """Record that a transition fired for the `unit`-th time in [earliest, latest], observed on
+        a robot at `t`."""
         if unit < self.subject.counts.get(event, 0):
             return
         old = self.seen.get((event, unit))
@@ -50,8 +50,7 @@ class SeenFirings:
             self.seen[event, unit] = _Seen(earliest, latest, t, robot)
 
     def solve(self, begin: float, end: float) -> tuple[list[Firing], list[Firing], list[Violation]]:
-        """The firings seen, those inferred, and the firings that nothing explains. Linear in the
-        firings."""
+        """The observed firings, the inferred ones, and the violations. Linear in the firings."""
         solver = _Solver(self, begin, end)
         violations = solver.forward()
         solver.backward()
@@ -60,15 +59,16 @@ class SeenFirings:
 
 
 class _Solver:
-    """The intervals of all firings that what was seen asks for."""
+    """The intervals of all firings, observed and inferred."""
 
-    def __init__(self, seen: SeenFirings, begin: float, end: float) -> None:
-        self.given, self.begin, self.end = seen, begin, end
-        factory, wip, counts = seen.subject.factory, seen.subject.wip, seen.subject.counts
+    def __init__(self, observed: SeenFirings, begin: float, end: float) -> None:
+        self.observed, self.begin, self.end = observed, begin, end
+        subject = observed.subject
+        factory, wip, counts = subject.factory, subject.wip, subject.counts
         self.net = marked(factory.net) if wip is None else with_wip(factory, wip)
         self.names = [t.name for t in factory.net.threaded.transitions]
         self.weight = {
-            o.place: max(0.0, o.dwell - seen.slack) for o in factory.operations if o.dwell
+            o.place: max(0.0, o.dwell - observed.slack) for o in factory.operations if o.dwell
         }
         self.done = [counts.get(e, 0) for e in range(len(self.names))]
         self.count = self._counts()
@@ -77,9 +77,9 @@ class _Solver:
         self.high: dict[tuple[int, int], float] = {}
 
     def _counts(self) -> list[int]:
-        """How often each transition has fired at least, since m_0."""
+        """Least number of firings of each transition, since m_0."""
         count = list(self.done)
-        for event, unit in self.given.seen:
+        for event, unit in self.observed.seen:
             count[event] = max(count[event], unit + 1)
         waiting = deque(range(len(count)))
         queued = [True] * len(count)
@@ -100,7 +100,7 @@ class _Solver:
         return [(net.left[p], net.tokens[p], p) for p in net.net.preset[event]]
 
     def _order(self) -> list[tuple[int, int]]:
-        """All firings, each after those it needs."""
+        """All firings, each after its preconditions."""
         order = token_free(self.net).order
         first, last = min(self.done), max(self.count)
         return [
@@ -111,13 +111,13 @@ class _Solver:
         ]
 
     def forward(self) -> list[Violation]:
-        """The earliest time of every firing; a firing seen before it is a violation, and counts
-        from then on as seen, so that one fault gives one violation."""
-        found = []
+        """The earliest time of every firing; a firing observed before it is a violation, and counts
+        as observed afterwards, so that one fault gives one violation."""
+        violations = []
         seen_when_over = {
             o.end
-            for o in self.given.subject.factory.operations
-            if self.given.subject.moves_parts[o.index]
+            for o in self.observed.subject.factory.operations
+            if self.observed.subject.moves_parts[o.index]
         }
         for event, unit in self.order:
             early, cause = self.begin, -1
@@ -125,25 +125,25 @@ class _Solver:
                 ready = self.low.get((before, unit - tokens), -inf) + self.weight.get(place, 0.0)
                 if ready > early:
                     early, cause = ready, before
-            noted = self.given.seen.get((event, unit))
+            noted = self.observed.seen.get((event, unit))
             if noted is None:
                 late = event in seen_when_over
                 self.low[event, unit] = self.end if late else min(early, self.end)
                 continue
-            if early > noted.latest + self.given.slack:
-                found.append(self._violation(event, unit, noted, cause, early))
+            if early > noted.latest + self.observed.slack:
+                violations.append(self._violation(event, unit, noted, cause, early))
                 early = noted.earliest
             self.low[event, unit] = min(max(early, noted.earliest), noted.latest)
-        return found
+        return violations
 
     def _violation(
         self, event: int, unit: int, noted: _Seen, cause: int, early: float
     ) -> Violation:
-        operation = self.given.subject.factory.operations[event // 2]
+        operation = self.observed.subject.factory.operations[event // 2]
         name, other = self.names[event], self.names[cause]
-        never = f"{other} comes first, and was not seen"
-        why = f"could not fire before {early:.3f} s, for {other} comes first"
-        words = f"{name} was seen at {noted.t:.3f} s, in unit {unit}, but "
+        never = f"{other} must come first, and was not observed"
+        why = f"could not fire before {early:.3f} s, since {other} must come first"
+        words = f"{name} was observed at {noted.t:.3f} s in unit {unit}, but "
         words += never if early >= self.end else why
         at = operation.position
         return Violation(noted.t, noted.robot, operation.label, "Order", words, at)
@@ -151,7 +151,7 @@ class _Solver:
     def backward(self) -> None:
         """The latest time of every firing."""
         for event, unit in self.order:
-            noted = self.given.seen.get((event, unit))
+            noted = self.observed.seen.get((event, unit))
             self.high[event, unit] = noted.latest if noted else self.end
         for event, unit in reversed(self.order):
             latest = self.high[event, unit]
@@ -165,7 +165,7 @@ class _Solver:
         """All firings, in the order of time."""
         seen, inferred = [], []
         for event, unit in self.order:
-            noted = self.given.seen.get((event, unit))
+            noted = self.observed.seen.get((event, unit))
             name, low, high = self.names[event], self.low[event, unit], self.high[event, unit]
             if noted is None:
                 inferred.append(Firing(name, unit, low, high))

@@ -1,4 +1,4 @@
-"""What holds each copy of a part: by the welds that are active, and by where the part really is."""
+"""The holder of each copy of a part, from the active welds and from the position of the part."""
 
 from __future__ import annotations
 
@@ -15,32 +15,31 @@ from factory.record.monitor.anatomy import Anatomy
 from factory.record.monitor.observation import Array, Index, Observation
 
 HANGS = 2e-3
-"""A part is not held where it is further than this from its place [m], beyond twice the radius of
-the goal balls in which robots hand over. The engine's welds yield by 0.03 mm, and a hand-over with
-a gap above 1 mm is a fault already."""
+"""Distance from its place above which a part is not held [m], in addition to twice the radius of
+the goal balls of hand-overs. The engine's welds yield by 0.03 mm, and a hand-over with a gap above
+1 mm is a fault already."""
 
 MISSED = 1e-4
-"""As an operation ends, a robot is not at its goal that is further than this beyond its goal ball
-[m]; nor is a part where its next holder takes it over that is further than this beyond twice the
-radius of those balls."""
+"""Tolerance [m] as an operation ends: of a robot beyond its goal ball, and of a part beyond twice
+the radius of those balls where its next holder takes it over."""
 
 TWISTS = radians(0.5)
-"""A part that is turned by more than this against its weld is not held either [rad]."""
+"""Angle to its weld above which a part is not held [rad]."""
 
 TURNED = radians(0.1)
-"""Nor is one where it should be, where its next holder takes it over, that is turned by more than
-this; nor does a weld put a part in its place that does [rad]. Honest runs stay below 1e-6."""
+"""Tolerance of the angle of a part where its next holder takes it over, and of a weld to the
+product [rad]. Correct runs stay below 1e-6."""
 
 FIRST = np.zeros((1, 1), np.intp)
-"""The only one of several looks."""
+"""The index of the only observation."""
 
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
-"""All that is held has the axes of the product, which are those of the world."""
+"""Held parts have the axes of the product, which are those of the world."""
 
 
 @dataclass(frozen=True, slots=True)
 class Switch:
-    """A copy that is held by other welds than before; all by number."""
+    """A copy with the numbers of the welds that held it before and hold it after."""
 
     copy: int
     before: tuple[int, ...]
@@ -49,8 +48,8 @@ class Switch:
 
 @dataclass(frozen=True, slots=True)
 class _Kept:
-    """The welds that are active, by number, the copies they hold, the addresses (n, 7) of those,
-    and where they are kept."""
+    """The active welds, by number, their copies, the addresses (n, 7) of those, and their
+    frames."""
 
     welds: Index
     copies: Index
@@ -59,7 +58,7 @@ class _Kept:
 
 
 class Grips:
-    """The welds on each copy, kept from tick to tick: `held[copy]`. `radius`: the largest goal ball
+    """The welds on each copy, `held[copy]`, updated from tick to tick. `radius`: largest goal ball
     [m]."""
 
     def __init__(self, anatomy: Anatomy, radius: float) -> None:
@@ -74,7 +73,7 @@ class Grips:
         self._taken: list[tuple[int, int, int]] = []
 
     def switched(self, seen: Observation) -> list[Switch]:
-        """The copies whose welds have changed since the observation before."""
+        """The copies whose welds have changed since the previous observation."""
         if seen.welds is self._welds:
             return []
         self._welds, self._kept, before = seen.welds, None, self._copy
@@ -99,8 +98,8 @@ class Grips:
         return switches
 
     def take(self, seen: Observation, switches: Sequence[Switch]) -> int:
-        """Robots or the tray take copies over, and nothing has pulled at them yet; gives how many
-        observations of that wait for `missed`."""
+        """Store the copies that robots or the tray take over, before any force acts on them;
+        returns the number of observations stored for `missed`."""
         holder = self.anatomy.holder
         taken = [
             (len(self._taking), switch.copy, weld)
@@ -114,8 +113,8 @@ class Grips:
         return len(self._taking)
 
     def missed(self) -> list[tuple[float, int, int, float]]:
-        """Of the copies that were taken over those that were not where their weld keeps them: when
-        [s], copy, weld, and how far off they were [m]."""
+        """The copies that were not in the place of their weld as they were taken over: time [s],
+        copy, weld, and distance [m]."""
         if not self._taken:
             return []
         looks, copies, welds = np.array(self._taken).T
@@ -133,8 +132,8 @@ class Grips:
         return found
 
     def dropped(self, seen: Observation) -> list[tuple[int, int, float]]:
-        """Copies that since the last observation have left the place where their weld keeps them:
-        copy, weld, and how far off they are [m]."""
+        """The copies that have left the place of their weld since the last observation: copy, weld,
+        and distance [m]."""
         if self._kept is None:
             on = (self._copy >= 0).nonzero()[0]
             copies = self._copy[on]
@@ -154,9 +153,9 @@ class Grips:
 def _apart(
     qpos: Array, look: Index, at: Index, frames: WeldFrames, most: float
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """How far bodies, at these addresses (n, 7) in the states (k, nq) of looks (n, 1), are from
-    where welds keep them [m], and whether they are turned by more than a `most` [rad]; bodies that
-    are nowhere are."""
+    """Distance [m] of bodies from the places of their welds, and whether they are turned by more
+    than `most` [rad], NaN included; bodies by addresses (n, 7) in the states (k, nq) of the
+    observations `look` (n, 1)."""
     pose = qpos[look, at]
     apart = pose[:, :3] - frames.at(qpos[look, frames.along])
     straight = _straight(pose[:, 3:], frames.turn, most)
@@ -164,7 +163,7 @@ def _apart(
 
 
 def _straight(one: Array, other: Array, most: float) -> NDArray[np.bool_]:
-    """Whether quaternions (n, 4) are apart by no more than an angle [rad]."""
+    """Whether the angle between quaternions (n, 4) is at most `most` [rad]."""
     along = np.abs(np.einsum("ni,ni->n", one, np.broadcast_to(other, one.shape)))
     return np.asarray(along >= np.cos(most / 2))
 
@@ -172,9 +171,9 @@ def _straight(one: Array, other: Array, most: float) -> NDArray[np.bool_]:
 def misplaced(
     anatomy: Anatomy, factory: Factory, places: dict[str, Array], tolerance: float = 1e-6
 ) -> list[int]:
-    """The welds (by number) that turn a part, or do not keep it in its place in the product,
-    relative to the others that the same holder keeps, a robot on one tour. Those by which robots
-    hold nothing in this factory, but may as deputies, are left out."""
+    """The welds (by number) that turn a part, or hold it out of its place in the product relative
+    to the other parts of the same holder, for a robot on the same tour. Welds that a robot uses
+    only as a deputy are left out."""
     first: dict[tuple[int, ...], tuple[Array, Array]] = {}
     inside, robots = factory.contents, range(len(factory.robots))
     brought = [{part for x in factory.deliveries(r) for part in inside[x]} for r in robots]

@@ -1,4 +1,4 @@
-"""The monitor: it watches a factory tick by tick, and judges what it saw against the net."""
+"""The monitor: it observes a factory tick by tick, and compares the observations with the net."""
 
 from __future__ import annotations
 
@@ -23,26 +23,26 @@ from factory.record.monitor.transfers import Transfers
 from factory.support.collector import collector_paused
 
 MOST = 100
-"""Number of violations that are kept, the first ones: a fault is often followed by others."""
+"""Number of violations that are kept, the first ones: a fault often causes others."""
 
 LOOK = 0.5
-"""A monitor that does not look after every tick looks at everything after this time [s], and at
-what moves and what holds the parts where those change hands."""
+"""Interval of full observations of a monitor that does not observe every tick [s]; in between it
+observes motion and grips where parts change hands."""
 
 KEPT = 64
-"""So many looks are judged at a time."""
+"""Number of observations that are judged at a time."""
 
 NOBODY = (np.empty(0, np.intp),) * 3
-"""No robots that leave, arrive, or pass."""
+"""No robots leave, arrive or pass."""
 
 TICKS = 1.5
-"""Times that are seen tick by tick may be off by so many ticks."""
+"""Tolerance of observed times, in ticks."""
 
 
 @dataclass(slots=True)
 class _Clock:
-    """Times [s]: when the monitor began, of the present tick and the one before, of the last change
-    that was seen; and whether the run was found to be stalled."""
+    """Times [s] of the start of the monitor, of the present and the previous observation, and of
+    the last change; and whether the run is stalled."""
 
     begun: float
     now: float
@@ -52,11 +52,11 @@ class _Clock:
 
 
 class Monitor:
-    """Reconstructs each robot's mode and each part's carrier from what it sees: `first`, before the
-    run begins, and then an observation after every tick.
+    """Reconstructs the mode of each robot and the holder of each part from observations: `first`,
+    before the run begins, and then one after every tick.
 
-    `turn[r]`: how many operations robot r has finished since m_0, which tells where in its gear it
-    is; `judged[o]`: how often operation o has been judged. `time_s`: the time that the monitor took
+    `turn[r]`: number of operations that robot r has finished since m_0, hence its place in its
+    gear; `judged[o]`: number of judged ends of operation o. `time_s`: time taken by the monitor
     [s].
     """
 
@@ -87,8 +87,8 @@ class Monitor:
     # --- a tick --------------------------------------------------------------------------------
 
     def see(self, seen: Observation, thorough: bool = True) -> None:
-        """Take in the state after a tick, or as operations end; unless `thorough`, of the former
-        only what holds the parts."""
+        """Take in an observation after a tick, or as operations end; of one after a tick only the
+        grips, unless `thorough`."""
         clock = self.clock
         clock.before, clock.now = clock.now, seen.time
         left, arrived, passed = NOBODY
@@ -118,41 +118,41 @@ class Monitor:
 
     @collector_paused()
     def report(self, recorded: Recorded | None = None) -> Report:
-        """The verdict on what was seen so far and, where nothing is wrong with that, on whether a
-        record agrees with it."""
+        """The verdict on the observations so far and, without violations, on the agreement of a
+        record with them."""
         begin = perf_counter()
         self._look_at_transfers()
         seen, inferred, unexplained = self.explanation.solve(self.clock.begun, self.clock.now)
-        every = sorted([*self.violations, *unexplained], key=lambda v: v.t)[:MOST]
-        if recorded is not None and not every:
-            found = disagreements(self.subject, (*seen, *inferred), recorded)
-            every = [*islice(found, MOST)]
+        violations = sorted([*self.violations, *unexplained], key=lambda v: v.t)[:MOST]
+        if recorded is not None and not violations:
+            disagreeing = disagreements(self.subject, (*seen, *inferred), recorded)
+            violations = [*islice(disagreeing, MOST)]
         self.time_s += perf_counter() - begin
-        return Report(tuple(seen), tuple(inferred), tuple(every), self.time_s)
+        return Report(tuple(seen), tuple(inferred), tuple(violations), self.time_s)
 
     def _look_at_frames(self) -> None:
-        """Blame welds that put a part elsewhere than where it is in the product."""
+        """Blame welds that hold a part out of its place in the product."""
         places = {part: np.array(place) for part, place in self.subject.places.items()}
         for weld in misplaced(self.anatomy, self.subject.factory, places):
             holder, part = self.anatomy.holder[weld], self.anatomy.part[weld]
-            words = f"the weld that holds {part} puts it elsewhere than where it is in the product"
+            words = f"the weld of {part} holds it out of its place in the product"
             self._blame("Frame", holder[1] if holder else -1, part, words)
 
     def _look_at_parts(self, seen: Observation) -> None:
-        """Blame parts that have left the place where their weld keeps them."""
+        """Blame parts that have left the place given by their weld."""
         for copy, weld, gap in self.grips.dropped(seen):
             holder, name = self.anatomy.holder[weld], self.anatomy.copies[copy]
-            words = f"{name} is {1e3 * gap:.1f} mm from where its weld keeps it, or turned"
+            words = f"{name} is {1e3 * gap:.1f} mm from the place given by its weld, or turned"
             self._blame("Dropped", holder[1] if holder else -1, self.anatomy.label[copy], words)
 
     def _look_at_transfers(self) -> None:
-        """Blame holders of parts that were elsewhere than where these took them over."""
+        """Blame holders that took over parts which were not in their place."""
         for t, copy, weld, gap in self.grips.missed():
             holder, name = self.anatomy.holder[weld], self.anatomy.copies[copy]
-            words = f"it takes {name} over, which is {1e3 * gap:.2f} mm off, or turned"
+            words = f"it takes over {name}, which is {1e3 * gap:.2f} mm off, or turned"
             self._blame("Missed", holder[1] if holder else -1, self.anatomy.label[copy], words, t)
 
-    # --- what is seen --------------------------------------------------------------------------
+    # --- observations --------------------------------------------------------------------------
 
     def _ended(self, operation: Operation, unit: int) -> None:
         """The parts of an operation have changed hands: X_e."""
@@ -170,8 +170,8 @@ class Monitor:
             self.motion.stand(robot, self.subject.goal(operation, robot))
 
     def _leaves(self, robot: int) -> None:
-        """A robot leaves the place where it stood: the next operation that has its goal elsewhere
-        has started, if it was not to go ahead, and those before are over."""
+        """A robot leaves its place: the next operation with another goal has started, unless the
+        robot may go ahead of it, and those before are over."""
         spot, ball = float(self.motion.spot[robot]), float(self.motion.ball[robot])
         goals, first = self.subject.gear_goals[robot], self.turn[robot]
         for turn in range(first, first + len(goals) + 1):
@@ -181,7 +181,7 @@ class Monitor:
                 break
         else:
             operation, _ = self._at(robot, first)
-            words = "it moves, though its program keeps it where it is"
+            words = "it moves, although its program has the same goal throughout"
             self._blame("Order", robot, operation.label, words)
             self.motion.spot[robot] = self.motion.now.s[robot]
             return
@@ -196,7 +196,7 @@ class Monitor:
         self.explanation.saw(operation.start, unit, self.clock.begun, begun, shown, name)
 
     def _passed(self, robot: int) -> None:
-        """A robot passes its goal without stopping: its operation ended before the robot came."""
+        """A robot passes its goal without stopping: its operation ended before its arrival."""
         operation, _ = self._at(robot, self.turn[robot])
         words = f"it passes its goal of {self.subject.name(operation)} without stopping"
         self._blame("Early", robot, operation.label, words)
@@ -208,7 +208,7 @@ class Monitor:
 
     def _over(self, robot: int, turn: int, t: float) -> None:
         """All operations of a robot before the `turn`-th are over, at `t` [s] at the latest; those
-        whose end does not show are judged now."""
+        without a visible end are judged now."""
         for number in range(self.turn[robot], turn):
             operation, unit = self._at(robot, number)
             if not self.subject.moves_parts[operation.index]:
@@ -217,8 +217,8 @@ class Monitor:
 
     def _judge(self, operation: Operation, unit: int, t: float, leaving: int = -1) -> None:
         """Blame a robot of an operation that is over at `t` [s] where it was not at rest at its
-        goal, or not for as long as the operation takes. The robot `leaving`, which shows the end,
-        was."""
+        goal, or not for the duration of the operation. The robot `leaving`, whose departure shows
+        the end, was at rest."""
         if self.judged[operation.index] > unit:
             return
         self.judged[operation.index] = unit + 1
@@ -227,14 +227,16 @@ class Monitor:
             goal = self.subject.goal(operation, robot)
             off = 0.0 if robot == leaving else self.motion.misses(robot, goal, radius)
             if off:
-                words = f"{name} ended while it was {1e3 * off:.1f} mm from its goal, or moved"
+                words = f"{name} ended while it was {1e3 * off:.1f} mm from its goal, or moving"
                 self._blame("Early", robot, operation.label, words)
                 return
         came = self.motion.came[0]
         last = max(operation.robots, key=lambda r: float(came[r]))
         stayed = t - float(came[last])
         if stayed < operation.dwell - self.explanation.slack:
-            words = f"{name} ended {stayed:.3f} s after it came, and takes {operation.dwell:g} s"
+            words = (
+                f"{name} ended {stayed:.3f} s after its arrival, but takes {operation.dwell:g} s"
+            )
             self._blame("Early", last, operation.label, words)
 
     def _stuck(self, actuator: int, since: float, seen: Observation) -> None:
@@ -246,7 +248,7 @@ class Monitor:
 
     def _stalled(self) -> None:
         """Nothing has happened for too long: blame the robots that are under way, or else
-        operations that all their robots have come to."""
+        operations at which all their robots have arrived."""
         self.clock.stalled = True
         when = f"nothing has happened for {self.clock.now - self.clock.changed:.1f} s"
         away = self.motion.way.nonzero()[0].tolist()
@@ -255,16 +257,18 @@ class Monitor:
             words = f"{when} while it was on its way in {self.subject.name(operation)}"
             self._blame("Stalled", robot, operation.label, words, self.clock.changed)
         for operation in () if away else self._ready()[:3]:
-            words = f"{when}; {self.subject.name(operation)} does not go on, with all robots there"
+            words = (
+                f"{when}; {self.subject.name(operation)} does not proceed with all its robots there"
+            )
             self._blame("Stalled", operation.carrier, operation.label, words, self.clock.changed)
 
     def _ready(self) -> list[Operation]:
-        """The operations that all their robots have come to, those without inputs first."""
+        """The operations at which all their robots have arrived, those without inputs first."""
         at = [self._at(r, turn)[0].index for r, turn in enumerate(self.turn)]
         ready = [o for o in self.factory.operations if all(at[r] == o.index for r in o.robots)]
         return sorted(ready, key=lambda o: not o.inputs)
 
-    # --- words ---------------------------------------------------------------------------------
+    # --- names ---------------------------------------------------------------------------------
 
     def _at(self, robot: int, turn: int) -> tuple[Operation, int]:
         """The operation of a robot after `turn` others, and its unit."""
@@ -291,9 +295,9 @@ class Monitor:
 
 
 class EngineMonitor(Monitor):
-    """A monitor of a running engine, which begins before the run does: it is told where operations
-    end, and is an observer of that run beside. What it sees is judged some looks at a time, which
-    takes half as long as to do so between steps of the engine."""
+    """A monitor of a running engine, an observer of the run from before its start, called also
+    when operations end. Observations are judged KEPT at a time, which takes half as long as judging
+    each between steps of the engine."""
 
     def __init__(self, subject: MonitorSubject, anatomy: Anatomy, m: Any, d: Any) -> None:
         self.view = EngineView(m, d)
@@ -303,14 +307,13 @@ class EngineMonitor(Monitor):
         self._kept: list[tuple[Observation, bool]] = []
 
     def observe(self, world: Any, supervisor: Any) -> None:
-        """Look at the engine after a tick; what it is called with is not looked at."""
+        """Observe the engine after a tick; the arguments are not used."""
         begin = perf_counter()
         self._keep()
         self.time_s += perf_counter() - begin
 
     def glance(self, world: Any, supervisor: Any) -> None:
-        """After some ticks, look only where a weld has been switched, or nothing has been looked at
-        for a while."""
+        """Observe the engine only where a weld has been switched, or LOOK seconds have passed."""
         begin = perf_counter()
         due = self.view.d.time - self._looked >= LOOK
         if due or self.view.welds() is not self._welds:

@@ -1,5 +1,5 @@
-"""How robots move: which leave the place where they stood, come to their goal, pass it, or do not
-follow their setpoints."""
+"""Motion of robots: which leave their place, arrive at their goal, pass it, or do not follow their
+setpoints."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ REST = 0.01
 """Speed below which robots hand over [m/s]."""
 
 NEAREST = 1e-3
-"""Upper bound on the way that a robot at rest may go within a tick [m]."""
+"""Upper bound on the displacement of a robot at rest within a tick [m]."""
 
 LAG = 0.01
-"""A robot follows its setpoint within this [m], plus its way in `LATENCY`."""
+"""Largest lag of a robot behind its setpoint [m], in addition to its displacement in `LATENCY`."""
 
 LATENCY = 0.02
-"""More than the time constant of a drive's position loop, 1/70 s [s]."""
+"""Upper bound on the time constant of a drive's position loop, 1/70 s [s]."""
 
 TINY = 1e-9
-"""Times no further apart are one [s]."""
+"""Times that differ by less are equal [s]."""
 
 LATE = 0.2
-"""A robot that lags for so long is stuck [s]: to brake from full speed takes as long."""
+"""Duration of a lag after which a robot is stuck [s]: that of braking from full speed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """What counts as at rest at a place: slower than `slow` [m/s], and within `slack` [m] of a goal
-    ball; `tick` [s]: what is seen is no older where it is seen tick by tick."""
+    """Tolerance of rest at a place: slower than `slow` [m/s], and within `slack` [m] of a goal
+    ball; `tick` [s]: greatest age of an observation."""
 
     slow: float
     slack: float
@@ -44,7 +44,7 @@ class Tolerance:
 
     @classmethod
     def of(cls, settings: Settings) -> Tolerance:
-        """That of a run that is seen tick by tick."""
+        """The tolerance for observations tick by tick."""
         slow = REST + min(settings.acceleration * settings.tick, 5 * REST)
         return cls(slow, min(slow * settings.tick, NEAREST), settings.tick)
 
@@ -61,33 +61,33 @@ class _State:
 
     @classmethod
     def of(cls, anatomy: Anatomy, seen: Observation) -> _State:
-        """That in an observation."""
+        """The state in an observation."""
         x, v = seen.qpos[anatomy.slide], seen.qvel[anatomy.dof]
         return cls(seen.time, x, v, seen.ctrl[anatomy.drive], seen.at_end)
 
 
 class _Setpoints:
-    """When the setpoints of robots (R,) stood last, or came nearer to where they stand, `still`
-    [s], and went from there first after that, `first`; `seen`: when they were looked at."""
+    """Times [s] (R,) at which setpoints last stood at, or approached, the place of their robot
+    (`still`), and first departed after that (`first`); `seen`: time of the last observation."""
 
     def __init__(self, count: int, t: float) -> None:
         self.still, self.first, self.seen = np.full(count, t), np.full(count, t), t
 
     def look(self, moved: NDArray[np.bool_], t: float) -> None:
-        """Some have gone off since they were looked at."""
+        """Take in the setpoints that have departed since the last observation."""
         np.copyto(self.first, t, where=moved & (self.still == self.seen))
         np.copyto(self.still, t, where=~moved)
         self.seen = t
 
 
 class AxisMotion:
-    """The motion of all robots (R,) along their guidepaths, from look to look.
+    """The motion of all robots (R,) along their guidepaths, over the observations.
 
-    `spot`: where a robot stands, or goes to, arc lengths [m]; `way`: the direction in which it goes
-    there, 0 where it stands; `ball`: how near to a spot it is there; `inside`: whether it is at
-    rest there; `came` (2, R): between which times [s] it came to rest there, in its last stay;
-    `ended`: when its operation was seen to end [s]; `written`: setpoints that were seen within a
-    tick, with the time, not counted yet. `radius`: each robot's largest goal ball [m].
+    `spot`: place or target of a robot, arc length [m]; `way`: direction to it, 0 where it stands;
+    `ball`: radius around the spot [m]; `inside`: whether the robot is at rest there; `came` (2, R):
+    bounds of the time [s] at which it came to rest there; `ended`: time of the observed end of its
+    operation [s]; `written`: setpoints observed within a tick, with the time, not counted yet.
+    `radius`: largest goal ball of each robot [m].
     """
 
     def __init__(
@@ -104,7 +104,7 @@ class AxisMotion:
         self.written: deque[tuple[float, Array]] = deque()
 
     def look(self, seen: Observation) -> tuple[Index, Index, Index]:
-        """The robots that now leave, that arrive, and that pass their target without stopping."""
+        """The robots that leave, arrive, and pass their target without stopping."""
         self.before, self.now, t = self.now, _State.of(self.anatomy, seen), seen.time
         if seen.at_end and t - self.before.t <= self.rest.tick:
             # within a tick, a robot that runs its own program has its setpoints written ahead
@@ -134,14 +134,14 @@ class AxisMotion:
         return left.nonzero()[0], arrived, passed
 
     def _tick_old(self, t: float) -> Array:
-        """The setpoints that were seen last a tick ago or before."""
+        """The latest setpoints that are at least a tick old."""
         found = self.before.s
         while self.written[0][0] <= t - self.rest.tick + TINY:
             found = self.written.popleft()[1]
         return found
 
     def stand(self, robot: int, goal: float) -> None:
-        """A robot has ended an operation: it stands at its goal, or where its setpoint is now."""
+        """A robot has ended an operation: it stands at its goal, or else at its setpoint."""
         s, ball = float(self.now.s[robot]), self.ball[robot]
         spot = goal if abs(s - goal) <= ball else s
         if self.way[robot] or abs(spot - self.spot[robot]) > ball:
@@ -153,19 +153,19 @@ class AxisMotion:
         self.setpoints.still[robot] = -np.inf  # it has come, and has not been seen to stand since
 
     def leaves(self, robot: int) -> bool:
-        """Whether a robot leaves the place where it stood: not if its operation has ended since."""
+        """Whether a robot leaves its place; not if its operation has ended since."""
         away = abs(self.now.s[robot] - self.spot[robot]) > self.ball[robot]
         return bool(away and not self.way[robot])
 
     def begun(self, robot: int) -> float:
-        """The time [s] by which a robot that leaves has begun to."""
+        """Upper bound on the time [s] at which a leaving robot departed."""
         still, seen = self.setpoints.still[robot], self.setpoints.seen
         # one that stood when setpoints were counted last has been seen to go off only now
-        known = self.came[1, robot] <= still < seen
-        return float(self.setpoints.first[robot]) if known else self.now.t
+        stood = self.came[1, robot] <= still < seen
+        return float(self.setpoints.first[robot]) if stood else self.now.t
 
     def leave(self, robot: int, target: float) -> None:
-        """A robot makes for a target, where it may be already."""
+        """A robot departs for a target, where it may be already."""
         self.way[robot] = 1.0 if target > self.spot[robot] else -1.0
         self.spot[robot] = target
         now, ball = self.now, self.ball[robot]
@@ -176,8 +176,8 @@ class AxisMotion:
             self.came[:, robot] = self.before.t, now.t
 
     def misses(self, robot: int, goal: float, radius: float) -> float:
-        """How far [m] a robot is off a goal ball, 0 where it is at rest in it; after a tick, where
-        it was before or after that."""
+        """Distance [m] of a robot from a goal ball, 0 where it is at rest in it, before or after
+        the present tick."""
         looked, slack = (self.before, self.now), self.rest.slack
         if self.now.at_end:
             looked, slack = (self.now, self.now), MISSED
@@ -189,15 +189,15 @@ class AxisMotion:
 
 
 class Lags:
-    """Since when [s] the joint of each actuator (A,) has lagged behind its setpoint: `since`, inf
-    where it does not, -inf where that was told."""
+    """Time [s] since which the joint of each actuator (A,) has lagged behind its setpoint: `since`,
+    inf where it does not, -inf where it has been reported."""
 
     def __init__(self, anatomy: Anatomy, settings: Settings) -> None:
         self.anatomy, self.limit = anatomy, LAG + LATENCY * settings.speed
         self.since = np.full(len(anatomy.joint), np.inf)
 
     def stuck(self, seen: Observation) -> list[tuple[int, float]]:
-        """The actuators whose joints have lagged for too long, each once, and since when [s]."""
+        """The actuators whose joints have lagged for too long, each once, with the start [s]."""
         behind = np.abs(seen.qpos[self.anatomy.joint] - seen.ctrl[self.anatomy.setpoint])
         lagging: NDArray[np.bool_] = behind > self.limit
         if not lagging.any():

@@ -1,4 +1,4 @@
-"""What is seen of a factory after a tick: the engine's state and its active constraints."""
+"""The observation of a factory after a tick: the state of the engine and its active constraints."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ Index = NDArray[np.intp]
 @dataclass(frozen=True, slots=True)
 class Observation:
     """The state at a time [s]: the engine's `qpos`, `qvel` and setpoints `ctrl`; `welds` (k, 3):
-    the active constraints by number, and the two bodies that each joins. `at_end`: it was made as
-    operations ended and parts changed hands, before the engine went on; others are made after a
+    the active constraints by number, and the two bodies that each joins. `at_end`: made as
+    operations ended and parts changed hands, before the engine continued; others are made after a
     tick.
 
-    As long as no constraint is switched or aimed anew, `welds` is one and the same array."""
+    Until a constraint is switched or reassigned, `welds` is the same array."""
 
     time: float
     qpos: Array = field(repr=False)

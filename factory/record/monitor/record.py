@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from factory.compiler.taking_over import nets_after
+from factory.mjcf.weld_frames import SLIDE
 from factory.nets.replay import replay
 from factory.plant.factory import Factory
 from factory.plant.material import joins_of
@@ -19,24 +20,30 @@ from factory.record.log.reader import Ends, Log
 from factory.record.monitor.agreement import contradictions
 from factory.record.monitor.anatomy import Anatomy
 from factory.record.monitor.calm import judge_calm
-from factory.record.monitor.continuity import jumps
 from factory.record.monitor.monitor import Monitor
 from factory.record.monitor.observation import Observation
 from factory.record.monitor.recount import differences, recounted, worst
-from factory.record.monitor.report import Report
+from factory.record.monitor.report import Report, Violation
 from factory.record.monitor.subject import MonitorSubject, subject_from
 from factory.record.project_table import factory_of, of_its_factory, settings_of
 from factory.record.verdict import FAULTS, RunVerdict, judged
 from factory.support.errors import Diagnostic
 
+JUMP = 3e-4
+"""Tolerance of the displacement of a joint in a tick against its speeds [m]; correct logs stay
+below a tenth of it."""
+
+SPAN = 20_000
+"""Number of ticks that are checked at once."""
+
 
 def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
     """The verdict on a recorded run, and its factory, compiled again from the log's header.
 
-    Only when nothing is wrong with the states are the log's firings and markings looked at: whether
-    they agree with those, and with each other. States alone do not tell what was undone: where
-    something failed, the states between failures are looked at (`calm`). Raises InputError (BadLog)
-    for a log of the ideal world, or of another factory than its header says.
+    The firings and markings of the log are checked, against the states and each other, only where
+    the states have no violations. In a run with failures the states between these are checked
+    (`calm`). Raises InputError (BadLog) for a log of the ideal world, or of another factory than
+    that in its header.
     """
     m = model_of(log)
     with of_its_factory():
@@ -52,8 +59,7 @@ def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
 
 
 def _seen(log: Log, subject: MonitorSubject, m: Any) -> Report:
-    """What a monitor says of the states, and of whether the firings and figures agree with
-    those."""
+    """The report of a monitor on the states of a log, and on its firings and figures."""
     seen, anatomy = observations(log), Anatomy.of(m, subject.factory)
     monitor = Monitor(subject, anatomy, next(seen))
     for observation in seen:
@@ -64,11 +70,31 @@ def _seen(log: Log, subject: MonitorSubject, m: Any) -> Report:
     return replace(report, violations=(*report.violations, *wrong), figures=counted)
 
 
+def jumps(log: Log, m: Any) -> Iterator[Violation]:
+    """The first tick in which the displacement of each slide joint is inconsistent with its speeds
+    at both ends of the tick."""
+    slides, reported = np.flatnonzero(m.jnt_type == SLIDE), set[int]()
+    at, moves = m.jnt_qposadr[slides], m.jnt_dofadr[slides]
+    for first in range(0, len(log) - 1, SPAN):
+        rows = range(first, min(first + SPAN + 1, len(log)))
+        q = np.array([log.qpos[row][at] for row in rows])
+        v = np.array([log.qvel[row][moves] for row in rows])
+        spent = np.diff(log.time[rows.start : rows.stop])[:, None]
+        gone = np.diff(q, axis=0) - spent * (v[1:] + v[:-1]) / 2
+        off = np.abs(gone) - spent * np.abs(np.diff(v, axis=0)) / 2
+        for joint in sorted({*np.flatnonzero((off > JUMP).any(axis=0)).tolist()} - reported):
+            reported.add(joint)
+            row = int((off[:, joint] > JUMP).argmax())
+            name = m.joint(int(slides[joint])).name
+            words = f"{name} jumps by {1e3 * abs(gone[row, joint]):.1f} mm within a tick"
+            yield Violation(float(log.time[first + row + 1]), "", "", "Record", words)
+
+
 def verdict_on(
     log: Log, factory: Factory, report: Report | None, faults: Sequence[Diagnostic] = ()
 ) -> RunVerdict:
-    """The verdict on a run of a factory that is recorded in a log, with a monitor's report on that
-    where there is one, and with what is wrong with its model."""
+    """The verdict on a recorded run of a factory, from its log, the report of a monitor on it where
+    there is one, and the faults of its model."""
     cut, start = log.cut_off, frozenset(log.header["start"])
     after = [*nets_after(factory, log.entries)]
     refines = replay(factory.net, log.entries, start, joins_of(factory), after).refines
@@ -76,13 +102,13 @@ def verdict_on(
     counted = report.figures if report else None
     figures = log.figures if counted is None else worst(log.figures, counted)
     if faults:
-        said = [[fault.code, fault.message] for fault in faults]
-        figures = {**(figures or {}), FAULTS: [*(figures or {}).get(FAULTS, []), *said]}
+        pairs = [[fault.code, fault.message] for fault in faults]
+        figures = {**(figures or {}), FAULTS: [*(figures or {}).get(FAULTS, []), *pairs]}
     return judged(trouble, refines, figures, report)
 
 
 def _markings(log: Log) -> Iterator[tuple[float, list[int]]]:
-    """Each marking in a log that differs from the one before, and when it was seen first [s]."""
+    """Each marking in a log that differs from the previous one, with its time [s]."""
     rows = np.flatnonzero(np.diff(log.marking.starts, prepend=-1))
     return ((float(log.time[row]), log.marking[row].tolist()) for row in rows.tolist())
 
@@ -93,9 +119,9 @@ def observations(log: Log, first: int = 0, last: int | None = None) -> Iterator[
     welds = np.empty((0, 3), np.intp)
     for rows, row, at_end in _rows(log, first, last):
         assert rows.ctrl is not None
-        found = rows.active[row]
-        if not np.array_equal(found, welds):
-            welds = found.astype(np.intp)
+        active = rows.active[row]
+        if not np.array_equal(active, welds):
+            welds = active.astype(np.intp)
         state = rows.qpos[row], rows.qvel[row], rows.ctrl[row]
         yield Observation(float(rows.time[row]), *state, welds, at_end)
 
@@ -116,7 +142,7 @@ def _rows(log: Log, first: int, last: int | None) -> Iterator[tuple[Log | Ends, 
 
 @of_its_factory()
 def recorded_subject(header: Mapping[str, Any]) -> MonitorSubject:
-    """The factory that a log is of. Raises InputError (BadLog) where the header is of none."""
+    """The subject of a log. Raises InputError (BadLog) where its header has no factory."""
     factory = factory_of(header)
     kept, start, wip = header["monitor"], header["start"], header["wip"]
     return subject_from(factory, kept, settings_of(header), start, wip)

@@ -1,9 +1,8 @@
-"""The figures of a run's bodies, counted again from the states in its log.
+"""The figures of the bodies of a run, recomputed from the states in its log.
 
-What a log says of itself is not believed: contacts, gaps and turns at hand-overs, and the errors of
-products follow from its positions, the constraints that were active, and the model. States are
-known once a tick, and what came and went within one is not seen. So a figure that the log keeps may
-be larger than the same counted here, and not smaller.
+The figures in a log are not trusted: contacts, gaps and turns at hand-overs, and errors of products
+follow from positions, active constraints, and the model. The log has one state a tick, and shorter
+events are missed. So a figure in the log may exceed the recomputed one, but not fall below it.
 """
 
 from __future__ import annotations
@@ -28,26 +27,26 @@ from factory.record.monitor.subject import MonitorSubject
 from factory.support.engine import mujoco
 
 PRESSED = 1e-4
-"""So deep may a part lie in the pad that holds it, or is about to [m]."""
+"""Largest depth of a part in the pad that holds it, or is about to [m]."""
 
 SAME = 5e-3
-"""Figures are the same up to this [mm, degrees]."""
+"""Tolerance of figures [mm, degrees]."""
 
 WORDS = {
     "unintended_contacts": "unintended contacts",
     "handoff_gap_max_mm": "mm of gap at a hand-off",
     "handoff_angle_max_deg": "degrees of turn at a hand-off",
-    "grip_gap_max_mm": "mm from a pad to what it takes",
+    "grip_gap_max_mm": "mm from a pad to the part it takes",
     "product_error_max_mm": "mm of error of a product",
     "product_angle_max_deg": "degrees of turn in a product",
 }
-"""What is counted again, in words."""
+"""The recomputed figures, in words."""
 
 
 def recounted(
     log: Log, subject: MonitorSubject, anatomy: Anatomy, m: Any, seen: Iterator[Observation]
 ) -> dict[str, Any]:
-    """The figures that the observations `seen` in a log show, as `kept_figures` names them."""
+    """The figures in the observations `seen` of a log, by the keys of `kept_figures`."""
     contacts, places = _Contacts(subject, anatomy, m), _Places(subject, anatomy, m)
     before, row = next(seen), 0
     for now in seen:
@@ -61,30 +60,30 @@ def recounted(
 
 
 def differences(kept: Mapping[str, Any], counted: Mapping[str, Any], t: float) -> list[Violation]:
-    """The figures kept in a log that ends at `t` [s] that its states contradict."""
-    found = []
+    """The figures of a log, which ends at `t` [s], that its states contradict."""
+    violations = []
     for key, words in WORDS.items():
-        said, value = kept.get(key), counted[key]
-        if key in kept and value is not None and not value <= (said or 0.0) + SAME:
-            message = f"the log says {said or 0:g} {words}, its states {value:g}"
-            found.append(Violation(t, "", "", "Record", message))
-    return found
+        recorded, value = kept.get(key), counted[key]
+        if key in kept and value is not None and not value <= (recorded or 0.0) + SAME:
+            message = f"the log has {recorded or 0:g} {words}, its states {value:g}"
+            violations.append(Violation(t, "", "", "Record", message))
+    return violations
 
 
 def worst(kept: Mapping[str, Any] | None, counted: Mapping[str, Any]) -> dict[str, Any]:
-    """Of each figure the larger of the two, and of contacts all that is known of more of them."""
+    """The larger of both figures for each key, with the data of the contacts that are more."""
     kept = kept or {}
-    found = {**kept}
+    figures = {**kept}
     for key in WORDS:
         values = [value for value in (kept.get(key), counted[key]) if value is not None]
-        found[key] = max(values, default=None)
+        figures[key] = max(values, default=None)
     if counted["unintended_contacts"] > (kept.get("unintended_contacts") or 0):
-        found |= {key: counted[key] for key in ("contacts", "contact_first_s")}
-    return found
+        figures |= {key: counted[key] for key in ("contacts", "contact_first_s")}
+    return figures
 
 
 class _Contacts:
-    """Contacts that nothing intends, of bodies in the hands that the active welds tell."""
+    """Unintended contacts, of bodies in the hands given by the active welds."""
 
     def __init__(self, subject: MonitorSubject, anatomy: Anatomy, m: Any) -> None:
         self._replica, self._anatomy = Replica(m), anatomy
@@ -100,7 +99,7 @@ class _Contacts:
         self._onsets: list[tuple[float, int, int]] = []
 
     def look(self, before: Observation, now: Observation, marked: set[int]) -> None:
-        """At what touches where a tick begins, in the hands that things are in during it."""
+        """Record the contacts at the start of a tick, with the hands during the tick."""
         if now.welds is not self._welds:
             self._hold(now.welds)
         m, d = self._replica.m, self._replica.d
@@ -117,7 +116,7 @@ class _Contacts:
         self._touching = touching
 
     def figures(self) -> dict[str, Any]:
-        """How many onsets, of which geoms, and when the first was [s]."""
+        """Number of onsets, pairs of geoms, and time of the first [s]."""
         name = self._replica.m.geom
         pairs = dict.fromkeys(f"{name(a).name} - {name(b).name}" for _, a, b in self._onsets)
         return {
@@ -127,8 +126,7 @@ class _Contacts:
         }
 
     def _hold(self, welds: Index) -> None:
-        """Parts are in the hands of what these welds (k, 3) hold them by, and of two of that which
-        took them last."""
+        """Assign parts to the holders in these welds (k, 3), the latest where there are several."""
         before = {*map(tuple, () if self._welds is None else self._welds.tolist())}
         fresh = [row for row in welds.tolist() if tuple(row) not in before]
         self._welds = welds
@@ -142,8 +140,8 @@ class _Contacts:
             self._replica.mask(self._solid[body], own, *masks_of(code))
 
     def _intended(self, a: int, b: int, apart: float, marked: set[int]) -> bool:
-        """Whether two geoms may touch: they are of parts that are being joined or overlap when
-        finished, or one is a pad and the other what that holds."""
+        """Whether two geoms may touch: those of parts that are being joined or overlap in the
+        product, and those of a pad and the part it holds."""
         m = self._replica.m
         bodies = m.geom_bodyid[[a, b]].tolist()
         label = [names.part_of(m.body(body).name) for body in bodies]
@@ -157,7 +155,7 @@ class _Contacts:
 
 
 class _Places:
-    """How far what changes hands is from where it should be, and the parts of products."""
+    """Errors of position of parts that change hands, and of the parts of products."""
 
     def __init__(self, subject: MonitorSubject, anatomy: Anatomy, m: Any) -> None:
         self._replica, self._anatomy = Replica(m), anatomy
@@ -169,7 +167,7 @@ class _Places:
         self.figures: dict[str, float | None] = dict.fromkeys(WORDS)
 
     def look(self, before: Observation, now: Observation) -> None:
-        """At a state `now`, and at what changed hands since the one before."""
+        """Measure the parts that changed hands between two observations."""
         if now.welds is before.welds:
             return
         was, on = ({int(w): int(b) for w, _, b in seen.welds} for seen in (before, now))
@@ -186,7 +184,7 @@ class _Places:
                 self._finished([*held_now.values()], seen.qpos)
 
     def _taken(self, welds: Index, bodies: Index, now: Observation) -> None:
-        """Welds close on bodies, and holders' pads on the first that they take."""
+        """Measure the welds that close on bodies, and the pads on the first body they take."""
         frames, qpos = self._anatomy.frames.chosen(welds), now.qpos
         pose = qpos[self._at(bodies)]
         gap = np.linalg.norm(pose[:, :3] - frames.at(qpos[frames.along]), axis=1)
@@ -199,7 +197,7 @@ class _Places:
             self._note("grip_gap_max_mm", 1e3 * apart)
 
     def _finished(self, bodies: Sequence[int], qpos: Array) -> None:
-        """The bodies of a product, against the first of them."""
+        """Measure the bodies of a product relative to the first of them."""
         name = {body: self._anatomy.label[self._anatomy.copy_of[body]] for body in bodies}
         order = sorted(bodies, key=lambda body: self._order.get(name[body], 0))
         pose, labels = qpos[self._at(np.array(order))], [name[body] for body in order]
@@ -228,8 +226,8 @@ def _angle(one: Array, other: Array) -> float:
 
 
 def _codes(m: Any, subject: MonitorSubject) -> Index:
-    """The code of each body that holds parts (nbody,): a robot's is that of its number, any other's
-    is in the masks of its geoms."""
+    """The code of each body that holds parts (nbody,): of a robot from its number, of any other
+    from the masks of its geoms."""
     robots = {robot.name: robot_code(robot.index) for robot in subject.factory.robots}
     found = np.zeros(m.nbody, np.intp)
     np.maximum.at(found, m.geom_bodyid, m.geom_contype >> 1)

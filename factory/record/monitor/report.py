@@ -1,4 +1,4 @@
-"""What a monitor finds: the firings that explain a run, and the violations, which none explain."""
+"""The findings of a monitor: the firings of a run, observed or inferred, and the violations."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from factory.support.errors import Diagnostic, Position
 
 @dataclass(frozen=True, slots=True)
 class Violation:
-    """An observation that no run of the net gives: the time [s], the robot at fault ("" for none),
-    the label it is about, and the line of the PAG that this comes from."""
+    """An observation that is inconsistent with the net: its time [s], the robot at fault ("" for
+    none), the label concerned, and the line of the PAG."""
 
     t: float
     robot: str
@@ -35,7 +35,7 @@ class Violation:
         }
 
     def diagnostic(self) -> Diagnostic:
-        """The violation as a message."""
+        """The violation as a diagnostic."""
         where = f"{self.robot}: " if self.robot else ""
         return Diagnostic(self.code, f"at {self.t:.3f} s, {where}{self.message}", self.position)
 
@@ -44,7 +44,7 @@ class Violation:
 class Firing:
     """A transition that fired for the `unit`-th time (from 0) between `earliest` and `latest` [s].
 
-    `seen`: the time at which it showed, to a tick; None where it is inferred."""
+    `seen`: time of its observation, to a tick; None where it is inferred."""
 
     transition: str
     unit: int
@@ -61,9 +61,9 @@ class Firing:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """The verdict of a monitor. `time_s`: what the monitor itself took [s]; `calm_s`: how long the
-    spells of the run were that it has judged [s], None where it has judged all of it; `figures` of
-    the bodies, counted from the states in a log, None where they were not."""
+    """The verdict of a monitor. `time_s`: time taken by the monitor [s]; `calm_s`: total duration
+    of the judged spells of the run [s], None where all of it is judged; `figures` of the bodies,
+    recomputed from the states in a log, None where they were not."""
 
     seen: tuple[Firing, ...] = field(repr=False)
     inferred: tuple[Firing, ...] = field(repr=False)
@@ -74,8 +74,8 @@ class Report:
 
     @property
     def refines_net(self) -> bool:
-        """Whether some legal firing sequence explains the run, and every part was where it had to
-        be."""
+        """Whether some legal firing sequence is consistent with the observations, and every part
+        was in its place."""
         return not self.violations
 
     def as_json(self) -> dict[str, object]:

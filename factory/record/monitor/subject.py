@@ -1,4 +1,4 @@
-"""What a monitor knows of the factory before the run: the net, and where its goals are."""
+"""The data that a monitor has before the run: the net and the goals of its operations."""
 
 from __future__ import annotations
 
@@ -21,21 +21,20 @@ from factory.support.settings import Settings
 PATIENCE = 4.0
 """A run stalls when nothing happens for this many times the longest time of an operation."""
 
-
 Manned = tuple[int, tuple[int, ...]]
 """An operation and the robots that take part in it (indices)."""
 
 
 @dataclass(frozen=True)
 class MonitorSubject:
-    """The factory under watch.
+    """The observed factory.
 
     `goals[i]`: arc length [m] of the goal of each robot of operation i; `radii[i]`: its goal ball
     [m]; `places[label]`: the centre of mass of a part, or a sub-assembly that is one body, in the
     frame of the product [m]; `start`: the marking in which the run begins; `wip`: the bound on
-    what is let in; `patience` [s]; `early`: (operation, robot) where a robot goes ahead whatever
-    the settings, since its hand has to be gone; `others`: the goals of operations (index) in which
-    other robots take part once a deputy has taken over.
+    units inside; `patience` [s]: time without an event until a run counts as stalled; `early`:
+    (operation, robot) where a robot goes ahead regardless of the settings, so that its hand is out
+    of the way; `others`: the goals of operations (index) with other robots after a takeover.
     """
 
     factory: Factory
@@ -54,17 +53,17 @@ class MonitorSubject:
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
 
     def after(self, crew: Factory) -> MonitorSubject:
-        """What is under watch when robots are gone and others have their tours: a `crew` in which
-        robots have the numbers that they have here."""
+        """The subject after an exchange of robots: `crew` is the new factory, with the numbers of
+        robots of this one."""
         number = {robot: n for n, robot in enumerate(present(crew))}
-        own = zip(crew.operations, self.goals, strict=True)
-        goals = tuple(self.others.get((o.index, o.robots), goals) for o, goals in own)
+        before = zip(crew.operations, self.goals, strict=True)
+        goals = tuple(self.others.get((o.index, o.robots), goals) for o, goals in before)
         early = frozenset((o, number[robot]) for o, robot in self.early if robot in number)
         return replace(self, factory=without_gone(crew), goals=goals, early=early, others={})
 
     @cached_property
     def counts(self) -> Mapping[int, int]:
-        """How often each transition has fired when the run begins."""
+        """Number of firings of each transition at the start of the run."""
         return MappingProxyType(firings(self.factory.net, self.start))
 
     @cached_property
@@ -76,8 +75,8 @@ class MonitorSubject:
 
     @cached_property
     def moves_parts(self) -> tuple[bool, ...]:
-        """Whether each operation's end shows as a switch of grips: it makes a part, a robot other
-        than its carrier brings one, or it drops the product off."""
+        """Whether the end of each operation is visible as a switch of grips: it makes a part, a
+        robot other than its carrier brings one, or it drops the product off."""
         return tuple(
             not o.inputs
             or self.factory.drops(o.index)
@@ -115,7 +114,7 @@ class MonitorSubject:
         return [[number, [*robots], [*goals]] for (number, robots), goals in self.others.items()]
 
     def as_json(self) -> dict[str, Any]:
-        """What a log keeps beside the PAG and the settings."""
+        """The data in a log, beside the PAG and the settings."""
         return {
             "goals": [list(goals) for goals in self.goals],
             "radii": list(self.radii),
@@ -202,5 +201,6 @@ def subject_from(
     early = frozenset((int(o), int(r)) for o, r in kept.get("early", ()))
     marking = frozenset(start)
     others = {(int(o), tuple(robots)): tuple(row) for o, robots, row in kept.get("others", ())}
-    given = goals, radii, places, settings, marking, patience, wip, early, others
-    return MonitorSubject(factory, *given)
+    return MonitorSubject(
+        factory, goals, radii, places, settings, marking, patience, wip, early, others
+    )

@@ -1,5 +1,5 @@
-"""What switched grips mean: which operation has ended, for which unit, and which switches belong to
-no operation."""
+"""Transfers of parts: the operation and the unit that a switch of grips ends, and switches that
+belong to no operation."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ Blame = Callable[[str, int, str, str], None]
 
 
 class Transfers:
-    """What holds each copy, the unit it is for (the k-th one that a feeder presents is
-    for unit k), and how often each operation that moves parts has ended."""
+    """The holder of each copy, its unit (the k-th copy that a feeder presents is for unit k), and
+    the number of ends of each operation that moves parts."""
 
     def __init__(self, subject: MonitorSubject, anatomy: Anatomy, blame: Blame) -> None:
         self.subject, self.anatomy, self.blame = subject, anatomy, blame
@@ -32,7 +32,7 @@ class Transfers:
         self.contents, self.inside = contents, [contents[label] for label in anatomy.label]
 
     def begin(self, switches: Sequence[Switch]) -> None:
-        """Record what is held at the start; blame what the marking does not account for."""
+        """Record the holders at the start; blame loads that the marking does not explain."""
         factory = self.subject.factory
         for switch in switches:
             holder = self._holder(switch)
@@ -67,9 +67,9 @@ class Transfers:
         return [self._end(number, copies) for number, copies in sorted(passed.items())]
 
     def _fused(self, switches: Sequence[Switch]) -> list[Switch]:
-        """The switches, without those by which bodies that one robot held have become one body made
-        of the same parts: they are put away, and that one was before, or has been put away by
-        another robot at the same time."""
+        """The switches, without those that replace several bodies in one robot by one body of the
+        same parts: the several are parked, and the one was parked, or is parked by another robot
+        at the same time."""
         at = self.at
         gone: dict[Holder, list[int]] = {}
         for switch in switches:
@@ -93,8 +93,8 @@ class Transfers:
     def _became(
         self, switches: Sequence[Switch], gone: dict[Holder, list[int]]
     ) -> list[tuple[int, Holder, list[int]]]:
-        """The copies that have taken the place of others: each with what held those, and them. A
-        copy that was parked comes before one that is used anew at once."""
+        """The copies that replace others: each with the holder and the numbers of those. A parked
+        copy comes before one that is reused at once."""
         found = []
         having: dict[str, dict[Holder, None]] = {}
         for holder, copies in gone.items():
@@ -113,12 +113,12 @@ class Transfers:
         return found
 
     def _holders(self, switch: Switch) -> set[Holder]:
-        """What holds a copy now."""
+        """The present holders of a copy."""
         return {holder for weld in switch.after if (holder := self.anatomy.holder[weld])}
 
     def _unit_of(self, whole: int, holder: Holder, copies: Sequence[int]) -> int:
-        """The unit of copies that a robot held and that have become one body; blame that they are
-        for several."""
+        """The unit of the copies that a robot held and one body replaces; blame copies for several
+        units."""
         units = {self.unit[copy] for copy in copies}
         if len(units) > 1:
             name, label = self.anatomy.copies[whole], self.anatomy.label[whole]
@@ -134,8 +134,7 @@ class Transfers:
     # --- one copy ------------------------------------------------------------------------------
 
     def _holder(self, switch: Switch) -> Holder | None:
-        """What holds a copy now. Blame that nothing holds it, that two hold it, or that it is held
-        as another part."""
+        """The present holder of a copy. Blame no holder, two holders, or a hold as another part."""
         anatomy, label = self.anatomy, self.anatomy.label[switch.copy]
         before, name = self.at[switch.copy], anatomy.copies[switch.copy]
         if not switch.after:
@@ -154,12 +153,12 @@ class Transfers:
         if len(holders) > 1:
             old = next((h for h in holders if h == before), holders[0])
             both = " and ".join(self._named(h) for h in holders)
-            self.blame("TwoHolders", old[1], label, f"{both} hold {name} both")
+            self.blame("TwoHolders", old[1], label, f"{both} both hold {name}")
         return fresh[-1] if fresh else holders[0]
 
     def _operation(self, copy: int, before: Holder | None, after: Holder) -> Operation | None:
-        """The operation whose end passes a copy on from `before` to `after`; None where none has
-        to. Blame what no operation does."""
+        """The operation whose end passes a copy from `before` to `after`; None where none is
+        needed. Blame a transfer that no operation does."""
         factory, label = self.subject.factory, self.anatomy.label[copy]
         found: Operation | None = None
         if before and (before[0], after[0]) in ((PARK, FEED), (HOLD, FEED), (HOLD, PARK)):
@@ -175,7 +174,7 @@ class Transfers:
             robot = after[1] if after[1] >= 0 else before[1] if before else -1
             name = self.anatomy.copies[copy]
             words = f"{name} passes from {self._named(before)} to {self._named(after)}"
-            self.blame("Exchanged", robot, label, f"{words}, as no operation does")
+            self.blame("Exchanged", robot, label, f"{words}, which no operation does")
             return None
         return found
 
@@ -203,7 +202,7 @@ class Transfers:
     # --- one operation -------------------------------------------------------------------------
 
     def _end(self, number: int, copies: Sequence[int]) -> tuple[Operation, int]:
-        """Count the end of an operation, and check what its carrier then has."""
+        """Count the end of an operation, and check the load of its carrier."""
         operation = self.subject.factory.operations[number]
         unit = self.ended[number]
         self.ended[number] += 1
@@ -228,7 +227,7 @@ class Transfers:
         return operation, unit
 
     def _complete(self, robot: int, label: str, copies: set[int], code: str) -> None:
-        """Blame parts that are missing or too many in what should be the sub-assembly `label`."""
+        """Blame missing and extra parts in a load that should be the sub-assembly `label`."""
         wanted = self.contents.get(label, frozenset())
         held = [self.inside[copy] for copy in copies]
         if sum(map(len, held)) == len(wanted) and all(parts <= wanted for parts in held):
@@ -238,14 +237,14 @@ class Transfers:
         twice = sorted({part for part in found if found.count(part) > 1}) if not extra else []
         for part, what in [
             *((p, f"lacks {p}") for p in missing[:1]),
-            *((p, f"has {p} too") for p in extra[:1]),
+            *((p, f"has {p} in excess") for p in extra[:1]),
             *((p, f"has {p} twice") for p in twice[:1]),
         ]:
-            what_of = "what it holds" if label == NOPART else label
+            what_of = "its load" if label == NOPART else label
             self.blame(code, robot, part, f"{what_of} {what}")
 
     def _made(self, robot: int) -> Operation | None:
-        """The operation that made what a robot holds in the marking where the run starts."""
+        """The operation that made the load of a robot in the marking at the start."""
         counts, factory = self.subject.counts, self.subject.factory
         gear = [factory.operations[o] for o in factory.robots[robot].operations]
         done = sum(counts.get(o.end, 0) for o in gear)

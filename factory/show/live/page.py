@@ -16,9 +16,8 @@ from factory.show.live.commands import FACTORS, SPEEDS
 from factory.show.live.session import Session
 from factory.show.report.drawings import floor_plan, net_drawing
 from factory.show.report.links import data, labels_of
-from factory.show.report.packing import Pack
 from factory.show.report.page import counts, filled, options
-from factory.show.report.scene import DrawnFactory, scene, stations
+from factory.show.report.scene import DrawnFactory, Pack, scene, stations
 from factory.show.report.sections import assembly_tree
 from factory.simulation.simulation import Simulation
 

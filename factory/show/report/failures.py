@@ -7,8 +7,7 @@ from html import escape
 from math import isfinite
 from typing import Any
 
-from factory.record.deaths import Death, deaths
-from factory.record.failures import Failing, Failures
+from factory.record.failures import Death, Failing, Failures, deaths
 from factory.show.report.recording import Recording
 
 LEGEND = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from html import escape
@@ -17,9 +18,8 @@ from factory.show.report.fidelity import fidelity
 from factory.show.report.frames import frames
 from factory.show.report.links import data, labels_of
 from factory.show.report.pace import measured, predicted
-from factory.show.report.packing import Pack, json_inside
 from factory.show.report.recording import Recording
-from factory.show.report.scene import scene
+from factory.show.report.scene import Pack, scene
 from factory.show.report.sections import (
     assembly_tree,
     ending,
@@ -112,6 +112,12 @@ def options(document: dict[str, Any]) -> str:
         for kind, key in kinds
         for name in document[key]
     )
+
+
+def json_inside(value: Any) -> str:
+    """JSON for a `<script>`: nothing in it ends the script or begins a comment."""
+    text = json.dumps(value, allow_nan=False, separators=(",", ":"))
+    return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
 
 
 def filled(

@@ -3,6 +3,8 @@ colours, shared by bodies that look alike, and what each thing stands for."""
 
 from __future__ import annotations
 
+import gzip
+from base64 import b64encode
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -17,8 +19,29 @@ from factory.mjcf import names
 from factory.mjcf.replica import Floats, Replica, paint, shown, triangles
 from factory.mjcf.robots import ROLES
 from factory.plant.factory import Factory, Operation
-from factory.show.report.packing import Pack
 from factory.support.engine import mujoco
+
+
+class Pack:
+    """A growing buffer. `index`: for each array by name its type, first byte and count."""
+
+    def __init__(self) -> None:
+        self.index: dict[str, tuple[str, int, int]] = {}
+        self._parts: list[bytes] = []
+        self._size = 0
+
+    def add(self, name: str, values: NDArray[Any]) -> None:
+        """Add an array, of type f4, u4 or u1, starting at a multiple of four bytes."""
+        kind = {"f": "f4", "u": f"u{values.dtype.itemsize}"}[values.dtype.kind]
+        content = np.ascontiguousarray(values, dtype=f"<{kind}").tobytes()
+        content += bytes(-len(content) % 4)
+        self.index[name] = kind, self._size, int(values.size)
+        self._parts.append(content)
+        self._size += len(content)
+
+    def text(self) -> str:
+        """The buffer, compressed with gzip (the same bytes at any time), in base 64."""
+        return b64encode(gzip.compress(b"".join(self._parts), 9, mtime=0)).decode()
 
 
 @dataclass(frozen=True)

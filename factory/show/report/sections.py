@@ -1,4 +1,4 @@
-"""The text and figures of a report, as HTML. What comes from a user's file is escaped here."""
+"""The text and figures of a report, as HTML, in which the texts of user files are escaped."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from factory.support.errors import Diagnostic
 SIGNS = {True: "✓", False: "✗", None: "?"}
 
 LISTED = 8
-"""The most failures that are listed whose codes have been listed already."""
+"""Number of failures that are listed even where their codes are listed already."""
 
 
 def ending(cut: CutOff | None) -> str:
@@ -57,11 +57,11 @@ def heading(
     judge = "record only" if found.monitor is None else "record and monitor agree"
     cut = recording.log.cut_off
     if held and cut:
-        judge = f"follows the net until then; {judge}"
+        judge = f"follows the net up to there; {judge}"
         cards.append(("Run", *_verdict(False, "", f"cut off at {cut.t:.2f} s"), judge))
     else:
         follows = found.verdict.refines and (not found.monitor or found.monitor.refines_net)
-        wrong = "bodies disagree" if follows else "does not follow the net"
+        wrong = "bodies differ" if follows else "does not follow the net"
         cards.append(("Run", *_verdict(held, "follows the net", wrong), judge))
     return "".join(_card(*card) for card in cards)
 
@@ -165,7 +165,7 @@ def utilisation(recording: Recording, run: MeasuredPace, plan: Predicted | None)
             f'<b class="{role}" style="width:{min(share, 100):.2f}%"></b>{mark}</span>'
             f"<span>{share:.0f} %</span></button>"
         )
-    legend = "bar: measured, share of the run in operations; line: predicted for this run"
+    legend = "bar: measured share of the run in operations; line: predicted for this run"
     note = f'<p class="note">{legend}.</p>' if plan else ""
     return f'<div class="uses">{"".join(rows)}</div>{note}'
 
@@ -201,10 +201,10 @@ def proof_words(proof: Proof) -> str:
         for claim in proof.claims
     )
     if proof.faults:
-        told = f"The checker refuses the certificate: {escape('; '.join(proof.faults[:3]))}."
+        result = f"The checker refuses the certificate: {escape('; '.join(proof.faults[:3]))}."
     else:
-        told = "An independent checker accepts the certificate, which says all of this in numbers."
-    digest = f'<p class="note">{told} SHA-256 <code>{escape(proof.digest)}</code> '
+        result = "An independent checker accepts the certificate of these claims."
+    digest = f'<p class="note">{result} SHA-256 <code>{escape(proof.digest)}</code> '
     save = '<button class="link" id="save-certificate">Save the certificate</button></p>'
     return f'<ul class="claims">{items}</ul>{digest}{save}'
 
@@ -223,12 +223,12 @@ def fidelity_words(found: RecordedFidelity, cut: CutOff | None) -> str:
 
 
 def _untested(found: RecordedFidelity) -> str:
-    """How many pairs of parts had no contact, and which."""
+    """The pairs of parts that were excluded from contact."""
     if not found.excluded:
         return ""
     count = f"{len(found.excluded)} of {found.pairs} pairs of parts"
     listed = "".join(f"<li>{escape(f'{one} - {other}')}</li>" for one, other in found.excluded)
-    summary = f"<summary>{count} were not tested against each other.</summary>"
+    summary = f"<summary>{count} were excluded from contact.</summary>"
     return f"<details>{summary}<ul>{listed}</ul></details>"
 
 
@@ -236,20 +236,20 @@ def _judged(found: RecordedFidelity, cut: CutOff | None) -> Iterator[str]:
     yield "<p>The record of firings " + ("refines" if found.verdict.refines else "does not refine")
     yield " the net. "
     if found.monitor is None:
-        yield "The log has nothing for the monitor to judge.</p>"
+        yield "The log has no states for the monitor.</p>"
         yield from _listed(found.verdict.bodies)
         return
     report = found.monitor
-    yield f"The monitor, which sees the engine alone, saw {len(report.seen)} firings and inferred "
-    yield f"{len(report.inferred)}; "
-    explain = f"they explain the run{', as far as it goes' if cut else ''}.</p>"
-    yield explain if report.refines_net else "some things nothing explains:</p>"
+    yield f"The monitor, from states of the engine alone, observed {len(report.seen)} firings and "
+    yield f"inferred {len(report.inferred)}; "
+    consistent = f"consistent with the net{' up to the end of the log' if cut else ''}.</p>"
+    yield consistent if report.refines_net else "violations:</p>"
     yield from _listed(found.verdict.bodies)
 
 
 def _listed(failures: Sequence[Diagnostic]) -> Iterator[str]:
-    """What is wrong with the bodies of a run: the first failures, the first of each code, and how
-    many more there are."""
+    """The failures of the bodies of a run: the first LISTED, the first of each code, and the number
+    of others."""
     if failures:
         first = {failure.code: failure for failure in reversed(failures)}.values()
         chosen = [f for n, f in enumerate(failures) if n < LISTED or f in first]
@@ -267,7 +267,7 @@ def _title(key: str) -> str:
 
 
 def made_how(recording: Recording) -> str:
-    """How the run was made."""
+    """The inputs of the run: files, world, settings, versions."""
     header = recording.log.header
     settings = ", ".join(f"{k} {v:g}" for k, v in header["settings"].items() if _is_number(v))
     versions = ", ".join(f"{k} {v}" for k, v in header.get("versions", {}).items())

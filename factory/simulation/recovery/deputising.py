@@ -12,7 +12,7 @@ from factory.layout.standby import deputies_in, part_of
 from factory.modes.modes import operation_modes, robot_limits
 from factory.modes.staging import stages_of
 from factory.nets.undone import Undone
-from factory.record.exchange import Exchange
+from factory.record.failures import Exchange
 from factory.simulation.ordering import Ordering
 from factory.simulation.recovery.books import Books
 from factory.simulation.simulation import Simulation

@@ -11,8 +11,7 @@ from factory.control.mode import Array
 from factory.nets.undone import Undone
 from factory.plant.factory import Factory, Operation
 from factory.problem.template import Failure
-from factory.record.exchange import Exchange
-from factory.record.failures import Failing, Failures, Stood
+from factory.record.failures import Exchange, Failing, Failures, Stood
 from factory.simulation.recovery.books import Books
 from factory.simulation.recovery.counting import summed
 from factory.simulation.recovery.faults import Campaign, WorldFault

@@ -1,15 +1,92 @@
-"""A block of ticks: what its arrays must be, checked when the log is read."""
+"""Checks of a log that is read: the values of its header, the arrays of its blocks of ticks."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from factory.control.profile import World
+from factory.layout.hands.hand import Point3
+from factory.layout.saved import LayoutTable
 from factory.record.log.blocks import Arrays
-from factory.support.tables import LARGE
+from factory.record.project_table import ProjectTable
+from factory.support.settings import AUTO
+from factory.support.tables import LARGE, value_of
+
+
+@dataclass(frozen=True, slots=True)
+class MonitorTable:
+    """The fields of a `MonitorSubject` in a log."""
+
+    goals: tuple[tuple[float, ...], ...]
+    radii: tuple[float, ...]
+    places: Mapping[str, Point3]
+    patience: float
+    early: tuple[tuple[int, int], ...]
+    others: tuple[tuple[int, tuple[int, ...], tuple[float, ...]], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Chosen:
+    """Whether the timestep and the bound on units inside were chosen for the run."""
+
+    timestep: bool
+    wip: bool
+
+
+@dataclass(frozen=True, slots=True)
+class LogHeader(ProjectTable):
+    """The header of a log. `nq`, `nv`: numbers of positions and speeds of the engine; `start`:
+    numbers of the places marked at the start of the run; `faults`: the requested faults, if any;
+    others as in a `RunRequest`."""
+
+    layout: LayoutTable
+    nq: int
+    nv: int
+    versions: Mapping[str, str]
+    command: tuple[str, ...]
+    world: World
+    seed: int
+    jitter: float
+    units: int
+    wip: int | None
+    fuse: bool
+    chosen: Chosen
+    distributed: bool
+    start: tuple[int, ...]
+    monitor: MonitorTable
+    robots: tuple[str, ...]
+    places: tuple[str, ...]
+    transitions: tuple[str, ...]
+    faults: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        ProjectTable.__post_init__(self)
+        counts = {"nq": (self.nq, 0), "nv": (self.nv, 0), "units": (self.units, 1)}
+        counts |= {"seed": (self.seed, 0), "wip": (self.wip or 1, 1)}
+        for name, (count, least) in counts.items():
+            if not least <= count or (name != "seed" and count > LARGE):
+                raise ValueError(f"{name} must be a whole number from {least}, not {count}")
+        if self.wip == 0:
+            raise ValueError("wip must be a whole number from 1, or null, not 0")
+        if not 0 <= self.jitter < 1:
+            raise ValueError(f"jitter must be a number from 0 to less than 1, not {self.jitter}")
+        if self.settings.timestep == AUTO:
+            raise ValueError(f"settings.timestep must be a number, not {AUTO}")
+        if not self.monitor.patience > 0:
+            raise ValueError(f"monitor.patience must be above 0, not {self.monitor.patience}")
+        if not all(0 <= place < len(self.places) for place in self.start):
+            raise ValueError(f"start must be numbers of places, below {len(self.places)}")
+
+
+def check_header(header: Any) -> None:
+    """Raises ValueError where a value is missing or impossible."""
+    value_of(LogHeader, header, "header")
+
 
 ARRAYS: Mapping[str, tuple[str, tuple[int, ...]]] = {
     "time": ("<f8", ()),
@@ -60,7 +137,7 @@ def state_bytes(arrays: Arrays) -> int:
 
 
 def check_course(time: NDArray[np.float64], delivered: NDArray[np.int32]) -> None:
-    """Raises ValueError where time goes back, or products do not leave one by one."""
+    """Raises ValueError where time decreases, or products do not leave one by one."""
     if (np.diff(time) < 0).any():
         raise ValueError("its time goes back")
     if not np.isin(np.diff(delivered, prepend=0), (0, 1)).all():
