@@ -213,7 +213,7 @@ def test_the_page_refers_to_nothing_outside_itself(front: ParetoFront, tmp_path:
     assert "default-src 'none'" in text
     assert text.count('class="plan"') == len(front.points) == len(plans)
     assert all(f'href="#p{n + 1:02d}"' in text for n in range(len(front.points)))
-    assert "Not all was looked at" in text
+    assert "The search is incomplete" in text
     assert text == front_page(evil, commands, plans, tmp_path)
 
 

@@ -106,7 +106,7 @@ def test_the_report_has_the_way_and_the_room_of_an_operation(
     (row,) = [row for row in text.split("<tr>") if f">{join['label']}<" in row]
     assert "<td>peg + cap</td><td>cap is lowered " in row
     room = f"{1e3 * abs(join['clearance']):.2f} mm"
-    assert (f">drawn {room} into each other<" if drawn else f">{room}<") in row
+    assert (f">overlap of {room} as drawn<" if drawn else f">{room}<") in row
     assert (">cap - peg<" if drawn else ">none<") in row
 
 

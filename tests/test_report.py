@@ -217,9 +217,9 @@ def _exceeded(figures: Mapping[str, float | None]) -> dict[str, float | None]:
 
 
 def test_a_good_run_has_good_figures(recording) -> None:
-    found = fidelity(recording)
-    assert found.verdict.refines and found.monitor is not None and found.monitor.refines_net
-    figures = found.figures
+    assert recording.verdict.refines and recording.monitor is not None
+    assert recording.monitor.refines_net
+    figures = fidelity(recording)
     assert not _exceeded(figures)
     assert figures["handoffs"] == 22
     assert 0 < figures["handoff_gap_max_mm"] < 0.2 and 0 < figures["weld_residual_max_mm"] < 0.2
@@ -234,12 +234,12 @@ def test_planted_faults_show_in_the_figures(recording) -> None:
     qpos[:, joint] += 2e-3
     ctrl[:, m.actuator_ctrladr[0]] += 5e-3
     found = fidelity(replace(recording, log=replace(log, qpos=qpos, ctrl=ctrl), layout=None))
-    bad = _exceeded(found.figures)
+    bad = _exceeded(found)
     assert bad["product_position_max_mm"] == pytest.approx(2, abs=0.2)
     assert bad["weld_residual_max_mm"] == pytest.approx(2, abs=0.2)
     assert bad["tracking_error_max_mm"] == pytest.approx(5, abs=0.5)
     fired = log.fired[::-1].copy()
-    changed = fidelity(replace(recording, log=replace(log, fired=fired), layout=None))
+    changed = replace(recording, log=replace(log, fired=fired), layout=None)
     assert not changed.verdict.refines
 
 
@@ -384,7 +384,7 @@ def test_bodies_that_replace_others_are_no_hand_overs(tmp_path: Path) -> None:
     simulation = Simulation(paper_layout(), RunRequest(units=2, fuse=True))
     with LogWriter(path, simulation) as writer:
         run = simulation.run([writer.observe])
-    figures = fidelity(recording_of(path)).figures
+    figures = fidelity(recording_of(path))
     assert run.physics is not None
     assert figures["handoffs"] == run.physics.handoffs
     assert figures["handoff_gap_max_mm"] == pytest.approx(run.physics.handoff_gap_max_mm, abs=0.02)

@@ -109,7 +109,7 @@ def say_failures(failures: Failures, verbose: bool) -> None:
     say(
         f"{len(failures.found)} failures, {failures.undone} transitions undone,"
         f" {failures.scrapped} scrapped, {failures.spares} spares used,"
-        f" {failures.contacts} contacts with what fell or lay askew"
+        f" {failures.contacts} contacts with fallen or misplaced parts"
     )
     if failures.binned or failures.spilled:
         spilled = ", ".join(failures.spilled)

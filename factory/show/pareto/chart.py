@@ -1,6 +1,6 @@
 """Charts of a front: a figure of its points against their robots, as SVG to be put into a page.
 
-Both axes are logarithmic: what is half as fast with half as many robots lies on a straight line.
+Both axes are logarithmic: a constant product of cycle time and robots is a straight line.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ DOT = 5.5
 """Radius of a point."""
 
 ROOM = 1.12
-"""The axes go on beyond the points by this factor."""
+"""Factor by which the axes extend beyond the points."""
 
 STEPS = (
     (1.0, 2.0, 5.0),
@@ -69,8 +69,8 @@ class ChartAxis:
 
 
 def cycle_chart(front: ParetoFront) -> str:
-    """The cycle times of the points against their robots, with the product as it is written, and
-    what work over robots allows."""
+    """The cycle times of the points against their robots, with the product as written, and the
+    bound work / robots."""
     return _Chart(front, lambda point: point.seconds, "cycle time [s]", front.work).text()
 
 
@@ -106,8 +106,8 @@ class _Chart:
         self._stairs()
         written = self.front.written
         if written is not None:
-            told = f"as written: {written}"
-            self.canvas.circle(self._at(written), DOT + 3, "written", title=told)
+            title = f"as written: {written}"
+            self.canvas.circle(self._at(written), DOT + 3, "written", title=title)
         for number, point in enumerate(self.front.points):
             self._point(point_name(number), point)
         for number, point in enumerate(self.front.points):
@@ -143,7 +143,7 @@ class _Chart:
             self.canvas.line("bound", *ends)
 
     def _stairs(self) -> None:
-        """What can be had with at most so many robots."""
+        """The best value with at most each number of robots."""
         best: list[Point] = []
         for point in self.front.points:
             at = self._at(point)
@@ -154,7 +154,7 @@ class _Chart:
             self.canvas.line("stairs", *corners, best[-1])
 
     def _point(self, name: str, point: FrontPoint) -> None:
-        """A point that leads to what is said of it further down."""
+        """A point, with a link to its panel."""
         at, trial = self._at(point), point.trial
         style = "point" if trial is None else "point held" if trial.holds else "point failed"
         with _link(self.canvas, f"#{name}"):
@@ -164,7 +164,7 @@ class _Chart:
 
 @contextmanager
 def _link(canvas: Canvas, target: str) -> Iterator[None]:
-    """What is drawn meanwhile leads to a place of the page."""
+    """Elements drawn in this context link to a place of the page."""
     canvas.elements.append(f'<a href="{target}">')
     yield
     canvas.elements.append("</a>")

@@ -1,4 +1,4 @@
-"""The page of a front: its charts, a table, and of each point floor plan and command."""
+"""The page of a Pareto front: charts, a table, and the floor plan and command of each point."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def front_page(
 def _counts(front: ParetoFront) -> str:
     parts = sum(1 for _ in front.points[0].project.pag.parts()) if front.points else 0
     judged = "robots, cycle time, floor" if front.work is not None else "robots, cycle time"
-    return f"{parts} parts; no other factory found is as good in {judged} as one of these"
+    return f"{parts} parts; the Pareto-optimal factories in {judged}"
 
 
 def _cards(front: ParetoFront) -> list[str]:
@@ -106,7 +106,7 @@ def _cards(front: ParetoFront) -> list[str]:
 def _ending(front: ParetoFront) -> str:
     words = [escape(front.unproved)] * bool(front.unproved)
     if not front.complete:
-        words.append("Not all was looked at: there was no time for the rest, or it was stopped.")
+        words.append("The search is incomplete: it ran out of time or was stopped.")
     return "".join(f'<p class="notice" role="note">{one}</p>' for one in words)
 
 
@@ -154,21 +154,21 @@ def _figure(value: float | None, unit: str) -> str:
 
 def _point(name: str, point: FrontPoint, command: str, plan: bytes | None) -> str:
     """A panel: what the point is, its floor plan, its lines and its command."""
-    told, picture = str(point), ""
+    words, picture = str(point), ""
     if plan is not None:
         data = b64encode(plan).decode()
-        alt = f"Floor plan of {name}: {told}"
+        alt = f"Floor plan of {name}: {words}"
         picture = f'<img class="plan" alt="{alt}" src="data:image/svg+xml;base64,{data}">'
     return (
         f'<section class="panel" id="{name}" aria-labelledby="h-{name}"><div class="bar">'
-        f'<h2 id="h-{name}">{name}</h2><span class="note">{told}</span></div>{picture}'
+        f'<h2 id="h-{name}">{name}</h2><span class="note">{words}</span></div>{picture}'
         f'<div class="text"><pre class="command">{escape(command)}</pre>'
         f"{_lines(point)}{_trial(point)}</div></section>"
     )
 
 
 def _lines(point: FrontPoint) -> str:
-    """Which labels share a robot."""
+    """The labels that share a robot."""
     if not point.lines:
         return '<p class="note">A robot for each label.</p>'
     rows = "".join(f"<li>{escape(', '.join(line))}</li>" for line in point.lines)
@@ -179,7 +179,7 @@ def _lines(point: FrontPoint) -> str:
 
 
 def _trial(point: FrontPoint) -> str:
-    """How a run of it went."""
+    """The result of a run of it."""
     trial = point.trial
     if trial is None:
         return ""
@@ -195,9 +195,9 @@ def _trial(point: FrontPoint) -> str:
 
 
 def _how(front: ParetoFront) -> str:
-    """How the front was found, and what its figures mean."""
+    """The search for the front, and the definitions of its figures."""
     rows = [
-        ("Looked at", f"{front.estimated} estimates, {front.laid_out} layouts, each certified"),
+        ("Searched", f"{front.estimated} estimates, {front.laid_out} layouts, each certified"),
         (
             "Cycle",
             "predicted for the layout, with all robots at their nominal speed; without a layout"
@@ -205,8 +205,8 @@ def _how(front: ParetoFront) -> str:
         ),
         (
             "Least",
-            "what the robots of the point spend in operations in a cycle, over their number; the"
-            " dashed line is the same with the least of all points",
+            "total time of the point's robots in operations in a cycle, divided by their number;"
+            " the dashed line has the least total of all points",
         ),
         (
             "Runs",

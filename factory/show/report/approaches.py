@@ -1,4 +1,4 @@
-"""How the inputs of each operation come together, as HTML."""
+"""The approaches of the inputs of each operation, as HTML."""
 
 from __future__ import annotations
 
@@ -12,19 +12,20 @@ from factory.plant.approaches import Approach, Pair
 from factory.plant.factory import Operation
 from factory.show.report.recording import Recording
 
-COLUMNS = ("Operation", "Inputs", "Way", "Room on the way", "Left out")
+COLUMNS = ("Operation", "Inputs", "Approach", "Clearance on approach", "Excluded")
 
 LEGEND = (
-    "Room: the least between what comes and what stands on the way, but for its last millimetre. "
-    "Left out: pairs of parts that overlap or scrape there, so have no contact in the run."
+    "Clearance: the least distance between the moving and the standing parts during the approach, "
+    "except in its last millimetre. Excluded: pairs of parts that overlap or touch there, and so "
+    "are excluded from contact in the run."
 )
 
 NAMED = 100
-"""So many pairs of an operation, at most, are named."""
+"""Upper bound on the listed pairs of an operation."""
 
 
 def approaches_section(recording: Recording, labels: Mapping[str, int]) -> str:
-    """The section of a product whose approaches were judged; nothing of one of default boxes."""
+    """The section on approaches; empty for a product of default boxes, which has none."""
     operations = [o for o in recording.factory.operations if o.approach is not None]
     if not operations:
         return ""
@@ -41,8 +42,7 @@ def approaches_section(recording: Recording, labels: Mapping[str, int]) -> str:
 
 
 def _taken(recording: Recording, operation: Operation) -> Approach:
-    """The approach of an operation, from the side that its layout has chosen where that is
-    known."""
+    """The approach of an operation, from the side chosen by its layout where there is one."""
     approach = operation.approach
     assert approach is not None
     if recording.layout is None or approach.kind == "lower" or not any(approach.overlaps):
@@ -53,7 +53,7 @@ def _taken(recording: Recording, operation: Operation) -> Approach:
 
 
 def _rooms(recording: Recording, chosen: Mapping[str, Approach]) -> Mapping[str, float]:
-    """The room on each way by label; nothing where the meshes are gone."""
+    """The clearance on each approach by label; empty where the meshes are missing."""
     if recording.layout is None:
         return {}
     return rooms(nodes_of(recording.factory), recording.layout.product, chosen)
@@ -72,17 +72,19 @@ def _row(o: Operation, approach: Approach, room: float | None, labels: Mapping[s
 
 
 def _room(room: float | None) -> str:
-    """A room in words [mm]."""
+    """A clearance in words [mm]."""
     if room is None:
         return "–"
     if room == float("inf"):
         return f"more than {1e3 * AMPLE:g} mm"
-    found = round(1e3 * room, 2)
-    return f"{abs(found):.2f} mm" if found >= 0 else f"drawn {-found:.2f} mm into each other"
+    millimetres = round(1e3 * room, 2)
+    if millimetres >= 0:
+        return f"{abs(millimetres):.2f} mm"
+    return f"overlap of {-millimetres:.2f} mm as drawn"
 
 
 def _left_out(pairs: set[Pair]) -> str:
-    """How many pairs, and which."""
+    """The number of pairs, and a list."""
     if not pairs:
         return "none"
     named = [escape(f"{one} - {other}") for one, other in sorted(pairs)[:NAMED]]

@@ -1,4 +1,4 @@
-"""What went wrong in a recorded run, and what was done about it, as HTML and as data."""
+"""The failures of a recorded run and the responses to them, as HTML and as data."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from factory.record.failures import Death, Failing, Failures, deaths
 from factory.show.report.recording import Recording
 
 LEGEND = (
-    "Robots over time: hatched is what was undone; in a band a robot stands still, in a dark one it"
-    " is dead, until another is in its place, or does its tours."
+    "Robots over time: undone operations are hatched; in a band a robot stands still, in a dark one"
+    " it is dead, until a spare replaces it, or another robot does its tours."
 )
 
-COLUMNS = ("Time", "What failed", "What was done", "Undone", "Scrapped")
+COLUMNS = ("Time", "Failure", "Response", "Undone", "Scrapped")
 
 
 def failures_section(recording: Recording) -> str:
-    """The section of a run that goes on after failures; nothing of any other."""
+    """The section of a run that recovers from failures; empty for any other."""
     found = recording.log.failures
     if found is None:
         return ""
@@ -35,10 +35,10 @@ def failures_section(recording: Recording) -> str:
 
 
 def failures_data(recording: Recording) -> dict[str, Any]:
-    """What the page draws of it: `undone`, after how many firings, when [s] and which transitions;
-    `dead`, which robots were, from when on and until when [s], null where none took their place,
-    and what was then; `gone`, which were lifted out for good, when [s], and their deputies;
-    `stood`, from when on [s] which robots stood."""
+    """The data of the page: `undone`: number of firings before, time [s] and transitions; `dead`:
+    robot, start and end [s], null where nothing replaced it, and the situation after it; `gone`:
+    robot removed for good, time [s] and deputy; `stood`: times [s] and the robots that stood still
+    from then on."""
     log, net = recording.log, recording.factory.net.threaded.net.transition_index
     if log.failures is None:
         return {}
@@ -60,23 +60,23 @@ def failures_data(recording: Recording) -> dict[str, Any]:
 
 
 def _dead(robot: int, death: Death) -> list[Any]:
-    """A death, as the page draws it."""
+    """A death, as in `failures_data`."""
     start, end = round(death.start, 4), round(death.end, 4) if isfinite(death.end) else None
     return [robot, start, end, f", then {death.then}" if end is not None else ""]
 
 
 def _summary(found: Failures) -> str:
-    """The figures of all failures in a sentence or two."""
+    """The counts of all failures, in words."""
     struck = ", ".join(f"{n} {kind.replace('_', ' ')}" for kind, n in found.struck.items() if n)
     figures = (
         _count(len(found.found), "failure"),
         f"{_count(found.undone, 'transition')} undone",
         f"{found.scrapped} scrapped",
         f"{_count(found.spares, 'spare')} used",
-        f"{_count(found.contacts, 'contact')} with what fell or lay askew",
+        f"{_count(found.contacts, 'contact')} with fallen or misplaced parts",
     )
-    told = f"{found.missed} missed, {_count(found.false_alarms, 'false alarm')}"
-    return f"Faults: {struck or 'none'}; {told}. {', '.join(figures)}."
+    detection = f"{found.missed} missed, {_count(found.false_alarms, 'false alarm')}"
+    return f"Faults: {struck or 'none'}; {detection}. {', '.join(figures)}."
 
 
 def _row(recording: Recording, one: Failing) -> str:

@@ -1,11 +1,9 @@
-"""The fidelity of a recorded run: figures from the log alone, and against the ideal world where
-there is a layout."""
+"""The fidelity of a recorded run: figures from the log and, where there is a layout, against the
+ideal world."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from math import comb
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -15,8 +13,7 @@ from factory.mjcf.parts import HIDDEN
 from factory.mjcf.replica import Replica
 from factory.mjcf.weld_frames import FEED, GRIP, HOLD, gaps
 from factory.plant.approaches import Pair
-from factory.record.monitor.report import Report
-from factory.record.verdict import STRENGTH, RunVerdict
+from factory.record.verdict import STRENGTH
 from factory.show.report.recording import Recording
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Event
@@ -26,42 +23,26 @@ from factory.study.fidelity.causality import causal_record, duration_differences
 from factory.study.fidelity.readings import ActiveWelds
 
 EVERY = 5
-"""Residuals of welds are measured every so many ticks."""
+"""Number of ticks between two measurements of the residuals of welds."""
 
 
-@dataclass(frozen=True)
-class RecordedFidelity:
-    """The figures by the keys of their definitions, the verdict on the run, and what the monitor
-    reports, None where the log is not one to be judged; of how many `pairs` of parts there are
-    those whose contact was off."""
-
-    figures: Mapping[str, float | None]
-    verdict: RunVerdict
-    monitor: Report | None
-    pairs: int
-    excluded: tuple[Pair, ...]
-
-
-def fidelity(recording: Recording) -> RecordedFidelity:
-    """The fidelity of a recording."""
+def fidelity(recording: Recording) -> dict[str, float | None]:
+    """The figures of a recording, by the keys of their definitions."""
     monitor = recording.monitor
-    violations = None if monitor is None else float(len(monitor.violations))
-    found = {
-        "monitor_violations": violations,
+    return {
+        "monitor_violations": None if monitor is None else float(len(monitor.violations)),
         **_welds(recording),
         STRENGTH: (recording.log.figures or {}).get(STRENGTH),
         "tracking_error_max_mm": _tracking(recording),
         **_ideal(recording),
     }
-    pairs = comb(len(recording.factory.leaves), 2)
-    return RecordedFidelity(found, recording.verdict, monitor, pairs, _excluded(recording))
 
 
-def _excluded(recording: Recording) -> tuple[Pair, ...]:
-    """The pairs of parts that the recorded model leaves out of contact."""
+def excluded(recording: Recording) -> tuple[Pair, ...]:
+    """The pairs of parts that are excluded from contact in the recorded model."""
     m = recording.motion.m
-    found = (names.excluded(m.exclude(i).name) for i in range(m.nexclude))
-    return tuple(dict.fromkeys(found))
+    pairs = (names.excluded(m.exclude(i).name) for i in range(m.nexclude))
+    return tuple(dict.fromkeys(pairs))
 
 
 def _tracking(recording: Recording) -> float | None:
@@ -116,7 +97,7 @@ def _welds(recording: Recording) -> dict[str, float | None]:
 
 
 def _rows(recording: Recording) -> Iterator[tuple[int, bool]]:
-    """Rows of the log to measure, and whether welds are switched there."""
+    """The measured rows of the log, and whether welds are switched there."""
     active = recording.log.active
     for row in range(1, len(recording.log)):
         if active.starts[row] != active.starts[row - 1]:
@@ -134,7 +115,7 @@ def _ideal(recording: Recording) -> dict[str, float | None]:
     if not recording.from_start or not log.delivered[-1]:
         return {}
     units = int(log.delivered[-1])
-    thought = Simulation(
+    ideal = Simulation(
         recording.layout,
         RunRequest(
             "ideal",
@@ -146,10 +127,12 @@ def _ideal(recording: Recording) -> dict[str, float | None]:
         ),
     ).run()
     events = [Event(t, name) for t, name in log.lasting]
-    apart = duration_differences(causal_record(net, thought.lasting), causal_record(net, events))
-    if not len(apart):
+    differences = duration_differences(
+        causal_record(net, ideal.lasting), causal_record(net, events)
+    )
+    if not len(differences):
         return {}
     return {
-        "duration_difference_mean_s": float(apart.mean()),
-        "duration_difference_max_s": float(apart[np.abs(apart).argmax()]),
+        "duration_difference_mean_s": float(differences.mean()),
+        "duration_difference_max_s": float(differences[np.abs(differences).argmax()]),
     }

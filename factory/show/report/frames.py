@@ -23,13 +23,13 @@ UNITS = 10_000
 """Positions are whole tenths of a millimetre, components of quaternions whole 1/10000."""
 
 TURNED = 2e-3
-"""A body has one orientation where no component of its quaternion changes by more than this."""
+"""A change of a quaternion component up to which a body has a constant orientation."""
 
 
 def frames(recording: Recording, pack: Pack) -> dict[str, Any]:
     """Poses relative to the parent body: `time` (n,) [s] and, for each body that moves,
-    `x<body>` (3, n), `q<body>` (4, n) if it turns, go into the pack; poses of all at the start,
-    and which body is another's child, are given."""
+    `x<body>` (3, n), `q<body>` (4, n) if it turns, go into the pack; the poses of all bodies at
+    the start, and the parents, are returned."""
     seen = recording.motion
     m, rows = seen.m, seen.rows
     time = recording.log.time[rows]

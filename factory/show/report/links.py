@@ -1,4 +1,4 @@
-"""Links: what is highlighted with every robot, label, transition and place."""
+"""Links: the elements that are highlighted with each robot, label, transition and place."""
 
 from __future__ import annotations
 

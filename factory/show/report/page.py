@@ -47,14 +47,14 @@ SCRIPTS = (
 STYLES = ("report/report.css",)
 
 FAILURES = "report/failures.js", "report/failures.css"
-"""What a page has more where the run goes on after failures."""
+"""The additional script and style of a run that recovers from failures."""
 
 
 def page(recording: Recording) -> str:
     """The text of the page, the same for the same recording."""
     labels = labels_of(recording.factory)
     run, plan = measured(recording), predicted(recording)
-    proved, found = proof(recording.factory), fidelity(recording)
+    proved = proof(recording.factory)
     pack = Pack()
     document = {
         **data(recording.factory),
@@ -73,7 +73,7 @@ def page(recording: Recording) -> str:
         "name": escape(recording.name, quote=True),
         "counts": escape(counts(recording.factory)),
         "ending": ending(recording.log.cut_off),
-        "heading": heading(recording, run, plan, proved, found),
+        "heading": heading(recording, run, plan, proved),
         "tree": assembly_tree(recording.factory.pag, labels),
         "floor": floor_plan(recording.stage, labels),
         "net": net_drawing(recording.factory, recording.stage.roles),
@@ -82,7 +82,7 @@ def page(recording: Recording) -> str:
         "pace": pace(recording, run, plan),
         "utilisation": utilisation(recording, run, plan),
         "proof": proof_words(proved),
-        "fidelity": fidelity_words(found, recording.log.cut_off),
+        "fidelity": fidelity_words(recording, fidelity(recording)),
         "how": made_how(recording),
         "options": options(document),
     }
@@ -96,7 +96,7 @@ def page(recording: Recording) -> str:
 
 
 def counts(factory: Factory) -> str:
-    """How large a factory and its net are."""
+    """The sizes of a factory and its net."""
     net = factory.net.threaded
     return (
         f"{len(factory.leaves)} parts, {len(factory.robots)} robots, {len(net.places)} places, "
@@ -105,7 +105,7 @@ def counts(factory: Factory) -> str:
 
 
 def options(document: dict[str, Any]) -> str:
-    """The options of the field that finds things by name."""
+    """The options of the search field."""
     kinds = (("robot", "robots"), ("part", "labels"), ("transition", "transitions"))
     return "".join(
         f'<option value="{escape(f"{kind} {name}", quote=True)}"></option>'
@@ -129,11 +129,11 @@ def filled(
     styles: Sequence[str],
     connects: str = "",
 ) -> str:
-    """A template with its fields filled in, in one pass: what is filled in is not scanned again.
-    Templates, scripts and styles are named like `report/report.css`; `connects`: what the
-    page may connect to, by its content security policy."""
+    """A template with its fields filled in, in one pass, so that the values are not scanned again.
+    Templates, scripts and styles are named like `report/report.css`; `connects`: the
+    addresses that its content security policy lets the page connect to."""
     texts = [_asset(name) for name in scripts]
-    every = {
+    values = {
         **fields,
         "policy": _policy(texts, connects),
         "style": "".join(map(_asset, styles)),
@@ -143,7 +143,7 @@ def filled(
         "licence": escape(_asset("report/three.LICENSE.txt")),
     }
     pieces = _asset(template).split("%%")
-    return "".join(every[piece] if n % 2 else piece for n, piece in enumerate(pieces))
+    return "".join(values[piece] if n % 2 else piece for n, piece in enumerate(pieces))
 
 
 def _policy(scripts: list[str], connects: str) -> str:

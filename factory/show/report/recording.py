@@ -1,5 +1,5 @@
-"""The subject of a report: a log with its motion, the factory it compiles to and, where it can be
-made again, the layout that it ran in."""
+"""The subject of a report: a log with its motion, its factory and, where it can be reproduced, its
+layout."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ from factory.support.errors import Diagnostic, InputError, RunError
 
 @dataclass(frozen=True)
 class Recording:
-    """A recorded run. Predictions follow from `layout`; where it is None, `missing` says why.
-    `faults`: what is wrong with its model."""
+    """A recorded run. Predictions follow from `layout`; `missing`: the reason where it is None.
+    `faults` of its model."""
 
     file: str
     log: Log = field(repr=False)
@@ -60,7 +60,7 @@ class Recording:
 
     @cached_property
     def monitor(self) -> Report | None:
-        """What a monitor reports on the log; None where it is not one to be judged."""
+        """The report of a monitor on the log; None where the log has no states for it."""
         try:
             return watch_log(self.log)[0]
         except InputError:
@@ -73,7 +73,7 @@ class Recording:
 
     @cached_property
     def stage(self) -> DrawnFactory:
-        """What there is to be drawn."""
+        """The drawable data."""
         m, seen = self.motion.m, self.motion
         return DrawnFactory(
             self.factory,

@@ -1,5 +1,5 @@
-"""What there is to be drawn of a factory in the engine, and the 3-D view of it: triangles in
-colours, shared by bodies that look alike, and what each thing stands for."""
+"""The drawable data of a factory in the engine, and its 3-D view: coloured triangles, shared by
+bodies of the same shape, and the robot or label of each body."""
 
 from __future__ import annotations
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
+from math import comb
 
 from factory.plant.factory import Factory
 from factory.problem.pag import PAG
 from factory.record.ending import CutOff
-from factory.show.report.fidelity import RecordedFidelity
+from factory.show.report.fidelity import excluded
 from factory.show.report.links import words_of
 from factory.show.report.pace import MeasuredPace, Predicted
 from factory.show.report.recording import Recording
@@ -36,31 +37,30 @@ def heading(
     run: MeasuredPace,
     plan: Predicted | None,
     proof: Proof,
-    found: RecordedFidelity,
 ) -> str:
     """The key figures, as cards."""
     robots = recording.factory.robots
-    asked = recording.log.header["units"]
+    units = int(recording.log.header["units"])
     products = f"in {recording.end:.2f} s of simulated time"
-    cards = [("Products", f"{len(run.dropoffs)} <small>of {int(asked)}</small>", products)]
+    cards = [("Products", f"{len(run.dropoffs)} <small>of {units}</small>", products)]
     if plan is not None:
         hourly = f"{_figure(_per_hour(plan.cycle))} products an hour"
         cards.append(("Cycle time", f"{plan.cycle:.3f} <small>s</small>", f"predicted; {hourly}"))
         names = escape(", ".join(plan.critical[:3]))
-        told = f"measured: gear of {robots[run.critical].name}" if run.dropoffs else "predicted"
-        cards.append(("Sets the pace", names, told))
+        note = f"measured: gear of {robots[run.critical].name}" if run.dropoffs else "predicted"
+        cards.append(("Sets the pace", names, note))
     elif run.cycle:
         hourly = f"{_figure(_per_hour(run.cycle))} products an hour"
         cards.append(("Cycle time", f"{run.cycle:.3f} <small>s</small>", f"measured; {hourly}"))
     cards.append(("Net", *_verdict(proof.holds, "proved", "not proved"), "live, safe, reversible"))
-    held = found.verdict.follows
-    judge = "record only" if found.monitor is None else "record and monitor agree"
+    held, monitor = recording.verdict.follows, recording.monitor
+    judge = "record only" if monitor is None else "record and monitor agree"
     cut = recording.log.cut_off
     if held and cut:
         judge = f"follows the net up to there; {judge}"
         cards.append(("Run", *_verdict(False, "", f"cut off at {cut.t:.2f} s"), judge))
     else:
-        follows = found.verdict.refines and (not found.monitor or found.monitor.refines_net)
+        follows = recording.verdict.refines and (not monitor or monitor.refines_net)
         wrong = "bodies differ" if follows else "does not follow the net"
         cards.append(("Run", *_verdict(held, "follows the net", wrong), judge))
     return "".join(_card(*card) for card in cards)
@@ -110,21 +110,21 @@ def _gears(recording: Recording, run: MeasuredPace, plan: Predicted | None) -> s
     """The critical gear as a chain of its operations, as predicted and as measured."""
     factory = recording.factory
     names = {robot.name: robot.index for robot in factory.robots}
-    wanted = [("measured", run.critical, run.durations)]
-    told = ""
+    chains = [("measured", run.critical, run.durations)]
+    note = ""
     if plan is not None:
         critical = [names[name] for name in plan.critical if name in names]
         if not critical:
-            told = f"<p>The pace is set by {escape(', '.join(plan.critical))}, not by a robot.</p>"
-        wanted[:0] = [("predicted", robot, plan.durations) for robot in critical[:1]]
-    longest = max((_sum(factory, r, times) for _, r, times in wanted), default=1.0) or 1.0
-    bars = "".join(_chain(factory, *row, longest) for row in wanted)
-    return f"<h3>Critical gear</h3>{told}<div class='chains'>{bars}</div>"
+            note = f"<p>The pace is set by {escape(', '.join(plan.critical))}, not by a robot.</p>"
+        chains[:0] = [("predicted", robot, plan.durations) for robot in critical[:1]]
+    longest = max((_sum(factory, r, times) for _, r, times in chains), default=1.0) or 1.0
+    bars = "".join(_chain(factory, *row, longest) for row in chains)
+    return f"<h3>Critical gear</h3>{note}<div class='chains'>{bars}</div>"
 
 
 def _sum(factory: Factory, robot: int, times: Iterable[float | None]) -> float:
-    every = list(times)
-    return sum(every[o] or 0.0 for o in factory.robots[robot].operations)
+    seconds = list(times)
+    return sum(seconds[o] or 0.0 for o in factory.robots[robot].operations)
 
 
 def _chain(
@@ -209,42 +209,46 @@ def proof_words(proof: Proof) -> str:
     return f'<ul class="claims">{items}</ul>{digest}{save}'
 
 
-def fidelity_words(found: RecordedFidelity, cut: CutOff | None) -> str:
+def fidelity_words(recording: Recording, figures: Mapping[str, float | None]) -> str:
     """The figures in a table, and the verdict of the monitor."""
     rows = "".join(
         f'<tr class="{"bad" if QUANTITIES[key].exceeded(value) else ""}">'
         f"<th>{escape(_title(key))}<p>{escape(QUANTITIES[key].definition)}</p></th>"
         f"<td>{_shown(value)}</td><td>{_shown(QUANTITIES[key].limit)}</td>"
         f"<td>{escape(QUANTITIES[key].unit)}</td></tr>"
-        for key, value in found.figures.items()
+        for key, value in figures.items()
     )
-    table = _table(("", "found", "limit", ""), rows)
-    return "".join(_judged(found, cut)) + _untested(found) + table
+    table = _table(("", "measured", "limit", ""), rows)
+    return "".join(_judged(recording)) + _excluded(recording) + table
 
 
-def _untested(found: RecordedFidelity) -> str:
+def _excluded(recording: Recording) -> str:
     """The pairs of parts that were excluded from contact."""
-    if not found.excluded:
+    pairs = excluded(recording)
+    if not pairs:
         return ""
-    count = f"{len(found.excluded)} of {found.pairs} pairs of parts"
-    listed = "".join(f"<li>{escape(f'{one} - {other}')}</li>" for one, other in found.excluded)
+    count = f"{len(pairs)} of {comb(len(recording.factory.leaves), 2)} pairs of parts"
+    listed = "".join(f"<li>{escape(' - '.join(pair))}</li>" for pair in pairs)
     summary = f"<summary>{count} were excluded from contact.</summary>"
     return f"<details>{summary}<ul>{listed}</ul></details>"
 
 
-def _judged(found: RecordedFidelity, cut: CutOff | None) -> Iterator[str]:
-    yield "<p>The record of firings " + ("refines" if found.verdict.refines else "does not refine")
+def _judged(recording: Recording) -> Iterator[str]:
+    verdict, report = recording.verdict, recording.monitor
+    yield "<p>The record of firings " + ("refines" if verdict.refines else "does not refine")
     yield " the net. "
-    if found.monitor is None:
+    if report is None:
         yield "The log has no states for the monitor.</p>"
-        yield from _listed(found.verdict.bodies)
+        yield from _listed(verdict.bodies)
         return
-    report = found.monitor
     yield f"The monitor, from states of the engine alone, observed {len(report.seen)} firings and "
     yield f"inferred {len(report.inferred)}; "
-    consistent = f"consistent with the net{' up to the end of the log' if cut else ''}.</p>"
-    yield consistent if report.refines_net else "violations:</p>"
-    yield from _listed(found.verdict.bodies)
+    if not report.refines_net:
+        yield "violations:</p>"
+    else:
+        yield "consistent with the net"
+        yield " up to the end of the log.</p>" if recording.log.cut_off else ".</p>"
+    yield from _listed(verdict.bodies)
 
 
 def _listed(failures: Sequence[Diagnostic]) -> Iterator[str]:

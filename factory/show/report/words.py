@@ -21,19 +21,19 @@ NAMES = {
     "legal": "Legal start",
 }
 MEANS = {
-    "gear_net": "every robot goes round in a cycle of its own, and robots meet in operations only",
-    "gear_train": "every robot goes round in a cycle of its own, with a wait of its own before each"
-    " operation; robots meet in operations only",
-    "live": "whatever has happened, every operation can happen again: it never stops",
-    "safe": "no place ever holds two tokens: no robot is asked to be twice at once",
-    "reversible": "the factory can always come back to where it started",
+    "gear_net": "every robot has its own cycle, and robots share operations only",
+    "gear_train": "every robot has its own cycle, with its own wait before each operation; robots"
+    " share operations only",
+    "live": "from every reachable marking, every operation can occur again: no deadlock",
+    "safe": "no place ever holds two tokens: no robot has two tasks at once",
+    "reversible": "the factory can always return to its initial marking",
     "legal": "at the start every robot is at exactly one place of its program",
 }
 
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """A property, what it means, whether it holds (None: undecided), and why, in words."""
+    """A property, its meaning, whether it holds (None: undecided), and the reason, in words."""
 
     name: str
     means: str
@@ -43,7 +43,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Proof:
-    """The claims, the digest of the certificate, the faults that its checker finds, and the
+    """The claims, and the certificate: its digest, the faults found by its checker, the
     document."""
 
     claims: tuple[Claim, ...]
@@ -78,36 +78,36 @@ def _claim(name: str, factory: Factory, verdict: Verdict, document: dict[str, An
 def _gear_net(factory: Factory, section: dict[str, Any]) -> Iterator[str]:
     order = section.get("order", [])
     names = [factory.robots[joint["gear"]].name for joint in order]
-    yield f"The net is put together from {len(order)} gears, one for each robot, in the order"
-    yield f"{listing(names, 8)}; each new one meets those before it in one operation."
+    yield f"The net is composed of {len(order)} gears, one for each robot, in the order"
+    yield f"{listing(names, 8)}; each shares one operation with those before it."
 
 
 def _gear_train(factory: Factory, section: dict[str, Any]) -> Iterator[str]:
     order = section.get("order") or []
-    yield f"The {len(order)} transitions stand in an order in which the program of each of the"
-    yield f"{len(factory.robots)} robots, from its token on, ascends: so one product can be made"
-    yield "alone, and again."
+    yield f"The {len(order)} transitions have an order in which the program of each of the"
+    yield f"{len(factory.robots)} robots ascends from its token on: so one product at a time can be"
+    yield "made, repeatedly."
 
 
 def _safe(factory: Factory, section: dict[str, Any]) -> Iterator[str]:
     cover = section.get("cover", [])
-    yield f"Each of the {len(cover)} places lies on the gear of a robot, a circle with one token;"
-    yield "firing a transition moves that token on and never makes another."
+    yield f"Each of the {len(cover)} places lies on the gear of a robot, a circuit with one token;"
+    yield "firing a transition moves that token and never adds one."
 
 
 def _live(factory: Factory, section: dict[str, Any]) -> Iterator[str]:
-    yield f"The {len(section.get('order', []))} places without a token stand in an order in which"
-    yield "each comes after all that it waits for: no circle waits for itself."
+    yield f"The {len(section.get('order', []))} places without a token have an order in which"
+    yield "each comes after all those that it waits for: no circuit is free of tokens."
 
 
 def _reversible(factory: Factory, section: dict[str, Any]) -> Iterator[str]:
     if section.get("root") is None:
-        yield "Live, and every transition that fires equally often brings the marking back."
+        yield "Live, and firing every transition equally often restores the marking."
         return
     first = factory.net.threaded.transitions[section["root"]].name
     depth = max(section["there"]["depth"], default=0)
-    yield f"From {first} there is a way to every transition, at most {depth} steps long, and one"
-    yield "back from each: firing all of them once gives the first marking again."
+    yield f"From {first} there is a path to every transition, at most {depth} steps long, and one"
+    yield "back from each: firing all of them once restores the marking."
 
 
 def _legal(factory: Factory, section: dict[str, Any]) -> Iterator[str]:
