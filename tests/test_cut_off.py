@@ -85,16 +85,16 @@ def assert_told(run: Terminal, log: Path, html: Path) -> None:
     told = run("monitor", log)
     assert told.status == 1
     assert f"consistent with the net up to its end, {cut}\n" in told.out
-    assert f"CutOff '{log}' is {cut.told}\n" in told.err
+    assert f"CutOff '{log}' is {cut.with_cause}\n" in told.err
     document = run("monitor", log, "--json")
     assert document.status == 1 and document.json["refines_net"]
     assert document.json["cut_off"] == cut.as_json()
     told = run("report", log, "-o", html, "--json")
     assert told.status == 1 and told.json["cut_off"] == cut.as_json()
-    assert cut.told in told.err
+    assert cut.with_cause in told.err
     words = Page(html.read_text("utf-8")).words
-    assert f"C{cut.told[1:]}." in words and f"✗ cut off at {cut.t:.2f} s" in words
-    assert words.index(f"C{cut.told[1:]}.") < words.index("Replay")
+    assert f"C{cut.with_cause[1:]}." in words and f"✗ cut off at {cut.t:.2f} s" in words
+    assert words.index(f"C{cut.with_cause[1:]}.") < words.index("Replay")
     assert not any("✓ follows the net" in text for text in words)
 
 
@@ -162,7 +162,7 @@ def test_a_stall(run: Terminal, out: Path) -> None:
     assert done.status == 1 and f"VIOLATIONS, {cut_off(log)}\n" in done.out
     assert run("report", log, "-o", out / "a.html").status == 1
     words = Page((out / "a.html").read_text("utf-8")).words
-    assert "✗ does not follow the net" in words and f"C{cut_off(log).told[1:]}." in words
+    assert "✗ does not follow the net" in words and f"C{cut_off(log).with_cause[1:]}." in words
 
 
 def test_an_error_of_another_observer(out: Path) -> None:
@@ -184,7 +184,7 @@ def test_a_log_that_does_not_say_what_ended_its_run(whole: Path, out: Path) -> N
     assert read_log(put_together(out / "a.log", header, plain)).cut_off is None
     cut = cut_off(put_together(out / "b.log", {**header, "units": 5}, plain))
     assert (cut.products, cut.units, cut.code, cut.message) == (2, 5, "", "")
-    assert cut.told == str(cut)
+    assert cut.with_cause == str(cut)
 
 
 def test_what_ended_a_run_is_text(whole: Path, out: Path) -> None:
@@ -276,7 +276,7 @@ def test_a_run_killed_in_its_first_second_is_not_of_the_ideal_world(
 def test_what_is_made_of_a_log_is_made_with_a_warning(
     run: Terminal, killed: Path, out: Path
 ) -> None:
-    told = f"CutOff warning: '{killed}' is {cut_off(killed).told}"
+    told = f"CutOff warning: '{killed}' is {cut_off(killed).with_cause}"
     csv, png = out / "a.csv", out / "a.png"
     commands: list[list[object]] = [
         ["export", killed, "--format", "csv", "-o", csv],

@@ -372,7 +372,7 @@ def test_a_log_that_was_cut_off_is_told_as_far_as_it_goes(log: Path, tmp_path: P
     kept = read_log(cut)
     assert not kept.complete and kept.cut_off is not None
     found = Page(page(recording_of(cut)))
-    assert kept.cut_off.told in found.words
+    assert kept.cut_off.with_cause in found.words
     assert any(
         "consistent with the net up to the end of the log." in words for words in found.words
     )

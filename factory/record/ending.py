@@ -24,7 +24,7 @@ class CutOff:
         return f"cut off at {self.t:.2f} s: {self.products} of {self.units} units"
 
     @property
-    def told(self) -> str:
+    def with_cause(self) -> str:
         """The same, with the cause."""
         return f"{self}; {self.message}" if self.message else str(self)
 
@@ -46,4 +46,4 @@ class CutOff:
     def diagnostic(self, file: object) -> Diagnostic:
         """The message about the log in a file."""
         hint = "all results cover the time until then"
-        return Diagnostic("CutOff", f"'{file}' is {self.told}", None, hint)
+        return Diagnostic("CutOff", f"'{file}' is {self.with_cause}", None, hint)

@@ -92,7 +92,7 @@ def _done(path: Path, log: Log) -> CutOff | None:
     if cut is None:
         return CutOff(float(log.time[-1]), int(log.delivered[-1]), log.header["units"])
     if cut.code in IN_ITSELF:
-        words = f"is of a run that would end again as it did: {cut.told}"
+        words = f"is of a run that would end again as it did: {cut.with_cause}"
         raise InputError(_bad(path, words, "mend what ended it, and run it again"))
     return None
 

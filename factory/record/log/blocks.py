@@ -73,14 +73,14 @@ def unpacked(content: memoryview) -> Arrays:
             raise ValueError(f"a block unpacks to more than {DENSEST} times its bytes")
         (length,) = LENGTH.unpack_from(body)
         entries = json.loads(body[LENGTH.size : LENGTH.size + length])
-        found, at = {}, LENGTH.size + length
+        arrays, at = {}, LENGTH.size + length
         for name, kind, shape in entries:
             if kind not in KINDS or min(shape, default=0) < 0:
                 raise ValueError(f"unknown array {kind} {shape}")
             count = int(np.prod(shape, dtype=np.int64))
-            found[str(name)] = np.frombuffer(body, kind, count, at).reshape(shape)
+            arrays[str(name)] = np.frombuffer(body, kind, count, at).reshape(shape)
             at += count * np.dtype(kind).itemsize
-        return found
+        return arrays
     except (zlib.error, struct.error, TypeError, RecursionError, OverflowError) as error:
         raise ValueError(f"a broken block: {error}") from error
 

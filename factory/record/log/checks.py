@@ -144,10 +144,10 @@ def check_course(time: NDArray[np.float64], delivered: NDArray[np.int32]) -> Non
         raise ValueError("its products do not leave one by one")
 
 
-def _check_kind(name: str, found: NDArray[Any], kind: str, row: tuple[int, ...]) -> None:
-    if found.dtype != kind or found.ndim != 1 + len(row) or found.shape[1:] != row:
+def _check_kind(name: str, array: NDArray[Any], kind: str, row: tuple[int, ...]) -> None:
+    if array.dtype != kind or array.ndim != 1 + len(row) or array.shape[1:] != row:
         shape = ", ".join(["n", *map(str, row)])
-        raise ValueError(f"{name} is {found.dtype.str} {found.shape}, not {kind} ({shape})")
+        raise ValueError(f"{name} is {array.dtype.str} {array.shape}, not {kind} ({shape})")
 
 
 def _check_range(name: str, values: NDArray[Any], most: int) -> None:

@@ -63,16 +63,18 @@ def failures_in(content: bytes, robots: frozenset[str]) -> Failures:
 
 def failures_of(table: Any, robots: frozenset[str]) -> Failures:
     """The failures in a table. Raises ValueError."""
-    found = value_of(Failures, table, "failures")
-    unknown = {name for _, names in found.stood for name in names} - robots
+    failures = value_of(Failures, table, "failures")
+    unknown = {name for _, names in failures.stood for name in names} - robots
     if unknown:
         raise ValueError(f"'{min(unknown)}' stood, which is no robot")
-    counts = (*found.struck.values(), found.missed, found.false_alarms, found.undone, found.spares)
-    if min(*counts, found.contacts, found.binned) < 0:
+    counts = [failures.missed, failures.false_alarms, failures.undone, failures.spares]
+    counts += [failures.contacts, failures.binned, *failures.struck.values()]
+    if min(counts) < 0:
         raise ValueError("failures: counts must be whole numbers from 0")
-    if any(not t >= 0 for t in (*(one.t for one in found.found), *(t for t, _ in found.stood))):
+    times = [failing.t for failing in failures.found] + [t for t, _ in failures.stood]
+    if not all(t >= 0 for t in times):
         raise ValueError("failures: times must be from 0")
-    return found
+    return failures
 
 
 Placed = tuple[int, Undone]

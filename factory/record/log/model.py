@@ -91,9 +91,9 @@ def model_of(log: Log) -> mujoco.MjModel:
     return m
 
 
-def _within(found: Ragged, *counts: int) -> bool:
+def _within(ragged: Ragged, *counts: int) -> bool:
     """Whether the numbers in each column are below the count of that column."""
-    numbers = found.values.reshape(-1, len(counts))
+    numbers = ragged.values.reshape(-1, len(counts))
     return bool(((numbers >= 0) & (numbers < counts)).all())
 
 

@@ -261,10 +261,10 @@ def log_in(data: memoryview, written: bool = False) -> Log:
 
 def _at_end(ticks: Sequence[Arrays], counts: Sequence[int]) -> NDArray[np.bool_]:
     """Whether each row is the end of an operation, not a tick."""
-    found = np.zeros(sum(counts), bool)
+    at_end = np.zeros(sum(counts), bool)
     for arrays, base in zip(ticks, np.cumsum([0, *counts]), strict=False):
-        found[base + arrays["ended_at"]] = True
-    return found
+        at_end[base + arrays["ended_at"]] = True
+    return at_end
 
 
 def _figures(content: NDArray[Any]) -> Mapping[str, Any]:
@@ -327,5 +327,5 @@ def _single(name: str, values: str, ticks: Sequence[Arrays], counts: Sequence[in
     at, first, last = _spans(name, ticks, counts)
     starts, ends = np.zeros(sum(counts), int), np.zeros(sum(counts), int)
     starts[at], ends[at] = first, last
-    found = np.concatenate([a[values] for a in ticks]) if ticks else np.zeros(0)
-    return Ragged(locked(found), starts, ends)
+    joined = np.concatenate([a[values] for a in ticks]) if ticks else np.zeros(0)
+    return Ragged(locked(joined), starts, ends)

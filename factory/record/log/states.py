@@ -31,8 +31,8 @@ class Unpacking:
     def row(self, name: str, number: int) -> NDArray[np.float64]:
         """The state (width,) in a row of the whole log."""
         block = int(np.searchsorted(self._first, number, side="right")) - 1
-        found: NDArray[np.float64] = self._block(block)[name][number - self._first[block]]
-        return found
+        state: NDArray[np.float64] = self._block(block)[name][number - self._first[block]]
+        return state
 
     def _unpack(self, block: int) -> Arrays:
         begin, count = self._begins[block], int(self._first[block + 1] - self._first[block])

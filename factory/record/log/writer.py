@@ -62,14 +62,14 @@ class _Ticks:
         """The arrays of the block."""
         fired = np.array(self.fired, float).reshape(-1, 3)
         states = zip(STATES, zip(*self.states, strict=True), strict=False)
-        found: Arrays = {
+        arrays: Arrays = {
             "time": np.array(self.time, float),
             "delivered": np.array(self.delivered, np.int32),
         }
         for name, rows in states:
-            found |= pack_rows(name, np.array(rows))
+            arrays |= pack_rows(name, np.array(rows))
         return {
-            **found,
+            **arrays,
             **_ragged("marking", self.markings, ()),
             **_ragged("active", self.active, (3,)),
             **_ragged("contact", [c[:2] for c in self.contacts], (2,)),

@@ -83,15 +83,15 @@ class Grips:
         self._copy = now
         changed = (now != before).nonzero()[0]
         welds = zip(*(x.tolist() for x in (changed, before[changed], now[changed])), strict=True)
-        found: dict[int, set[int]] = {}
+        welds_of: dict[int, set[int]] = {}
         for weld, old, new in welds:
             if old >= 0:
-                found.setdefault(old, set(self.held[old])).discard(weld)
+                welds_of.setdefault(old, set(self.held[old])).discard(weld)
             if new >= 0:
-                found.setdefault(new, set(self.held[new])).add(weld)
+                welds_of.setdefault(new, set(self.held[new])).add(weld)
         switches = []
-        for copy in sorted(found):
-            after, held = tuple(sorted(found[copy])), self.held[copy]
+        for copy in sorted(welds_of):
+            after, held = tuple(sorted(welds_of[copy])), self.held[copy]
             if after != held:
                 self.held[copy] = after
                 switches.append(Switch(copy, held, after))
@@ -122,14 +122,14 @@ class Grips:
         qpos = np.array([seen.qpos for seen in self._taking])
         gap, turned = _apart(qpos, looks[:, None], at, frames.chosen(welds), TURNED)
         rows = np.flatnonzero((gap > self.near) | turned).tolist()
-        found = [
+        misses = [
             (self._taking[look].time, copy, weld, float(gap[row]))
             for row in rows
             for look, copy, weld in (self._taken[row],)
         ]
         self._taking.clear()
         self._taken.clear()
-        return found
+        return misses
 
     def dropped(self, seen: Observation) -> list[tuple[int, int, float]]:
         """The copies that have left the place of their weld since the last observation: copy, weld,

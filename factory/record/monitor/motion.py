@@ -135,10 +135,10 @@ class AxisMotion:
 
     def _tick_old(self, t: float) -> Array:
         """The latest setpoints that are at least a tick old."""
-        found = self.before.s
+        setpoints = self.before.s
         while self.written[0][0] <= t - self.rest.tick + TINY:
-            found = self.written.popleft()[1]
-        return found
+            setpoints = self.written.popleft()[1]
+        return setpoints
 
     def stand(self, robot: int, goal: float) -> None:
         """A robot has ended an operation: it stands at its goal, or else at its setpoint."""
@@ -204,7 +204,7 @@ class Lags:
             self.since.fill(np.inf)
             return []
         self.since = np.where(lagging, np.minimum(self.since, seen.time), np.inf)
-        found = np.flatnonzero((self.since <= seen.time - LATE) & (self.since > -np.inf))
-        since = self.since[found].tolist()
-        self.since[found] = -np.inf
-        return list(zip(found.tolist(), since, strict=True))
+        actuators = np.flatnonzero((self.since <= seen.time - LATE) & (self.since > -np.inf))
+        since = self.since[actuators].tolist()
+        self.since[actuators] = -np.inf
+        return list(zip(actuators.tolist(), since, strict=True))

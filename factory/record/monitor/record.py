@@ -53,8 +53,8 @@ def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
         else:
             report = _seen(log, subject, m)
         if report.refines_net:
-            found = contradictions(subject, log.timed_entries, _markings(log))
-            report = replace(report, violations=tuple(found))
+            violations = contradictions(subject, log.timed_entries, _markings(log))
+            report = replace(report, violations=tuple(violations))
     return report, subject
 
 

@@ -105,11 +105,11 @@ class _Contacts:
         m, d = self._replica.m, self._replica.d
         self._replica.place(before.qpos)
         mujoco.mj_collision(m, d)
-        found = d.contact
+        contacts = d.contact
         touching = set()
-        for number in np.flatnonzero(found.dist[: d.ncon] < 0).tolist():
-            a, b = found.geom[number].tolist()
-            if not self._intended(a, b, float(found.dist[number]), marked):
+        for number in np.flatnonzero(contacts.dist[: d.ncon] < 0).tolist():
+            a, b = contacts.geom[number].tolist()
+            if not self._intended(a, b, float(contacts.dist[number]), marked):
                 touching.add((a, b))
         fresh = sorted(touching - self._touching)
         self._onsets += [(before.time, a, b) for a, b in fresh]
@@ -229,22 +229,22 @@ def _codes(m: Any, subject: MonitorSubject) -> Index:
     """The code of each body that holds parts (nbody,): of a robot from its number, of any other
     from the masks of its geoms."""
     robots = {robot.name: robot_code(robot.index) for robot in subject.factory.robots}
-    found = np.zeros(m.nbody, np.intp)
-    np.maximum.at(found, m.geom_bodyid, m.geom_contype >> 1)
+    codes = np.zeros(m.nbody, np.intp)
+    np.maximum.at(codes, m.geom_bodyid, m.geom_contype >> 1)
     for body in range(m.nbody):
         name = m.body(body).name
-        found[body] = robots.get(names.holder(name), found[body])
-    return found
+        codes[body] = robots.get(names.holder(name), codes[body])
+    return codes
 
 
 def _held(m: Any, subject: MonitorSubject, anatomy: Anatomy) -> dict[str, set[str]]:
     """The labels of all bodies that each holder ever holds, by the holder's name."""
-    found: dict[str, set[str]] = {}
+    labels: dict[str, set[str]] = {}
     contents = subject.factory.contents
     for weld, holder in enumerate(anatomy.holder):
         if holder is not None and holder[0] != PARK:
             name = names.holder(m.body(int(m.eq_obj1id[weld])).name)
             label = anatomy.part[weld]
             owner = name.removesuffix("/slider")
-            found.setdefault(owner, set()).update((label, *contents.get(label, ())))
-    return found
+            labels.setdefault(owner, set()).update((label, *contents.get(label, ())))
+    return labels

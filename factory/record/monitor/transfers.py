@@ -95,7 +95,7 @@ class Transfers:
     ) -> list[tuple[int, Holder, list[int]]]:
         """The copies that replace others: each with the holder and the numbers of those. A parked
         copy comes before one that is reused at once."""
-        found = []
+        replacing = []
         having: dict[str, dict[Holder, None]] = {}
         for holder, copies in gone.items():
             for part in (part for copy in copies for part in self.inside[copy]):
@@ -107,10 +107,10 @@ class Transfers:
                 copies = gone[holder]
                 inside = [c for c in copies if self.inside[c] < parts]
                 if sum(len(self.inside[c]) for c in inside) == len(parts):
-                    found.append((switch.copy, holder, inside))
+                    replacing.append((switch.copy, holder, inside))
                     gone[holder] = [c for c in copies if c not in inside]
                     break
-        return found
+        return replacing
 
     def _holders(self, switch: Switch) -> set[Holder]:
         """The present holders of a copy."""
@@ -160,23 +160,25 @@ class Transfers:
         """The operation whose end passes a copy from `before` to `after`; None where none is
         needed. Blame a transfer that no operation does."""
         factory, label = self.subject.factory, self.anatomy.label[copy]
-        found: Operation | None = None
+        operation: Operation | None = None
         if before and (before[0], after[0]) in ((PARK, FEED), (HOLD, FEED), (HOLD, PARK)):
             return None
         if after[0] == GRIP and before and before[0] == FEED:
-            found = factory.by_label[label]
+            operation = factory.by_label[label]
         elif before and before[0] == GRIP and after[0] in (GRIP, HOLD):
-            found = self._delivery(before[1], label)
-        takes = found is not None and (
-            after == (GRIP, found.carrier) if not factory.drops(found.index) else after[0] == HOLD
+            operation = self._delivery(before[1], label)
+        takes = operation is not None and (
+            after == (GRIP, operation.carrier)
+            if not factory.drops(operation.index)
+            else after[0] == HOLD
         )
-        if found is None or not takes:
+        if operation is None or not takes:
             robot = after[1] if after[1] >= 0 else before[1] if before else -1
             name = self.anatomy.copies[copy]
             words = f"{name} passes from {self._named(before)} to {self._named(after)}"
             self.blame("Exchanged", robot, label, f"{words}, which no operation does")
             return None
-        return found
+        return operation
 
     def _delivery(self, robot: int, label: str) -> Operation:
         """The operation in which a robot delivers a body of some label."""

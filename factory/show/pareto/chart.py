@@ -59,13 +59,13 @@ class ChartAxis:
     def marks(self, whole: bool = False) -> list[float]:
         """The round values on it, numbers without a fraction where it is `whole`."""
         powers = range(floor(log10(self.low)), floor(log10(self.high)) + 1)
-        found: list[float] = []
+        values: list[float] = []
         for steps in STEPS:
             every = [round(step * 10.0**power, 6) for power in powers for step in steps]
-            found = [x for x in every if self.low <= x <= self.high and not (whole and x % 1)]
-            if len(found) >= MARKS:
+            values = [x for x in every if self.low <= x <= self.high and not (whole and x % 1)]
+            if len(values) >= MARKS:
                 break
-        return found
+        return values
 
 
 def cycle_chart(front: ParetoFront) -> str:

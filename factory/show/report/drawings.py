@@ -114,17 +114,17 @@ class _Plan:
 
     def _bodies(self) -> dict[str, list[int]]:
         """The robots and the parts, about their own origin; the page puts them where they are."""
-        found: dict[str, list[int]] = {"robot": [], "part": []}
+        by_kind: dict[str, list[int]] = {"robot": [], "part": []}
         for body in range(1, self.m.nbody):
             kind = names.kind(self.m.body(body).name)
-            if kind in found and not int(self.m.body_parentid[body]):
-                found[kind].append(body)
-        return found
+            if kind in by_kind and not int(self.m.body_parentid[body]):
+                by_kind[kind].append(body)
+        return by_kind
 
     def _robot(self, body: int) -> None:
         """Arm and carriage; the finger reaches below the payload."""
         name, turn = self.m.body(body).name, rotation(self.stage.quaternion[body])
-        role, found = self.stage.roles[self.robots[name.partition("/")[0]]], []
+        role, outlines = self.stage.roles[self.robots[name.partition("/")[0]]], []
         for geom, points in self._rigid(body):
             style = MOVES.get(self.m.geom(geom).name.rpartition("/")[2])
             corners = self._outline(points @ turn.T)
@@ -132,9 +132,9 @@ class _Plan:
                 right, up, _ = (1e3 * float(way) for way in far)
                 self.reach += [(x + right, y - up) for x, y in corners]
             if style:
-                found.append((style == "carriage", corners))
+                outlines.append((style == "carriage", corners))
         with self.canvas.group(**self._meant(name), data_body=body):
-            for carriage, corners in sorted(found, key=lambda shape: shape[0]):
+            for carriage, corners in sorted(outlines, key=lambda shape: shape[0]):
                 self.canvas.polygon(corners, f"carriage {role}" if carriage else "arm")
 
     def _part(self, body: int) -> None:

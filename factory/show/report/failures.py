@@ -20,13 +20,13 @@ COLUMNS = ("Time", "Failure", "Response", "Undone", "Scrapped")
 
 def failures_section(recording: Recording) -> str:
     """The section of a run that recovers from failures; empty for any other."""
-    found = recording.log.failures
-    if found is None:
+    failures = recording.log.failures
+    if failures is None:
         return ""
     head = "".join(f"<th>{name}</th>" for name in COLUMNS)
-    rows = "".join(_row(recording, one) for one in found.found)
+    rows = "".join(_row(recording, one) for one in failures.found)
     table = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>" if rows else ""
-    text = f"<p>{escape(_summary(found))}</p>{table}<p class='note'>{LEGEND}</p>"
+    text = f"<p>{escape(_summary(failures))}</p>{table}<p class='note'>{LEGEND}</p>"
     return (
         '\n<section class="panel wide failures" aria-labelledby="h-failures">\n'
         '<div class="bar"><h2 id="h-failures">Failures</h2></div>'
@@ -65,17 +65,17 @@ def _dead(robot: int, death: Death) -> list[Any]:
     return [robot, start, end, f", then {death.then}" if end is not None else ""]
 
 
-def _summary(found: Failures) -> str:
+def _summary(failures: Failures) -> str:
     """The counts of all failures, in words."""
-    struck = ", ".join(f"{n} {kind.replace('_', ' ')}" for kind, n in found.struck.items() if n)
+    struck = ", ".join(f"{n} {kind.replace('_', ' ')}" for kind, n in failures.struck.items() if n)
     figures = (
-        _count(len(found.found), "failure"),
-        f"{_count(found.undone, 'transition')} undone",
-        f"{found.scrapped} scrapped",
-        f"{_count(found.spares, 'spare')} used",
-        f"{_count(found.contacts, 'contact')} with fallen or misplaced parts",
+        _count(len(failures.found), "failure"),
+        f"{_count(failures.undone, 'transition')} undone",
+        f"{failures.scrapped} scrapped",
+        f"{_count(failures.spares, 'spare')} used",
+        f"{_count(failures.contacts, 'contact')} with fallen or misplaced parts",
     )
-    detection = f"{found.missed} missed, {_count(found.false_alarms, 'false alarm')}"
+    detection = f"{failures.missed} missed, {_count(failures.false_alarms, 'false alarm')}"
     return f"Faults: {struck or 'none'}; {detection}. {', '.join(figures)}."
 
 

@@ -62,8 +62,8 @@ def _thinned(time: NDArray[np.float64], bodies: int) -> NDArray[np.int64]:
     span = float(time[-1] - time[0])
     rate = min(RATE, max(1.0, MOST / (3 * max(1, bodies) * max(span, 1e-9))))
     wanted = np.arange(time[0], time[-1], 1 / rate)
-    found = np.searchsorted(time, wanted - 1e-9)
-    return np.unique([0, *found.tolist(), len(time) - 1]).astype(np.int64)
+    rows = np.searchsorted(time, wanted - 1e-9)
+    return np.unique([0, *rows.tolist(), len(time) - 1]).astype(np.int64)
 
 
 def _continuous(turns: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -95,12 +95,12 @@ def _of_place(factory: Factory, labels: dict[str, int], place: int) -> Link:
 
 def _solids(factory: Factory, labels: dict[str, int], label: str) -> list[int]:
     """The labels of the bodies in a sub-assembly: its own, and those of all its inputs."""
-    found, stack = [], [label]
+    solids, stack = [], [label]
     while stack:
         name = stack.pop()
-        found.append(labels[name])
+        solids.append(labels[name])
         stack += factory.pag[name].inputs
-    return sorted(found)
+    return sorted(solids)
 
 
 def words_of(operation: Operation) -> str:

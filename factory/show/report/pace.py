@@ -79,15 +79,15 @@ def predicted(recording: Recording) -> Predicted | None:
     timing = Timing(recording.layout, made.settings, made.world, made.seed, made.jitter)
     net = timed_net(timing, wip=made.wip)
     units = max(1, int(recording.log.delivered[-1]))
-    found = flow(timing, net, units)
+    timeline = flow(timing, net, units)
     begun = recording.from_start
     own = {circuit.name: circuit.seconds for circuit in net.named}
     return Predicted(
         net.pace,
-        found.first if begun else None,
-        found.last if begun else None,
+        timeline.first if begun else None,
+        timeline.last if begun else None,
         tuple(circuit.name for circuit in net.critical),
-        tuple((found.lasting + made.settings.tick).tolist()),
-        found.busy,
+        tuple((timeline.lasting + made.settings.tick).tolist()),
+        timeline.busy,
         tuple(own[robot.name] for robot in recording.factory.robots),
     )

@@ -81,15 +81,15 @@ def stations(
 ) -> dict[tuple[float, float], list[str]]:
     """The stations of operations, each with the state of the engine (nq,) as it ends."""
     replica = Replica(m)
-    found: dict[tuple[float, float], list[str]] = {}
+    stations: dict[tuple[float, float], list[str]] = {}
     for operation, qpos in ends:
         nest = f"{factory.robots[operation.carrier].name}/nest"
         if len(operation.robots) < 2 or not _has_site(m, nest):
             continue
         replica.place(qpos)
         x, y = (round(float(v), 3) for v in replica.d.site_xpos[m.site(nest).id][:2])
-        found.setdefault((x, y), []).append(operation.label)
-    return found
+        stations.setdefault((x, y), []).append(operation.label)
+    return stations
 
 
 def _has_site(m: mujoco.MjModel, name: str) -> bool:
@@ -105,12 +105,12 @@ def placed(m: mujoco.MjModel, geom: int) -> tuple[Floats, NDArray[np.int64]]:
 def _look(m: mujoco.MjModel, geoms: Sequence[int]) -> tuple[list[NDArray[Any]], float]:
     """Several geoms of a body as one: vertices (n, 3) [m] in its frame, faces (k, 3), colours
     (n, 3) from 0 to 255; and how opaque it is."""
-    found = [placed(m, geom) for geom in geoms]
+    meshes = [placed(m, geom) for geom in geoms]
     paints = np.array([paint(m, geom) for geom in geoms])
-    counts = [len(points) for points, _ in found]
+    counts = [len(points) for points, _ in meshes]
     starts = np.cumsum([0, *counts])
-    vertices = np.concatenate([points for points, _ in found])
-    faces = [faces + start for (_, faces), start in zip(found, starts, strict=False)]
+    vertices = np.concatenate([points for points, _ in meshes])
+    faces = [faces + start for (_, faces), start in zip(meshes, starts, strict=False)]
     colours = np.round(255 * np.clip(paints[:, :3], 0, 1)).astype(np.uint8)
     made = [
         vertices.astype(np.float32),

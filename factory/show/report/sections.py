@@ -28,7 +28,7 @@ def ending(cut: CutOff | None) -> str:
     """The notice of a run that was cut off; nothing of a whole one."""
     if cut is None:
         return ""
-    words = escape(cut.told, quote=True)
+    words = escape(cut.with_cause, quote=True)
     return f'<p class="notice" role="note">{words[0].upper()}{words[1:]}.</p>'
 
 
@@ -283,7 +283,7 @@ def made_how(recording: Recording) -> str:
         ("Versions", versions),
     ]
     if recording.log.cut_off:
-        rows.append(("Log", recording.log.cut_off.told))
+        rows.append(("Log", recording.log.cut_off.with_cause))
     body = "".join(f"<dt>{name}</dt><dd>{escape(str(words))}</dd>" for name, words in rows)
     return f"<dl>{body}</dl>"
 
