@@ -29,6 +29,7 @@ from factory.nets.coordinated import Order
 from factory.pipeline import read
 from factory.problem.robot_types import load_catalogue
 from factory.simulation.ordering import Ordering
+from factory.support.errors import RunError
 from factory.support.settings import Settings
 
 Json = dict[str, Any]
@@ -199,6 +200,18 @@ def test_what_no_order_keeps_apart_is_a_fault() -> None:
     fault = next(f for f in found.faults if "both at once" in f.message)
     assert {*fault.robots} == {"r1", "r2"} and fault.lacking > 0.008
     assert fault.diagnostic().code == "Layout"
+
+
+def test_hands_that_collide_where_an_operation_ends_are_a_fault(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """What is lowered comes down through a beam, where hands are chosen as if that were a pin."""
+    file = tmp_path / "product.pag"
+    file.write_text(random_product(2611270266))
+    narrow = "factory.layout.hands.in_the_way.under_beam"
+    monkeypatch.setattr(narrow, lambda kind, low, high, radius: (low, high))
+    with pytest.raises(RunError, match=r"beam of r6 and p15 of r7 .* at the end of 's16'"):
+        _ = read(file).layout
 
 
 def test_a_product_is_the_same_with_its_certificate() -> None:

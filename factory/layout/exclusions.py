@@ -3,12 +3,13 @@ are never in both at once.
 
 Either a circuit of the net that carries one token goes through both places, or order places are
 added, in the order in which a single unit is made. A pair that is marked together while a single
-unit is made is a fault: a machine stands, or holds something, where another has to pass.
+unit is made is a fault: a machine stands, or holds something, where another has to pass. So is a
+pair of robots whose hands collide where their common operation ends.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from heapq import heapify, heappop, heappush
 from itertools import product
@@ -29,6 +30,7 @@ from factory.layout.hands.limbs import rises_first
 from factory.layout.layout import Layout
 from factory.layout.machines import presences
 from factory.layout.presence import Near, Presence, near, nearer, nearest
+from factory.layout.staying import Staying
 from factory.nets.coordinated import CoordinatedNet, Past
 from factory.nets.exclusion import (
     Circuit,
@@ -116,8 +118,25 @@ def exclusions(layout: Layout) -> Exclusions:
         orders,
         tuple(passes),
         tuple(backs.items()),
-        tuple(_fault(layout, net.net, p) for n, p in needed.items() if n not in circuits),
+        (
+            *(_fault(layout, net.net, p) for n, p in needed.items() if n not in circuits),
+            *_met(layout, Staying(layout, net, backs)),
+        ),
     )
+
+
+def _met(layout: Layout, robots: Staying) -> Iterator[Fault]:
+    """Robots that collide at the end of an operation of both."""
+    for one, other in robots.ends():
+        boxed = nearest(one, other, layout.clearance)
+        if boxed is not None and (pair := nearer(boxed, layout.clearance)) is not None:
+            (operation,) = (o for o in layout.factory.making if o.place == one.places[0])
+            message = (
+                f"{pair.bodies[0]} of {one.machine} and {pair.bodies[1]} of {other.machine} come"
+                f" {pair.lacking * MILLI:.2f} mm nearer than they may at the end of"
+                f" '{operation.label}'"
+            )
+            yield fault(layout.factory, message, one.robot, other.robot, lacking=pair.lacking)
 
 
 def _stuck(layout: Layout, net: CoordinatedNet) -> Fault:

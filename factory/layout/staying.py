@@ -9,8 +9,9 @@ segment the places on both sides of the passes are marked beside the wait or the
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import permutations
 
 import numpy as np
 
@@ -33,6 +34,7 @@ from factory.layout.hands.limbs import Limb, limbs, rises_first
 from factory.layout.layout import Layout
 from factory.layout.presence import ROUNDING, MachineBodies, Presence, Span, corners_of
 from factory.nets.coordinated import Past
+from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
 
 LATE = 0.005
@@ -118,6 +120,34 @@ class Staying:
             np.ones(count, bool),
             _way(layout, robot),
         )
+
+    def ends(self) -> Iterator[tuple[Presence, Presence]]:
+        """Pairs of robots at the end of an operation of both, the first without its payload, the
+        second with it. All robots stand at their goals; of a robot that waits for its carrier the
+        last stretch counts, and of a lift that is lowered its stroke. Whether payloads collide is
+        judged in `compiler/mating`."""
+        for operation in self.layout.factory.making:
+            carrier = operation.robots.index(operation.carrier)
+            for pair in permutations(range(len(operation.robots)), 2):
+                one, other = (self._end(operation, slot, carrier in pair) for slot in pair)
+                yield replace(one, bodies=self._own[one.robot]), other
+
+    def _end(self, operation: Operation, slot: int, comes: bool) -> Presence:
+        """A robot with its payload at the end of an operation, and on the stretch before that where
+        it `comes` to its carrier and has waited for it."""
+        layout, robot, label = self.layout, operation.robots[slot], operation.before[slot]
+        end, low = layout.legs[operation.index, robot][1], self.height(robot, operation.index)
+        high, far, bodies = low, end, self._own[robot]
+        if layout.factory.lowers(robot) and layout.factory.delivers(robot, operation.index):
+            high = layout.level(robot, operation.index).up
+        pile = operation.before[operation.template.carrier - 1]
+        if comes and (slot != operation.lowered or pile != NOPART):
+            far += layout.standoff(operation, slot)
+        if label != NOPART:
+            bodies += self.held(robot, operation.index, label)
+        sweeps = ((far, end), (high, high)), ((end, end), (high, low))
+        name = layout.factory.robots[robot].name
+        return Presence(robot, name, (operation.place,), bodies, sweeps, self.partners[robot])
 
     @cached_property
     def _pieces(self) -> Mapping[str, Array]:
