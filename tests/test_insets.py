@@ -367,7 +367,7 @@ def test_a_report_says_how_many_pairs_were_not_tested(run: Terminal, tmp_path: P
         file.write_text(text)
         assert run("report", file, "-o", page, "--units", 1).status == 1  # they overlap
         words = page.read_text()
-        told = "1 of 6 pairs of parts were not tested against each other."
+        told = "1 of 6 pairs of parts were not checked for collisions."
         listed = words.partition(told)[2].partition("</ul>")[0]
         assert (told in words) == expected and ("<li>a - b</li>" in listed) == expected
 

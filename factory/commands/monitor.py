@@ -113,7 +113,7 @@ def say_failures(failures: Failures, verbose: bool) -> None:
     )
     if failures.binned or failures.spilled:
         spilled = ", ".join(failures.spilled)
-        none = f"; no bin for that of {spilled}" if spilled else ""
+        none = f"; no bin for the scrap of {spilled}" if spilled else ""
         say(f"scrap in bins: {failures.binned}{none}")
     for one in failures.found if verbose else ():
         say(f"  {one.t:.2f} s: {one}")

@@ -213,15 +213,20 @@ class Factory:
             for before, number in pairwise(robot.operations):
                 onward[before].append(number)
         came, ordered, ready = count(), list[int](), list[tuple[int, int, int]]()
-        free = [number for number, left in enumerate(waits) if not left]
-        while free or ready:
-            for number in free:
-                heappush(ready, (self.operations[number].turn, next(came), number))
+
+        def free(number: int) -> None:
+            heappush(ready, (self.operations[number].turn, next(came), number))
+
+        for number, left in enumerate(waits):
+            if not left:
+                free(number)
+        while ready:
             *_, number = heappop(ready)
             ordered.append(number)
             for after in onward[number]:
                 waits[after] -= 1
-            free = [after for after in onward[number] if not waits[after]]
+                if not waits[after]:
+                    free(after)
         if len(ordered) < len(self.operations):
             raise ValueError("the robots' programs wait for each other: the net is not live")
         return tuple(ordered)

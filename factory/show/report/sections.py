@@ -223,13 +223,13 @@ def fidelity_words(recording: Recording, figures: Mapping[str, float | None]) ->
 
 
 def _excluded(recording: Recording) -> str:
-    """The pairs of parts that were excluded from contact."""
+    """The pairs of parts that were not checked for collisions, since they overlap as drawn."""
     pairs = excluded(recording)
     if not pairs:
         return ""
     count = f"{len(pairs)} of {comb(len(recording.factory.leaves), 2)} pairs of parts"
     listed = "".join(f"<li>{escape(' - '.join(pair))}</li>" for pair in pairs)
-    summary = f"<summary>{count} were excluded from contact.</summary>"
+    summary = f"<summary>{count} were not checked for collisions.</summary>"
     return f"<details>{summary}<ul>{listed}</ul></details>"
 
 

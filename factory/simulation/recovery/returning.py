@@ -125,7 +125,8 @@ class Returning:
         rise = (lift, float(at[lift]))
         if robot in layout.factory.adjusted:
             return [*goals, rise]
-        return [rise, *goals] if rise[1] else goals
+        up = layout.level(robot, layout.factory.robots[robot].operations[step]).up
+        return [rise, *goals] if rise[1] == up > 0 else goals
 
     def has_left(self, robot: int, marking: Marking) -> bool:
         """Whether a robot is away from where it waits in a marking, or would, if what it does had
