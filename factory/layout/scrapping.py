@@ -1,8 +1,8 @@
-"""Which piles a robot can carry back to the B end of its guidepath, when they are scrap.
+"""Piles that a robot can carry back to the B end of its guidepath when they are scrap.
 
-A pile is swept from where it is complete back to B, and held against all regions of the clearance
-certificate, wherever the other robots are. Where it may come too near to one it is let fall where
-it is.
+A pile is swept from where it is complete back to B, and compared with all regions of the clearance
+certificate, wherever the other robots are. A pile that may come too near to one of them is dropped
+where it is.
 """
 
 from __future__ import annotations

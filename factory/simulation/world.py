@@ -66,7 +66,7 @@ class Hooks:
 
 @dataclass(frozen=True, slots=True)
 class Drop:
-    """A robot has let fall what is more than its hand bears: when [s], and what is said of it."""
+    """A grip whose load has exceeded its strength: the time [s], and the diagnosis."""
 
     time: float
     diagnostic: Diagnostic
@@ -137,8 +137,8 @@ class World(Protocol):
 
     @property
     def dropped(self) -> Drop | None:
-        """The first that a robot has let fall, None while none has. From then on nothing may
-        fire."""
+        """The first payload that a robot has dropped, None while there is none. From then on
+        nothing may fire."""
 
     def figures(self) -> PhysicsFigures | None:
         """What only bodies can tell, None where there are none."""

@@ -12,13 +12,13 @@ from factory.support.tables import value_of
 
 KINDS: Mapping[str, str] = MappingProxyType(
     {
-        "drop": "a robot lets fall what it carries",
+        "drop": "a robot drops its payload",
         "misplaced": "a feeder shows a part that lies askew or upside down",
-        "bad_part": "a feeder shows a part that is no good",
+        "bad_part": "a feeder shows a defective part",
         "no_part": "a feeder is empty for some time",
         "bad_joint": "an input has slipped in its hand when it is joined",
-        "blackout": "no sensor tells anything for some time",
-        "down": "a robot stands for some time",
+        "blackout": "no sensor gives a reading for some time",
+        "down": "a robot stands still for some time",
         "dead": "a robot never moves again",
     }
 )

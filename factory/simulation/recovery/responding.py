@@ -1,6 +1,6 @@
-"""What is done about a failure: the net fires backwards to the greatest marking without it
-(nets/undo.py), robots go back to where they wait there, and let fall on the way what nobody asks
-for any more."""
+"""The response to a failure: the net fires backwards to the greatest marking without it
+(nets/undo.py), robots go back to where they wait in that marking, and drop on the way what is no
+longer needed."""
 
 from __future__ import annotations
 
