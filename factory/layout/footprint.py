@@ -161,13 +161,11 @@ class Footprint:
         return {n: round(far - self.shape.shift(n)[0], 6) for n, far in aside.items()}
 
     def early(self, stop: Stop, side: int, guest: Shape) -> float:
-        """How much earlier than at the end of its guidepath one that delivers from a side does so
-        at the most, since both hold in other places what they bring for the operations of a stop
-        [m]."""
-        found = (
+        """The greatest distance before the end of its guidepath at which a guest from a side
+        delivers at a stop [m]: guest and carrier may hold different parts in different places."""
+        return max(
             guest.shift(o.index)[0] + side * self.shape.shift(o.index)[1] for o in stop.operations
         )
-        return max(found, default=0.0)
 
 
 def footprint(

@@ -33,7 +33,8 @@ def reach(product: Product, kind: Kind, at: Array, radius: Array, u: Way) -> tup
 
 
 def under_beam(kind: Kind, low: Array, high: Array, radius: Array) -> tuple[Array, Array]:
-    """The same as what comes from above sees it: hands above are as broad as their beams."""
+    """The boxes of hands for parts that come down from above: a hand above is as wide as its
+    beam, which is over its pad."""
     more = np.maximum(0.0, FINGER / 2 - radius)[:, None] * [1.0, 1.0, 0.0] * (kind == "above")
     return low - more, high + more
 
