@@ -68,20 +68,12 @@ class Net:
     @cached_property
     def owners(self) -> Rows:
         """For each place the gears through it."""
-        owners: Rows = [[] for _ in self.names]
-        for index, robot in enumerate(self.robots):
-            for p in robot.places:
-                owners[p].append(index)
-        return owners
+        return _through(len(self.names), [robot.places for robot in self.robots])
 
     @cached_property
     def meeting(self) -> Rows:
         """For each transition the gears through it."""
-        meeting: Rows = [[] for _ in self.events]
-        for index, robot in enumerate(self.robots):
-            for e in robot.turns:
-                meeting[e].append(index)
-        return meeting
+        return _through(len(self.events), [robot.turns for robot in self.robots])
 
     def marked_graph(self) -> bool:
         """Whether each place has at most one producer and one consumer."""
@@ -161,3 +153,12 @@ class ListedRobot:
 
 def _rows(places: list[Section], key: str) -> Rows:
     return [[number(value) for value in place[key]] for place in places]
+
+
+def _through(count: int, gears: list[list[int]]) -> Rows:
+    """For each of so many nodes the gears through it, in their order."""
+    through: Rows = [[] for _ in range(count)]
+    for index, nodes in enumerate(gears):
+        for node in nodes:
+            through[node].append(index)
+    return through
