@@ -1,12 +1,15 @@
 """Domains of attraction: each mode alone, in physics, from starts drawn in the D_p that it claims.
 
-A start is drawn in W - Δ, inside and on its borders: at the stops A and B, next to Δ (robots that
-all but touch), at the corner and along the edges of the L that a gate makes of W. The robots of the
-mode are put there in the engine, parts in their hands; the rest of the factory stands where it is
-when the mode starts for the first unit. The goal is reached when all are in the goal ball, at rest,
-the clock run out, before `patience`. A claimed start from which it is not, or on whose way there is
-a contact, is a defect. A start that has a contact to begin with is one too, counted apart: no
-factory can be there."""
+A mode claims what its field and the certificate claim together: W - Δ, as far as the certificate
+has its robots there while the mode's place is marked. (Hands and parts are as large as they are:
+further out in W, a hand may be where something else stands, and no run brings it there.) A start is
+drawn inside and on the borders: at the ends of the ways, next to Δ (robots that all but touch), at
+the corner and along the edges of the L that a gate makes of W. The robots of the mode are put there
+in the engine, parts in their hands; the rest of the factory stands where it is when the mode starts
+for the first unit. The goal is reached when all are in the goal ball, at rest, the clock run out,
+before `patience`. A claimed start from which it is not, or on whose way there is a contact, is a
+defect. A start that has a contact to begin with is one too, counted apart: no factory can be
+there."""
 
 from __future__ import annotations
 
@@ -16,9 +19,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.control.mode import REST, Array
+from factory.control.mode import REST, Array, Index
 from factory.control.navigation import Bundle
+from factory.layout.exclusions import awaited_positions, coordinated
 from factory.layout.layout import Layout
+from factory.layout.machines import presences
+from factory.layout.presence import ROUNDING, Span
 from factory.nets.petri import Marking
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
@@ -51,6 +57,50 @@ class Outcome:
     contacts: tuple[tuple[str, str], ...] = ()
 
 
+class Claim:
+    """Where the certificate has the robots of a mode while its place is marked: for each of its
+    axes the spans [m], of which those of a robot and its lift go together."""
+
+    def __init__(self, plan: Layout, number: int, axes: Index) -> None:
+        operation, lifts = plan.factory.operations[number], plan.factory.lift_axis
+        net = coordinated(plan)
+        # A magazine shows the part only once its robot has passed out of the slider's way.
+        served = number in net.served
+        before = {place for place, _ in net.passes.values()} if served else set[int]()
+        column = {int(axis): n for n, axis in enumerate(axes)}
+        spans: dict[int, list[tuple[Span, Span]]] = {}
+        for presence in presences(plan, net, awaited_positions(plan)):
+            here = operation.place in presence.places and before.isdisjoint(presence.places)
+            if here and not presence.bears:
+                spans.setdefault(presence.robot, []).extend(presence.sweeps)
+        self.columns = [(column[r], column.get(lifts.get(r, -1))) for r in operation.robots]
+        self.spans = [spans[r] for r in operation.robots]
+
+    def draw(self, chance: np.random.Generator, size: int, ends: float) -> Array:
+        """A place drawn in it, each number at an end of its span with a probability `ends`."""
+        x = np.zeros(size)
+        for columns, spans in zip(self.columns, self.spans, strict=True):
+            chosen = spans[chance.integers(len(spans))]
+            for column, span in zip(columns, chosen, strict=True):
+                if column is not None:
+                    at_end = chance.random() < ends
+                    x[column] = chance.choice(span) if at_end else chance.uniform(*sorted(span))
+        return x
+
+    def holds(self, x: Array) -> bool:
+        """Whether a place is in it, to a rounding."""
+        return all(
+            any(
+                all(
+                    column is None or min(span) - ROUNDING <= x[column] <= max(span) + ROUNDING
+                    for column, span in zip(columns, pair, strict=True)
+                )
+                for pair in spans
+            )
+            for columns, spans in zip(self.columns, self.spans, strict=True)
+        )
+
+
 class Bench:
     """One operation's mode in the engine, alone, to be started from anywhere in its domain."""
 
@@ -62,6 +112,7 @@ class Bench:
         self.world, self.axes = self.simulation.physical, supervisor.active.axes
         self.bundle: Bundle = supervisor.active.bundle
         self.mode = self.bundle.modes[0]
+        self.claim = Claim(plan, number, self.axes)
         self.world.apply([(plan.factory.operations[number], 0)], [])
         self.tick = self.simulation.request.settings.tick
         self.kept = mujoco.MjData(self.world.m)
@@ -147,20 +198,16 @@ def _within(plan: Layout, operation: int, number: int) -> bool:
     return operation == number
 
 
-def draw(bundle: Bundle, chance: np.random.Generator, kind: str) -> Array | None:
-    """A start of a kind in the domain of a bundle's one mode; None where the mode has no such
+def draw(bench: Bench, chance: np.random.Generator, kind: str) -> Array | None:
+    """A start of a kind in the domain that a bench's mode claims; None where it has no such
     place."""
-    mode = bundle.modes[0]
+    mode, bundle = bench.mode, bench.bundle
     gated = np.flatnonzero(mode.gate >= 0)
     if (kind == "gate" and not len(gated)) or (kind == "touching" and not len(mode.pairs)):
         return None
     for _ in range(1000):
-        x = chance.uniform(mode.lower, mode.upper)
-        if kind == "stop":
-            ends = chance.integers(3, size=mode.size)
-            ends[chance.integers(mode.size)] = chance.integers(2)
-            x = np.select([ends == 0, ends == 1], [mode.lower, mode.upper], x)
-        elif kind == "touching":
+        x = bench.claim.draw(chance, mode.size, 2 / 3 if kind == "stop" else 0.0)
+        if kind == "touching":
             _close_in(bundle, x, chance)
         elif kind == "gate":
             robot = int(chance.choice(gated))
@@ -169,7 +216,7 @@ def draw(bundle: Bundle, chance: np.random.Generator, kind: str) -> Array | None
             else:
                 gate = mode.gate[robot]
                 x[gate] = mode.goals[gate] + chance.uniform(-0.7, 0.7) * mode.eps
-        if (x >= mode.lower).all() and (x <= mode.upper).all() and bundle.in_domain(x)[0]:
+        if bench.claim.holds(x) and bundle.in_domain(x)[0]:
             return x
     return None
 
@@ -191,7 +238,7 @@ def try_mode(plan: Layout, number: int, count: int, seed: int = 0) -> list[Outco
     outcomes = []
     for kind in KINDS:
         for _ in range(count):
-            x = draw(bench.bundle, chance, kind)
+            x = draw(bench, chance, kind)
             if x is not None:
                 outcomes.append(bench.reach(x, kind))
     return outcomes
@@ -275,9 +322,10 @@ def section(results: dict) -> str:
         [
             "## Domains of attraction",
             f"Each mode alone in MuJoCo from {results['starts_of_each_kind']} starts of each kind"
-            " in the D_p that it claims: inside, at the stops, within 1 mm of Δ, at the edges that"
-            " gates make. Reached: in the goal ball and at rest, the clock run out, without a"
-            " contact, within twice the time for the whole of W, the dwell and 3 s.",
+            " in the D_p that it claims, which is W - Δ as far as the certificate has its robots"
+            " there: inside, at the ends of ways, within 1 mm of Δ, at the edges that gates make."
+            " Reached: in the goal ball and at rest, the clock run out, without a contact, within"
+            " twice the time for the whole of W, the dwell and 3 s.",
             table(head, rows),
             f"**{total} starts, {bad} defects.**" + (" Where:" if lines else ""),
             *(["\n".join(lines)] if lines else []),
