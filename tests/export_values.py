@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from factory.export import Made, Subject, exporters
+from factory.exporting import Made, Subject, exporters
 from factory.layout.layout import Layout
 from factory.pipeline import Project, read
 from factory.record.log import Log, LogWriter, is_log, read_log

@@ -25,7 +25,7 @@ FLOORS = (
     ("timing", "pipeline"),
     ("record", "planning"),
     ("simulation",),
-    ("export", "study", "render"),
+    ("exporting", "study", "rendering"),
     ("show",),
     ("commands",),
 )
@@ -39,9 +39,9 @@ ENGINE_ROOMS = (
     "mjcf",
     "record",
     "simulation/mujoco",
-    "export",
+    "exporting",
     "study/fidelity",
-    "render",
+    "rendering",
     "show/report",
 )
 """Rooms, or parts of rooms, that may import the engine."""

@@ -10,7 +10,7 @@ import mujoco
 import pytest
 
 import factory
-from factory.export import exporters
+from factory.exporting import exporters
 from factory.lang import read_template, write_template
 from factory.mjcf.robots import load_robot_model
 from factory.pipeline import all_templates

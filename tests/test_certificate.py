@@ -16,11 +16,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import factory.export.certificate
-from factory.export.certificate.check import check_certificate
-from factory.export.certificate.listing import CLAIMS, digest
-from factory.export.certificate.writer import certificate
-from factory.export.pnml import write_pnml
+import factory.exporting.certificate
+from factory.exporting.certificate.check import check_certificate
+from factory.exporting.certificate.listing import CLAIMS, digest
+from factory.exporting.certificate.writer import certificate
+from factory.exporting.pnml import write_pnml
 from factory.foreign_nets.behaviour import analyse
 from factory.foreign_nets.pnml_reader import read_pnml
 from factory.nets.gears import GearNet
@@ -263,10 +263,10 @@ def test_junk_is_no_certificate(junk: object) -> None:
 
 
 def test_the_checker_uses_nothing_that_made_the_certificate() -> None:
-    folder = Path(factory.export.certificate.__file__ or "").parent
+    folder = Path(factory.exporting.certificate.__file__ or "").parent
     checker = {path.stem: path for path in folder.glob("*.py")}
     assert set(checker) == {"__init__", "writer", "proof_file", "check", "listing", "refute"}
-    allowed = {f"factory.export.certificate.{name}" for name in ("check", "listing", "refute")}
+    allowed = {f"factory.exporting.certificate.{name}" for name in ("check", "listing", "refute")}
     for name in ("check", "listing", "refute"):
         tree = ast.parse(checker[name].read_text("utf-8"))
         froms = {n.module or "" for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}

@@ -15,7 +15,7 @@ import pytest
 import trimesh
 
 from factory.commands import cli
-from factory.export.certificate.check import check_certificate
+from factory.exporting.certificate.check import check_certificate
 from factory.record.log import read_log
 from factory.support.extras import EXTRAS
 from tests.command_line import PAPER, ROOT, Terminal, files_in, spawn

@@ -23,7 +23,7 @@ import pytest
 from factory.commands.run import carry_out
 from factory.record.ending import CutOff
 from factory.record.log import LogWriter, read_log
-from factory.render.video import VideoFile
+from factory.rendering.video import VideoFile
 from factory.show.report import page, recording_of
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation

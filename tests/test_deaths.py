@@ -19,12 +19,12 @@ from factory.record.failures import Death, Failing, deaths, gone
 from factory.record.log import Log
 from factory.record.log.model import model_of
 from factory.record.monitor.record import recorded_subject
-from factory.render.caption import Caption, draw_notices
-from factory.render.colours import DEAD
-from factory.render.history import History
-from factory.render.marks import LeftOut
-from factory.render.net_panel import NetPanel
-from factory.render.rows import Rows
+from factory.rendering.caption import Caption, draw_notices
+from factory.rendering.colours import DEAD
+from factory.rendering.history import History
+from factory.rendering.marks import LeftOut
+from factory.rendering.net_panel import NetPanel
+from factory.rendering.rows import Rows
 from factory.show.report.failures import failures_data
 from factory.show.report.recording import recording_of
 from factory.simulation.recovery import Campaign, WorldFault

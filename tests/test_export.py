@@ -28,16 +28,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import factory.export
+import factory.exporting
 from factory import to_networkx
-from factory.export import Subject, exporters
-from factory.export.bodies import file_name
-from factory.export.events import COLUMNS
-from factory.export.svg import draw_net
-from factory.export.swimlanes import swimlanes
-from factory.export.tina import write_tina
-from factory.export.tree_drawing import draw_tree
-from factory.export.urdf import roll_pitch_yaw
+from factory.exporting import Subject, exporters
+from factory.exporting.bodies import file_name
+from factory.exporting.events import COLUMNS
+from factory.exporting.svg import draw_net
+from factory.exporting.swimlanes import swimlanes
+from factory.exporting.tina import write_tina
+from factory.exporting.tree_drawing import draw_tree
+from factory.exporting.urdf import roll_pitch_yaw
 from factory.geometry.solids import rotation
 from factory.modes.modes import operation_modes
 from factory.nets.marked import MarkedNet, marked
@@ -63,7 +63,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_they_are_found_by_directory() -> None:
     found = exporters()
-    folder = Path(factory.export.__file__ or "").parent
+    folder = Path(factory.exporting.__file__ or "").parent
     texts = [p.read_text("utf-8") for p in folder.glob("*.py")]
     assert len(found) == sum(bool(re.search(r"^FORMAT\b", text, re.M)) for text in texts)
     assert list(found) == sorted(found)
@@ -85,7 +85,7 @@ def test_the_docs_list_them_all() -> None:
 
 def test_the_order_of_hashing_does_not_show() -> None:
     code = (
-        "import hashlib, pathlib; from factory.export import Subject, exporters;"
+        "import hashlib, pathlib; from factory.exporting import Subject, exporters;"
         "from factory.pipeline import read;"
         f"file = pathlib.Path({str(PAPER)!r}); s = Subject(file, read(file));"
         "made = [e.export(s) for e in exporters().values() if e.takes != 'log'];"

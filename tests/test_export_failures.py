@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.export import Subject, exporters
-from factory.export.events import rows
-from factory.export.pnml import write_pnml
+from factory.exporting import Subject, exporters
+from factory.exporting.events import rows
+from factory.exporting.pnml import write_pnml
 from factory.foreign_nets.behaviour import analyse
 from factory.foreign_nets.pnml_reader import read_pnml
 from factory.nets.marked import marked

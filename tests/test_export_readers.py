@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.export import exporters
-from factory.export.bodies import parts_of
+from factory.exporting import exporters
+from factory.exporting.bodies import parts_of
 from factory.geometry.solids import rotation
 from factory.layout.layout import Layout
 from factory.mjcf.loading import load

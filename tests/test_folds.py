@@ -23,10 +23,10 @@ from factory.compiler.folding import (
     line_of,
     lines_of_labels,
 )
-from factory.export.certificate.check import check_certificate
-from factory.export.certificate.listing import digest
-from factory.export.certificate.writer import certificate
-from factory.export.pnml import write_pnml
+from factory.exporting.certificate.check import check_certificate
+from factory.exporting.certificate.listing import digest
+from factory.exporting.certificate.writer import certificate
+from factory.exporting.pnml import write_pnml
 from factory.foreign_nets.behaviour import analyse, play
 from factory.foreign_nets.explore import explore
 from factory.foreign_nets.pnml_reader import read_pnml

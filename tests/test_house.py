@@ -91,13 +91,13 @@ BREACHES: tuple[tuple[Law, dict[str, str], str], ...] = (
     ),
     (
         engine_imports,
-        {"factory/render/a.py": "from mujoco import MjData"},
-        "render.a imports mujoco past support.engine",
+        {"factory/rendering/a.py": "from mujoco import MjData"},
+        "rendering.a imports mujoco past support.engine",
     ),
     (
         engine_writes,
-        {"factory/render/a.py": "def f(d):\n    d.qpos[3] = 0.0"},
-        "render.a:2 writes d.qpos[3]",
+        {"factory/rendering/a.py": "def f(d):\n    d.qpos[3] = 0.0"},
+        "rendering.a:2 writes d.qpos[3]",
     ),
     (
         engine_writes,

@@ -11,7 +11,7 @@ import pytest
 from layout_values import many_layouts, paper_layout, random_layout, row_of_inserts, table_pag
 from pag_values import factory_of
 
-from factory.export.floor_sheet import write_svg
+from factory.exporting.floor_sheet import write_svg
 from factory.geometry.product import product_geometry
 from factory.layout.embedding import lay_out
 from factory.layout.layout import Layout

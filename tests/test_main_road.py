@@ -16,7 +16,7 @@ from tests.house import this_house
 ASIDE = ("foreign_nets", "networkx")
 """What the main road does without."""
 
-OFF_THE_ROAD = {"foreign_nets", "export", "study", "commands"}
+OFF_THE_ROAD = {"foreign_nets", "exporting", "study", "commands"}
 """Rooms that may import `foreign_nets`: commands when they are given a net in PNML."""
 
 PLANTED = "import factory.foreign_nets.behaviour"

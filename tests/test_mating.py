@@ -34,8 +34,8 @@ from factory.compiler.mating.mating import matings
 from factory.compiler.mating.meetings import meetings
 from factory.compiler.mating.overlaps import CHUNK
 from factory.compiler.mating.paths import CLEAR, NEAR, TOLERANCE, depths_of, sought
-from factory.export.clash_picture import draw
-from factory.export.product_view import picture_names
+from factory.exporting.clash_picture import draw
+from factory.exporting.product_view import picture_names
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import Product
 from factory.lang import read_pag

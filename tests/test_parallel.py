@@ -14,8 +14,8 @@ import pytest
 
 from factory.compiler.mating.mating import judged
 from factory.compiler.parallel import in_parallel
-from factory.export.certificate.check import check_certificate
-from factory.export.certificate.writer import certificate
+from factory.exporting.certificate.check import check_certificate
+from factory.exporting.certificate.writer import certificate
 from factory.foreign_nets.explore import explore
 from factory.layout.bounds import cycle_time_bound
 from factory.layout.durations import Pace, cycle_of

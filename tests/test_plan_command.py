@@ -15,7 +15,7 @@ import pytest
 from factory.pipeline import read
 from factory.planning.blocking import blocking
 from factory.planning.cannot import interlocks
-from factory.render.interlocked import PAINTS, InterlockedView
+from factory.rendering.interlocked import PAINTS, InterlockedView
 from factory.support.progress import StepBar
 from tests.command_line import ROOT, Done, Terminal, files_in
 from tests.opengl import needs_gl
@@ -255,7 +255,7 @@ def test_the_time_that_is_asked_for_bounds_proofs_of_small_products(planning: Pl
     ("where", "kept"),
     [
         ("factory.planning.plan.blocking", False),
-        ("factory.render.exploded.ExplodedView.film", True),
+        ("factory.rendering.exploded.ExplodedView.film", True),
     ],
 )
 def test_a_signal_is_heard_at_once(
@@ -267,7 +267,7 @@ def test_a_signal_is_heard_at_once(
         os.kill(os.getpid(), signal.SIGINT)
         raise AssertionError("the signal was not heard")
 
-    monkeypatch.setattr("factory.render.exploded.ExplodedView.still", lambda *_: None)
+    monkeypatch.setattr("factory.rendering.exploded.ExplodedView.still", lambda *_: None)
     monkeypatch.setattr(where, stop)
     done = planning(LOADED, "--seconds", 0.001)
     assert (done.status, done.codes) == (130, ["Interrupted"])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from factory.pipeline import read
 from factory.planning.exploding import explosion
-from factory.render.exploded import ExplodedView
+from factory.rendering.exploded import ExplodedView
 from tests.command_line import Terminal
 from tests.opengl import needs_gl
 

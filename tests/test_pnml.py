@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.export.dot import write_dot
-from factory.export.pnml import write_pnml
+from factory.exporting.dot import write_dot
+from factory.exporting.pnml import write_pnml
 from factory.foreign_nets.behaviour import analyse
 from factory.foreign_nets.pnml_reader import read_pnml
 from factory.nets.gears import GearNet

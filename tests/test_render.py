@@ -29,13 +29,13 @@ from factory.geometry.sight import Framing, fit, towards
 from factory.mjcf.mesh_files import corner_normals, face_normals, mesh_file
 from factory.record.log import LogWriter, read_log
 from factory.record.monitor.subject import subject_of_run
-from factory.render import Film, Picture, Still, check_output, render_log
-from factory.render.camera import from_above, overview
-from factory.render.caption import Caption
-from factory.render.painter import Painter, Renderer
-from factory.render.reel import HOLD
-from factory.render.subject import Snapshot
-from factory.render.video import VideoFile
+from factory.rendering import Film, Picture, Still, check_output, render_log
+from factory.rendering.camera import from_above, overview
+from factory.rendering.caption import Caption
+from factory.rendering.painter import Painter, Renderer
+from factory.rendering.reel import HOLD
+from factory.rendering.subject import Snapshot
+from factory.rendering.video import VideoFile
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support import gl
@@ -195,7 +195,7 @@ def test_a_killed_process_leaves_all_but_the_last_second(
     path = tmp_path / f"k{ending}"
     code = (
         "import time, numpy as np; from pathlib import Path;"
-        "from factory.render.video import VideoFile;"
+        "from factory.rendering.video import VideoFile;"
         f"v = VideoFile(Path({str(path)!r}), (64, 48), {fps});"
         "noise = np.random.default_rng(0).integers(0, 255, (60, 48, 64, 3), np.uint8);"
         "[v.write(frame) for frame in noise];"

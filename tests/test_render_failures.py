@@ -18,15 +18,15 @@ from factory.record.log import Log
 from factory.record.log.model import model_of
 from factory.record.monitor.record import recorded_subject
 from factory.record.monitor.subject import subject_of
-from factory.render.caption import TOLD, Caption, draw_notices
-from factory.render.colours import AMBER, DEAD, FLASH
-from factory.render.film import moment_of
-from factory.render.gantt_panel import GanttPanel
-from factory.render.history import History
-from factory.render.ink import Ink
-from factory.render.marks import Mark, Marks
-from factory.render.net_panel import NetPanel
-from factory.render.rows import Rows
+from factory.rendering.caption import TOLD, Caption, draw_notices
+from factory.rendering.colours import AMBER, DEAD, FLASH
+from factory.rendering.film import moment_of
+from factory.rendering.gantt_panel import GanttPanel
+from factory.rendering.history import History
+from factory.rendering.ink import Ink
+from factory.rendering.marks import Mark, Marks
+from factory.rendering.net_panel import NetPanel
+from factory.rendering.rows import Rows
 from factory.support.settings import Settings
 from tests.failing_runs import failing, paper_layout
 from tests.token_game import enabled, follower

@@ -15,21 +15,21 @@ from factory.pipeline import all_templates
 from factory.record.log import Log, LogWriter, read_log
 from factory.record.monitor.record import recorded_subject
 from factory.record.monitor.subject import subject_of_run
-from factory.render import Film, Picture, Still, camera_named, panels_named, render_log
-from factory.render.camerawork import Moment
-from factory.render.caption import FADES, SHOWN, draw_title, strength
-from factory.render.colours import GROUND, operation_colours, robot_colours
-from factory.render.film import moment_of, take_of
-from factory.render.following import Followed
-from factory.render.gantt_panel import GanttPanel
-from factory.render.history import History, OperationProgress, depths, followed
-from factory.render.ink import Ink, fitted, width
-from factory.render.net_panel import NetPanel
-from factory.render.picture import PANELS, shared
-from factory.render.reel import Poster
-from factory.render.rows import CLOSE, EASY, ROOM, Rows, neighbourhood
-from factory.render.sheet import BOTTOM, FOOT, OUTSIDE, TALLEST
-from factory.render.subject import Snapshot
+from factory.rendering import Film, Picture, Still, camera_named, panels_named, render_log
+from factory.rendering.camerawork import Moment
+from factory.rendering.caption import FADES, SHOWN, draw_title, strength
+from factory.rendering.colours import GROUND, operation_colours, robot_colours
+from factory.rendering.film import moment_of, take_of
+from factory.rendering.following import Followed
+from factory.rendering.gantt_panel import GanttPanel
+from factory.rendering.history import History, OperationProgress, depths, followed
+from factory.rendering.ink import Ink, fitted, width
+from factory.rendering.net_panel import NetPanel
+from factory.rendering.picture import PANELS, shared
+from factory.rendering.reel import Poster
+from factory.rendering.rows import CLOSE, EASY, ROOM, Rows, neighbourhood
+from factory.rendering.sheet import BOTTOM, FOOT, OUTSIDE, TALLEST
+from factory.rendering.subject import Snapshot
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError

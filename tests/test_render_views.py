@@ -12,15 +12,15 @@ from factory.mjcf import names
 from factory.mjcf.replica import Replica
 from factory.problem.pag import NOPART
 from factory.record.log import Log, LogWriter, read_log
-from factory.render.action import Action, action_of, shape_of
-from factory.render.camera import orbit, overview
-from factory.render.camerawork import Take
-from factory.render.fading import FAINT, Fading
-from factory.render.film import moment_of, take_of
-from factory.render.following import Viewpoint
-from factory.render.junction import handover_view
-from factory.render.picture import Picture
-from factory.render.subject import placed
+from factory.rendering.action import Action, action_of, shape_of
+from factory.rendering.camera import orbit, overview
+from factory.rendering.camerawork import Take
+from factory.rendering.fading import FAINT, Fading
+from factory.rendering.film import moment_of, take_of
+from factory.rendering.following import Viewpoint
+from factory.rendering.junction import handover_view
+from factory.rendering.picture import Picture
+from factory.rendering.subject import placed
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco

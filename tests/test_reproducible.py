@@ -92,7 +92,7 @@ def test_a_film_changes_nothing(here: str, tmp_path: Path) -> None:
         probe()
     except MissingError:
         pytest.skip("no GL here")
-    from factory.render import Film, Picture
+    from factory.rendering import Film, Picture
 
     made = reproduced()
     with Film(made, tmp_path / "f.mp4", Picture((64, 48)), 2.0) as film:

@@ -203,7 +203,7 @@ def test_buffers_are_where_the_shoes_of_carriages_meet_them() -> None:
 
 def test_the_urdf_has_them() -> None:
     """The ranges of joints are those of the model."""
-    from factory.export.urdf import _Writer
+    from factory.exporting.urdf import _Writer
     from factory.mjcf.loading import load
 
     m = load(physical_model(layout_of("fence"), 1))

@@ -16,8 +16,8 @@ import pytest
 from factory.commands.run import summarise
 from factory.compiler.taking_over import Takeover
 from factory.control.mode import Limits
-from factory.export import Subject, exporters
-from factory.export.motion import motion_of
+from factory.exporting import Subject, exporters
+from factory.exporting.motion import motion_of
 from factory.layout import standby
 from factory.layout.bins import bins_of
 from factory.layout.exclusions import goes_early

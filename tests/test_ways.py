@@ -16,7 +16,7 @@ import pytest
 from random_products import random_product
 from ways_checker import check
 
-from factory.export.ways import ways
+from factory.exporting.ways import ways
 from factory.layout.clearance import certify
 from factory.layout.coordinating import with_machines
 from factory.layout.exclusions import awaited_positions, coordinated

@@ -15,7 +15,7 @@ import click
 from reference_text import code, definition, heading, prose, table
 
 from factory.commands import cli
-from factory.export import exporters
+from factory.exporting import exporters
 from factory.lang.values import GEOMETRY
 from factory.pipeline import all_templates
 from factory.problem.robot_types import load_catalogue

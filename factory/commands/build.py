@@ -23,7 +23,7 @@ from factory.support.files import is_plan
 from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
-    from factory.export.build import Built
+    from factory.exporting.build import Built
     from factory.pipeline import Project
 
 SHOWN = 20
@@ -63,8 +63,8 @@ def build(
     kept = find_build(name)
     is_current = kept is not None
     if kept is None:
-        from factory.export.build import BuildRequest, files_read
-        from factory.export.build import build as build_files
+        from factory.exporting.build import BuildRequest, files_read
+        from factory.exporting.build import build as build_files
         from factory.nets.verify import proved
         from factory.record.plan_file import plan_and_layout
 

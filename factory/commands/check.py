@@ -86,7 +86,7 @@ def check(
         own_names(clashes, files, [file])
         write_all(files)
     if certificate is not None:
-        from factory.export.certificate.writer import certificate as document
+        from factory.exporting.certificate.writer import certificate as document
 
         proof = document(checked.net, checked.verdict)
         write_text(certificate, json.dumps(proof, ensure_ascii=False) + "\n")
@@ -103,8 +103,8 @@ def check(
 def _proved(certificate: Path, checked: Checked) -> dict[str, bool | None]:
     """The claims of a certificate of the checked net: each property proved (True), refuted (False)
     or open (None). Raises InputError, or RunError if the certificate is refuted."""
-    from factory.export.certificate.listing import CLAIMS, TRAIN
-    from factory.export.certificate.proof_file import check_against
+    from factory.exporting.certificate.listing import CLAIMS, TRAIN
+    from factory.exporting.certificate.proof_file import check_against
 
     document = check_against(certificate, checked.net, checked.verdict)
     claims = (*CLAIMS, TRAIN) if TRAIN in document else CLAIMS
@@ -124,7 +124,7 @@ def _claims(proved: dict[str, bool | None]) -> str:
 def _pictures(checked: Checked, folder: Path) -> dict[Path, bytes]:
     """The files of `--clashes`: a picture of each blocked operation, and of each sub-assembly that
     no hand can hold."""
-    from factory.export import clash_picture, grip_picture
+    from factory.exporting import clash_picture, grip_picture
 
     found: dict[Path, bytes] = {}
     if checked.product is None:

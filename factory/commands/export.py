@@ -18,8 +18,8 @@ from factory.support.console import emit, say
 from factory.support.errors import did_you_mean, usage_error
 
 if TYPE_CHECKING:
-    from factory.export import Exporter, Made
-    from factory.export.subject import Source
+    from factory.exporting import Exporter, Made
+    from factory.exporting.subject import Source
 
 TAKEN = {
     "net": ("a PAG", "a net in PNML"),
@@ -34,7 +34,7 @@ class _Listing(Grouped):
     """A command whose help ends with the summary of every exporter."""
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        from factory.export import exporters
+        from factory.exporting import exporters
 
         with formatter.section("Formats"):
             formatter.write_dl([(e.format, e.summary) for e in exporters().values()])
@@ -47,14 +47,14 @@ class _Format(click.ParamType[str]):
 
     def get_missing_message(self, param: click.Parameter, ctx: click.Context | None) -> str:
         """The list of formats."""
-        from factory.export import exporters
+        from factory.exporting import exporters
 
         return f"There are: {', '.join(exporters())}."
 
     def shell_complete(
         self, ctx: click.Context, param: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
-        from factory.export import exporters
+        from factory.exporting import exporters
 
         known = exporters().values()
         return [
@@ -77,7 +77,7 @@ def export(
     options: ProjectOptions, out: OutputOptions, form: str, output: Path | None, of: str
 ) -> int:
     """Write FILE.pag, a net in FILE.pnml or a LOG of a run for other tools."""
-    from factory.export import Subject
+    from factory.exporting import Subject
     from factory.pipeline import Project
     from factory.record.log import Log
     from factory.support.files import write_all
@@ -132,7 +132,7 @@ def _source(options: ProjectOptions, chosen: Exporter, silent: bool) -> Source:
 
 
 def _exporter(form: str, of: str) -> Exporter:
-    from factory.export import exporters
+    from factory.exporting import exporters
 
     known = exporters()
     if form not in known:

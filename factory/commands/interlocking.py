@@ -73,7 +73,7 @@ def _interlocked(
     """Pictures of the first sets of interlocked parts; none, with a warning, on a machine without
     GL."""
     from factory.importing.labels import file_stem
-    from factory.render.interlocked import InterlockedView
+    from factory.rendering.interlocked import InterlockedView
     from factory.support.files import own_names
 
     locks = why.interlocks[:DRAWN]

@@ -187,7 +187,7 @@ def _looks(project: Project, out: OutputOptions) -> list[Path]:
     """The still and the film of the exploded view, written beside the PAG; none, with a warning, on
     a machine without GL."""
     from factory.planning.exploding import explosion
-    from factory.render.exploded import ExplodedView
+    from factory.rendering.exploded import ExplodedView
     from factory.support.files import own_names
 
     still, film = (project.file.with_name(f"{project.name}-{end}") for end in LOOKS)

@@ -56,7 +56,7 @@ def render(
 ) -> int:
     """Film FILE.pag, or the run in a LOG written by `run --log`, headless through EGL."""
     from factory.record.log import is_log
-    from factory.render import Film, Still, check_output, render_log
+    from factory.rendering import Film, Still, check_output, render_log
     from factory.support.gl import probe
 
     file = options.file

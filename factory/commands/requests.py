@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from factory.plant.factory import Factory
     from factory.problem.pag import PAG, AllowedOverlap
     from factory.record.plan_file import PlanFile
-    from factory.render import Picture
+    from factory.rendering import Picture
     from factory.simulation.recovery.faults import Campaign
     from factory.simulation.request import RunRequest, WorldName
     from factory.study.allocation.candidate import Candidate
@@ -285,8 +285,8 @@ class PictureOptions:
         """The picture that the options describe; `pag`: the product whose labels cameras may name,
         None for any. Raises InputError (BadValue) for an unknown name, a size without room for
         the panels, or a poster that cannot be a still."""
-        from factory.render import Picture, camera_named, check_output, panels_named
-        from factory.render.picture import shared
+        from factory.rendering import Picture, camera_named, check_output, panels_named
+        from factory.rendering.picture import shared
 
         size = self.area()
         camera, panels = camera_named(self.camera, pag), panels_named(self.panels)

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from factory.pipeline import Project
     from factory.plant.factory import Factory
     from factory.record.observed import Recorder
-    from factory.render import Film
+    from factory.rendering import Film
     from factory.simulation.resuming import Resumed
     from factory.simulation.run import PhysicsFigures, Run
     from factory.simulation.simulation import Simulation
@@ -155,7 +155,7 @@ def _film(
         return None
     if asked.world == "ideal":
         raise usage_error("the ideal world has no bodies to film", "leave out --world ideal")
-    from factory.render import Film, check_output
+    from factory.rendering import Film, check_output
     from factory.support.gl import probe
 
     check_output(video, shown.area(), shown.fps)

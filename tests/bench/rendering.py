@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from factory.record.monitor.subject import subject_of_run
-from factory.render.camerawork import Camerawork, Moment, Take
-from factory.render.history import History
-from factory.render.picture import Picture
-from factory.render.reel import Reel
-from factory.render.subject import Snapshot
-from factory.render.video import FPS
+from factory.rendering.camerawork import Camerawork, Moment, Take
+from factory.rendering.history import History
+from factory.rendering.picture import Picture
+from factory.rendering.reel import Reel
+from factory.rendering.subject import Snapshot
+from factory.rendering.video import FPS
 from factory.simulation.simulation import Simulation
 from factory.support import gl
 from factory.support.engine import mujoco

@@ -10,7 +10,7 @@ from math import ceil, isfinite
 import numpy as np
 
 from factory.nets.verdict import listing
-from factory.render.marks import Zone, Zones
+from factory.rendering.marks import Zone, Zones
 from factory.simulation.recovery import Recovery
 
 Message = tuple[str, str]

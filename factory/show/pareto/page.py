@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 
-from factory.export.floor_sheet import write_svg
+from factory.exporting.floor_sheet import write_svg
 from factory.show.pareto.chart import cycle_chart, floor_chart
 from factory.show.report.page import filled
 from factory.study.pareto.front import FrontPoint, ParetoFront

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from factory.export.net_drawing import NetDrawing
+from factory.exporting.net_drawing import NetDrawing
 from factory.geometry.solids import rotation
 from factory.mjcf import names
 from factory.mjcf.replica import Floats, paint, shown

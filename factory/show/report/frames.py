@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.export import motion
+from factory.exporting import motion
 from factory.mjcf import names
 from factory.mjcf.parts import HIDDEN
 from factory.show.report.recording import Recording

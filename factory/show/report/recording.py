@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from factory.export.motion import BodyMotion, motion_of
+from factory.exporting.motion import BodyMotion, motion_of
 from factory.geometry.meshes import Array
 from factory.layout.layout import Layout
 from factory.plant.factory import Factory, Operation

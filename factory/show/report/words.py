@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from factory.export.certificate.check import check_certificate
-from factory.export.certificate.writer import certificate
+from factory.exporting.certificate.check import check_certificate
+from factory.exporting.certificate.writer import certificate
 from factory.nets.verdict import Verdict, listing
 from factory.nets.verify import verify
 from factory.plant.factory import Factory

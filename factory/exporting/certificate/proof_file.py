@@ -1,0 +1,148 @@
+"""A certificate in a file, checked against a net.
+
+It is refuted where some claim in it is not proved by it, which `check_certificate` finds from the
+document alone, or where it is of another net: both are compared by the names of places,
+transitions and robots, as another program may number them otherwise.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from factory.exporting.certificate.check import check_certificate
+from factory.exporting.certificate.listing import CLAIMS, digest
+from factory.exporting.certificate.writer import certificate
+from factory.nets.gears import GearNet
+from factory.nets.marked import MarkedNet
+from factory.nets.verdict import Verdict
+from factory.support.errors import Diagnostic, InputError, Position, RunError
+from factory.support.files import NET, read_bytes
+
+Json = dict[str, Any]
+Named = dict[tuple[str, str], Json]
+
+HINT = "`factory check FILE --certificate OUT` writes the certificate of a net"
+
+
+def read_certificate(path: Path) -> Json:
+    """The document in a file. Raises InputError (BadProof) where there is none, or none with
+    the sections of a certificate."""
+    try:
+        document = json.loads(read_bytes(path, NET).decode("utf-8-sig"))
+    except OSError as error:
+        raise InputError(_bad(path, f"it cannot be read: {error.strerror}")) from error
+    except json.JSONDecodeError as error:
+        at = Position(str(path), error.lineno, error.colno)
+        ends = error.pos >= len(error.doc.rstrip()) or error.msg.startswith("Unterminated")
+        what = "it ends too early" if ends else "no JSON from here on"
+        raise InputError(_bad(path, what, at)) from None
+    except (ValueError, RecursionError):
+        raise InputError(_bad(path, "its content is no JSON in UTF-8")) from None
+    sections = ("schema", "net", "robots", *CLAIMS, "digest")
+    missing = [key for key in sections if not isinstance(document, dict) or key not in document]
+    if missing:
+        raise InputError(_bad(path, f"it lacks {', '.join(map(repr, missing))}"))
+    found: Json = document
+    return found
+
+
+def check_against(path: Path, net: GearNet | MarkedNet, verdict: Verdict) -> Json:
+    """The certificate in a file, which is of this net and proves what it claims.
+
+    Raises InputError (BadProof) where it cannot be read, RunError (BadProof) with every
+    reason for which it is refuted.
+    """
+    document = read_certificate(path)
+    own: Json = json.loads(json.dumps(certificate(net, verdict)))
+    faults = check_certificate(document)
+    if document["digest"] != digest(document):
+        place = first_difference({**document, "digest": own["digest"]}, own)
+        faults.append(f"what `check` writes of this net differs from it, first at {place}")
+    differing = list(differences(document, own, isinstance(net, GearNet)))
+    if differing:
+        more = f", and {len(differing) - 1} more differences" if differing[1:] else ""
+        faults.append(f"it is of another net: {differing[0]}{more}")
+    if faults:
+        raise RunError([_bad(path, faults[0]), *(_bad(path, f, hint="") for f in faults[1:])])
+    return document
+
+
+def differences(one: Json, other: Json, has_gears: bool) -> Iterator[str]:
+    """Differences between the nets of two certificates, including robots, gears and slots if the
+    net `has_gears`."""
+    try:
+        ours, theirs = _named(one, has_gears), _named(other, has_gears)
+    except (KeyError, TypeError, IndexError, ValueError, AttributeError):
+        yield "its net is not of the documented form"
+        return
+    for kind, name in ours:
+        if (kind, name) not in theirs:
+            yield f"the net has no {kind} '{name}'"
+    for (kind, name), wanted in theirs.items():
+        row = ours.get((kind, name))
+        if row is None:
+            yield f"it has no {kind} '{name}'"
+            continue
+        for key in (key for key in wanted if row[key] != wanted[key]):
+            there, here = _shown(row[key]), _shown(wanted[key])
+            yield f"{key} of {kind} '{name}': {there} in the certificate, {here} in the net"
+
+
+def _named(document: Json, has_gears: bool) -> Named:
+    """The net of a certificate with names in place of numbers."""
+    net, robots = document["net"], document["robots"]
+    events, places = ([row["name"] for row in net[key]] for key in ("transitions", "places"))
+    names = [robot["name"] for robot in robots]
+    found: Named = {("transition", event): {} for event in events}
+    for place in net["places"]:
+        found["place", place["name"]] = row = {
+            "tokens": place["tokens"],
+            "producers": sorted(events[e] for e in place["left"]),
+            "consumers": sorted(events[e] for e in place["right"]),
+        }
+        if has_gears:
+            row |= {key: place[key] for key in ("mode", "label")}
+            row["robots"] = [names[slot] if slot >= 0 else None for slot in place["slots"]]
+    for event in net["transitions"] if has_gears else ():
+        moves = event["moves"]
+        named = moves and sorted([places[p], i, places[q], j] for p, i, q, j in moves)
+        found["transition", event["name"]]["moves"] = named
+    for robot in robots if has_gears else ():
+        found["robot", robot["name"]] = {
+            "type": robot["type"],
+            "gear": [places[p] for p in robot["places"]],
+            "initial place": None if robot["initial"] is None else places[robot["initial"]],
+        }
+    return found
+
+
+def first_difference(one: Any, other: Any, path: str = "") -> str:
+    """Path of the first difference of two documents, as `live.order[3]`; "" where they are
+    equal."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        for key in dict.fromkeys([*other, *one]):
+            place = f"{path}.{key}" if path else key
+            if key not in one or key not in other:
+                return place
+            if found := first_difference(one[key], other[key], place):
+                return found
+        return ""
+    if isinstance(one, list) and isinstance(other, list):
+        pairs = enumerate(zip(one, other, strict=False))
+        inside = (first_difference(a, b, f"{path}[{i}]") for i, (a, b) in pairs)
+        shorter = f"{path}[{min(len(one), len(other))}]"
+        return next(filter(None, inside), shorter if len(one) != len(other) else "")
+    return "" if one == other and type(one) is type(other) else path
+
+
+def _shown(value: Any) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _bad(path: Path, words: str, at: Position | None = None, hint: str = HINT) -> Diagnostic:
+    at = at or Position(str(path), 1, 1)
+    return Diagnostic("BadProof", f"the certificate is refused: {words}", at, hint)

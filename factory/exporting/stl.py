@@ -1,0 +1,29 @@
+"""STL, binary, in millimetres, the unit of slicers and CAD: the finished product, or a sub-assembly
+(`--of LABEL`), in the product's frame; into a folder, a file for every label."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from factory.exporting.bodies import joined, parts_of, placed, wanted
+from factory.exporting.subject import Subject
+from factory.geometry.meshes import Mesh
+from factory.mjcf.mesh_files import stl
+
+FORMAT, TAKES, BINARY, FOLDER, OF = "stl", "pag", True, True, "a label"
+
+MILLIMETRES = 1e3
+"""To a metre."""
+
+
+def export(subject: Subject) -> bytes | Mapping[str, bytes]:
+    """The file, or those of a folder."""
+    made = {name: write_stl(subject, label) for label, name in wanted(subject, ".stl")}
+    return made if subject.whole else made[""]
+
+
+def write_stl(subject: Subject, label: str) -> bytes:
+    """A sub-assembly as one STL."""
+    solids = subject.project.product.solids
+    mesh = joined([placed(solids[p]) for p in parts_of(subject.project.pag, label)], label)
+    return stl(Mesh(label, mesh.vertices * MILLIMETRES, mesh.faces))

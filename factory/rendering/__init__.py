@@ -1,0 +1,16 @@
+"""Pictures without a screen: films and stills of a run, or of its log."""
+
+from factory.rendering.camera import camera_named
+from factory.rendering.film import Film, Still, render_log
+from factory.rendering.picture import Picture, panels_named
+from factory.rendering.video import check_output
+
+__all__ = [
+    "Film",
+    "Picture",
+    "Still",
+    "camera_named",
+    "check_output",
+    "panels_named",
+    "render_log",
+]

@@ -1,0 +1,125 @@
+"""The moving bodies of a factory, from its model alone: cameras are fitted to these, not to fixed
+ones."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from factory.geometry.sight import Array
+from factory.geometry.solids import rotation
+from factory.mjcf import names
+from factory.mjcf.weld_frames import WeldFrames
+from factory.rendering.subject import SIGNS, corners, placed
+from factory.support.engine import mujoco
+
+Own = tuple[int, str]
+"""A body that moves by itself, and `body` or `load`: it, or what it holds."""
+
+
+@dataclass(frozen=True, slots=True)
+class Action:
+    """What a picture of a factory has to show, as boxes (n, 8, 3) by their corners [m]: its
+    `robots`, and what they carry, at both ends of their guidepaths; `beside` these the feeders that
+    parts hang from at first, and the tray with a product, empty and where it goes into the shed."""
+
+    robots: Array
+    beside: Array
+
+    @property
+    def points(self) -> Array:
+        """All corners (n, 3) [m]."""
+        return np.concatenate([self.robots, self.beside]).reshape(-1, 3)
+
+
+def action_of(m: mujoco.MjModel, d: mujoco.MjData) -> Action:
+    """The action of a model, with its state at the start."""
+    points: defaultdict[Own, list[Array]] = defaultdict(list)
+    for own, corners_of in (*_bodies(m, d), *_loads(m, d)):
+        points[own].append(corners_of)
+    boxes = {own: box_of(np.concatenate(corners_of)) for own, corners_of in points.items()}
+    beside = [placed(m, d, g) for g in range(m.ngeom) if _feeds(m, g)]
+    robots: list[Array] = []
+    for (body, _), box in boxes.items():
+        way = _way(m, d, body, boxes.get((body, "load"), box))
+        is_tray = m.body(body).name == names.OUTFEED_TRAY
+        (beside if is_tray else robots).extend((box, box + way))
+    return Action(
+        *(np.array(corners_of).reshape(-1, 8, 3) for corners_of in (robots or beside, beside))
+    )
+
+
+def _feeds(m: mujoco.MjModel, geom: int) -> bool:
+    return names.kind(m.geom(geom).name) == "feeder"
+
+
+def _bodies(m: mujoco.MjModel, d: mujoco.MjData) -> Iterator[tuple[Own, Array]]:
+    """Points around each geom of the moving bodies."""
+    roots = m.body_rootid[m.geom_bodyid]
+    slides = m.jnt_bodyid[m.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE]
+    moving = [b for b in m.body_rootid[slides] if names.kind(m.body(int(b)).name) != "feeder"]
+    for g in np.flatnonzero(np.isin(roots, moving)).tolist():
+        yield (int(roots[g]), "body"), placed(m, d, g)
+
+
+def _loads(m: mujoco.MjModel, d: mujoco.MjData) -> Iterator[tuple[Own, Array]]:
+    """Points around all payloads, with lifts down and up. Bodies of parts never turn."""
+    frames = WeldFrames.of(m, d)
+    held = frames.at(d.qpos[frames.along])
+    shapes: dict[int, Array] = {}
+    for e in range(m.neq):
+        if names.kind(m.equality(e).name) not in ("grip", "hold"):
+            continue
+        holder, body = int(m.eq_obj1id[e]), int(m.eq_obj2id[e])
+        if body not in shapes:
+            shapes[body] = shape_of(m, body)
+        own = int(m.body_rootid[holder]), "load"
+        yield own, held[e] + shapes[body]
+        yield own, held[e] + shapes[body] + (0.0, 0.0, _stroke(m, holder))
+
+
+def shape_of(m: mujoco.MjModel, body: int) -> Array:
+    """The corners of a body's box in its own frame, with its shells."""
+    of = m.geom_bodyid
+    geoms = np.flatnonzero((of == body) | (m.body_parentid[of] == body)).tolist()
+    return box_of(
+        np.concatenate([corners(m, g) @ rotation(m.geom_quat[g]).T + m.geom_pos[g] for g in geoms])
+    )
+
+
+def box_of(points: Array) -> Array:
+    """The corners (8, 3) of the box round points (n, 3)."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    return np.asarray((low + high) / 2 + SIGNS * (high - low) / 2)
+
+
+def _stroke(m: mujoco.MjModel, holder: int) -> float:
+    """Stroke of the lift with this head: the length of its column [m]."""
+    robot, _, kind = m.body(holder).name.partition("/")
+    return 2 * _half(m, f"{robot}/column", 1) if kind == "head" else 0.0
+
+
+def _way(m: mujoco.MjModel, d: mujoco.MjData, body: int, load: Array) -> Array:
+    """The way of a robot from the B end of its guidepath to that of its rail at A, or of the tray
+    until half of its load is in the shed (3,) [m]."""
+    name, along = m.body(body).name, d.xaxis[m.body_jntadr[body]]
+    if name != names.OUTFEED_TRAY:
+        rail = f"{name.partition('/')[0]}/rail"
+        return np.asarray(-along * 2 * (_half(m, rail, 0) - _half(m, name, 0)))
+    if (wall := _geom(m, "outfeed/wall1")) < 0:
+        return np.zeros(3)
+    mouth = m.geom_pos[wall, 0] - m.geom_size[wall, 0]
+    return np.asarray(along * max(float(mouth - load[:, 0].mean()), 0.0))
+
+
+def _half(m: mujoco.MjModel, geom: str, axis: int) -> float:
+    """Half the size of a geom along one of its axes, 0 where there is none [m]."""
+    number = _geom(m, geom)
+    return float(m.geom_size[number, axis]) if number >= 0 else 0.0
+
+
+def _geom(m: mujoco.MjModel, name: str) -> int:
+    return int(mujoco.mj_name2id(m, mujoco.mjtObj.mjOBJ_GEOM.value, name))

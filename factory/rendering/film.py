@@ -1,0 +1,191 @@
+"""Films and stills of a run, by observers that do not disturb it, and of a log, with the same
+pictures as those of its run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from factory.mjcf.model import product_name
+from factory.nets.undone import Undone
+from factory.record.log import Log
+from factory.record.log.model import model_of
+from factory.record.monitor.record import recorded_subject
+from factory.record.monitor.subject import subject_of_run
+from factory.record.observed import Recorder
+from factory.rendering.camerawork import Moment, Take, When, past_the_end, pictureless
+from factory.rendering.history import TIE, History
+from factory.rendering.picture import USUAL, Picture
+from factory.rendering.reel import Reel, save
+from factory.rendering.subject import Snapshot, held
+from factory.rendering.video import FPS, check_output
+
+if TYPE_CHECKING:
+    from factory.simulation.simulation import Simulation
+
+
+class _Observer(Recorder):
+    """Base class of films and stills of a run."""
+
+    def __init__(self, simulation: Simulation, picture: Picture) -> None:
+        if simulation.model is None:
+            raise pictureless()
+        self.simulation, factory = simulation, simulation.layout.factory
+        picture.check(factory.pag)
+        subject = subject_of_run(simulation)
+        m, self.history = simulation.physical.m, History(subject)
+        name, units = product_name(factory), simulation.request.units
+        self.take = Take(m, subject, name, units, picture, self.history)
+        self.last = self._moment()
+
+    def _moment(self) -> Moment:
+        world, history = self.simulation.physical, self.history
+        for event in self.simulation.supervisor.events[history.taken :]:
+            history.add(event.t, event if isinstance(event, Undone) else event.transition)
+        if (account := world.hooks.account) is not None:
+            history.failings += account.found[len(history.failings) :]
+            history.stand(account.stood)
+        made = world.delivered() - self.simulation.before
+        return Moment(world.time, made, Snapshot.of(world.m, world.d))
+
+
+class Film(_Observer):
+    """Films a run: a frame whenever simulated time reaches the next, from the run itself.
+
+    Frame k is at k / fps seconds, so T seconds have ⌊T fps⌋ + 1 frames, and those of the last
+    moment (`reel.HOLD`). Closed after an interruption too, the file holds what happened until then.
+    `poster`: a still (PNG) of the moment that shows most. Raises InputError for a size, rate,
+    ending or camera that will not do, MissingError where there is no GL."""
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        path: Path | str,
+        picture: Picture = USUAL,
+        fps: float = FPS,
+        poster: Path | str | None = None,
+    ) -> None:
+        super().__init__(simulation, picture)
+        self.reel = Reel(self.take, Path(path), fps, None if poster is None else Path(poster))
+        try:
+            self.reel.until(self.last)
+        except BaseException:  # no file is left without a frame
+            self.reel.give_up()
+            raise
+
+    @property
+    def frames(self) -> int:
+        """Frames taken."""
+        return self.reel.frames
+
+    def observe(self, world: Any, supervisor: Any) -> None:
+        """Take the frames that are due."""
+        self.reel.until(self._moment())
+
+    def close(self) -> None:
+        """Finish the file, and write the poster."""
+        self.reel.close()
+
+
+class Still(_Observer):
+    """A still (PNG) of a run at a time [s], or at its end; written when it is closed, except after
+    an exception before that time.
+
+    For the camera `product` the end is when the output robot last holds a product.
+    """
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        path: Path | str,
+        picture: Picture = USUAL,
+        at: When = "end",
+    ) -> None:
+        check_output(path, picture.size, still=True)
+        super().__init__(simulation, picture)
+        self.path, self.at, self.held = Path(path), at, False
+
+    def observe(self, world: Any, supervisor: Any) -> None:
+        """Keep the state if the picture may be of it."""
+        if self.at != "end" and self._has_come:
+            return
+        now = self._moment()
+        holds = held(world.m, now.shown)
+        follows = self.take.picture.camera == "product"
+        if self.at != "end" or not follows or holds or not self.held:
+            self.last, self.held = now, self.held or holds
+
+    @property
+    def _has_come(self) -> bool:
+        """Whether the time of the picture has come."""
+        return self.at == "end" or self.last.time >= self.at - TIE
+
+    def close(self) -> None:
+        """Take the picture. Raises InputError (BadValue) where the run ended before its time."""
+        if self.at != "end" and not self._has_come:
+            raise past_the_end(self.at, "run", self.last.time)
+        save(self.take, self.last, self.path)
+
+    def __exit__(self, *raised: object) -> None:
+        if self._has_come or raised[0] is None:
+            self.close()
+
+
+def render_log(
+    log: Log,
+    path: Path | str,
+    picture: Picture = USUAL,
+    fps: float = FPS,
+    at: When = "end",
+    poster: Path | str | None = None,
+) -> int:
+    """A film, or for .png a still at a time [s], from a log alone; gives the number of frames.
+    `poster` is that of `Film`.
+
+    Nothing is simulated again. Raises InputError for a log of the ideal world, one without a tick,
+    or one that is not of the factory in its header, and for a time after its end."""
+    is_still = check_output(path, picture.size, fps, still=None)
+    take = take_of(log, picture)
+    if is_still:
+        moment = moment_of(log, _row(log, take, at))
+        take.history.catch_up(log.timed_entries, moment.time)
+        save(take, moment, Path(path))
+        return 1
+    with Reel(take, Path(path), fps, None if poster is None else Path(poster)) as reel:
+        for row in range(len(log)):
+            moment = moment_of(log, row)
+            take.history.catch_up(log.timed_entries, moment.time)
+            reel.until(moment)
+    return reel.frames
+
+
+def take_of(log: Log, picture: Picture) -> Take:
+    """The take of a log, before its first firing."""
+    if log.header["world"] == "ideal":
+        raise pictureless()
+    m, subject = model_of(log), recorded_subject(log.header)
+    picture.check(subject.factory.pag)
+    history = History(subject)
+    if log.failures is not None:
+        history.failings += log.failures.found
+        history.stand(log.failures.stood)
+    return Take(m, subject, log.header["product"], log.header["units"], picture, history)
+
+
+def moment_of(log: Log, row: int) -> Moment:
+    """The state in a row of a log."""
+    active = log.active[row]
+    shown = Snapshot(log.qpos[row], active[:, 0], active[:, 2])
+    return Moment(float(log.time[row]), int(log.delivered[row]), shown)
+
+
+def _row(log: Log, take: Take, at: When) -> int:
+    """Index of the row of a log that a still at a time shows."""
+    last = len(log) - 1
+    if at != "end":
+        row = log.row_at(at)
+        if row > last:
+            raise past_the_end(at, "log", float(log.time[-1]))
+        return row
+    rows = range(last, -1, -1) if take.picture.camera == "product" else ()
+    return next((row for row in rows if held(take.m, moment_of(log, row).shown)), last)
