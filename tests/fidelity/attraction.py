@@ -76,15 +76,16 @@ class Claim:
         self.columns = [(column[r], column.get(lifts.get(r, -1))) for r in operation.robots]
         self.spans = [spans[r] for r in operation.robots]
 
-    def draw(self, chance: np.random.Generator, size: int, ends: float) -> Array:
-        """A place drawn in it, each number at an end of its span with a probability `ends`."""
+    def draw(self, chance: np.random.Generator, size: int, at_ends: bool) -> Array:
+        """A place drawn in it; `at_ends`: one robot is at an end of its way, and others may be."""
         x = np.zeros(size)
-        for columns, spans in zip(self.columns, self.spans, strict=True):
+        pinned = chance.integers(len(self.spans))
+        for robot, (columns, spans) in enumerate(zip(self.columns, self.spans, strict=True)):
             chosen = spans[chance.integers(len(spans))]
+            end = at_ends and (robot == pinned or chance.random() < 2 / 3)
             for column, span in zip(columns, chosen, strict=True):
                 if column is not None:
-                    at_end = chance.random() < ends
-                    x[column] = chance.choice(span) if at_end else chance.uniform(*sorted(span))
+                    x[column] = chance.choice(span) if end else chance.uniform(*sorted(span))
         return x
 
     def holds(self, x: Array) -> bool:
@@ -206,7 +207,7 @@ def draw(bench: Bench, chance: np.random.Generator, kind: str) -> Array | None:
     if (kind == "gate" and not len(gated)) or (kind == "touching" and not len(mode.pairs)):
         return None
     for _ in range(1000):
-        x = bench.claim.draw(chance, mode.size, 2 / 3 if kind == "stop" else 0.0)
+        x = bench.claim.draw(chance, mode.size, kind == "stop")
         if kind == "touching":
             _close_in(bundle, x, chance)
         elif kind == "gate":
