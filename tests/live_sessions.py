@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from factory.layout.layout import Layout
+from factory.record.state import State
 from factory.show.live import LiveFrame, Session
 from factory.simulation.recovery import Campaign
 from factory.simulation.request import RunRequest
@@ -47,7 +48,7 @@ class Running:
         with pytest.raises(Stopped):
             self.session.run(self._observe)
 
-    def _observe(self, world: Any, supervisor: Any) -> None:
+    def _observe(self, _: State) -> None:
         if self.over:
             raise Stopped
 

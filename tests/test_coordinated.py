@@ -20,6 +20,7 @@ from factory.nets.coordinated import CoordinatedNet, Coordination
 from factory.nets.marked import MarkedNet, marked
 from factory.pipeline import read
 from factory.problem.plan import Plan
+from factory.record.state import Event, State
 from factory.simulation.ordering import Ordering
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
@@ -150,11 +151,11 @@ def late(layout: Layout, request: RunRequest, kept: bool) -> list[str]:
     number = {transition.name: n for n, transition in enumerate(transitions)}
     seen, away, early = 0, set[Any](), list[str]()
 
-    def look(world: Any, supervisor: Any) -> None:
+    def look(state: State) -> None:
         nonlocal seen
-        x = world.sense()[0]
-        events = [number[e.transition] for e in supervisor.events[seen:]]
-        seen = len(supervisor.events)
+        x = simulation.world.sense()[0]
+        events = [number[e.transition] for e in state.events[seen:] if isinstance(e, Event)]
+        seen = len(state.events)
         for order in orders:
             if order.start in events and order.past in away:
                 early.append(transitions[order.start].name)

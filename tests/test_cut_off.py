@@ -23,6 +23,7 @@ import pytest
 from factory.commands.run import carry_out
 from factory.record.ending import CutOff
 from factory.record.log import LogWriter, read_log
+from factory.record.state import State
 from factory.rendering.video import VideoFile
 from factory.show.report import page, recording_of
 from factory.simulation.request import RunRequest
@@ -168,7 +169,7 @@ def test_a_stall(run: Terminal, out: Path) -> None:
 def test_an_error_of_another_observer(out: Path) -> None:
     log, simulation = out / "run.log", Simulation(paper_layout(), RunRequest(units=1))
 
-    def fail(world: object, supervisor: object) -> None:
+    def fail(state: State) -> None:
         raise RuntimeError("no more")
 
     with pytest.raises(RuntimeError), LogWriter(log, simulation) as writer:
@@ -249,8 +250,8 @@ from factory.simulation.simulation import Simulation
 import factory
 layout = factory.lay_out(factory.compile(factory.load_pag("examples/paper.pag")))
 simulation = Simulation(layout, RunRequest(units=20))
-def kill(world, supervisor):
-    if world.time > 0.3:
+def kill(state):
+    if state.time > 0.3:
         os.kill(os.getpid(), signal.SIGKILL)
 with LogWriter(sys.argv[1], simulation) as writer:
     simulation.run([writer.observe, kill])

@@ -12,13 +12,14 @@ import numpy as np
 import pytest
 
 from factory.layout.layout import Layout
+from factory.record.figures import PhysicsFigures
+from factory.record.state import Event
 from factory.simulation.disturbance import Gain, Mass, Noise, Push, disturb
 from factory.simulation.disturbance.interventions import Interventions
 from factory.simulation.mujoco import outfeed
 from factory.simulation.mujoco.courses import AHEAD, Follower
 from factory.simulation.mujoco.fast import neighbours, strides
 from factory.simulation.mujoco.world import MujocoWorld
-from factory.simulation.run import Event, PhysicsFigures
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from factory.support.settings import LOOK, MOST, Settings
@@ -140,8 +141,8 @@ def test_observers_make_no_difference() -> None:
     """One that observes sees every tick; one that glances, the ends of calls."""
     glanced, seen = list[float](), list[float]()
     first, second = ready("chest", units=1), ready("chest", units=1)
-    one = first.run(glances=[lambda world, _: glanced.append(world.time)])
-    other = second.run([lambda world, _: seen.append(world.time)], glances=[lambda *_: None])
+    one = first.run(glances=[lambda state: glanced.append(state.time)])
+    other = second.run([lambda state: seen.append(state.time)], glances=[lambda *_: None])
     assert glanced[-1] == seen[-1] and set(glanced) <= set(seen)
     assert len(seen) == round(seen[-1] / 0.01) and len(glanced) < 0.5 * len(seen)
     assert (one.events, one.physics) == (other.events, other.physics)

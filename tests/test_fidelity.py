@@ -18,9 +18,9 @@ import factory
 from factory.layout.layout import Layout
 from factory.layout.outfeed import tray_profile
 from factory.mjcf.weld_frames import soften
+from factory.record.state import Event
 from factory.simulation.mujoco.courses import towards
 from factory.simulation.request import RunRequest
-from factory.simulation.run import Event
 from factory.simulation.simulation import Simulation
 from factory.study.fidelity import QUANTITIES, SeedRecord, measure, measure_seed, study
 from factory.study.fidelity.causality import (
@@ -168,7 +168,7 @@ def until_carried() -> tuple[mujoco.MjModel, Measurement, int]:
     with measurement._steps:
         while not measurement.welds.carried().size:
             simulation.supervisor.step()
-            measurement.observe(simulation.world, simulation.supervisor)
+            measurement.observe(simulation.state())
     return simulation.world.m, measurement, int(measurement.welds.carried()[0])
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from factory.mjcf.model import GRAVITY, ROLLING
 from factory.mjcf.timestep import FRICTION
+from factory.record.state import State
 from factory.simulation.disturbance import Friction, disturb
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
@@ -30,7 +31,9 @@ def followed(simulation: Simulation, empty: Any) -> list[bytes]:
     """Runs, and gives the different frictions that were seen, all of them right."""
     seen = dict[bytes, None]()
 
-    def observe(world: Any, _: Any) -> None:
+    world = simulation.physical
+
+    def observe(_: State) -> None:
         found = world.m.dof_frictionloss[world.motion.axes.dof]
         assert found == pytest.approx(empty + carried(world), rel=1e-12, abs=0)
         seen[found.tobytes()] = None

@@ -48,7 +48,7 @@ def looked_at(layout: Layout, units: int = 3) -> tuple[Simulation, HiddenPenetra
     """A run of a layout, with everything solid looked at."""
     simulation = Simulation(layout, RunRequest(units=units, jitter=0.3))
     hidden = HiddenPenetrations.of(simulation)
-    simulation.run([lambda world, _: hidden.look(world.d.qpos, world.time)], max_time=120.0)
+    simulation.run([lambda state: hidden.look(state.observation.qpos, state.time)], max_time=120.0)
     return simulation, hidden
 
 

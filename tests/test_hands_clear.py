@@ -128,7 +128,7 @@ def laid_out(text: str, folder: Path) -> Layout:
 def test_hands_meet_nothing(what: str, tmp_path: Path) -> None:
     simulation = Simulation(laid_out(PARTS[what], tmp_path), RunRequest(units=3, jitter=0.3))
     hidden = HiddenPenetrations.of(simulation)
-    simulation.run([lambda world, _: hidden.look(world.d.qpos, world.time)], max_time=60.0)
+    simulation.run([lambda state: hidden.look(state.observation.qpos, state.time)], max_time=60.0)
     assert simulation.world.delivered() == 3
     assert simulation.physical.figures().unintended_contacts == 0
     deep = [p.depth_mm for p in hidden.found()]

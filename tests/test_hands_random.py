@@ -72,7 +72,8 @@ def succeeds(project: Project, seed: int, units: int, jitter: float) -> None:
     request = RunRequest(units=units, seed=seed, jitter=jitter)
     simulation = Simulation(project.layout, request)
     hidden = HiddenPenetrations.of(simulation)
-    run = watched(simulation, [lambda world, _: hidden.look(world.d.qpos, world.time)], 600.0)
+    look = [lambda state: hidden.look(state.observation.qpos, state.time)]
+    run = watched(simulation, look, 600.0)
     assert run.succeeded, run.verdict.failures
     assert run.physics is not None
     assert (run.physics.grip_gap_max_mm or 0.0) < GRIP_MM

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from factory.mjcf.solid import drawn
+from factory.record.state import State
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.study.fidelity.hidden import HiddenPenetrations, overlaps_of
@@ -96,7 +97,7 @@ def test_parts_count_by_what_they_are_deeper_than_in_the_product() -> None:
     less, whole = HiddenPenetrations.of(simulation), HiddenPenetrations.of(simulation)
     whole = HiddenPenetrations(whole.replica.m, {})
 
-    def look(world: object, _: object) -> None:
+    def look(_: State) -> None:
         for hidden in (less, whole):
             hidden.look(simulation.physical.d.qpos, simulation.world.time)
 

@@ -13,6 +13,7 @@ from factory.geometry.product import product_geometry
 from factory.layout.embedding import lay_out
 from factory.layout.layout import Layout
 from factory.layout.sides import admissible, admitted
+from factory.record.state import State
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from tests.pag_texts import PAPER, compiled
@@ -35,7 +36,7 @@ def deepest(layout: Layout) -> float:
     parts = [m.geom(f"part/{o.label}#1").id for o in layout.factory.leaves]
     line, worst = np.zeros(6), [0.0]
 
-    def observe(world, supervisor) -> None:
+    def observe(_: State) -> None:
         for i, one in enumerate(parts):
             for other in parts[:i]:
                 worst.append(-mujoco.mj_geomDistance(m, d, one, other, 0.01, line))

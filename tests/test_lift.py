@@ -18,6 +18,7 @@ from factory.nets.verify import verify
 from factory.pipeline import all_templates
 from factory.plant.approaches import MARGIN
 from factory.plant.factory import Factory
+from factory.record.state import State
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
@@ -137,9 +138,9 @@ def test_it_is_lowered_only_when_all_others_stand() -> None:
     goals = np.array([layout.goal(last.index, s) for s in range(len(last.robots))])
     seen = []
 
-    def observe(world, supervisor) -> None:
-        if last.index in supervisor.active.operations:
-            x, _ = world.sense()
+    def observe(_: State) -> None:
+        if last.index in simulation.supervisor.active.operations:
+            x = simulation.world.sense()[0]
             away = np.abs(x[list(last.robots)] - goals).max()
             if x[len(factory.robots)] < factory.strokes[robot] - 1e-3:
                 seen.append(away)

@@ -126,7 +126,7 @@ def looked_into(layout: Layout, distributed: bool = False) -> tuple[Run, HiddenP
     asked = RunRequest(units=4, jitter=0.3, seed=1, distributed=distributed)
     simulation = Simulation(layout, asked)
     hidden = HiddenPenetrations.of(simulation)
-    look = [lambda world, _: hidden.look(world.d.qpos, world.time)]
+    look = [lambda state: hidden.look(state.observation.qpos, state.time)]
     return watched(simulation, look, 90.0), hidden
 
 

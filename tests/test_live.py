@@ -20,6 +20,7 @@ import pytest
 
 from factory.nets.replay import replay
 from factory.record.monitor import beside
+from factory.record.state import State
 from factory.show.live import Server, Session
 from factory.show.live.commands import FAULTS, KEYS, Command, command_of
 from factory.show.live.page import page, stage_of
@@ -125,10 +126,10 @@ def test_a_run_with_interventions_refines_the_net(pushed: bool) -> None:
     interventions, watcher = Interventions(simulation), beside(simulation)
     draw, ticks = np.random.default_rng(5), 0
 
-    def act(world: Any, supervisor: Any) -> None:
+    def act(state: State) -> None:
         nonlocal ticks
         ticks += 1
-        watcher.observe(world, supervisor)
+        watcher.observe(state)
         if ticks > 2500:
             for part in PARTS:
                 interventions.free(part)

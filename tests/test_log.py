@@ -19,6 +19,7 @@ from factory.record.log import MAGIC, Log, LogWriter, is_log, read_log
 from factory.record.log.blocks import HEAD, LENGTH, pack_rows, unpack_rows
 from factory.record.log.states import StoredRows
 from factory.record.monitor.record import watch_log
+from factory.record.state import State
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
@@ -37,9 +38,11 @@ class Witness:
 
     def __init__(self, simulation: Simulation) -> None:
         self.rows: list[tuple] = []
-        self.observe(simulation.world, simulation.supervisor)
+        self.simulation = simulation
+        self.observe(simulation.state())
 
-    def observe(self, world, supervisor) -> None:
+    def observe(self, _: State) -> None:
+        world, supervisor = self.simulation.physical, self.simulation.supervisor
         d, m = world.d, world.m
         on = [e for e in range(m.neq) if d.eq_active[e]]
         active = [(e, int(m.eq_obj1id[e]), int(m.eq_obj2id[e])) for e in on]
@@ -239,8 +242,8 @@ def test_a_log_that_cannot_be_written_is_refused(layout, tmp_path: Path) -> None
 def test_an_interrupted_run_leaves_a_closed_log(layout, tmp_path: Path) -> None:
     simulation = Simulation(layout, RunRequest("mujoco", units=1))
 
-    def interrupt(world, supervisor) -> None:
-        if world.time > 1.234:
+    def interrupt(state: State) -> None:
+        if state.time > 1.234:
             raise KeyboardInterrupt
 
     path = tmp_path / "cut"

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from factory.record.state import State
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from tests.fidelity import long_runs
@@ -35,9 +36,10 @@ def test_every_copy_is_somewhere_at_every_tick() -> None:
     simulation, seen = Simulation(layout(PAPER), RunRequest(units=4)), set()
     wrong: list[str] = []
 
-    def look(world, supervisor) -> None:
-        wrong.extend(long_runs.misplaced(world))
-        seen.update(h for holders in long_runs.whereabouts(world).values() for h in holders)
+    def look(_: State) -> None:
+        wrong.extend(long_runs.misplaced(simulation.world))
+        whereabouts = long_runs.whereabouts(simulation.world).values()
+        seen.update(h for holders in whereabouts for h in holders)
 
     simulation.run([look])
     assert wrong == []

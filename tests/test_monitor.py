@@ -24,8 +24,8 @@ from factory.record.log import Log, LogWriter, read_log
 from factory.record.monitor import MonitorSubject, Report, beside, subject_of
 from factory.record.monitor.explanation import SeenFirings
 from factory.record.monitor.motion import AxisMotion
-from factory.record.monitor.observation import Observation
 from factory.record.monitor.record import watch_log
+from factory.record.state import Observation
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
@@ -135,7 +135,7 @@ def test_setpoints_are_two_ticks_old_at_most_though_something_ends_in_every_tick
     it was before them, and then to leave from there."""
     simulation = Simulation(paper, RunRequest())
     monitor, tick = beside(simulation), simulation.request.settings.tick
-    first, drives = monitor.view.look().kept(), monitor.anatomy.drive
+    first, drives = simulation.state().observation.kept(), monitor.anatomy.drive
     for number in range(1, 9):
         ctrl = first.ctrl.copy()
         ctrl[drives] += 1e-3 * number

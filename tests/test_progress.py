@@ -34,7 +34,7 @@ class Terminal(io.StringIO):
 def watch(progress: Progress) -> None:
     with progress:
         for n in range(4):
-            progress.observe(SimpleNamespace(time=float(n), delivered=lambda n=n: n), None)
+            progress.observe(SimpleNamespace(time=float(n), made=n))
 
 
 @pytest.mark.parametrize("stream", [io.StringIO(), Terminal()])

@@ -6,7 +6,6 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +16,7 @@ from factory.layout.layout import Layout
 from factory.layout.machines import presences
 from factory.layout.presence import Presence
 from factory.pipeline import read
+from factory.record.state import Event, State
 from factory.simulation.mujoco.passing import Passing
 from factory.simulation.ordering import Ordering
 from factory.simulation.request import RunRequest
@@ -40,7 +40,8 @@ class CoordinatedGame:
     of a magazine as its slider comes down with another part. `faults`: what fired without being
     enabled, and where a robot was in none of its presences."""
 
-    def __init__(self, layout: Layout) -> None:
+    def __init__(self, simulation: Simulation) -> None:
+        self.simulation, layout = simulation, simulation.layout
         self.coordinated = coordinated(layout)
         self.layout, self.net, self.faults = layout, self.coordinated.net, list[str]()
         self.tokens = list(self.net.tokens)
@@ -54,12 +55,14 @@ class CoordinatedGame:
                 self.robots.setdefault(presence.robot, []).append(presence)
         self.seen, self.shown = 0, dict[str, int]()
 
-    def look(self, world: Any, supervisor: Any) -> None:
+    def look(self, state: State) -> None:
         """After a tick."""
+        world = self.simulation.physical
         x, _ = world.sense()
-        for event in supervisor.events[self.seen :]:
+        for event in state.events[self.seen :]:
+            assert isinstance(event, Event)
             self.fire(self.number[event.transition])
-        self.seen = len(supervisor.events)
+        self.seen = len(state.events)
         self.pass_on(x)
         shown = world.parts.feeders.shown()
         if self.shown:
@@ -120,7 +123,8 @@ def _within(x: float, span: tuple[float, float]) -> bool:
 def played(layout: Layout, seed: int, distributed: bool = False, ordered: bool = True) -> list[str]:
     """What is wrong in a run of three units, each robot with a speed of its own."""
     request = RunRequest(units=3, seed=seed, jitter=0.3, distributed=distributed)
-    simulation, game = Simulation(layout, request), CoordinatedGame(layout)
+    simulation = Simulation(layout, request)
+    game = CoordinatedGame(simulation)
     if not ordered:
         simulation.supervisor.ordering = Ordering()
     watched(simulation, [game.look], 600.0)

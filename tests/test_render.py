@@ -29,6 +29,7 @@ from factory.geometry.sight import Framing, fit, towards
 from factory.mjcf.mesh_files import corner_normals, face_normals, mesh_file
 from factory.record.log import LogWriter, read_log
 from factory.record.monitor.subject import subject_of_run
+from factory.record.state import State
 from factory.rendering import Film, Picture, Still, check_output, render_log
 from factory.rendering.camera import from_above, overview
 from factory.rendering.caption import Caption
@@ -170,8 +171,8 @@ def test_a_log_gives_the_same_pictures_as_its_run(taken, tmp_path: Path) -> None
 def test_an_interruption_leaves_a_film_of_what_was(layout, tmp_path: Path, error) -> None:
     simulation = Simulation(layout, RunRequest("mujoco", units=1))
 
-    def interrupt(world, supervisor) -> None:
-        if world.time >= 1.0:
+    def interrupt(state: State) -> None:
+        if state.time >= 1.0:
             raise error
 
     path = tmp_path / "cut.mp4"
@@ -337,7 +338,8 @@ def test_no_more_facets_are_drawn_than_are_seen(layout, tmp_path: Path) -> None:
     with all of that shows the same."""
     simulation = Simulation(layout, RunRequest("mujoco", units=1))
     subject = subject_of_run(simulation)
-    shown = Snapshot.of(simulation.world.m, simulation.world.d)
+    seen = simulation.state().observation
+    shown = Snapshot.of(seen.qpos, seen.welds)
     with Painter(simulation.world.m, (320, 180), "overview", subject) as painter:
         few, quality = painter.paint(shown), painter.replica.m.vis.quality
         assert (quality.numquads, quality.numstacks) == (1, 2)

@@ -15,6 +15,7 @@ from factory.pipeline import all_templates
 from factory.record.log import Log, LogWriter, read_log
 from factory.record.monitor.record import recorded_subject
 from factory.record.monitor.subject import subject_of_run
+from factory.record.state import State
 from factory.rendering import Film, Picture, Still, camera_named, panels_named, render_log
 from factory.rendering.camerawork import Moment
 from factory.rendering.caption import FADES, SHOWN, draw_title, strength
@@ -262,9 +263,10 @@ def test_the_product_followed_is_the_same_when_parts_become_one_body(tmp_path: P
         followed = Followed(simulation.world.m, subject_of_run(simulation))
         track: list[np.ndarray] = []
 
-        def look(world, supervisor, followed=followed, track=track) -> None:
-            seen = followed.furthest(world.d, Snapshot.of(world.m, world.d))
-            track.append(np.full(3, np.nan) if seen is None else followed.origin(world.d, seen[0]))
+        def look(state: State, d=simulation.world.d, followed=followed, track=track) -> None:
+            now = state.observation
+            seen = followed.furthest(d, Snapshot.of(now.qpos, now.welds))
+            track.append(np.full(3, np.nan) if seen is None else followed.origin(d, seen[0]))
 
         simulation.run([look])
         found.append((np.array(track), simulation, followed))
@@ -282,8 +284,9 @@ def test_a_part_is_followed_from_its_feeder_to_the_dropoff(fuse: bool) -> None:
     followed = Followed(simulation.world.m, subject_of_run(simulation), "part1")
     ranks, labels = [], []
 
-    def look(world, supervisor) -> None:
-        seen = followed.furthest(world.d, Snapshot.of(world.m, world.d))
+    def look(state: State) -> None:
+        now = state.observation
+        seen = followed.furthest(simulation.world.d, Snapshot.of(now.qpos, now.welds))
         if seen is not None:
             ranks.append(seen[1])
             labels.append(followed.labels[seen[0]])
@@ -493,7 +496,7 @@ def test_a_still_of_a_time_that_does_not_come_is_not_written(tmp_path: Path) -> 
     """What went wrong is told, not that the time did not come."""
     simulation = Simulation(laid_out("paper"), RunRequest("mujoco", units=1))
 
-    def fail(world, supervisor) -> None:
+    def fail(_: State) -> None:
         raise RuntimeError
 
     with pytest.raises(RuntimeError), Still(simulation, tmp_path / "a.png", at=1.0) as still:

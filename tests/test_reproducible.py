@@ -31,8 +31,8 @@ import sys
 from factory.record.log import LogWriter
 from tests.simulation_values import reproduced
 made = reproduced(1000000)
-def tell(world, supervisor):
-    print(world.time, flush=True)
+def tell(state):
+    print(state.time, flush=True)
 with LogWriter(sys.argv[1], made, command=["factory"]) as log:
     made.run([log.observe, tell])
 """

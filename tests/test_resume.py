@@ -20,6 +20,7 @@ from factory.record.log.blocks import Arrays, pack_rows, unpack_rows
 from factory.record.log.continued import Continued, last_full
 from factory.record.log.reader import header_in
 from factory.record.log.writer import rows_of_a_block
+from factory.record.state import State
 from factory.simulation.request import RunRequest
 from factory.simulation.resuming import Resumed
 from factory.simulation.simulation import Compiled, Simulation, compiled
@@ -304,9 +305,9 @@ def test_an_interruption_before_it_goes_on_leaves_the_log(
     log = cut(whole, tmp_path / "run.log", whole.stat().st_size * 3 // 4)
     before, seen, observe = log.read_bytes(), list[float](), Continued.observe
 
-    def stopped(recorder: Continued, world: Any, supervisor: Any) -> None:
-        observe(recorder, world, supervisor)
-        seen.append(world.time)
+    def stopped(recorder: Continued, state: State) -> None:
+        observe(recorder, state)
+        seen.append(state.time)
         if len(seen) == 20:
             raise KeyboardInterrupt
 

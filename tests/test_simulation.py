@@ -15,9 +15,10 @@ from factory.nets.history import firings, legal_marking
 from factory.nets.replay import replay
 from factory.pipeline import all_templates
 from factory.plant.programs import program_of, write_program
+from factory.record.state import Event
 from factory.simulation.distributed import DistributedSupervisor
 from factory.simulation.request import RunRequest
-from factory.simulation.run import Event, busy_times
+from factory.simulation.run import busy_times
 from factory.simulation.simulation import Simulation
 from factory.support.settings import Settings
 from tests.bench.factories import laid_out as floor_of

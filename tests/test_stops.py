@@ -15,6 +15,7 @@ from factory.mjcf import names
 from factory.mjcf.scene import SHOE
 from factory.mjcf.stops import OVERLOAD
 from factory.mjcf.timestep import timed
+from factory.record.state import State
 from factory.simulation.modelling import physical_model
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
@@ -166,8 +167,8 @@ def test_nothing_of_a_run_meets_one() -> None:
     simulation, limits = at_rest("chest", 0.01), int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT)
     touched = []
 
-    def observe(world: Any, _: Any) -> None:
-        touched.append(int(np.count_nonzero(world.d.efc_type == limits)))
+    def observe(_: State) -> None:
+        touched.append(int(np.count_nonzero(simulation.physical.d.efc_type == limits)))
 
     run = simulation.run([observe])
     assert run.trouble is None

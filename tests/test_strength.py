@@ -25,6 +25,7 @@ from factory.layout.request import Ground
 from factory.mjcf import names
 from factory.record.log import read_log
 from factory.record.monitor.record import verdict_on, watch_log
+from factory.record.state import State
 from factory.show.live import Session
 from factory.show.live.commands import Command
 from factory.simulation.disturbance import Mass, disturb
@@ -299,8 +300,8 @@ def test_what_is_dropped_falls_and_nothing_fires_any_more() -> None:
     world, seen = simulation.physical, list[tuple[float, float, int]]()
     body = world.m.body(names.part("holder", 1)).id
 
-    def look(world: Any, supervisor: Any) -> None:
-        seen.append((world.time, float(world.d.xpos[body, 2]), len(supervisor.events)))
+    def look(state: State) -> None:
+        seen.append((state.time, float(world.d.xpos[body, 2]), len(state.events)))
 
     run = simulation.run([look])
     assert run.trouble is not None and world.dropped is not None
@@ -332,7 +333,7 @@ def test_a_live_view_says_what_was_dropped(monkeypatch: pytest.MonkeyPatch) -> N
     session = Session(lambda: ready("paper", units=10**9))
     session.send(Command("speed", factor=0.0))
 
-    def observe(world: Any, supervisor: Any) -> None:
+    def observe(_: State) -> None:
         if session.frame.note:
             raise Stopped
 

@@ -23,6 +23,7 @@ from factory.layout.request import Ground
 from factory.mjcf import timestep
 from factory.mjcf.timestep import ALLOWED, FRICTION, STEPS, USUAL, predicted_error, timed
 from factory.problem.pag import PAG, Parameter
+from factory.record.state import State
 from factory.simulation.modelling import physical_model
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
@@ -89,7 +90,7 @@ def measured(
     world, worst = simulation.physical, [0.0]
     qpos, control = world.motion.axes.qpos, world.motion.drives.control
 
-    def observe(*_: Any) -> None:
+    def observe(_: State) -> None:
         error = np.abs(world.d.qpos[qpos] - world.d.ctrl[control])
         worst[0] = max(worst[0], float(error.max()))
 

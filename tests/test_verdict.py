@@ -172,7 +172,7 @@ def test_a_monitor_of_a_run_looks_where_operations_end(paper: Layout) -> None:
     monitor, run = beside(simulation), simulation.run
     see = monitor.see
     monitor.see = lambda seen, thorough: (looks.append(seen.at_end), see(seen, thorough))[1]  # type: ignore[assignment, func-returns-value]
-    done = run(glances=[monitor.glance, lambda world, supervisor: glances.append(world.time)])
+    done = run(glances=[monitor.glance, lambda state: glances.append(state.time)])
     report = monitor.report(done.events)
     assert report.refines_net
     ticks = done.sim_time_s / simulation.request.settings.tick

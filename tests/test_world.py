@@ -83,7 +83,7 @@ def test_a_closed_gate_keeps_an_operation_from_starting(name: Name, distributed:
 
     world.hooks.gates.append(gate)
     world.hooks.gates.append(lambda *_: True)
-    simulation.run([lambda world, _: setattr(world, "supplied", True)], max_time=30.0)
+    simulation.run([lambda _: setattr(world, "supplied", True)], max_time=30.0)
     starts = [e.t for e in simulation.supervisor.events if e.transition == "part1_s"]
     others = [e.t for e in simulation.supervisor.events if e.transition == "part2_s"]
     assert starts[0] < 1.0 and starts[1] == pytest.approx(9.0, abs=0.05)

@@ -43,10 +43,11 @@ from factory.support.progress import Progress, Waiting
 if TYPE_CHECKING:
     from factory.pipeline import Project
     from factory.plant.factory import Factory
-    from factory.record.observed import Recorder
+    from factory.record.figures import PhysicsFigures
+    from factory.record.state import Recorder
     from factory.rendering import Film
     from factory.simulation.resuming import Resumed
-    from factory.simulation.run import PhysicsFigures, Run
+    from factory.simulation.run import Run
     from factory.simulation.simulation import Simulation
 
     Filming = Callable[[Simulation], Film]

@@ -10,6 +10,9 @@ from factory.support.engine import mujoco, unwarned
 from factory.support.errors import Diagnostic, InputError
 from factory.support.interruption import awaited
 
+EngineModel = mujoco.MjModel
+"""The type of the engine's models."""
+
 MANY = 20_000
 """A model of more geoms is read in pieces."""
 

@@ -4,7 +4,7 @@ pictures as those of its run."""
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from factory.mjcf.model import product_name
 from factory.nets.undone import Undone
@@ -12,7 +12,7 @@ from factory.record.log import Log
 from factory.record.log.model import model_of
 from factory.record.monitor.record import recorded_subject
 from factory.record.monitor.subject import subject_of_run
-from factory.record.observed import Recorder
+from factory.record.state import Recorder, State
 from factory.rendering.camerawork import Moment, Take, When, past_the_end, pictureless
 from factory.rendering.history import TIE, History
 from factory.rendering.picture import USUAL, Picture
@@ -30,23 +30,23 @@ class _Observer(Recorder):
     def __init__(self, simulation: Simulation, picture: Picture) -> None:
         if simulation.model is None:
             raise pictureless()
-        self.simulation, factory = simulation, simulation.layout.factory
+        factory = simulation.layout.factory
         picture.check(factory.pag)
         subject = subject_of_run(simulation)
         m, self.history = simulation.physical.m, History(subject)
         name, units = product_name(factory), simulation.request.units
         self.take = Take(m, subject, name, units, picture, self.history)
-        self.last = self._moment()
+        self.last = self._moment(simulation.state())
 
-    def _moment(self) -> Moment:
-        world, history = self.simulation.physical, self.history
-        for event in self.simulation.supervisor.events[history.taken :]:
+    def _moment(self, state: State) -> Moment:
+        history, account = self.history, state.account
+        for event in state.events[history.taken :]:
             history.add(event.t, event if isinstance(event, Undone) else event.transition)
-        if (account := world.hooks.account) is not None:
+        if account is not None:
             history.failings += account.found[len(history.failings) :]
             history.stand(account.stood)
-        made = world.delivered() - self.simulation.before
-        return Moment(world.time, made, Snapshot.of(world.m, world.d))
+        seen = state.observation
+        return Moment(state.time, state.made, Snapshot.of(seen.qpos.copy(), seen.welds))
 
 
 class Film(_Observer):
@@ -78,9 +78,9 @@ class Film(_Observer):
         """Frames taken."""
         return self.reel.frames
 
-    def observe(self, world: Any, supervisor: Any) -> None:
+    def observe(self, state: State) -> None:
         """Take the frames that are due."""
-        self.reel.until(self._moment())
+        self.reel.until(self._moment(state))
 
     def close(self) -> None:
         """Finish the file, and write the poster."""
@@ -105,12 +105,12 @@ class Still(_Observer):
         super().__init__(simulation, picture)
         self.path, self.at, self.held = Path(path), at, False
 
-    def observe(self, world: Any, supervisor: Any) -> None:
+    def observe(self, state: State) -> None:
         """Keep the state if the picture may be of it."""
         if self.at != "end" and self._has_come:
             return
-        now = self._moment()
-        holds = held(world.m, now.shown)
+        now = self._moment(state)
+        holds = held(self.take.m, now.shown)
         follows = self.take.picture.camera == "product"
         if self.at != "end" or not follows or holds or not self.held:
             self.last, self.held = now, self.held or holds
@@ -174,8 +174,7 @@ def take_of(log: Log, picture: Picture) -> Take:
 
 def moment_of(log: Log, row: int) -> Moment:
     """The state in a row of a log."""
-    active = log.active[row]
-    shown = Snapshot(log.qpos[row], active[:, 0], active[:, 2])
+    shown = Snapshot.of(log.qpos[row], log.active[row])
     return Moment(float(log.time[row]), int(log.delivered[row]), shown)
 
 

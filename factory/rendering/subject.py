@@ -26,10 +26,9 @@ class Snapshot:
     body2: NDArray[np.int32]
 
     @classmethod
-    def of(cls, m: mujoco.MjModel, d: mujoco.MjData) -> Snapshot:
-        """The present state of a running model."""
-        active = np.flatnonzero(d.eq_active).astype(np.int32)
-        return cls(d.qpos.copy(), active, m.eq_obj2id[active].copy())
+    def of(cls, qpos: Array, welds: NDArray[np.integer]) -> Snapshot:
+        """That of positions and active constraints (k, 3), as of an `Observation`."""
+        return cls(qpos, *welds[:, [0, 2]].T.astype(np.int32))
 
 
 def corners(m: mujoco.MjModel, geom: int) -> Array:

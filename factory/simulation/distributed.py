@@ -21,10 +21,10 @@ from factory.control.navigation import Bundle
 from factory.modes.staging import HeadStart
 from factory.plant.factory import Factory, Operation
 from factory.plant.programs import Program, ProgramStep, program_of
+from factory.record.state import Event
 from factory.simulation.bundles import Bundles
 from factory.simulation.cells import Cells, Link
 from factory.simulation.ordering import Ordering
-from factory.simulation.run import Event
 from factory.simulation.supervisor import Active
 from factory.simulation.world import Job, World
 

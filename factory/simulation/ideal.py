@@ -12,8 +12,9 @@ from factory.control.navigation import Bundle
 from factory.layout.layout import Layout
 from factory.nets.coordinated import Past
 from factory.plant.factory import Operation
+from factory.record.figures import PhysicsFigures
+from factory.record.state import Observation
 from factory.simulation.request import RunRequest
-from factory.simulation.run import PhysicsFigures
 from factory.simulation.world import Hooks, Job
 
 
@@ -22,6 +23,7 @@ class IdealWorld:
     touch."""
 
     lacking: Container[str] = ()
+    _nothing = np.empty(0), np.empty((0, 3), np.intp)
 
     def __init__(
         self, layout: Layout, request: RunRequest, start: Array, counts: Mapping[int, int]
@@ -38,6 +40,10 @@ class IdealWorld:
     def sense(self) -> tuple[Array, Array]:
         """Positions; speeds count as zero, since ẋ = F has no inertia."""
         return self.hooks.sensed(self.x, self.v)
+
+    def observe(self, at_end: bool = False) -> Observation:
+        """Positions and speeds of all axes."""
+        return Observation(self.time, self.x, self.v, *self._nothing, at_end)
 
     def prepared(self, operation: Operation, unit: int) -> bool:
         """A feeder gives a part for every unit asked for, and that may be let in."""

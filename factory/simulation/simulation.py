@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from factory.control.mode import Limits, Mode
 from factory.layout.layout import Layout
@@ -18,6 +18,8 @@ from factory.nets.history import firings
 from factory.nets.petri import Marking
 from factory.nets.replay import replay
 from factory.plant.material import joins_of
+from factory.record.figures import PhysicsFigures
+from factory.record.state import Observer, State
 from factory.simulation.distributed import DistributedSupervisor
 from factory.simulation.ideal import IdealWorld
 from factory.simulation.modelling import modelled
@@ -34,12 +36,9 @@ from factory.timing.timed import timed as timed_net
 from factory.timing.timing import Timing
 
 if TYPE_CHECKING:
+    from factory.mjcf.loading import EngineModel
     from factory.mjcf.model import Model
     from factory.simulation.mujoco.world import MujocoWorld
-
-Observer = Callable[[Any, Any], None]
-"""Called after every tick with the world and the supervisor: to render, to log, to show
-progress."""
 
 PATIENCE = 10.0
 """A run has stalled when nothing fires for this many times the longest predicted delay."""
@@ -59,7 +58,7 @@ class Compiled:
 
     modes: tuple[Mode, ...]
     model: Model | None = None
-    loaded: Any = None
+    loaded: EngineModel | None = None
 
 
 class Simulation:
@@ -106,6 +105,7 @@ class Simulation:
             loaded = compiled.loaded if compiled else None
             at = start_positions(layout, self.start)
             self.world = MujocoWorld(self.model, request, at, gains, self.counts, loaded)
+        self.world.hooks.state = self.state
         self.before = self.world.delivered()
         self.supervisor = (self._distributed if request.distributed else self._central)(stages)
         self.supervisor.ordering = Ordering(self.timing.coordinated.orders)
@@ -175,6 +175,26 @@ class Simulation:
         assert isinstance(self.world, MujocoWorld), "the ideal world has no bodies"
         return self.world
 
+    @property
+    def engine(self) -> EngineModel | None:
+        """The engine's model; None in the ideal world."""
+        return None if self.model is None else self.physical.m
+
+    @property
+    def at_ends(self) -> list[Observer]:
+        """Observers that are shown the state in which operations have ended."""
+        return self.world.hooks.ended
+
+    def state(self, at_end: bool = False) -> State:
+        """The state of now; `at_end`: as operations have ended."""
+        world, supervisor = self.world, self.supervisor
+        made, seen = world.delivered() - self.before, world.observe(at_end)
+        return State(seen, supervisor.marked, made, supervisor.events, world.hooks.account)
+
+    def figures(self) -> PhysicsFigures | None:
+        """The figures of the bodies so far; None in the ideal world."""
+        return self.world.figures()
+
     def limit(self, limits: Limits) -> None:
         """From now on axes have these limits."""
         self.limits = limits
@@ -215,8 +235,9 @@ class Simulation:
                 act()
             if observers or glances:
                 pause = perf_counter()
+                state = self.state()
                 for observe in (*observers, *glances):
-                    observe(world, supervisor)
+                    observe(state)
                 watched += perf_counter() - pause
             trouble = self.ends(max_time)
         watched += world.hooks.ended_time
@@ -248,7 +269,7 @@ class Simulation:
 
     def _record(self, wall: float, time: float, trouble: Diagnostic | None) -> Run:
         supervisor, world, factory = self.supervisor, self.world, self.layout.factory
-        request, physics, figures = self.request, world.physics_time, world.figures()
+        request, physics, figures = self.request, world.physics_time, self.figures()
         predicted = self.cycle
         entries = entries_of(supervisor.events)
         exchanges = tuple(world.hooks.account.exchanges) if world.hooks.account else ()

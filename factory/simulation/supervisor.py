@@ -20,9 +20,9 @@ from factory.nets.threaded import Threads
 from factory.nets.undo import marking_after
 from factory.nets.undone import Undone
 from factory.plant.factory import Factory, Operation
+from factory.record.state import Event
 from factory.simulation.bundles import Bundles
 from factory.simulation.ordering import Ordering
-from factory.simulation.run import Event
 from factory.simulation.world import World
 
 

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from factory.record.monitor import beside
+from factory.record.state import Observer
 from factory.simulation.run import Run
-from factory.simulation.simulation import Observer, Simulation
+from factory.simulation.simulation import Simulation
 
 
 def watched(

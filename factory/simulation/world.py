@@ -12,7 +12,8 @@ from factory.control.navigation import Bundle
 from factory.nets.coordinated import Past
 from factory.plant.factory import Operation
 from factory.record.failures import Account
-from factory.simulation.run import PhysicsFigures
+from factory.record.figures import PhysicsFigures
+from factory.record.state import Observation, Observer, State
 from factory.support.errors import Diagnostic
 
 Job = tuple[Operation, int]
@@ -25,10 +26,11 @@ class Hooks:
 
     `before_step`: called before every timestep. `sensors`: from positions [m] and speeds [m/s] of
     all axes to what is sensed. `gates`: an operation may start only where all say so; `judges`: it
-    may end only where all do. `ticks`: called after every tick. `ended`: called when operations
-    have ended and parts have changed hands, before the world goes on, to look at it; `ended_time`
-    [s]: what that took. `trouble`: what ends the run, if anything does; `busy` [s]: until when it
-    is no stall that nothing fires. `account`: what a run that goes on after failures tells of them.
+    may end only where all do. `ticks`: called after every tick. `ended`: shown the `state` in
+    which operations have ended and parts have changed hands, before the world goes on;
+    `ended_time` [s]: what that took. `trouble`: what ends the run, if anything does; `busy` [s]:
+    until when it is no stall that nothing fires. `account`: what a run that goes on after failures
+    tells of them.
     """
 
     before_step: list[Callable[[], None]] = field(default_factory=list)
@@ -36,7 +38,8 @@ class Hooks:
     gates: list[Callable[[Operation, int], bool]] = field(default_factory=list)
     judges: list[Callable[[Operation, int], bool]] = field(default_factory=list)
     ticks: list[Callable[[], None]] = field(default_factory=list)
-    ended: list[Callable[[], None]] = field(default_factory=list)
+    ended: list[Observer] = field(default_factory=list)
+    state: Callable[[bool], State] | None = None
     ended_time: float = 0.0
     trouble: Diagnostic | None = None
     busy: float = 0.0
@@ -59,8 +62,10 @@ class Hooks:
     def tell_ended(self) -> None:
         """Operations have ended."""
         begin = perf_counter()
-        for look in self.ended:
-            look()
+        if self.ended and self.state is not None:
+            state = self.state(True)
+            for look in self.ended:
+                look(state)
         self.ended_time += perf_counter() - begin
 
 
@@ -105,6 +110,9 @@ class World(Protocol):
     def sense(self) -> tuple[Array, Array]:
         """Positions x [m] and speeds [m/s] of all axes: in arc length of all carriages, then the
         heights of all lifts."""
+
+    def observe(self, at_end: bool = False) -> Observation:
+        """What can be measured of it now; `at_end`: as operations have ended."""
 
     def prepared(self, operation: Operation, unit: int) -> bool:
         """Whether the world is in the domain of an operation's mode as far as parts go: a feeder

@@ -124,7 +124,7 @@ class Interruption(Closing):
         for number, handler in self._before.items():
             signal.signal(number, handler)
 
-    def observe(self, world: Any, supervisor: Any) -> None:
+    def observe(self, state: object = None) -> None:
         """Raise a noted interruption, at the end of a tick."""
         if self.noted:
             raise KeyboardInterrupt

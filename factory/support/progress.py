@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 from threading import Event, Thread
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Protocol, Self
 
 from factory.support.resource import Closing
 
@@ -22,6 +22,15 @@ PERIOD = 0.1
 
 LINES = 30.0
 """Time between two lines where stderr is no terminal [s]."""
+
+
+class Counted(Protocol):
+    """How far a run has come: to a `time` [s], with `made` units."""
+
+    @property
+    def time(self) -> float: ...
+    @property
+    def made(self) -> int: ...
 
 
 class ProgressBar(Closing):
@@ -134,7 +143,6 @@ class Progress(ProgressBar):
         super().__init__(quiet)
         self.units, self.seconds = units, seconds
         self.last = 0.0
-        self.before: int | None = None
 
     def drawn(self) -> tuple[Bar, TaskID]:
         """Simulated time before the bar, units and speed behind."""
@@ -146,27 +154,24 @@ class Progress(ProgressBar):
         units, total = f"0/{self.units}", self.seconds or None
         return bar, bar.add_task("", total=total, time="0.0 s", units=units, speed="")
 
-    def observe(self, world: Any, supervisor: Any) -> None:
+    def observe(self, state: Counted) -> None:
         """Update the bar, or write a line, at most once a period."""
         if self.bar is None and not self.told:
             return
-        if self.before is None:
-            self.before = int(world.delivered())
-        wall = perf_counter() - self.begin
-        made = int(world.delivered()) - self.before
+        wall, made = perf_counter() - self.begin, state.made
         is_due = wall >= self.last + (LINES if self.bar is None else PERIOD)
         if self.bar is None:
             if is_due:
                 self.last = wall
-                print(self._line(made, world.time, wall), file=sys.stderr)
+                print(self._line(made, state.time, wall), file=sys.stderr)
         elif is_due or made >= self.units:
             self.last = wall
             self.bar.update(
                 self.task,
-                completed=self.seconds if made >= self.units else min(world.time, self.seconds),
-                time=f"{world.time:.1f} s",
+                completed=self.seconds if made >= self.units else min(state.time, self.seconds),
+                time=f"{state.time:.1f} s",
                 units=f"{made}/{self.units}",
-                speed=f"{world.time / max(wall, 1e-9):.1f} x real time",
+                speed=f"{state.time / max(wall, 1e-9):.1f} x real time",
             )
 
     def _line(self, made: int, time: float, wall: float) -> str:

@@ -59,7 +59,8 @@ def recorded(simulation: Simulation, frames: int) -> list[Moment]:
     start = world.time
     for number in range(frames):
         run_until(simulation, start + number / FPS)
-        found.append(Moment(number / FPS, 0, Snapshot.of(world.m, world.d)))
+        seen = world.observe().kept()
+        found.append(Moment(number / FPS, 0, Snapshot.of(seen.qpos, seen.welds)))
     return found
 
 

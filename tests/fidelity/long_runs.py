@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from factory.mjcf import names
+from factory.record.state import State
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from tests.fidelity.products import PAPER, REAL, layout
@@ -53,8 +54,9 @@ class Diary:
     lost: list[str] = field(default_factory=list)
     seen: int = 0
 
-    def observe(self, world: Any, supervisor: Any) -> None:
+    def observe(self, _: State) -> None:
         """After a tick; the worst figures of the inspection begin anew with each dropoff."""
+        world = self.simulation.physical
         if len(world.dropoffs) == self.seen:
             return
         self.seen = len(world.dropoffs)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from io import FileIO
-from typing import Any
 
 from factory.nets.undone import Entry, Undone
 from factory.record.log.blocks import blocks
 from factory.record.log.reader import Log, header_in
 from factory.record.log.writer import LogWriter
-from factory.record.observed import Observed, Recorder
+from factory.record.state import Event, Recordable, Recorder, State
 from factory.support.errors import Diagnostic, InputError
 from factory.support.files import AGAIN
 
@@ -42,7 +42,7 @@ class Continued(Recorder):
     """
 
     def __init__(
-        self, simulation: Observed, log: Log, file: FileIO, end: int, since: float
+        self, simulation: Recordable, log: Log, file: FileIO, end: int, since: float
     ) -> None:
         self.simulation, self.log, self.file, self.since = simulation, log, file, since
         self.writer: LogWriter | None = None
@@ -55,19 +55,19 @@ class Continued(Recorder):
         self.file.seek(self._end)
         self.writer = LogWriter(str(self.file.name), self.simulation, going_on=self.file)
 
-    def observe(self, world: Any, supervisor: Any) -> None:
+    def observe(self, state: State) -> None:
         """Compare a state, or write it on."""
         if self.writer is not None:
-            self.writer.observe(world, supervisor)
+            self.writer.observe(state)
             return
-        is_there = world.time >= self.since
-        if len(supervisor.events) > self._seen or is_there:
-            self._compare_events(world.time, supervisor.events)
-            self._compare_state(world)
+        is_there = state.time >= self.since
+        if len(state.events) > self._seen or is_there:
+            self._compare_events(state.time, state.events)
+            self._compare_state(state)
         if is_there:
             self._write_on()
 
-    def _compare_events(self, time: float, events: list[Any]) -> None:
+    def _compare_events(self, time: float, events: Sequence[Event | Undone]) -> None:
         logged, begin = self.log.timed_entries, self._seen
         self._seen = len(events)
         for number, event in enumerate(events[begin:], start=begin):
@@ -78,18 +78,17 @@ class Continued(Recorder):
         if self._seen < len(logged) and logged[self._seen][0] < time:
             raise self._another(time, _fired(logged[self._seen]), "no such event")
 
-    def _compare_state(self, world: Any) -> None:
-        log, row = self.log, self.log.row_at(world.time)
-        if row == len(log) or log.time[row] != world.time:
-            raise self._another(world.time, "no state of that time", "one")
-        made, products = world.delivered() - self.simulation.before, int(log.delivered[row])
-        if made != products:
-            raise self._another(world.time, f"{products} products", f"{made}")
-        now = world.x if self.simulation.model is None else world.d.qpos
+    def _compare_state(self, state: State) -> None:
+        log, row, time = self.log, self.log.row_at(state.time), state.time
+        if row == len(log) or log.time[row] != time:
+            raise self._another(time, "no state of that time", "one")
+        if state.made != (products := int(log.delivered[row])):
+            raise self._another(time, f"{products} products", f"{state.made}")
+        now = state.observation.qpos
         if (other := now != log.qpos[row]).any():
             at = int(other.argmax())
             words = f"{log.qpos[row][at]!r} at position {at}", f"{now[at]!r}"
-            raise self._another(world.time, *words)
+            raise self._another(time, *words)
 
     def _another(self, time: float, logged: str, again: str) -> InputError:
         """The error of a run that is not as logged."""

@@ -21,10 +21,9 @@ from factory.pipeline import Project
 from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, block, pack_rows
 from factory.record.log.failed import Written
 from factory.record.log.states import STATES
-from factory.record.monitor.observation import EngineView
 from factory.record.monitor.subject import subject_of_run
-from factory.record.observed import Observed, Recorder
 from factory.record.project_table import project_table
+from factory.record.state import Array, Event, Observation, Recordable, Recorder, State
 from factory.record.verdict import kept_figures
 from factory.support.claim import claimed
 from factory.support.errors import Diagnostic, FactoryError, InputError
@@ -93,34 +92,28 @@ class LogWriter(Recorder):
     def __init__(
         self,
         path: Path | str,
-        simulation: Observed,
+        simulation: Recordable,
         project: Project | None = None,
         command: Sequence[str] | None = None,
         going_on: FileIO | None = None,
     ) -> None:
-        self.path, self.world, self.supervisor = Path(path), simulation.world, simulation.supervisor
-        self.view = EngineView(self.world.m, self.world.d) if simulation.model else None
-        self.before = int(simulation.before)
+        self.path, self.simulation, now = Path(path), simulation, simulation.state()
         net = simulation.layout.factory.net.threaded
         self.numbers = {t.name: n for n, t in enumerate(net.transitions)}
         self.most = rows_of_a_block(simulation.request.settings.tick)
-        self.ticks, self.written = _Ticks(), Written(len(self.supervisor.events))
-        if going_on is not None and self.world.time:
-            self.written.complete(self.world.hooks.account)
+        self.ticks, self.written = _Ticks(), Written(len(now.events))
+        if going_on is not None and now.time:
+            self.written.complete(now.account)
         self.trouble: Diagnostic | None = None
-        self.file = self._begun(simulation, project, command) if going_on is None else going_on
-        if going_on is None or not self.world.time:
-            self.observe(self.world, self.supervisor)
-        if self.view is not None:
-            self.world.hooks.ended.append(self.ended)
+        self.file = self._begun(now, project, command) if going_on is None else going_on
+        if going_on is None or not now.time:
+            self.observe(now)
+        simulation.at_ends.append(self.ended)
 
-    def _begun(
-        self, simulation: Observed, project: Project | None, command: Sequence[str] | None
-    ) -> FileIO:
+    def _begun(self, now: State, project: Project | None, command: Sequence[str] | None) -> FileIO:
         """The file, with its header and the model."""
-        sizes = [len(values) for values in self._state()[:2]]
-        header = json.dumps(_header(simulation, project, command, *sizes)).encode()
-        content = MAGIC + LENGTH.pack(len(header)) + header + _model(simulation)
+        header = json.dumps(_header(self.simulation, now, project, command)).encode()
+        content = MAGIC + LENGTH.pack(len(header)) + header + _model(self.simulation)
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             file = self.file = claimed(self.path)
@@ -135,49 +128,48 @@ class LogWriter(Recorder):
             raise
         return file
 
-    def ended(self) -> None:
+    def ended(self, state: State) -> None:
         """Record the state in which operations have ended, before the engine continues."""
         if not self.file.closed:
             self.ticks.ended.append(len(self.ticks.time))
-            self._record(self.world, self.supervisor)
+            self._record(state)
 
-    def observe(self, world: Any, supervisor: Any) -> None:
-        self._record(world, supervisor)
+    def observe(self, state: State) -> None:
+        self._record(state)
         if len(self.ticks.time) >= self.most:
             self.flush()
 
-    def _record(self, world: Any, supervisor: Any) -> None:
+    def _record(self, state: State) -> None:
         """A row of the log."""
-        ticks, row = self.ticks, len(self.ticks.time)
-        ticks.time.append(world.time)
-        ticks.delivered.append(world.delivered() - self.before)
-        ticks.states.append(self._state())
-        marked = bytes(supervisor.marked)
+        ticks, row, seen = self.ticks, len(self.ticks.time), state.observation
+        ticks.time.append(seen.time)
+        ticks.delivered.append(state.made)
+        ticks.states.append(_rounded(seen))
+        marked = bytes(state.marked)
         if marked != ticks.marked:
             ticks.marked = marked
             ticks.markings.append((row, np.flatnonzero(np.frombuffer(marked, "u1"))))
-        if self.view is not None:
-            welds, contact = self.view.welds(), self.view.d.contact
-            if welds is not ticks.welds:
-                ticks.welds = welds
-                ticks.active.append((row, welds))
-            if self.view.d.ncon:
-                ticks.contacts.append((row, contact.geom.copy(), contact.dist.copy()))
+        if seen.welds is not ticks.welds:
+            ticks.welds = seen.welds
+            ticks.active.append((row, seen.welds))
+        if seen.contacts is not None:
+            geoms, distances = seen.contacts
+            ticks.contacts.append((row, geoms.copy(), distances.copy()))
         for number, event in enumerate(
-            supervisor.events[self.written.events :], start=self.written.events
+            state.events[self.written.events :], start=self.written.events
         ):
             if isinstance(event, Undone):
-                before = sum(not isinstance(e, Undone) for e in supervisor.events[:number])
+                before = sum(isinstance(e, Event) for e in state.events[:number])
                 ticks.undone.append(table_of((before, event)))
                 continue
             ticks.fired.append((row, self.numbers[event.transition], event.t))
-        self.written.events = len(supervisor.events)
+        self.written.events = len(state.events)
 
     def flush(self) -> None:
         """Write the ticks since the last block."""
         ticks, self.ticks = self.ticks, _Ticks()
         if ticks.time:
-            news = self.written.news(self.world.hooks.account)
+            news = self.written.news(self.simulation.state().account)
             failures = {"failures": np.frombuffer(news, "u1")} if news else {}
             self._append(block(b"T", {**ticks.arrays(), **failures}))
 
@@ -209,9 +201,9 @@ class LogWriter(Recorder):
         texts = {}
         if self.trouble is not None:
             texts = {"code": self.trouble.code, "message": self.trouble.message}
-        if (figures := self.world.figures()) is not None:
+        if (figures := self.simulation.figures()) is not None:
             texts["figures"] = json.dumps(kept_figures(figures))
-        if (account := self.world.hooks.account) is not None:
+        if (account := self.simulation.state().account) is not None:
             texts["failures"] = json.dumps(table_of(account.report()))
         return {name: _text(text) for name, text in texts.items()}
 
@@ -226,17 +218,19 @@ class LogWriter(Recorder):
                 self.file.truncate(self.file.seek(len(left) - len(content), SEEK_CUR))
             raise unwritten(self.path, error) from error
 
-    def _state(self) -> tuple[NDArray[np.float64], ...]:
-        if self.view is None:
-            return self.world.x.copy(), self.world.v.copy()
-        d = self.view.d
-        return d.qpos.copy(), _coarse(d.qvel), _coarse(d.ctrl)
-
 
 def rows_of_a_block(tick: float) -> int:
     """Least number of rows of a block, except the last of a run: about a simulated second, in
     ticks of this duration [s]."""
     return max(1, round(1.0 / tick))
+
+
+def _rounded(seen: Observation) -> tuple[Array, ...]:
+    """A state as a log keeps it. In the ideal world there are no setpoints, and speeds are kept to
+    the last bit."""
+    if not len(seen.ctrl):
+        return seen.qpos.copy(), seen.qvel.copy()
+    return seen.qpos.copy(), _coarse(seen.qvel), _coarse(seen.ctrl)
 
 
 def _coarse(values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -258,7 +252,7 @@ def _ragged(name: str, rows: Sequence[tuple[int, Any]], shape: tuple[int, ...]) 
     }
 
 
-def _model(simulation: Observed) -> bytes:
+def _model(simulation: Recordable) -> bytes:
     """The block of the engine's model; nothing in the ideal world."""
     if simulation.model is None:
         return b""
@@ -274,10 +268,10 @@ def packed(model: Model | None) -> dict[str, bytes]:
 
 
 def _header(
-    simulation: Observed, project: Project | None, command: Sequence[str] | None, nq: int, nv: int
+    simulation: Recordable, now: State, project: Project | None, command: Sequence[str] | None
 ) -> dict[str, Any]:
     layout, net = simulation.layout, simulation.layout.factory.net.threaded
-    factory, account = layout.factory, simulation.world.hooks.account
+    factory, account = layout.factory, now.account
     pag, templates = (project.pag, project.templates) if project else (factory.pag, {})
     return {
         **project_table(pag, templates, factory, simulation.request.settings),
@@ -301,8 +295,8 @@ def _header(
         "robots": [robot.name for robot in factory.robots],
         "places": [place.name for place in net.places],
         "transitions": [transition.name for transition in net.transitions],
-        "nq": nq,
-        "nv": nv,
+        "nq": len(now.observation.qpos),
+        "nv": len(now.observation.qvel),
     }
 
 

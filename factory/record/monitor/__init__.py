@@ -9,17 +9,17 @@ from factory.record.monitor.anatomy import Anatomy
 from factory.record.monitor.monitor import EngineMonitor
 from factory.record.monitor.report import Report
 from factory.record.monitor.subject import MonitorSubject, subject_of, subject_of_run
-from factory.record.observed import Observed
+from factory.record.state import Recordable
 
 
-def beside(simulation: Observed) -> EngineMonitor:
+def beside(simulation: Recordable) -> EngineMonitor:
     """A monitor of the engine of a simulation: `observe` is an observer of its run, and `glance`
     one that need not be called after every tick. It uses only the engine, the layout, the start of
     the simulation, and the times at which operations end."""
-    m, d = simulation.world.m, simulation.world.d
-    anatomy = Anatomy.of(m, simulation.layout.factory)
-    monitor = EngineMonitor(subject_of_run(simulation), anatomy, m, d)
-    simulation.world.hooks.ended.append(monitor.ended)
+    anatomy = Anatomy.of(simulation.engine, simulation.layout.factory)
+    first = simulation.state().observation
+    monitor = EngineMonitor(subject_of_run(simulation), anatomy, first)
+    simulation.at_ends.append(monitor.observe)
     return monitor
 
 

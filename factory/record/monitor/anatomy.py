@@ -11,7 +11,7 @@ import numpy as np
 from factory.mjcf import names
 from factory.mjcf.weld_frames import GRIP, KINDS, WeldFrames, check_holders
 from factory.plant.factory import Factory
-from factory.record.monitor.observation import Index
+from factory.record.state import Index
 
 Holder = tuple[int, int]
 """Kind and, for a grip, the robot's index; -1 for others, and for a robot that is gone."""

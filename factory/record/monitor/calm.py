@@ -25,9 +25,9 @@ from factory.record.log.reader import Log
 from factory.record.monitor.agreement import ROUNDING
 from factory.record.monitor.anatomy import Anatomy
 from factory.record.monitor.monitor import MOST, Monitor
-from factory.record.monitor.observation import Observation
 from factory.record.monitor.report import Firing, Report
 from factory.record.monitor.subject import MonitorSubject
+from factory.record.state import Observation
 
 SHORT = 0.2
 """Shorter spells are not judged [s]."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from factory.mjcf.weld_frames import GRIP, HOLD, WeldFrames
 from factory.plant.factory import Factory
 from factory.record.monitor.anatomy import Anatomy
-from factory.record.monitor.observation import Array, Index, Observation
+from factory.record.state import Array, Index, Observation
 
 HANGS = 2e-3
 """Distance from its place above which a part is not held [m], in addition to twice the radius of

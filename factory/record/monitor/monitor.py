@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import islice
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 
@@ -16,10 +15,10 @@ from factory.record.monitor.anatomy import Anatomy
 from factory.record.monitor.explanation import SeenFirings
 from factory.record.monitor.grips import Grips, misplaced
 from factory.record.monitor.motion import AxisMotion, Lags
-from factory.record.monitor.observation import EngineView, Observation
 from factory.record.monitor.report import Report, Violation
 from factory.record.monitor.subject import MonitorSubject
 from factory.record.monitor.transfers import Transfers
+from factory.record.state import Observation, State
 from factory.support.collector import collector_paused
 
 MOST = 100
@@ -299,31 +298,24 @@ class EngineMonitor(Monitor):
     when operations end. Observations are judged KEPT at a time, which takes half as long as judging
     each between steps of the engine."""
 
-    def __init__(self, subject: MonitorSubject, anatomy: Anatomy, m: Any, d: Any) -> None:
-        self.view = EngineView(m, d)
-        first = self.view.look()
-        super().__init__(subject, anatomy, first)
+    def __init__(self, subject: MonitorSubject, anatomy: Anatomy, first: Observation) -> None:
+        super().__init__(subject, anatomy, first.kept())
         self._looked, self._welds = first.time, first.welds
         self._kept: list[tuple[Observation, bool]] = []
 
-    def observe(self, world: Any, supervisor: Any) -> None:
-        """Observe the engine after a tick; the arguments are not used."""
+    def observe(self, state: State) -> None:
+        """Observe the engine after a tick, or where operations have ended and parts have changed
+        hands. Nothing else of the state is read."""
         begin = perf_counter()
-        self._keep()
+        self._keep(state.observation)
         self.time_s += perf_counter() - begin
 
-    def glance(self, world: Any, supervisor: Any) -> None:
+    def glance(self, state: State) -> None:
         """Observe the engine only where a weld has been switched, or LOOK seconds have passed."""
-        begin = perf_counter()
-        due = self.view.d.time - self._looked >= LOOK
-        if due or self.view.welds() is not self._welds:
-            self._keep(thorough=due)
-        self.time_s += perf_counter() - begin
-
-    def ended(self) -> None:
-        """Operations have ended, and parts have changed hands."""
-        begin = perf_counter()
-        self._keep(at_end=True)
+        begin, seen = perf_counter(), state.observation
+        due = seen.time - self._looked >= LOOK
+        if due or seen.welds is not self._welds:
+            self._keep(seen, thorough=due)
         self.time_s += perf_counter() - begin
 
     def report(self, recorded: Recorded | None = None) -> Report:
@@ -332,12 +324,11 @@ class EngineMonitor(Monitor):
         self.time_s += perf_counter() - begin
         return super().report(recorded)
 
-    def _keep(self, at_end: bool = False, thorough: bool = True) -> None:
-        seen = self.view.look(at_end).kept()
+    def _keep(self, seen: Observation, thorough: bool = True) -> None:
         self._welds = seen.welds
-        if thorough and not at_end:
+        if thorough and not seen.at_end:
             self._looked = seen.time
-        self._kept.append((seen, thorough))
+        self._kept.append((seen.kept(), thorough))
         if len(self._kept) >= KEPT:
             self._judge_all()
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from factory.record.monitor.anatomy import Anatomy
 from factory.record.monitor.grips import MISSED
-from factory.record.monitor.observation import Array, Index, Observation
+from factory.record.state import Array, Index, Observation
 from factory.support.settings import Settings
 
 REST = 0.01

@@ -21,11 +21,11 @@ from factory.record.monitor.agreement import contradictions
 from factory.record.monitor.anatomy import Anatomy
 from factory.record.monitor.calm import judge_calm
 from factory.record.monitor.monitor import Monitor
-from factory.record.monitor.observation import Observation
 from factory.record.monitor.recount import differences, recounted, worst
 from factory.record.monitor.report import Report, Violation
 from factory.record.monitor.subject import MonitorSubject, subject_from
 from factory.record.project_table import factory_of, of_its_factory, settings_of
+from factory.record.state import Observation
 from factory.record.verdict import FAULTS, RunVerdict, judged
 from factory.support.errors import Diagnostic
 

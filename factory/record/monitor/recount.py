@@ -21,9 +21,9 @@ from factory.mjcf.shells import trunks
 from factory.mjcf.weld_frames import GRIP, HOLD, PARK
 from factory.record.log.reader import Log
 from factory.record.monitor.anatomy import Anatomy
-from factory.record.monitor.observation import Array, Index, Observation
 from factory.record.monitor.report import Violation
 from factory.record.monitor.subject import MonitorSubject
+from factory.record.state import Array, Index, Observation
 from factory.support.engine import mujoco
 
 PRESSED = 1e-4

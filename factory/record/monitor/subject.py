@@ -15,7 +15,7 @@ from factory.nets.history import firings
 from factory.nets.petri import Marking
 from factory.plant.factory import Factory, Operation
 from factory.plant.fused_bodies import FusedBodies, bodies_of
-from factory.record.observed import Observed
+from factory.record.state import Recordable
 from factory.support.settings import Settings
 
 PATIENCE = 4.0
@@ -170,7 +170,7 @@ def _with_others(subject: MonitorSubject, whole: Layout) -> MonitorSubject:
     return replace(subject, others=others, early=subject.early | early)
 
 
-def subject_of_run(simulation: Observed) -> MonitorSubject:
+def subject_of_run(simulation: Recordable) -> MonitorSubject:
     """The subject of a simulation, in either world."""
     model = simulation.model
     return subject_of(

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from factory.nets.undo import marking_after
 from factory.nets.undone import Undone
 from factory.record.failures import Failing
+from factory.record.state import Observer
 from factory.show.live.commands import LASTS, PUSH, Command
 from factory.show.live.outages import Outages, Watch
 from factory.simulation.disturbance.interventions import Interventions
 from factory.simulation.recovery import Campaign
-from factory.simulation.simulation import FALL, Observer, Simulation
+from factory.simulation.simulation import FALL, Simulation
 from factory.simulation.supervisor import Supervisor
 
 RATE = 30.0
@@ -176,7 +177,7 @@ class Session:
         while True:
             begun = perf_counter()
             ran = self._advance(begun, observe) if self._goes else 0
-            observe(self.simulation.world, self.simulation.supervisor)
+            observe(self.simulation.state())
             if ran:
                 self._publish()
             rest = 1 / RATE - (perf_counter() - begun) if self._clock.speed else 0.0
@@ -201,7 +202,7 @@ class Session:
                 break
             before = len(supervisor.events)
             (supervisor.coast if world.dropped else supervisor.step)()
-            observe(world, supervisor)
+            observe(self.simulation.state())
             count += 1
             if reason := world.unstable():
                 self._trouble = f"{reason}: restart it"

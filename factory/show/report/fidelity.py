@@ -13,10 +13,10 @@ from factory.mjcf.parts import HIDDEN
 from factory.mjcf.replica import Replica
 from factory.mjcf.weld_frames import FEED, GRIP, HOLD, gaps
 from factory.plant.approaches import Pair
+from factory.record.state import Event
 from factory.record.verdict import STRENGTH
 from factory.show.report.recording import Recording
 from factory.simulation.request import RunRequest
-from factory.simulation.run import Event
 from factory.simulation.simulation import Simulation
 from factory.study.analysis.measured import conditions
 from factory.study.fidelity.causality import causal_record, duration_differences

@@ -9,8 +9,9 @@ import numpy as np
 
 from factory.compiler.taking_over import crews_after
 from factory.nets.undone import Undone
+from factory.record.state import Event
 from factory.show.report.recording import Recording
-from factory.simulation.run import Event, busy_times, mean_interval
+from factory.simulation.run import busy_times, mean_interval
 from factory.study.analysis import Timing
 from factory.study.analysis.flow import flow
 from factory.study.analysis.measured import conditions, dropoff_times, operation_times

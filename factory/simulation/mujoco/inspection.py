@@ -10,13 +10,13 @@ import numpy as np
 from factory.layout.layout import Layout
 from factory.mjcf.model import Model
 from factory.mjcf.weld_frames import residuals
+from factory.record.figures import PhysicsFigures
 from factory.simulation.mujoco.onsets import Onsets
 from factory.simulation.mujoco.pressing import Pressing
 from factory.simulation.mujoco.product_error import Misfit, ProductError
 from factory.simulation.mujoco.soundness import Soundness
 from factory.simulation.mujoco.strength import StrengthUse
 from factory.simulation.mujoco.welds import Welds
-from factory.simulation.run import PhysicsFigures
 from factory.support.engine import mujoco
 
 

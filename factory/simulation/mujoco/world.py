@@ -21,6 +21,8 @@ from factory.mjcf.loading import load
 from factory.mjcf.model import Model
 from factory.nets.coordinated import Past
 from factory.plant.factory import Operation
+from factory.record.figures import PhysicsFigures
+from factory.record.state import EngineView, Observation
 from factory.simulation.mujoco.fast.neighbours import Neighbours
 from factory.simulation.mujoco.fast.strides import Strides
 from factory.simulation.mujoco.inspection import Inspection
@@ -30,7 +32,6 @@ from factory.simulation.mujoco.sliders import NEVER, ROUNDED
 from factory.simulation.mujoco.soundness import Soundness
 from factory.simulation.mujoco.stepping import SingleSteps
 from factory.simulation.request import RunRequest
-from factory.simulation.run import PhysicsFigures
 from factory.simulation.world import Drop, Hooks, Job
 from factory.support.engine import by_name, mujoco
 
@@ -62,6 +63,7 @@ class MujocoWorld:
         self.model, self.hooks, self.supplied = model, Hooks(), True
         self.m = load(model) if loaded is None else copy(loaded)
         self.d = mujoco.MjData(self.m)
+        self._view = EngineView(self.m, self.d)
         self.dropoffs: list[float] = []
         self._before = model.factory.units(counts)
         self._unseen = 0
@@ -98,6 +100,10 @@ class MujocoWorld:
     def sense(self) -> tuple[Array, Array]:
         """Measured positions [m] and speeds [m/s] of all carriages, then of all lifts."""
         return self.hooks.sensed(*self.motion.axes.measured(self.d))
+
+    def observe(self, at_end: bool = False) -> Observation:
+        """The state of the engine, whose arrays change with its next step."""
+        return self._view.look(at_end)
 
     @property
     def lacking(self) -> set[str]:

@@ -12,6 +12,7 @@ from factory.nets.undone import Undone
 from factory.plant.factory import Factory, Operation
 from factory.problem.template import Failure
 from factory.record.failures import Exchange, Failing, Failures, Stood
+from factory.record.state import Event
 from factory.simulation.recovery.books import Books
 from factory.simulation.recovery.counting import summed
 from factory.simulation.recovery.faults import Campaign, WorldFault
@@ -19,7 +20,6 @@ from factory.simulation.recovery.plant import Plant
 from factory.simulation.recovery.responding import Responding
 from factory.simulation.recovery.standing import patience
 from factory.simulation.recovery.striking import Striking
-from factory.simulation.run import Event
 from factory.simulation.simulation import Simulation
 from factory.simulation.supervisor import Supervisor
 from factory.support.errors import Diagnostic, InputError

@@ -14,7 +14,8 @@ from factory.control.profile import World
 from factory.plant.factory import Factory
 from factory.record.log import Log
 from factory.record.project_table import settings_of
-from factory.simulation.run import Event, Run, mean_interval
+from factory.record.state import Event
+from factory.simulation.run import Run, mean_interval
 from factory.study.analysis.firing import Floats
 from factory.study.analysis.flow import Flow
 from factory.study.analysis.timed import TimedNet

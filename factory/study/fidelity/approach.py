@@ -9,8 +9,6 @@ their carrier, and those that deliver to the same carrier. No distance is certif
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from factory.control.mode import Array, Index, Truth
@@ -68,8 +66,9 @@ class Reaching:
 class Approaches:
     """The least distance for each pair of kinds, with the names of the two bodies."""
 
-    def __init__(self, world: Any, layout: Layout, welds: ActiveWelds, shadow: Shadow) -> None:
-        m = world.m
+    def __init__(
+        self, m: mujoco.MjModel, layout: Layout, welds: ActiveWelds, shadow: Shadow
+    ) -> None:
         self.welds, self.shadow = welds, shadow
         self.certified, self.trunk = certified(layout), trunks(m)
         words = [m.body(i).name for i in range(m.nbody)]

@@ -14,7 +14,7 @@ import numpy as np
 
 from factory.control.mode import Array, Truth
 from factory.nets.gears import GearNet
-from factory.simulation.run import Event
+from factory.record.state import Event
 
 Firing = tuple[str, int]
 """A transition's name and the number of the firing, from 1."""

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from factory.control.mode import REST, Array
 from factory.mjcf.weld_frames import FEED, ROWS, Slides, residuals
+from factory.simulation.mujoco.world import MujocoWorld
 from factory.study.fidelity.readings import ActiveWelds, Velocities
 from factory.support.engine import mujoco
 
@@ -83,7 +82,7 @@ class Histogram:
 class DriveFigures:
     """Tracking errors [m], forces as a share of their limit, and work [J]."""
 
-    def __init__(self, world: Any) -> None:
+    def __init__(self, world: MujocoWorld) -> None:
         self.world, m = world, world.m
         self.tracking = Histogram()
         self.error = self.peak = self.work = 0.0

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 from time import perf_counter
-from typing import Any
 
 from factory.record.monitor import beside
+from factory.record.state import State
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from factory.study.fidelity.approach import BEYOND, Approaches
@@ -36,7 +36,7 @@ class Measurement:
         self.handoffs = HandOffs(m, self.welds, velocities)
         self.payload = Payload(self.welds, velocities, float(m.opt.timestep))
         self.drives = DriveFigures(world)
-        self.approaches = Approaches(world, layout, self.welds, shadow)
+        self.approaches = Approaches(m, layout, self.welds, shadow)
         self.hidden = HiddenPenetrations.of(simulation)
         self.finished = Finished(model)
         self.residual = Residual(m, d, velocities.slides)
@@ -57,7 +57,7 @@ class Measurement:
         self.seconds += report.time_s
         return replace(run, monitor=report)
 
-    def observe(self, world: Any, supervisor: Any) -> None:
+    def observe(self, state: State) -> None:
         """Measure a tick. The shadow still has the configuration at the beginning of the tick, in
         which welds were switched."""
         begin, shadow = perf_counter(), self.approaches.shadow
@@ -69,15 +69,15 @@ class Measurement:
             xpos, xmat = shadow.d.xpos, shadow.d.xmat
             self.finished.tick(self.welds, fresh, xpos, xmat)
             if len(fresh):
-                begun = world.time - (len(v) - 1) * float(world.m.opt.timestep)
+                begun = state.time - (len(v) - 1) * self.payload.timestep
                 self.handoffs.begin(fresh, begun, v[0], xpos, xmat)
-        self.handoffs.tick(v, world.time)
+        self.handoffs.tick(v, state.time)
         self.payload.tick(v)
         self.drives.tick(v, force)
         self.residual.tick(v[-1])
         shadow.follow()
-        self.approaches.tick(supervisor.active.operations)
-        self.hidden.look(world.d.qpos, world.time)
+        self.approaches.tick(self.simulation.supervisor.active.operations)
+        self.hidden.look(state.observation.qpos, state.time)
         self.seconds += perf_counter() - begin
 
     def _counts(self) -> tuple[int, int]:

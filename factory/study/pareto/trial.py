@@ -8,8 +8,9 @@ from typing import Any
 
 from factory.pipeline import Project
 from factory.plant.fused_bodies import fusing_pays
+from factory.record.state import Observer
 from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Observer, Simulation
+from factory.simulation.simulation import Simulation
 from factory.simulation.watched import watched
 from factory.study.analysis.flow import steady_units
 from factory.timing.timing import Timing

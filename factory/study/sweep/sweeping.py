@@ -115,7 +115,7 @@ def sweep(
                     store.add(outcome, recipe.at(outcome.point))
                 tally.count(outcome)
                 bar.advance(bool(outcome.reason))
-                interruption.observe(None, None)
+                interruption.observe()
         tally.wall_time_s = perf_counter() - begin
     return tally
 
