@@ -65,4 +65,4 @@ wheel: setup
 	$(PY) -m pip wheel --quiet --no-deps --wheel-dir dist .
 
 clean:
-	rm -rf .venv .oracles .rivals build dist docs/_build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv .oracles .engines .rivals build dist docs/_build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -268,7 +268,7 @@ STRANGE: Mapping[str, tuple[Callable[[str], str], str]] = {
     "user": (planted('<geom name="floor"', f' user="{"1 " * 9}"'), "more than 8 numbers"),
     "samples": (lambda xml: xml.replace('nsample="', 'nsample="9999999'), "nsample is"),
     "deep": (planted("<worldbody>", "<body>" * 99 + "</body>" * 99), "deep in each other"),
-    "keys": (planted("<keyframe>", "<key/>" * 9), "key comes to 10"),
+    "keys": (planted("</actuator>", f"<keyframe>{'<key/>' * 9}</keyframe>"), "key comes to 9"),
     "entities": (lambda xml: f'<!DOCTYPE m [<!ENTITY a "b">]>{xml}', "document type"),
     "no model": (lambda xml: "<robot/>", "<robot>"),
     "no XML": (lambda xml: "words", "syntax error"),

@@ -23,6 +23,7 @@ from factory.layout.exclusions import awaited_positions, coordinated
 from factory.layout.layout import Layout
 from factory.layout.machines import presences
 from factory.layout.presence import Presence
+from factory.mjcf import stock
 from factory.mjcf.loading import load
 from factory.mjcf.model import build_model
 from factory.nets.coordinated import Order
@@ -56,7 +57,7 @@ def laid_out(seed: int) -> Layout:
 def _written(seed: int) -> tuple[mujoco.MjModel, Json, Json]:
     layout = laid_out(seed)
     copies = {leaf.label: 1 for leaf in layout.factory.leaves}
-    model = build_model(layout, load_catalogue(), copies, Settings(timestep=0.002))
+    model = stock.written(build_model(layout, load_catalogue(), copies, Settings(timestep=0.002)))
     assert layout.certificate is not None
     return load(model), ways(model), layout.certificate.as_json()
 
@@ -124,7 +125,7 @@ def test_a_clear_point_that_is_5_mm_short_is_refused() -> None:
     assert beyond
     for way in beyond:
         for span in way["spans"]:
-            span[0][0] -= 0.005
+            span[0][1] += 0.005
     refused(check(m, machines, clearance), "r9/pad", "magazine down:p3", "no circuit")
 
 

@@ -15,6 +15,7 @@ from factory.layout.certificate import Certificate
 from factory.layout.clearance import certify
 from factory.mjcf.binary import beside, kept, key_of, packed, seal_of, sealed
 from factory.mjcf.model import Model, model_files
+from factory.mjcf.stock import written
 from factory.modes.modes import operation_modes
 from factory.nets.verdict import Verdict
 from factory.pipeline import Project
@@ -60,7 +61,7 @@ def build(project: Project, verdict: Verdict, request: BuildRequest) -> Built:
     clearance = layout.certificate or certify(layout)
     if not clearance.holds:
         raise RunError(fault.diagnostic() for fault in clearance.faults)
-    model = physical_model(layout, request.units, settings, project.catalogue, request.wip)
+    model = written(physical_model(layout, request.units, settings, project.catalogue, request.wip))
     mjcf, read = request.mjcf, (*files_read(project), *request.read)
     if output is not None:
         mjcf = mjcf or output / f"{project.name}.xml"

@@ -1,9 +1,9 @@
 """The motions of a factory's machines, from which another program can check that they never
 collide.
 
-For each machine and each place of the coordinated net in which it is: its bodies in the MJCF,
-the spans of its joints, and the welds by which it holds parts. The pairs that come
-near, and their circuits, are in the clearance certificate. Stationary machines have none.
+For each machine and each place of the coordinated net in which it is: its bodies in the MJCF that
+is written, the spans of its joints there, and the welds by which it holds parts. The pairs that
+come near, and their circuits, are in the clearance certificate. Stationary machines have none.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from factory.layout.machines import presences
 from factory.layout.presence import Presence, Span
 from factory.mjcf import names
 from factory.mjcf.model import Model
+from factory.mjcf.stock import Scale, scales_of
 
 Json = dict[str, object]
 
@@ -47,6 +48,7 @@ class _Writer:
     def __init__(self, model: Model) -> None:
         self._model, self._hanging = model, Hanging.of(model.layout)
         self._outlets = {(o.label, o.robot): o.name for o in outlets_of(model.layout)}
+        self._scales = scales_of(model.layout)
 
     def way(self, one: Presence) -> Json:
         """One presence."""
@@ -56,26 +58,32 @@ class _Writer:
             bodies, joints = [names.carriage(robot)], [names.slide(robot)]
             if one.robot in self._model.factory.strokes:
                 bodies, joints = [*bodies, names.head(robot)], [*joints, names.lift(robot)]
-            return _way(one, bodies, joints, [names.grip(robot, label) for label in held], 0.0)
+            scales = [self._scales[joint] for joint in joints]
+            return _way(one, bodies, joints, [names.grip(robot, label) for label in held], scales)
         if name == "tray":
             bodies, joints = [names.OUTFEED_TRAY], [names.OUTFEED_SLIDE]
-            return _way(one, bodies, joints, [names.hold(label) for label in held], 0.0)
+            return _way(one, bodies, joints, [names.hold(label) for label in held], [Scale()])
         outlet = self._outlets[one.label, one.robot]
         slider = names.slider(self._hanging.slider[outlet])
         hangs = [names.feed(outlet)] * (len(one.bodies.names) > 1)
-        return _way(one, [slider], [slider], hangs, self._hanging.raised[outlet])
+        raised = Scale(zero=-self._hanging.raised[outlet])
+        return _way(one, [slider], [slider], hangs, [raised])
 
 
 def _way(
-    one: Presence, bodies: Sequence[str], joints: Sequence[str], welds: Sequence[str], more: float
+    one: Presence,
+    bodies: Sequence[str],
+    joints: Sequence[str],
+    welds: Sequence[str],
+    scales: Sequence[Scale],
 ) -> Json:
-    def span(ends: Span) -> list[float]:
-        return [round(min(ends) + more, 6), round(max(ends) + more, 6)]
+    def span(scale: Scale, ends: Span) -> list[float]:
+        return sorted(round(scale.at(end), 6) for end in ends)
 
     return {
         "machine": one.machine,
         "bodies": bodies,
         "joints": joints,
         "welds": welds,
-        "spans": [[span(ends) for ends in sweep[: len(joints)]] for sweep in one.sweeps],
+        "spans": [[*map(span, scales, sweep)] for sweep in one.sweeps],
     }

@@ -67,7 +67,7 @@ def add_feeders(
         place, code, drive = hanging.places[at], codes[outlet.robot], drives[at]
         _add_slider(body, at, found.high + OVER, place, code, drive, stops)
         gains, name = drive.attributes(), names.slider(at)
-        add(actuator, "pid", name=name, joint=name, input="pos vel ff", **gains)
+        add(actuator, "pid", name=name, joint=name, **gains)
 
 
 def _add_housing(body: Element, name: str, found: Feeder, left: float) -> None:

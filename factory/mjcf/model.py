@@ -1,4 +1,5 @@
-"""The only writer of MJCF: a layout as one XML with its mesh files, that stock MuJoCo loads.
+"""The model of a run: a layout as one XML with its mesh files. What is written of it for others
+follows from it (`stock.py`).
 
 Guarantees: every weld that a run can switch is there, with its nominal frame compiled from nest and
 product pose; robots come before parts; nothing depends on hashing, so the same factory gives the
@@ -23,12 +24,11 @@ from factory.layout.feeding import outlets_of
 from factory.layout.hanging import Hanging
 from factory.layout.layout import Layout
 from factory.layout.standby import Repertoire
-from factory.mjcf import names
 from factory.mjcf.bins import add_bins
-from factory.mjcf.elements import add, fill
-from factory.mjcf.feeders import SLIDER_MASS, add_feeders
+from factory.mjcf.elements import fill
+from factory.mjcf.feeders import add_feeders
 from factory.mjcf.insets import Insets, insets_of
-from factory.mjcf.outfeed import SHUTTER_MASS, TRAY_MASS, add_outfeed
+from factory.mjcf.outfeed import TRAY_MASS, add_outfeed
 from factory.mjcf.parts import add_meshes, add_parts, add_wholes
 from factory.mjcf.robot_bodies import add_robots
 from factory.mjcf.robots import (
@@ -219,13 +219,6 @@ def build_model(
     add_exclusions(section["contact"], apart, copies)
     if not len(section["contact"]):
         root.remove(section["contact"])
-    weights = {
-        names.slider(outlet.name): SLIDER_MASS + masses[outlet.label]
-        for outlet in outlets_of(layout)
-        if outlet.name in sliders
-    }
-    weights[names.SHUTTER] = SHUTTER_MASS
-    _home(section["keyframe"], layout, actuator, weights)
     if not shown:
         leave_out_what_is_shown(root)
     fill(section["size"], memory=f"{ARENA + broad_phase(root) // 2**20}M")
@@ -325,20 +318,3 @@ def stroke_ticks(layout: Layout, settings: Settings) -> int:
     profile = SpeedProfile(*settings.feeder_limits)
     strokes = (outlet.feeder.stroke for outlet in outlets_of(layout))
     return ceil(profile.rest(max(strokes)) / settings.tick) + 4
-
-
-def _home(
-    keyframe: Element, layout: Layout, actuator: Element, weights: Mapping[str, float]
-) -> None:
-    """The keyframe `home`: setpoints at which every robot stays at the end B of its guidepath, and
-    what actuators (by name) carry stays where it is [kg]."""
-    ends = {
-        names.drive(robot.name): path.length
-        for robot, path in zip(layout.factory.robots, layout.guidepaths, strict=True)
-    }
-    setpoints: list[float] = []
-    for element in actuator:
-        name, inputs = element.get("name") or "", len((element.get("input") or "pos").split())
-        setpoint = [ends.get(name, 0.0), 0.0, weights.get(name, 0.0) * GRAVITY]
-        setpoints += [*setpoint, *[0.0] * inputs][:inputs]
-    add(keyframe, "key", name="home", ctrl=tuple(setpoints))

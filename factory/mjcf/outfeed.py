@@ -81,7 +81,7 @@ def _add_tray(world: Element, actuator: Element, layout: Layout, drive: Drive) -
             material="tray",
         )
     gains = drive.attributes()
-    add(actuator, "pid", name=names.OUTFEED_DRIVE, joint=slide, input="pos vel ff", **gains)
+    add(actuator, "pid", name=names.OUTFEED_DRIVE, joint=slide, **gains)
 
 
 def _add_shutter(world: Element, actuator: Element, layout: Layout, drive: Drive) -> None:
@@ -108,7 +108,7 @@ def _add_shutter(world: Element, actuator: Element, layout: Layout, drive: Drive
     )
     gains = drive.attributes()
     name = names.SHUTTER
-    add(actuator, "pid", name=name, joint=name, input="pos vel ff", **gains)
+    add(actuator, "pid", name=name, joint=name, **gains)
 
 
 def _add_table(world: Element, layout: Layout) -> None:

@@ -65,8 +65,9 @@ class Drive:
     inertia: float = 0.0
 
     def attributes(self) -> dict[str, str]:
-        """As attributes of an actuator."""
+        """As attributes of a `pid` actuator, which has three setpoints."""
         return {
+            "input": "pos vel ff",
             "kp": number(self.kp),
             "kv": number(self.kv),
             "forcerange": numbers((-self.force, self.force)),
@@ -182,19 +183,18 @@ def instantiate(
     stops.limit(slide)
     actuators = []
     for actuator in model.actuators:
-        copy = _prefixed(actuator, model.name, names=False)
-        copy.set("name", f"{robot}/{actuator.get('name')}")
-        joint = f"{robot}/{actuator.get('joint')}"
-        copy.set("joint", joint)
-        chosen = {"drive": drive, "hoist": hoist.drive if hoist else None}
-        gains = chosen.get(actuator.get("name") or "")
-        if gains is not None:
-            copy.attrib.update(gains.attributes())
-            moved = next(j for j in body.iter("joint") if j.get("name") == joint)
-            add_inertia(moved, gains)
-            if hoist and gains is hoist.drive:
-                hoist.stops.limit(moved)
-        actuators.append(copy)
+        kind = actuator.get("name") or ""
+        named = {"name": f"{robot}/{kind}", "joint": f"{robot}/{actuator.get('joint')}"}
+        gains = {"drive": drive, "hoist": hoist.drive if hoist else None}.get(kind)
+        if gains is None:
+            actuators.append(_prefixed(actuator, model.name, names=False))
+            actuators[-1].attrib.update(named)
+            continue
+        actuators.append(Element("pid", {**named, **gains.attributes()}))
+        moved = next(j for j in body.iter("joint") if j.get("name") == named["joint"])
+        add_inertia(moved, gains)
+        if hoist and gains is hoist.drive:
+            hoist.stops.limit(moved)
     return body, actuators
 
 

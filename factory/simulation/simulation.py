@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 from factory.control.mode import Limits, Mode
 from factory.layout.layout import Layout
+from factory.layout.starting import start_positions
 from factory.mjcf.timestep import timed
 from factory.modes.modes import operation_modes, robot_limits
 from factory.modes.staging import HeadStart, stages_of
-from factory.modes.starting import start_positions
 from factory.nets.history import firings
 from factory.nets.petri import Marking
 from factory.nets.replay import replay

@@ -17,9 +17,9 @@ from factory.layout.feeding import feeder_of
 from factory.layout.hands.limbs import rises_first
 from factory.layout.layout import Layout
 from factory.layout.outfeed import away, leaving
+from factory.layout.starting import start_positions
 from factory.modes.modes import operation_modes, operation_starts, robot_limits
 from factory.modes.staging import HeadStart, staged, stages_of, with_time
-from factory.modes.starting import start_positions
 from factory.nets.coordinated import Past
 from factory.plant.factory import Factory
 from factory.support.settings import Settings

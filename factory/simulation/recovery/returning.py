@@ -15,7 +15,7 @@ import numpy as np
 from factory.control.mode import Array, Mode
 from factory.layout.feeding import passing
 from factory.layout.layout import Layout
-from factory.modes.starting import start_positions
+from factory.layout.starting import start_positions
 from factory.nets.petri import Marking
 from factory.plant.factory import Operation
 from factory.simulation.supervisor import Supervisor
