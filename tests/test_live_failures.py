@@ -19,6 +19,7 @@ import pytest
 from factory.nets.replay import replay
 from factory.nets.undone import Undone
 from factory.plant.material import joins_of
+from factory.record.state import State
 from factory.show.live import Server
 from factory.show.live.commands import FAULTS, KEYS, LASTS, Command, command_of
 from factory.show.live.outages import Outages, Watch
@@ -92,8 +93,8 @@ def test_each_fault_by_hand_is_found(
     assert hands.recovery is not None
     watch = Watch(hands.recovery)
 
-    def act(world: Any, supervisor: object) -> None:
-        if world.time == pytest.approx(3.0):
+    def act(state: State) -> None:
+        if state.time == pytest.approx(3.0):
             hands.fail(kind, robot, label, 6.0)
         told.update(mark for mark, _ in watch.now().messages())
 
@@ -131,13 +132,13 @@ def test_how_long_it_lasts_still_is_told() -> None:
     assert hands.recovery is not None
     watch = Watch(hands.recovery)
 
-    def act(world: Any, supervisor: object) -> None:
+    def act(state: State) -> None:
         now = watch.now()
         for name, left in (("dark", now.dark), ("empty", now.empty.get("part2", 0.0))):
             if left:
                 seen.add(name)
-                assert left == pytest.approx(5.0 - world.time, abs=1e-6)
-        if world.time == pytest.approx(3.0):
+                assert left == pytest.approx(5.0 - state.time, abs=1e-6)
+        if state.time == pytest.approx(3.0):
             hands.fail("blackout", seconds=2.0)
             hands.fail("no_part", label="part2", seconds=2.0)
 
@@ -163,7 +164,7 @@ def test_a_run_that_is_made_to_fail_goes_on() -> None:
     simulation = Simulation(paper_layout(), RunRequest(units=6, recovers=True))
     hands, ticks = Interventions(simulation, CAMPAIGN), 0
 
-    def act(world: object, supervisor: object) -> None:
+    def act(_: State) -> None:
         nonlocal ticks
         ticks += 1
         match ticks:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -13,6 +12,7 @@ from factory.layout.layout import Layout
 from factory.nets.undone import Undone
 from factory.pipeline import read
 from factory.record.failures import Failing
+from factory.record.state import State
 from factory.simulation.recovery import Campaign, Recovery, WorldFault, recover
 from factory.simulation.recovery.counting import summed
 from factory.simulation.request import RunRequest, WorldName
@@ -48,9 +48,10 @@ def stopped(
     recovery = recover(simulation, Campaign(clear=1.0, spares=spares, swap=2.0))
     number, struck = layout.factory.by_label[label], list[float]()
 
-    def strike(world: Any, supervisor: Any) -> None:
+    def strike(state: State) -> None:
+        supervisor = simulation.supervisor
         if supervisor.fired[number.start] == 2 and number.index in supervisor.active.operations:
-            struck.append(world.time)
+            struck.append(state.time)
             if len(struck) == late:
                 for fault in faults:
                     recovery.strike(fault)

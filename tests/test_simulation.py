@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +14,7 @@ from factory.nets.history import firings, legal_marking
 from factory.nets.replay import replay
 from factory.pipeline import all_templates
 from factory.plant.programs import program_of, write_program
-from factory.record.state import Event
+from factory.record.state import Event, State
 from factory.simulation.distributed import DistributedSupervisor
 from factory.simulation.request import RunRequest
 from factory.simulation.run import busy_times
@@ -299,8 +298,9 @@ def test_an_unstable_engine_ends_the_run(paper: Layout) -> None:
     simulation = Simulation(paper, RunRequest(units=1))
     seen = []
 
-    def plant(world: Any, _: object) -> None:
-        seen.append(world.time)
+    def plant(state: State) -> None:
+        world = simulation.physical
+        seen.append(state.time)
         if world.time > 1.0:
             world.d.qvel[world.motion.axes.dof[2]] = float("nan")
 

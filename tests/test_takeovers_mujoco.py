@@ -30,6 +30,7 @@ from factory.pipeline import read
 from factory.record.log import LogWriter, read_log
 from factory.record.monitor.record import watch_log
 from factory.record.monitor.subject import MonitorSubject, subject_of
+from factory.record.state import State
 from factory.show.report.pace import measured
 from factory.show.report.recording import recording_of
 from factory.simulation.modelling import physical_model
@@ -141,9 +142,9 @@ def test_other_faults_go_on() -> None:
     simulation, recovery = simulated(INSERTS, "r4", 7.0, (*more, slip))
     respond, late = recovery.responding, list[float]()
 
-    def lose(world: Any, _: Any) -> None:
-        if not late and any(until < world.time + 0.25 for until in respond.dead.values()):
-            late.extend([world.time] * recovery.plant.lose(0))
+    def lose(state: State) -> None:
+        if not late and any(until < state.time + 0.25 for until in respond.dead.values()):
+            late.extend([state.time] * recovery.plant.lose(0))
 
     run = simulation.run([lose], max_time=300.0)
     assert (run.products, run.trouble, run.refines_net) == (10, None, True)
@@ -161,7 +162,8 @@ def test_inputs_that_a_deputy_joins_may_touch() -> None:
     made = laid_out(INSERTS).factory.by_label["sub1"]
     found = list[bool]()
 
-    def touch(world: Any, supervisor: Any) -> None:
+    def touch(_: State) -> None:
+        world, supervisor = simulation.physical, simulation.supervisor
         hands, m, d = world.parts.hands.of, world.m, world.d
         if not recovery.exchanges or found or made.index not in supervisor.active.operations:
             return
@@ -256,7 +258,8 @@ def test_a_robot_that_dies_where_it_went_ahead() -> None:
     simulation = Simulation(laid_out(STEPS), RunRequest("mujoco", 6, recovers=True))
     recovery = recover(simulation, Campaign(swap=4.0))
 
-    def strike(world: Any, _: Any) -> None:
+    def strike(_: State) -> None:
+        world = simulation.physical
         if not recovery.found and 2 in world.parts.hands.of and world.sense()[0][4] < 0.01:
             recovery.strike(WorldFault("dead", robot="r3", at=0.0))
 
@@ -283,7 +286,8 @@ def test_what_a_robot_that_is_gone_stood_under_goes_back() -> None:
     recovery = recover(simulation, Campaign(swap=4.0))
     length, standing = layout.guidepaths[3].length, recovery.striking.standing
 
-    def stop(world: Any, _: Any) -> None:
+    def stop(_: State) -> None:
+        world = simulation.physical
         is_there = "part2" in world.parts.feeders.shown() and world.sense()[0][3] > length - 0.07
         is_new = world.time > 3.0 and not recovery.found
         if is_new and is_there and 3 not in world.parts.hands.of:
@@ -307,9 +311,9 @@ def test_a_part_that_comes_late_waits_for_its_robot(monkeypatch: pytest.MonkeyPa
         simulation = Simulation(layout, RunRequest("mujoco", 1, recovers=True))
         recovery = recover(simulation, Campaign())
 
-        def lose(world: Any, supervisor: Any, by: Recovery = recovery) -> None:
-            if not by.found and supervisor.fired[layout.factory.dropoff.start] == 1:
-                world.motion.put({robot: 0.144, lift: layout.strokes[robot]})
+        def lose(_: State, made: Simulation = simulation, by: Recovery = recovery) -> None:
+            if not by.found and made.supervisor.fired[layout.factory.dropoff.start] == 1:
+                made.physical.motion.put({robot: 0.144, lift: layout.strokes[robot]})
                 by.plant.lose(0)
 
         run = simulation.run([lose], max_time=120.0)
