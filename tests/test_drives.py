@@ -246,9 +246,8 @@ def test_loads_of_robots_are_what_they_hold() -> None:
     motion, mass = world.motion, world.model.carried.mass
     while world.delivered() < 1:
         supervisor.step()
-        holds = world.parts.hands.of
         for robot in range(len(simulation.layout.factory.robots)):
-            held = sum(mass[label] for label in holds[robot].bodies) if robot in holds else 0.0
+            held = sum(mass[label] for label in world.parts.holdings.hand(robot))
             for axis in motion.axes.of_robot(robot):
                 load = motion.drives.mass[axis] - motion.drives.own[axis]
                 assert load == pytest.approx(held, abs=1e-9)

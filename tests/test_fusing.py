@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 import factory
 from factory.geometry.product import product_geometry
+from factory.mjcf.masks import robot_code
 from factory.plant.fused_bodies import FUSE_FROM, bodies_of, fused_copies, fusing_pays
 from factory.record.monitor import beside
 from factory.simulation.disturbance import Mass, disturb
@@ -97,7 +98,7 @@ def test_a_rigid_motion_goes_over_unchanged() -> None:
 def test_what_has_become_heavier_keeps_its_momentum() -> None:
     simulation = Simulation(layout_of("truck"), RunRequest(units=1, fuse=True))
     world, parts = simulation.physical, simulation.physical.parts
-    m, d, of_label, fed = world.m, world.d, parts.copies.body, [*parts.feeders.welds]
+    m, d, of_label, fed = world.m, world.d, parts.holdings.body, [*parts.feeders.welds]
     disturb(simulation, Mass(2.0, tuple(fed[:2])))
     whole = int(next(of_label[label][0] for label in of_label if label not in fed))
     bodies = [int(of_label[label][0]) for label in fed[:2]]
@@ -240,13 +241,15 @@ def test_the_monitor_catches_a_body_made_of_another_unit(
     parts, retire = simulation.physical.parts, Feeders.retire
     kept: list[str] = []
 
-    def faulty(self: Feeders, labels: Iterable[str], unit: int) -> None:
-        retire(self, labels, unit)
+    def faulty(self: Feeders, bodies: Iterable[int]) -> None:
+        bodies = [*bodies]
+        labels = [parts.holdings.of(body).label for body in bodies]
+        retire(self, bodies)
         if "part1" in labels and not kept:
             kept.append("part1")
             robot = simulation.layout.factory.by_label["sub1"].carrier
-            grip = parts.hands.grip[robot, "part1"]
-            parts.welds.loose([parts.copies._park["part1", parts.copies.free["part1"][0]]])
+            grip = parts.holdings.weld[robot_code(robot), "part1"]
+            parts.welds.loose([parts.holdings.park[parts.holdings.free["part1"][0]]])
             parts.welds.join({grip: int(simulation.physical.m.eq_obj2id[grip])})
 
     monkeypatch.setattr(Feeders, "retire", faulty)
@@ -296,7 +299,7 @@ def test_a_body_that_has_just_become_free_can_take_the_place_of_others(
     monkeypatch.setattr("factory.simulation.mujoco.joining.SETTLING", np.inf)
     simulation = Simulation(layout_of("chest"), RunRequest(units=4, fuse=True))
     world, parts = simulation.physical, simulation.physical.parts
-    hands = parts.hands.of
+    holdings = parts.holdings
     found: list[tuple[int, int]] = []
     while not found:
         simulation.supervisor.step()
@@ -305,17 +308,18 @@ def test_a_body_that_has_just_become_free_can_take_the_place_of_others(
         found = [
             (consumer, maker)
             for maker, label in made.items()
-            if not parts.copies.free[label]
+            if not holdings.free[label]
             for consumer in made
-            if label in hands[consumer].bodies
+            if label in holdings.hand(consumer)
         ]
     consumer, maker = found[0]
-    unit, held = hands[maker].unit, [*hands[maker].bodies.values()]
+    held = [*holdings.hand(maker).values()]
+    unit = holdings.of(held[0]).unit
     centre = world.m.body_mass[held] @ world.d.xpos[held] / world.m.body_mass[held].sum()
     parts.joining.fuse([consumer, maker] if first == "consumer" else [maker, consumer])
     parts.welds.write()
-    (label,) = hands[maker].bodies
-    at = world.m.jnt_qposadr[world.m.body_jntadr[parts.copies[label, unit]]]
+    (label,) = holdings.hand(maker)
+    at = world.m.jnt_qposadr[world.m.body_jntadr[holdings[label, unit]]]
     assert np.linalg.norm(world.d.qpos[at : at + 3] - centre) < 0.005
     done = simulation.run()
     assert done.products == 4 and done.physics and done.physics.unintended_contacts == 0

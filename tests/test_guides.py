@@ -20,7 +20,7 @@ from tests.simulation_values import layout_of, ready
 def carried(world: Any) -> np.ndarray:
     """What the weights of loads add to the friction of each axis [N], by what hands hold."""
     axes, loads = world.motion.axes, np.zeros(len(world.motion.axes))
-    for robot, load in world.parts.hands.loads().items():
+    for robot, load in world.parts.holdings.loads().items():
         loads[robot] = load
     if world.parts.on_tray is not None:
         loads[axes.tray] = world.model.masses[world.model.factory.pag.root]

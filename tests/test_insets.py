@@ -213,12 +213,13 @@ def test_planted_fault_a_part_that_is_pushed_into_another_is_seen(
     chosen = replace(Settings(timestep=0.002, substeps=5), overlap=overlap)
     simulation = ready(laid_out(PRESSED), settings=chosen, jitter=0.0)
     world = simulation.physical
-    while not ({("a", 1), ("b", 1)} <= world.parts.copies._number.keys() and held(world) == 2):
+    holdings = world.parts.holdings
+    while not (("a", 1) in holdings and ("b", 1) in holdings and held(world) == 2):
         simulation.supervisor.step()
     assert not world.inspection.unintended
     axes, tick = np.array([1, 2]), world.model.settings.steps
     at, speed = world.motion.robots.x[axes].copy(), np.full(2, -0.1)
-    mine, other = (world.parts.copies[label, 1] for label in "ab")
+    mine, other = (holdings[label, 1] for label in "ab")
     while world.d.xpos[other, 1] - world.d.xpos[mine, 1] > 0.0392 and world.time < 5:
         world.move(axes, at, speed, np.zeros(2))
         world.advance(tick)
@@ -230,7 +231,7 @@ def test_planted_fault_a_part_that_is_pushed_into_another_is_seen(
 
 def held(world: MujocoWorld) -> int:
     """How many robots other than the carrier hold something while none is joining."""
-    hands = world.parts.hands.of
+    hands = world.parts.holdings.in_hands()
     return 0 if world.inspection.joining else len({1, 2} & hands.keys())
 
 

@@ -73,7 +73,7 @@ def test_a_copy_that_two_hold_is_noticed(running: Simulation) -> None:
 
 def test_a_copy_that_is_in_no_list_is_noticed(running: Simulation) -> None:
     """Planted fault: a parked copy is not among those to spare."""
-    free = running.physical.parts.copies.free
+    free = running.physical.parts.holdings.free
     label = next(label for label in free if free[label])
     free[label].pop()
     said = long_runs.misplaced(running.physical)

@@ -16,7 +16,7 @@ from factory.simulation.mujoco.contacts import ContactMasks
 from factory.simulation.mujoco.fast import neighbours
 from factory.simulation.mujoco.fast.neighbours import CALM, Neighbours
 from factory.simulation.mujoco.fast.strides import Strides
-from factory.simulation.mujoco.parts import Parts
+from factory.simulation.mujoco.holdings import Holdings
 from factory.simulation.simulation import Simulation
 from factory.study.fidelity.readings import Shadow
 from factory.support.engine import mujoco
@@ -256,9 +256,9 @@ def test_what_a_run_starts_with_is_within_boxes() -> None:
 
 def test_a_forgotten_grip_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Boxes of robots without what they carry."""
-    grips = Parts.grips
+    welds = Holdings.welds
     monkeypatch.setattr(
-        Parts, "grips", lambda self: ((weld, code) for weld, code in grips(self) if code > 12)
+        Holdings, "welds", lambda self: ((weld, code) for weld, code in welds(self) if code > 12)
     )
     simulation = ready("chest")
     found = overlooked_in(simulation, lambda: simulation.supervisor.step(MOST), 4.0)
@@ -315,7 +315,7 @@ def test_what_is_given_something_is_looked_at(
         simulation.supervisor.step()
         assert world.time < 10.0
     holder = next(b for b in own if not m.body_contype[b])
-    body = int(next(iter(parts.copies.body.values()))[-1])
+    body = int(next(iter(parts.holdings.body.values()))[-1])
     x, y, z = d.xpos[holder].tolist()
     parts.welds.place(body, (x, y, z + 1.0))
     parts.welds.hold([body], int(code[holder]))

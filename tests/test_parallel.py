@@ -320,8 +320,8 @@ def test_a_part_in_the_wrong_branch_is_found() -> None:
     request = RunRequest("mujoco", 2, settings=made.settings)
     simulation = Simulation(made.layout, request)
     parts = simulation.physical.parts
-    one, other = (parts.hands.grip[robot, label] for robot, label in ((1, "part1"), (2, "part1@2")))
-    parts.hands.grip[1, "part1"], parts.hands.grip[2, "part1@2"] = other, one
+    welds, one, other = parts.holdings.weld, (2, "part1"), (3, "part1@2")
+    welds[one], welds[other] = welds[other], welds[one]
     run = watched(simulation, [], 15.0, [], True)
     assert not run.succeeded and not run.refines_net
 

@@ -164,10 +164,10 @@ def test_inputs_that_a_deputy_joins_may_touch() -> None:
 
     def touch(_: State) -> None:
         world, supervisor = simulation.physical, simulation.supervisor
-        hands, m, d = world.parts.hands.of, world.m, world.d
+        holdings, m, d = world.parts.holdings, world.m, world.d
         if not recovery.exchanges or found or made.index not in supervisor.active.operations:
             return
-        inputs = hands[0].bodies["part1"], hands[1].bodies["part2"]
+        inputs = holdings.hand(0)["part1"], holdings.hand(1)["part2"]
         a, b = (m.jnt_qposadr[m.body_jntadr[body]] for body in inputs)
         place = d.qpos[b : b + 3].copy()
         d.qpos[b : b + 3] = d.qpos[a : a + 3]
@@ -260,7 +260,7 @@ def test_a_robot_that_dies_where_it_went_ahead() -> None:
 
     def strike(_: State) -> None:
         world = simulation.physical
-        if not recovery.found and 2 in world.parts.hands.of and world.sense()[0][4] < 0.01:
+        if not recovery.found and world.parts.holdings.hand(2) and world.sense()[0][4] < 0.01:
             recovery.strike(WorldFault("dead", robot="r3", at=0.0))
 
     run = simulation.run([strike], max_time=60.0)
@@ -290,12 +290,12 @@ def test_what_a_robot_that_is_gone_stood_under_goes_back() -> None:
         world = simulation.physical
         is_there = "part2" in world.parts.feeders.shown() and world.sense()[0][3] > length - 0.07
         is_new = world.time > 3.0 and not recovery.found
-        if is_new and is_there and 3 not in world.parts.hands.of:
+        if is_new and is_there and not world.parts.holdings.hand(3):
             standing[3] = 1e6
 
     run = simulation.run([stop], max_time=60.0)
     assert figures(run)[:2] == (0, 4) and len(run.exchanges) == 1
-    assert not simulation.world.parts.feeders.back.parts
+    assert not simulation.world.parts.feeders.back.numbers
 
 
 def test_a_part_that_comes_late_waits_for_its_robot(monkeypatch: pytest.MonkeyPatch) -> None:

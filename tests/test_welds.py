@@ -31,7 +31,7 @@ def under_way(name: str = "paper", **given: Any) -> MujocoWorld:
 def test_what_is_said_last_of_a_weld_holds() -> None:
     world = under_way()
     m, d, welds = world.m, world.d, world.parts.welds
-    one, other, third, fourth = [*world.parts.hands.grip.values()][:4]
+    one, other, third, fourth = [*world.parts.holdings.weld.values()][:4]
     before = int(m.eq_obj2id[other])
     welds.join({one: 5})
     welds.join({other: 6})
@@ -52,7 +52,7 @@ def test_what_is_said_last_of_a_weld_holds() -> None:
 def test_what_is_said_last_of_a_body_holds() -> None:
     world = under_way()
     m, d, parts = world.m, world.d, world.parts
-    body, other = (int(parts.copies.body[label][0]) for label in ("part1", "part2"))
+    body, other = (int(parts.holdings.body[label][0]) for label in ("part1", "part2"))
     parts.welds.place(body, (1.0, 2.0, 3.0))
     parts.welds.place(body, (4.0, 5.0, 6.0))
     parts.welds.place(other, (7.0, 8.0, 9.0))
@@ -92,15 +92,15 @@ def test_parts_collide_exactly_if_their_holders_differ() -> None:
 def test_what_a_weld_joins_and_joined_is_woken() -> None:
     world = under_way()
     m, d, parts = world.m, world.d, world.parts
-    grip = parts.hands.grip
-    tree = {label: m.body_treeid[ids[0]] for label, ids in parts.copies.body.items()}
-    first = {label: m.body_dofadr[ids[0]] for label, ids in parts.copies.body.items()}
+    grip = parts.holdings.grips()
+    tree = {label: m.body_treeid[ids[0]] for label, ids in parts.holdings.body.items()}
+    first = {label: m.body_dofadr[ids[0]] for label, ids in parts.holdings.body.items()}
     for label in ("part1", "part2"):
         d.tree_asleep[tree[label]] = tree[label]
         d.qvel[first[label] : first[label] + 6] = 0.0
     d.tree_asleep[tree["part3"]] = -1
     weld = grip[0, "part1"]
-    m.eq_obj2id[weld] = parts.copies.body["part2"][0]
+    m.eq_obj2id[weld] = parts.holdings.body["part2"][0]
     joins = next(w for (robot, label), w in grip.items() if robot and label == "part3")
     for name, body in (("holder", m.eq_obj1id[weld]), ("other", m.eq_obj1id[joins])):
         tree[name], first[name] = m.body_treeid[body], m.body_dofadr[body]
@@ -108,8 +108,8 @@ def test_what_a_weld_joins_and_joined_is_woken() -> None:
         d.qvel[first[name]] = 0.0
     welds = parts.welds
     welds.loose([weld])
-    welds.join({weld: int(parts.copies.body["part1"][0])})
-    part3 = int(parts.copies.body["part3"][0])
+    welds.join({weld: int(parts.holdings.body["part1"][0])})
+    part3 = int(parts.holdings.body["part3"][0])
     welds.join({parts.feeders.welds["part3"]: part3, joins: part3})
     welds.write()
     for label, dofs in (("part1", 6), ("holder", 1), ("other", 1)):
@@ -121,7 +121,7 @@ def test_what_a_weld_joins_and_joined_is_woken() -> None:
 def test_what_a_weld_lets_go_is_woken() -> None:
     world = under_way()
     m, d, parts = world.m, world.d, world.parts
-    weld, body = parts.hands.grip[0, "part1"], int(parts.copies.body["part2"][0])
+    weld, body = parts.holdings.weld[1, "part1"], int(parts.holdings.body["part2"][0])
     m.eq_obj2id[weld] = body
     tree, first = m.body_treeid[body], m.body_dofadr[body]
     d.tree_asleep[tree] = tree
@@ -161,7 +161,7 @@ def test_gaps_are_those_where_bodies_are_taken_over() -> None:
     that are only joined are not measured."""
     world = under_way()
     m, d, parts = world.m, world.d, world.parts
-    grip, body = parts.hands.grip[0, "part1"], int(parts.copies.body["part1"][0])
+    grip, body = parts.holdings.weld[1, "part1"], int(parts.holdings.body["part1"][0])
     before, count = parts.welds.taken.gap, parts.welds.taken.count
     parts.welds.join({grip: body})
     parts.welds.write()
@@ -180,7 +180,7 @@ def test_a_loosened_grip_is_not_measured() -> None:
     """A weld that is let go in the same tick in which it took over holds nothing."""
     world = under_way()
     parts, count = world.parts, world.parts.welds.taken.count
-    grip, body = parts.hands.grip[0, "part1"], int(parts.copies.body["part1"][0])
+    grip, body = parts.holdings.weld[1, "part1"], int(parts.holdings.body["part1"][0])
     parts.welds.grip({grip: body})
     parts.welds.loose([grip])
     parts.welds.write()
@@ -200,17 +200,17 @@ def test_every_part_has_one_holder(name: str, given: dict[str, Any]) -> None:
     simulation = ready(name, **given)
     world = simulation.physical
     m, d, parts = world.m, world.d, world.parts
-    code_of = dict(parts.grips())
+    code_of = dict(parts.holdings.welds())
     while world.delivered() < 2:
         simulation.supervisor.step()
         active = np.flatnonzero(d.eq_active)
         held = {int(m.eq_obj2id[w]): code_of.get(int(w), NOBODY) for w in active.tolist()}
         assert len(held) == len(active)
         assert {b: int(parts.masks.code[b]) for b in parts.masks.solid} == held
-        for robot, hand in parts.hands.of.items():
-            for label, body in hand.bodies.items():
+        for robot, bodies in parts.holdings.in_hands().items():
+            for label, body in bodies.items():
                 assert held[body] == robot + 1
-                assert parts.copies[label, hand.unit] == body
+                assert parts.holdings[label, parts.holdings.of(body).unit] == body
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -221,7 +221,7 @@ def test_a_run_from_a_marking_begins_with_what_robots_hold(seed: int) -> None:
     places = world.d.xpos.copy()
     for _ in range(20):
         world.advance(1)
-    held = [body for hand in world.parts.hands.of.values() for body in hand.bodies.values()]
+    held = [body for held in world.parts.holdings.in_hands().values() for body in held.values()]
     assert np.abs(world.d.xpos[held] - places[held]).max(initial=0.0) < 1e-4
     assert not world.inspection.unintended
 
@@ -234,13 +234,13 @@ def test_excluded_pairs_of_one_unit_do_not_collide() -> None:
     assert excluded
     while world.delivered() < 2:
         simulation.supervisor.step()
-        present = world.parts.copies._number
-        units = {unit for _, unit in present}
+        present = world.parts.holdings
+        units = {holding.unit for _, holding in present.rows()}
         pairs = [
-            sorted((world.parts.copies[one, unit], world.parts.copies[other, unit]))
+            sorted((present[one, unit], present[other, unit]))
             for one, other in excluded
             for unit in units
-            if {(one, unit), (other, unit)} <= present.keys()
+            if (one, unit) in present and (other, unit) in present
         ]
         expected = sorted((low << 16) + high for low, high in pairs)
         assert listed[: len(pairs)].tolist() == expected

@@ -81,7 +81,7 @@ def resident_kib() -> float:
 
 def whereabouts(world: Any) -> dict[str, list[str]]:
     """What holds each copy, by the welds that are on: `held`, `fed`, `on the tray`, `parked`."""
-    m, d, copies = world.m, world.d, world.parts.copies
+    m, d, copies = world.m, world.d, world.parts.holdings
     found: dict[str, list[str]] = {
         m.body(body).name: [] for bodies in copies.body.values() for body in bodies
     }
@@ -96,16 +96,16 @@ def whereabouts(world: Any) -> dict[str, list[str]]:
 def misplaced(world: Any) -> list[str]:
     """Copies that nothing or more than one thing holds, or that are not either to spare or in one
     unit."""
-    copies, wrong = world.parts.copies, list[str]()
+    holdings, wrong = world.parts.holdings, list[str]()
     for name, holders in whereabouts(world).items():
         if len(holders) != 1:
             wrong.append(f"{name}: {' and '.join(holders) or 'nothing holds it'}")
     units = world.parts.masks.unit
-    for label, bodies in copies.body.items():
+    for label, bodies in holdings.body.items():
         for copy, body in enumerate(bodies.tolist()):
             part = label, int(units[body])
-            used = part in copies and copies[part] == body
-            if copies.free[label].count(copy) + used != 1:
+            used = part in holdings and holdings[part] == body
+            if holdings.free[label].count(body) + used != 1:
                 wrong.append(f"{names.part(label, copy + 1)}: neither to spare nor in a unit")
     return wrong
 

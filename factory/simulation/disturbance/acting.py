@@ -90,7 +90,7 @@ class _Acting:
 
     def _parts(self, labels: Iterable[str]) -> list[int]:
         """The bodies of all copies of some labels, of all for none."""
-        copies = self.world.parts.copies.body
+        copies = self.world.parts.holdings.body
         for label in labels:
             _known(label, copies, "part")
         return [int(body) for label in labels or copies for body in copies[label]]

@@ -39,7 +39,7 @@ class ContactMasks:
     ) -> None:
         self.code, self.unit = np.zeros(m.nbody, np.int64), np.full(m.nbody, -1)
         self.trunk = trunks(m)
-        self._m, self._masks = m, np.array([m.body_contype, m.body_conaffinity])
+        self._m, self._of, self._masks = m, bodies, np.array([m.body_contype, m.body_conaffinity])
         self._own = {int(b): np.array([b]) for ids in bodies.values() for b in ids}
         for shell in np.flatnonzero(self.trunk != np.arange(m.nbody)).tolist():
             trunk = int(self.trunk[shell])
@@ -55,7 +55,6 @@ class ContactMasks:
             for number, body in enumerate(bodies[label], 1)
         }
         self.fresh: set[int] = set()
-        self._present: dict[tuple[str, int], int] = {}
         self._signatures: set[int] = set()
 
     def _solid_geoms(self, bodies: Index) -> Index:
@@ -107,13 +106,11 @@ class ContactMasks:
     def enter(self, label: str, unit: int, body: int) -> None:
         """A part's body comes into the factory, for a unit."""
         self.unit[self._own[body]] = unit
-        self._present[label, unit] = body
         self._exclude(label, unit, body, True)
 
-    def leave(self, label: str, unit: int) -> None:
+    def leave(self, label: str, body: int) -> None:
         """A part's body leaves the factory with its unit."""
-        body = self._present.pop((label, unit))
-        self._exclude(label, unit, body, False)
+        self._exclude(label, int(self.unit[body]), body, False)
         self.unit[self._own[body]] = -1
 
     def _exclude(self, label: str, unit: int, body: int, now: bool) -> None:
@@ -121,13 +118,13 @@ class ContactMasks:
         engine merges the exclusions, a sorted list of unsigned numbers, with its sorted pairs; free
         slots are behind."""
         found = (
-            (part, self._present.get((partner, unit)), theirs)
+            (part, other, theirs)
             for part, (partner, theirs) in self._partners.get(label, ())
+            for other in self._of[partner][self.unit[self._of[partner]] == unit].tolist()
         )
         pairs = [
             sorted((self._of_part[body, part], self._of_part[other, theirs]))
             for part, other, theirs in found
-            if other is not None
         ]
         for low, high in pairs:
             (self._signatures.add if now else self._signatures.discard)((low << 16) + high)

@@ -15,29 +15,25 @@ import numpy as np
 from factory.control.mode import Index, Truth
 from factory.layout.feeding import Outlet, outlets_of
 from factory.layout.layout import Layout
-from factory.mjcf import names
 from factory.mjcf.masks import feeder_codes
 from factory.mjcf.model import Model
 from factory.mjcf.parts import presented_at
 from factory.plant.factory import Operation
-from factory.simulation.mujoco.copies import Copies
+from factory.simulation.mujoco.holdings import Holdings
 from factory.simulation.mujoco.passing import Passing
 from factory.simulation.mujoco.sliders import NEVER, Sliders
 from factory.simulation.mujoco.supply import Supply, TakenBack
 from factory.simulation.mujoco.turns import Turns
 from factory.simulation.mujoco.welds import Place, Welds
-from factory.support.engine import mujoco
 
 
 @dataclass(frozen=True, slots=True)
 class Station:
-    """An outlet of a feeder: the label of its parts, the robot (index) that takes them, the weld by
-    which it holds one, its feeder's code, and where the part is while the slider is down, and
-    up."""
+    """An outlet of a feeder: the label of its parts, the robot (index) that takes them, its
+    feeder's code, and where the part is while the slider is down, and up."""
 
     label: str
     robot: int
-    weld: int
     code: int
     down: Place
     up: Place
@@ -53,21 +49,19 @@ class Feeders:
 
     def __init__(
         self,
-        m: mujoco.MjModel,
         model: Model,
-        copies: Copies,
+        holdings: Holdings,
         welds: Welds,
         sliders: Sliders,
         passing: Passing,
         supply: Supply,
     ) -> None:
-        self._copies, self._welds, self._sliders = copies, welds, sliders
+        self._holdings, self._welds, self._sliders = holdings, welds, sliders
         self._passing, self.supply = passing, supply
         outlets = outlets_of(model.layout)
         codes = feeder_codes(model.factory, outlets)
-        self._stations = [_station(m, outlet, codes[outlet.robot]) for outlet in outlets]
+        self._stations = [_station(outlet, codes[outlet.robot]) for outlet in outlets]
         self.back = TakenBack()
-        self._shown: dict[str, int] = {}
         self.lacking = set[str]()
         self.due = NEVER
         self._turns = Turns([station.label for station in self._stations])
@@ -92,17 +86,14 @@ class Feeders:
     @property
     def welds(self) -> dict[str, int]:
         """What holds the part that a feeder presents, by label."""
-        return {label: self._stations[n].weld for label, n in self._number.items()}
+        stations = ((label, self._stations[n].code) for label, n in self._number.items())
+        return {label: self._holdings.weld[code, label] for label, code in stations}
 
     @property
     def trees(self) -> dict[int, int]:
         """The code of the feeder that each slider is of, by its kinematic tree."""
         codes = (station.code for station in self._stations)
         return dict(zip(self._sliders.trees.tolist(), codes, strict=True))
-
-    def grips(self) -> Iterator[tuple[int, int]]:
-        """The welds that hold what is presented, each with the code of its feeder."""
-        return ((station.weld, station.code) for station in self._stations)
 
     def begin(self) -> None:
         """Where the run starts, each feeder presents a part if it can and its robot is not yet
@@ -116,7 +107,7 @@ class Feeders:
         if not self.supply.admits(unit):
             return False
         number = self._number[label]
-        if self._shown.get(label) != unit:
+        if self.shows(label) != unit:
             self.lacking.add(label)
             return False
         ends = float(self._sliders.ends[number])
@@ -127,10 +118,8 @@ class Feeders:
         return True
 
     def taken(self, label: str) -> None:
-        """The robot has taken the part."""
+        """The robot takes the part."""
         number = self._number[label]
-        del self._shown[label]
-        self._welds.loose([self._stations[number].weld])
         self._passing.holding(self._stations[number].robot)
         self._turns.vacant[self._turns.taken(number)] = True
 
@@ -141,19 +130,18 @@ class Feeders:
         taken = [self._number[o.label] for o in operations if o.label in self._number]
         self._send(np.array(taken, np.intp), down=False)
 
-    def retire(self, labels: Iterable[str], unit: int) -> None:
-        """Put bodies of a unit out of sight; their feeders may be empty."""
-        for label in labels:
-            self._copies.put_back(label, unit)
+    def retire(self, bodies: Iterable[int]) -> None:
+        """Put bodies out of sight; their feeders may be empty."""
+        for label in self._holdings.put_away(bodies):
             number = self._number.get(label, -1)
-            if number >= 0 and label not in self._shown and self._turns.now[number]:
+            if number >= 0 and self.shows(label) is None and self._turns.now[number]:
                 self._turns.vacant[number] = True
 
     def tend(self) -> bool:
         """Let the next parts come down from housings whose sliders have come up, where the robots
         are out of the way. Whether one comes that a robot has asked for."""
         self._sliders.settle()
-        if self.back.parts:
+        if self.back.numbers:
             self._take_back()
         if not np.count_nonzero(self._turns.vacant):
             return False
@@ -174,30 +162,38 @@ class Feeders:
     def at_rest(self) -> Iterator[tuple[Station, int, int]]:
         """The parts that are shown by sliders that rest, and have not been looked at: where, for
         which unit, and the body."""
-        for label, unit in self._shown.items():
+        for label, unit in self.shown().items():
             number = self._number[label]
             if label not in self.back.good and self._sliders.ends[number] == NEVER:
-                yield self._stations[number], unit, self._copies[label, unit]
+                yield self._stations[number], unit, self._holdings[label, unit]
 
     def take_back(self, label: str, scrap: int) -> None:
         """A part that is shown goes back into the housing, and is no longer for any unit but for
         `scrap`."""
-        number, unit = self._number[label], self._shown.pop(label)
+        number = self._number[label]
         self.supply.next[label] -= self.supply.period
-        self._copies.renumber({(label, unit): scrap})
-        self.back.parts[number] = scrap
+        self._holdings.assign({self._holdings.held(self._stations[number].code)[label]: scrap})
+        self.back.numbers.append(number)
         self.back.good.discard(label)
 
     def served(self) -> Iterator[str]:
         """The labels of feeders that take a part back, but for those whose robots are in its way:
         it waits for them."""
-        for number in self.back.parts:
+        for number in self.back.numbers:
             if self._passing.is_aside(number):
                 yield from (self._stations[n].label for n in self._turns.lines[number])
 
     def shown(self) -> dict[str, int]:
-        """The unit of the part that is shown of each label."""
-        return dict(self._shown)
+        """The unit of the part that is shown of each label, as they came."""
+        codes, rows = {station.code for station in self._stations}, self._holdings.rows()
+        labels = (holding.label for _, holding in rows if holding.holder in codes)
+        return {label: unit for label in labels if (unit := self.shows(label)) is not None}
+
+    def shows(self, label: str) -> int | None:
+        """The unit of the part that is shown of a label, None where none is."""
+        number = self._number[label]
+        body = self._holdings.held(self._stations[number].code).get(label)
+        return None if body is None or number in self.back.numbers else self._holdings.of(body).unit
 
     def undone(self, units: Mapping[str, int], rounds: Mapping[str, int], scrap: int) -> None:
         """The next part of each label is for another unit, after so many rounds; what it is no
@@ -205,13 +201,11 @@ class Feeders:
         self.lacking.clear()
         self._turns.recount(rounds)
         for label, unit in units.items():
-            number, is_shown = self._number[label], label in self._shown
-            if is_shown:
-                self._shown[label] = unit
+            number, is_shown = self._number[label], self.shows(label) is not None
             self.supply.next[label] = unit + self.supply.period * is_shown
             if is_shown and not self._turns.now[number]:
                 self.take_back(label, scrap + number)
-            waits = label not in self._shown and number not in self.back.parts
+            waits = self.shows(label) is None and number not in self.back.numbers
             self._turns.vacant[number] = self._turns.now[number] and waits
 
     def exchange(self, robot: int, layout: Layout) -> None:
@@ -224,7 +218,7 @@ class Feeders:
     def elsewhere(self, layout: Layout) -> list[str]:
         """The labels of parts that are shown where they are not taken in a layout."""
         by_label = layout.factory.by_label
-        robots = ((x, self._stations[self._number[x]].robot) for x in self._shown)
+        robots = ((x, self._stations[self._number[x]].robot) for x in self.shown())
         return [label for label, robot in robots if by_label[label].carrier != robot]
 
     def in_the_way(self) -> set[int]:
@@ -244,7 +238,7 @@ class Feeders:
 
     def _take_back(self) -> None:
         """Sliders with what is taken back go up, and let go of it where nothing of it is seen."""
-        for number, unit in [*self.back.parts.items()]:
+        for number in [*self.back.numbers]:
             if self._sliders.ends[number] < NEVER:
                 continue
             if not self._sliders.is_up(number):
@@ -253,16 +247,15 @@ class Feeders:
                 self._sliders.send(np.array([number]), down=False, loaded=True)
                 continue
             station = self._stations[number]
-            self._welds.loose([station.weld])
-            self._copies.put_back(station.label, unit)
-            del self.back.parts[number]
+            self._holdings.put_away([self._holdings.held(station.code)[station.label]])
+            self.back.numbers.remove(number)
             self._turns.vacant[number] = self._turns.now[number]
         self._welds.write()
 
     def _held_back(self) -> Truth:
         """Whether each (n,) is to show nothing yet."""
         held = np.zeros(len(self._stations), bool)
-        held[[*self.back.parts]] = True
+        held[self.back.numbers] = True
         if self.back.awaited:
             held[[n for n, s in enumerate(self._stations) if s.label in self.back.awaited]] = True
         return held
@@ -279,21 +272,19 @@ class Feeders:
         self.back.late = self.back.late.union(numbers.tolist()).difference(loaded)
         for number in loaded:
             station, supply = self._stations[number], self.supply
-            unit = self._shown[station.label] = supply.next[station.label]
+            unit = supply.next[station.label]
             supply.next[station.label] += supply.period
-            body = self._copies.take(station.label, unit)
+            body = self._holdings.take(station.label, unit, station.code)
             self._welds.place(body, station.down if down else station.up)
-            self._welds.hold([body], station.code)
-            self._welds.join({station.weld: body})
             self.back.good.discard(station.label)
             self.back.fresh[station.label] = unit
         return np.array(loaded, np.intp)
 
     def _supplied(self, label: str) -> bool:
-        return bool(self._copies.free[label]) and self.supply.wants(label)
+        return bool(self._holdings.free[label]) and self.supply.wants(label)
 
 
-def _station(m: mujoco.MjModel, outlet: Outlet, code: int) -> Station:
+def _station(outlet: Outlet, code: int) -> Station:
     x, y, z = presented_at(outlet.layout, outlet.leaf.label)
-    up, weld = (x, y, z + outlet.feeder.stroke), m.equality(names.feed(outlet.name)).id
-    return Station(outlet.label, outlet.robot, weld, code, (x, y, z), up)
+    up = x, y, z + outlet.feeder.stroke
+    return Station(outlet.label, outlet.robot, code, (x, y, z), up)

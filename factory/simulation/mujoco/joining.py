@@ -7,11 +7,11 @@ from types import MappingProxyType
 
 import numpy as np
 
+from factory.mjcf.masks import robot_code
 from factory.mjcf.model import Model
-from factory.simulation.mujoco.copies import Copies
 from factory.simulation.mujoco.feeders import Feeders
 from factory.simulation.mujoco.fusing import RIGID, SETTLING, Fusion
-from factory.simulation.mujoco.hands import Grasps
+from factory.simulation.mujoco.holdings import Holdings
 from factory.simulation.mujoco.product_error import Misfit
 from factory.simulation.mujoco.welds import Welds
 from factory.support.engine import mujoco
@@ -24,10 +24,8 @@ class Joining:
     has joined and since when [s]; `misfit`: how far out of place a unit's parts were when
     they became one."""
 
-    def __init__(
-        self, model: Model, hands: Grasps, copies: Copies, feeders: Feeders, welds: Welds
-    ) -> None:
-        self._model, self._hands, self._copies = model, hands, copies
+    def __init__(self, model: Model, holdings: Holdings, feeders: Feeders, welds: Welds) -> None:
+        self._model, self._holdings = model, holdings
         self._feeders, self._welds = feeders, welds
         self.waiting: dict[int, tuple[str, float]] = {}
         self.misfit: dict[int, Misfit] = {}
@@ -36,7 +34,7 @@ class Joining:
     def weigh(self, m: mujoco.MjModel, d: mujoco.MjData) -> None:
         """From now on bodies have the masses that the model has."""
         places, radii = np.zeros((m.nbody, 3)), np.zeros(m.nbody)
-        for label, ids in self._copies.body.items():
+        for label, ids in self._holdings.body.items():
             places[ids] = self._model.carried.centre[label]
             radii[ids] = self._model.carried.radius[label]
         self.fusion = Fusion(m, d, places, radii)
@@ -50,7 +48,7 @@ class Joining:
         """Let one body take the place of those that a robot has joined, once they have settled.
         What has been looked at asleep is not looked at again before it wakes."""
         late = [robot for robot, (_, since) in self.waiting.items() if now - since > SETTLING]
-        asleep = {r for r in late if self.fusion.sleeps(self._hands.of[r].bodies)}
+        asleep = {r for r in late if self.fusion.sleeps(self._holdings.hand(r))}
         late = [robot for robot in late if robot not in asleep or robot not in self._asleep]
         self._asleep = asleep
         if late:
@@ -66,27 +64,24 @@ class Joining:
             if robot not in self.waiting:
                 continue
             label, _ = self.waiting.pop(robot)
-            if not self._copies.free[label]:
-                holders = (r for r in self.waiting if label in self._hands.of[r].bodies)
+            if not self._holdings.free[label]:
+                holders = (r for r in self.waiting if label in self._holdings.hand(r))
                 self.fuse([next(holders)])
             misfit = apart[robot] if robot in apart else self._misfits([robot])[0]
             self._become_one(robot, label, misfit)
 
     def _misfits(self, robots: Sequence[int]) -> list[float]:
         """How far out of place anything is of what each robot holds [m]."""
-        held = [[*self._hands.of[robot].bodies.values()] for robot in robots]
+        held = [[*self._holdings.hand(robot).values()] for robot in robots]
         return list(map(float, self.fusion.misfits(held)))
 
     def _become_one(self, robot: int, label: str, misfit: float) -> None:
         """A robot gets one body, of this label, for all that it holds. A body that has just become
         free may be that one, so it is put away first."""
         self._welds.write()
-        hand = self._hands.of[robot]
-        unit, bodies = hand.unit, [*hand.bodies.values()]
+        bodies = [*self._holdings.hand(robot).values()]
+        unit = self._holdings.of(bodies[0]).unit
         off = Misfit(misfit, self.fusion.turns(bodies), label)
         self.misfit[unit] = off.worse(self.misfit.get(unit, Misfit()))
-        whole = self._copies.take(label, unit)
-        self.fusion.fuse(bodies, whole)
-        self._hands.let_go(robot)
-        self._feeders.retire(hand.bodies, unit)
-        self._hands.begin_with(robot, unit, {label: whole})
+        self.fusion.fuse(bodies, self._holdings.take(label, unit, robot_code(robot)))
+        self._feeders.retire(bodies)

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from factory.mjcf import names
-from factory.mjcf.masks import tray_code
+from factory.mjcf.masks import robot_code, tray_code
 from factory.mjcf.model import Model
 from factory.mjcf.weld_frames import held_at
 from factory.plant.factory import Operation
 from factory.simulation.mujoco.contacts import ContactMasks
-from factory.simulation.mujoco.copies import Copies, copies_of
 from factory.simulation.mujoco.feeders import Feeders
-from factory.simulation.mujoco.hands import Grasps
+from factory.simulation.mujoco.holdings import Holdings, copies_of
 from factory.simulation.mujoco.joining import Joining
 from factory.simulation.mujoco.motion import Motion
 from factory.simulation.mujoco.passing import Passing
@@ -30,11 +28,11 @@ TICKS = 0.99
 
 
 class Parts:
-    """Copies, feeders, hands and the tray's hold, switched together.
+    """The parts, what holds them, and what becomes of them, switched together.
 
     A weld is aimed at the copy it holds by writing its body at run time; its nominal frame is the
-    same for all copies. `on_tray`: the unit on the outfeed's tray; `strength`: how much of that of
-    robots' hands is used.
+    same for all copies. `tray`: the code of the tray; `strength`: how much of that of robots' hands
+    is used.
     """
 
     def __init__(
@@ -49,22 +47,18 @@ class Parts:
         factory, body = model.factory, copies_of(m, model)
         self.model, self._d = model, d
         self._labels = [model.carried.carried[product] for product in factory.products]
-        every = [label for labels in self._labels for label in labels]
-        self.on_tray: int | None = None
+        self.tray = tray_code(factory)
         self.masks = ContactMasks(m, body, model.apart)
         radii = np.zeros(m.nbody)
         for label, ids in body.items():
             radii[ids] = model.carried.radius[label]
         self.welds = Welds(m, d, self.masks, motion.sleep, radii)
-        self.hold = {label: m.equality(names.hold(label)).id for label in every}
-        self.copies = Copies(m, model, body, self.welds)
+        self.holdings = Holdings(m, model, body, self.welds)
         passing, supply = Passing(m, d, model, request), Supply(model, request, counts)
-        self.feeders = Feeders(m, model, self.copies, self.welds, motion.sliders, passing, supply)
-        self.hands = Grasps(m, model, self.welds)
-        self.strength = Strength(m, d, model, self.hands.grip)
-        self.joining = Joining(model, self.hands, self.copies, self.feeders, self.welds)
+        self.feeders = Feeders(model, self.holdings, self.welds, motion.sliders, passing, supply)
+        self.strength = Strength(m, d, model, self.holdings.grips())
+        self.joining = Joining(model, self.holdings, self.feeders, self.welds)
         self.joining.weigh(m, d)
-        self.welds.loose([*(weld for weld, _ in self.feeders.grips()), *self.hold.values()])
         mujoco.mj_kinematics(m, d)
         for label, unit, robot in self._under_way(counts, passing):
             self._give(m, label, unit, robot)
@@ -93,59 +87,42 @@ class Parts:
         feeder's too, and at dropoff all of the output robot's against those of the tray."""
         for operation, unit in ended:
             if self.model.factory.drops(operation.index):
-                self._release(operation, unit)
+                self.holdings.move(self.holdings.hand(operation.carrier).values(), self.tray)
+                self.feeders.supply.released += 1
             elif operation.inputs:
-                self._pass_on(operation, unit)
+                self._pass_on(operation)
             else:
                 self.feeders.taken(operation.label)
-                body = self.copies[operation.label, unit]
-                self.hands.take(operation.carrier, unit, {operation.label: body})
+                taken = [self.holdings[operation.label, unit]]
+                self.holdings.move(taken, robot_code(operation.carrier))
         self.feeders.end([operation for operation, _ in ended])
         self.welds.write()
 
-    def _pass_on(self, operation: Operation, unit: int) -> None:
+    def _pass_on(self, operation: Operation) -> None:
         carrier = operation.carrier
         for robot in operation.robots:
-            if robot != carrier and robot in self.hands.of:
-                self.hands.take(carrier, unit, self.hands.let_go(robot).bodies)
+            if robot != carrier:
+                self.holdings.move(self.holdings.hand(robot).values(), robot_code(carrier))
         self.joining.joined(carrier, operation.label, float(self._d.time))
-
-    def _release(self, operation: Operation, unit: int) -> None:
-        bodies = self.hands.let_go(operation.carrier).bodies
-        self.welds.grip({self.hold[label]: body for label, body in bodies.items()})
-        self.welds.hold(bodies.values(), self.tray)
-        self.on_tray = unit
-        self.feeders.supply.released += 1
 
     def recycle(self) -> None:
         """Return the bodies of the product on the tray to their feeders, out of sight."""
-        unit, self.on_tray = self.on_tray, None
-        assert unit is not None
-        self.joining.misfit.pop(unit, None)
-        self.welds.loose(self.hold.values())
-        self.feeders.retire(self.labels(unit), unit)
+        assert self.on_tray is not None
+        self.joining.misfit.pop(self.on_tray, None)
+        self.feeders.retire(self.holdings.held(self.tray).values())
         self.welds.write()
 
     def finished(self, unit: int) -> tuple[np.ndarray, Misfit]:
         """The bodies of a finished product, in the order of its `labels`, and how far off its
         parts were when they became one body."""
-        bodies = [self.copies[label, unit] for label in self.labels(unit)]
+        labels = self._labels[unit % len(self._labels)]
+        bodies = [self.holdings[label, unit] for label in labels]
         return np.array(bodies), self.joining.misfit.get(unit, Misfit())
 
-    def labels(self, unit: int) -> tuple[str, ...]:
-        """The labels of the bodies that a finished product consists of."""
-        return self._labels[unit % len(self._labels)]
-
     @property
-    def tray(self) -> int:
-        """The code of the tray; that of a robot is its number."""
-        return tray_code(self.model.factory)
-
-    def grips(self) -> Iterator[tuple[int, int]]:
-        """All welds by which holders hold parts, each with the code of its holder."""
-        yield from ((weld, robot + 1) for (robot, _), weld in self.hands.grip.items())
-        yield from ((weld, self.tray) for weld in self.hold.values())
-        yield from self.feeders.grips()
+    def on_tray(self) -> int | None:
+        """The unit on the outfeed's tray."""
+        return self.holdings.unit(self.tray)
 
     def _under_way(
         self, counts: Mapping[int, int], passing: Passing
@@ -164,12 +141,11 @@ class Parts:
                 if holder.carrier == leaf.carrier:
                     passing.holding(leaf.carrier)
                 for label in self.model.carried.carried[holder.label]:
-                    if (label, unit) not in self.copies:
+                    if (label, unit) not in self.holdings:
                         yield label, unit, holder.carrier
 
     def _give(self, m: mujoco.MjModel, label: str, unit: int, robot: int) -> None:
         """Put a copy into a robot's hands, where the weld holds it."""
-        body, weld = self.copies.take(label, unit), self.hands.grip[robot, label]
-        x, y, z = held_at(m, np.array([weld]), self._d.xpos, self._d.xmat)[0].tolist()
-        self.welds.place(body, (x, y, z))
-        self.hands.begin_with(robot, unit, {label: body})
+        weld = np.array([self.holdings.weld[robot_code(robot), label]])
+        x, y, z = held_at(m, weld, self._d.xpos, self._d.xmat)[0].tolist()
+        self.welds.place(self.holdings.take(label, unit, robot_code(robot)), (x, y, z))

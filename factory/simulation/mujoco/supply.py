@@ -39,13 +39,13 @@ class Supply:
 
 @dataclass(slots=True)
 class TakenBack:
-    """What goes wrong with parts that are shown. `parts`: those on their way back, with the unit
-    that they count for, by feeder; `fresh`: those that have begun to be shown, with their unit, by
+    """What goes wrong with parts that are shown. `numbers`: the feeders whose part is on its way
+    back; `fresh`: those that have begun to be shown, with their unit, by
     label; `good`: labels whose part has been looked at and is good; `awaited`: labels of which none
     is to come yet; `late`: feeders that had nothing to show on their turn, so that their robots may
     be home before the next part comes down."""
 
-    parts: dict[int, int] = field(default_factory=dict)
+    numbers: list[int] = field(default_factory=list)
     fresh: dict[str, int] = field(default_factory=dict)
     good: set[str] = field(default_factory=set)
     awaited: set[str] = field(default_factory=set)

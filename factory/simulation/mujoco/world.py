@@ -71,7 +71,8 @@ class MujocoWorld:
             self.motion = Motion(self.m, self.d, model, start, gains)
             self.parts = Parts(self.m, self.d, model, self.motion, request, counts)
             parts = self.parts
-        soundness = Soundness(self.m, self.d, model, parts.masks, parts.copies.body, parts.grips)
+        held = parts.holdings
+        soundness = Soundness(self.m, self.d, model, parts.masks, held.body, held.welds)
         self.inspection = Inspection(self.m, self.d, model, soundness)
         for operation in model.factory.operations:
             begun, over = (counts.get(t, 0) for t in (operation.start, operation.end))
@@ -83,7 +84,7 @@ class MujocoWorld:
             if request.fast
             else SingleSteps(*stepping)
         )
-        self.motion.begin(self.parts.hands.loads())
+        self.motion.begin(self.parts.holdings.loads())
         soundness.look()
         mujoco.mj_forward(self.m, self.d)
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from factory.layout.bins import TOP, Bin
 from factory.layout.sweeping import SweptFloor
+from factory.mjcf.masks import robot_code
 from factory.simulation.mujoco.failing.jets import Jets
 from factory.simulation.mujoco.world import MujocoWorld, anything
 
@@ -18,10 +19,9 @@ SETTLES = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Heap:
-    """The `bodies` of something that has fallen, by label, which count for a `unit` of scrap, and
-    `until` when they lie [s]; `into`: the bin that they are to fall into."""
+    """The `bodies` of something that has fallen, by label, `until` when they lie [s], and the bin
+    `into` which they are to fall, if any."""
 
-    unit: int
     bodies: Mapping[str, int]
     until: float
     into: Bin | None = None
@@ -42,11 +42,11 @@ class Fallen:
         """A robot lets go of all that it holds, which lies for so long [s], in a bin where one is
         given."""
         world = self._world
-        hand = world.parts.hands.let_go(robot)
-        self.heaps.append(Heap(hand.unit, dict(hand.bodies), world.time + seconds, into))
+        bodies = world.parts.holdings.drop(robot_code(robot))
+        self.heaps.append(Heap(bodies, world.time + seconds, into))
         if into is not None:
-            self._jets.blow(hand.bodies.values(), into)
-        self.watch(hand.bodies.values())
+            self._jets.blow(bodies.values(), into)
+        self.watch(bodies.values())
         world.motion.load([robot], [0.0])
         self.closed |= self._near()
 
@@ -58,7 +58,7 @@ class Fallen:
         for heap in over:
             self.heaps.remove(heap)
             self.binned += self._is_in_bin(heap)
-            parts.feeders.retire(heap.bodies, heap.unit)
+            parts.feeders.retire(heap.bodies.values())
         if over:
             parts.welds.write()
         self._forget()

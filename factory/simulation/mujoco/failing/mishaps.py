@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from factory.mjcf.masks import robot_code
 from factory.plant.factory import Operation
 from factory.simulation.mujoco.failing.fallen import Fallen
 from factory.simulation.mujoco.pressing import PRESSED
@@ -51,19 +52,18 @@ class Mishaps:
     def open(self, robot: int) -> None:
         """A robot's hand opens."""
         parts = self._world.parts
-        held = parts.hands.of[robot].bodies
-        parts.welds.loose([parts.hands.grip[robot, label] for label in held])
+        held = parts.holdings.hand(robot)
+        parts.welds.loose([parts.holdings.weld[robot_code(robot), label] for label in held])
         parts.welds.write()
         self._fallen.watch(held.values())
         self.opened.add(robot)
 
     def slip(self, operation: Operation, metres: float) -> None:
         """The last input of an operation slips up in its hand."""
-        hands, robot = self._world.parts.hands, operation.robots[operation.last]
-        welds = tuple(hands.grip[robot, label] for label in hands.of[robot].bodies)
+        holdings, robot = self._world.parts.holdings, operation.robots[operation.last]
+        welds = tuple(holdings.weld[robot_code(robot), label] for label in holdings.hand(robot))
         self._world.m.eq_data[[*welds], 5] += metres
-        held = (hands.of[r].bodies.values() for r in operation.robots if r in hands.of)
-        bodies = tuple(body for found in held for body in found)
+        bodies = tuple(body for r in operation.robots for body in holdings.hand(r).values())
         self.slips[operation.index] = Slip(robot, welds, bodies)
         self._fallen.watch(bodies)
 
@@ -89,7 +89,7 @@ class Mishaps:
         if unit is None:
             self.gone.append(fault.kind)
             return
-        body, weld = parts.copies[label, unit], parts.feeders.welds[label]
+        body, weld = parts.holdings[label, unit], parts.feeders.welds[label]
         self.unseen[body] = fault.kind
         if fault.kind == "bad_part":
             self.bad[body] = fault.hidden
@@ -135,7 +135,7 @@ class Mishaps:
         is as good as new."""
         world = self._world
         self.restore(
-            [n for n, slip in self.slips.items() if slip.robot not in world.parts.hands.of]
+            [n for n, slip in self.slips.items() if not world.parts.holdings.hand(slip.robot)]
         )
         for _, bodies in [one for one in self._settling if one[0] <= world.time]:
             self._fallen.calm(bodies)

@@ -8,11 +8,13 @@ import numpy as np
 
 from factory.layout.bins import Bin
 from factory.layout.layout import Layout
+from factory.mjcf.masks import robot_code
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
 from factory.simulation.mujoco.failing.fallen import Fallen
 from factory.simulation.mujoco.failing.mishaps import Mishaps
 from factory.simulation.mujoco.failing.sensors import Senses
+from factory.simulation.mujoco.holdings import Holdings
 from factory.simulation.mujoco.world import MujocoWorld
 from factory.simulation.recovery.faults import Campaign, WorldFault
 
@@ -33,10 +35,14 @@ class MujocoPlant:
     def _factory(self) -> Factory:
         return self._layout.factory
 
+    @property
+    def _holdings(self) -> Holdings:
+        return self._world.parts.holdings
+
     def lose(self, robot: int) -> bool:
         """A robot's hand opens, and nothing tells; whether it held anything."""
-        hand = self._world.parts.hands.of.get(robot)
-        if hand is None or hand.unit >= SCRAP:
+        unit = self._holdings.unit(robot_code(robot))
+        if unit is None or unit >= SCRAP:
             return False
         self._mishaps.open(robot)
         return True
@@ -66,25 +72,23 @@ class MujocoPlant:
         """A tick is over."""
         if self._world.parts.strength.dropped is not None:
             self._world.parts.strength.dropped = None
-            hands = self._world.parts.hands.of
             for robot in self._senses.unfelt():
-                self._fallen.watch(hands[robot].bodies.values())
+                self._fallen.watch(self._holdings.hand(robot).values())
         self._mishaps.tick()
         if self._fallen.tick():
             self.supplied()
 
     def lost(self) -> Sequence[int]:
         """The robots that no longer feel what they carry."""
-        hands = self._world.parts.hands.of
-        return [r for r in self._senses.lost() if r in hands and hands[r].unit < SCRAP]
+        units = ((robot, self._holdings.unit(robot_code(robot))) for robot in self._senses.lost())
+        return [robot for robot, unit in units if unit is not None and unit < SCRAP]
 
     def knocked(self, robot: int) -> bool:
         """Whether a robot's hand is closed, and something touched what it holds that had fallen or
         slipped."""
-        hand, pressing = self._world.parts.hands.of.get(robot), self._world.inspection.pressing
-        if hand is None or robot in self._mishaps.opened:
-            return False
-        return not (pressing.shaken | pressing.fallen).isdisjoint(hand.bodies.values())
+        bodies, pressing = self._holdings.hand(robot).values(), self._world.inspection.pressing
+        is_open = robot in self._mishaps.opened
+        return not (is_open or (pressing.shaken | pressing.fallen).isdisjoint(bodies))
 
     def feels(self, robots: Sequence[int]) -> bool:
         """Whether robots feel all that they carry, now."""
@@ -110,7 +114,7 @@ class MujocoPlant:
                 continue
             found.append((label, unit, test))
             feeders.take_back(label, self._next_scrap())
-            if (carrier := self._factory.by_label[label].carrier) not in self._world.parts.hands.of:
+            if not self._holdings.hand(carrier := self._factory.by_label[label].carrier):
                 feeders.stay_clear(carrier)
         return found
 
@@ -127,8 +131,7 @@ class MujocoPlant:
 
     def rejects(self, robot: int) -> bool:
         """Whether an inspection rejects what a robot holds."""
-        hand = self._world.parts.hands.of.get(robot)
-        return hand is not None and not self._mishaps.bad.keys().isdisjoint(hand.bodies.values())
+        return not self._mishaps.bad.keys().isdisjoint(self._holdings.hand(robot).values())
 
     def undone(self, holds: Sequence[str], fired: Sequence[int], going: Set[int]) -> Sequence[int]:
         """From now on robots hold these labels by the books, NOPART for nothing, transitions have
@@ -136,7 +139,7 @@ class MujocoPlant:
         scrap now."""
         parts, operations = self._world.parts, self._factory.operations
         self._mishaps.restore([o.index for o in operations if fired[o.start] == fired[o.end]])
-        scrap = {robot for robot in parts.hands.of if holds[robot] == NOPART}
+        scrap = {robot for robot in self._holdings.in_hands() if holds[robot] == NOPART}
         gone = self._senses.unfelt() & scrap
         units = self._units(holds, fired, scrap)
         self._renumber(units, fired, scrap)
@@ -152,34 +155,30 @@ class MujocoPlant:
         """The unit for which each robot that holds something holds it from now on: the last that
         was made of it; what is scrap keeps together."""
         found, fresh = dict[int, int](), dict[int, int]()
-        for robot, hand in self._world.parts.hands.of.items():
+        for robot, bodies in self._holdings.in_hands().items():
             if robot not in scrap:
                 maker = self._factory.by_label[holds[robot]]
                 found[robot] = self._factory.unit(maker, fired[maker.end] - 1)
                 continue
-            if hand.unit not in fresh:
-                fresh[hand.unit] = hand.unit if hand.unit >= SCRAP else self._next_scrap()
-            found[robot] = fresh[hand.unit]
+            unit = self._holdings.of(next(iter(bodies.values()))).unit
+            if unit not in fresh:
+                fresh[unit] = unit if unit >= SCRAP else self._next_scrap()
+            found[robot] = fresh[unit]
         return found
 
     def _renumber(self, units: Mapping[int, int], fired: Sequence[int], scrap: Set[int]) -> None:
         """Bodies are for other units: those in hands, those that are shown, and the inputs of
         operations under way, or of those that come apart."""
-        parts, factory, joining = self._world.parts, self._factory, self._world.inspection.joining
-        shown = parts.feeders.shown()
+        factory, joining, held = self._factory, self._world.inspection.joining, self._holdings
         for_units = {
-            (label, hand.unit): units[robot]
-            for robot, hand in parts.hands.of.items()
-            for label in hand.bodies
+            body: units[robot]
+            for robot, bodies in held.in_hands().items()
+            for body in bodies.values()
         }
-        for_units |= {
-            (leaf.label, shown[leaf.label]): factory.unit(leaf, fired[leaf.end])
-            for leaf in factory.leaves
-            if leaf.label in shown
-        }
-        parts.copies.renumber(for_units)
-        for robot, unit in units.items():
-            parts.hands.of[robot].unit = unit
+        for label, unit in self._world.parts.feeders.shown().items():
+            leaf = factory.by_label[label]
+            for_units[held[label, unit]] = factory.unit(leaf, fired[leaf.end])
+        held.assign(for_units)
         for number in joining:
             operation = factory.operations[number]
             wasted = [units[robot] for robot in operation.robots if robot in scrap]
@@ -191,16 +190,15 @@ class MujocoPlant:
         down until it is there, and what has come goes up again; where with nothing, when it is out
         of the way."""
         factory, feeders = self._factory, self._world.parts.feeders
-        hands = self._world.parts.hands.of
         ends = {leaf.label: fired[leaf.end] for leaf in factory.leaves}
         units = {leaf.label: factory.unit(leaf, ends[leaf.label]) for leaf in factory.leaves}
         feeders.undone(units, ends, self._next_scrap(len(ends)))
         for leaf in factory.leaves:
-            hand = hands.get(leaf.carrier)
-            if hand is None:
+            bodies = self._holdings.hand(leaf.carrier)
+            if not bodies:
                 if leaf.carrier in going:
                     feeders.stay_clear(leaf.carrier)
-            elif leaf.carrier in scrap or (leaf.carrier in going and leaf.label in hand.bodies):
+            elif leaf.carrier in scrap or (leaf.carrier in going and leaf.label in bodies):
                 for label in self._layout.magazine(leaf.carrier):
                     feeders.back.awaited.add(label)
                     if label in feeders.shown():
@@ -272,9 +270,7 @@ class MujocoPlant:
     def _empty(self, robot: int) -> None:
         """What a robot that is taken away holds is put out of sight."""
         world = self._world
-        if robot in world.parts.hands.of:
-            hand = world.parts.hands.let_go(robot)
-            world.parts.feeders.retire(hand.bodies, hand.unit)
+        world.parts.feeders.retire(self._holdings.hand(robot).values())
         world.parts.welds.write()
         world.motion.load([robot], [0.0])
 
@@ -295,7 +291,7 @@ class MujocoPlant:
     def _take_back(self, label: str) -> None:
         """What is shown of a label goes back into its feeder."""
         feeders = self._world.parts.feeders
-        self._mishaps.take_back(self._world.parts.copies[label, feeders.shown()[label]])
+        self._mishaps.take_back(self._holdings[label, feeders.shown()[label]])
         feeders.take_back(label, self._next_scrap())
 
     def _next_scrap(self, count: int = 1) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from factory.control.mode import Array, Index
+from factory.mjcf.masks import robot_code
 from factory.mjcf.weld_frames import WeldFrames
 from factory.plant.factory import Operation
 from factory.simulation.mujoco.world import MujocoWorld
@@ -30,13 +31,13 @@ class Senses:
     def unfelt(self) -> frozenset[int]:
         """The robots (index) that do not feel now what they hold: there is no grip, or it is not in
         its place."""
-        hands, d = self._world.parts.hands, self._world.d
-        if self._seen != hands.changes:
-            self._seen = hands.changes
+        holdings, d = self._world.parts.holdings, self._world.d
+        if self._seen != holdings.changes:
+            self._seen = holdings.changes
             held = [
-                (hands.grip[robot, label], body, robot)
-                for robot, hand in hands.of.items()
-                for label, body in hand.bodies.items()
+                (holdings.weld[robot_code(robot), label], body, robot)
+                for robot, bodies in holdings.in_hands().items()
+                for label, body in bodies.items()
             ]
             self._welds, self._bodies, self._robots = np.array(held, np.intp).reshape(-1, 3).T
         off = np.linalg.norm(self._gaps(self._welds, self._bodies), axis=1)
@@ -52,12 +53,12 @@ class Senses:
     def residual(self, operation: Operation) -> float:
         """How far inputs are from where they belong when they are about to be joined, as measured
         [m]."""
-        hands = self._world.parts.hands
+        holdings = self._world.parts.holdings
         held = [
-            (hands.grip[operation.carrier, label], body)
+            (holdings.weld[robot_code(operation.carrier), label], body)
             for robot in operation.robots
-            if robot != operation.carrier and robot in hands.of
-            for label, body in hands.of[robot].bodies.items()
+            if robot != operation.carrier
+            for label, body in holdings.hand(robot).items()
         ]
         if not held:
             return 0.0

@@ -183,7 +183,7 @@ def _boxes(m: mujoco.MjModel, d: mujoco.MjData, parts: Parts, count: int) -> tup
     masks = parts.masks
     low, high = boxes(m, d, masks)
     bodies = np.flatnonzero(masks.code != NOBODY)
-    welds, codes = np.array([*parts.grips()]).T
+    welds, codes = np.array([*parts.holdings.welds()]).T
     held = m.eq_obj2id[welds]
     code = np.concatenate([masks.code[bodies], codes])
     place = np.concatenate([d.xpos[bodies], held_at(m, welds, d.xpos, d.xmat)])[:, :2]

@@ -1,0 +1,199 @@
+"""Who holds which part, for which unit: one table, from which welds and contact masks follow."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+
+from factory.control.mode import Index
+from factory.layout.feeding import outlets_of
+from factory.mjcf import names
+from factory.mjcf.grips import grips_of
+from factory.mjcf.masks import NOBODY, feeder_codes, robot_code, tray_code
+from factory.mjcf.model import Model
+from factory.mjcf.parts import parked_at
+from factory.simulation.mujoco.welds import Welds
+from factory.support.engine import mujoco
+
+NOTHING: Mapping[str, int] = MappingProxyType({})
+
+
+class HeldPart(NamedTuple):
+    """A part in the factory: its `label`, the `unit` that it is for, and the code of its `holder`:
+    a robot, the tray or a feeder; NOBODY while it falls or lies about."""
+
+    label: str
+    unit: int
+    holder: int
+
+
+class Holdings:
+    """The parts of a factory, by body. Those in no unit are to spare, parked out of sight.
+
+    `body[label]`: all bodies of a label; `free[label]`: those to spare, the next first. `weld`:
+    what a holder, by its code, holds a label by. `changes`: how often something has changed hands.
+    """
+
+    def __init__(
+        self, m: mujoco.MjModel, model: Model, body: Mapping[str, Index], welds: Welds
+    ) -> None:
+        self.body, self._welds, self._mass = body, welds, model.carried.mass
+        self.free = {label: deque(map(int, ids)) for label, ids in body.items()}
+        self.weld, self._tray, self.changes = _welds(m, model), tray_code(model.factory), 0
+        self._of: dict[int, HeldPart] = {}
+        self._present: dict[tuple[str, int], int] = {}
+        self._held: dict[int, dict[str, int]] = {}
+        copies = [(label, n, int(b)) for label, ids in body.items() for n, b in enumerate(ids, 1)]
+        self.park = {b: m.equality(names.park(label, n)).id for label, n, b in copies}
+        self._place = {b: parked_at(model.layout, label, n) for label, n, b in copies}
+        for each in self.park:
+            self._hide(each)
+        self._welds.loose(w for (holder, _), w in self.weld.items() if holder >= self._tray)
+
+    def __contains__(self, part: tuple[str, int]) -> bool:
+        return part in self._present
+
+    def __getitem__(self, part: tuple[str, int]) -> int:
+        """The body of a label in a unit."""
+        return self._present[part]
+
+    def of(self, body: int) -> HeldPart:
+        """What a body that is in the factory is, and who holds it."""
+        return self._of[body]
+
+    def rows(self) -> Iterator[tuple[int, HeldPart]]:
+        """All bodies that are in the factory, as they came into it."""
+        return iter(self._of.items())
+
+    def held(self, holder: int) -> Mapping[str, int]:
+        """The bodies that a holder (its code) has, by label."""
+        return self._held.get(holder, NOTHING)
+
+    def unit(self, holder: int) -> int | None:
+        """The unit that a holder (its code) has parts of, None where it has nothing."""
+        body = next(iter(self.held(holder).values()), None)
+        return None if body is None else self._of[body].unit
+
+    def hand(self, robot: int) -> Mapping[str, int]:
+        """The bodies that a robot (index) holds, by label."""
+        return self.held(robot_code(robot))
+
+    def in_hands(self) -> dict[int, Mapping[str, int]]:
+        """The same of each robot (index) that holds something."""
+        return {code - 1: held for code, held in self._held.items() if code < self._tray}
+
+    def loads(self) -> dict[int, float]:
+        """What each robot (index) that holds something carries [kg]."""
+        held = self.in_hands().items()
+        return {robot: sum(self._mass[label] for label in bodies) for robot, bodies in held}
+
+    def grips(self) -> dict[tuple[int, str], int]:
+        """The welds by which robots hold parts, by robot (index) and label."""
+        return {(code - 1, label): w for (code, label), w in self.weld.items() if code < self._tray}
+
+    def welds(self) -> Iterator[tuple[int, int]]:
+        """All welds by which holders hold parts, each with the code of its holder."""
+        return ((weld, holder) for (holder, _), weld in self.weld.items())
+
+    def take(self, label: str, unit: int, holder: int) -> int:
+        """A holder (its code) gets a part to spare, for a unit; gives its body."""
+        body = self.free[label].popleft()
+        self._welds.loose([self.park[body]])
+        self._enter(body, HeldPart(label, unit, NOBODY))
+        self._switch(body, holder)
+        self._welds.join({self.weld[holder, label]: body})
+        return body
+
+    def move(self, bodies: Iterable[int], holder: int) -> None:
+        """Bodies go from hand to hand: from now on this holder (its code) has them. The gaps of its
+        grips are measured."""
+        for body in [*bodies]:
+            self._let_go(body)
+            self._switch(body, holder)
+            self._welds.grip({self.weld[holder, self._of[body].label]: body})
+
+    def drop(self, holder: int) -> dict[str, int]:
+        """A holder (its code) lets go of all that it has, which falls; gives the bodies by label.
+        They touch whatever they touched before."""
+        bodies = dict(self.held(holder))
+        for body in bodies.values():
+            self._let_go(body)
+        return bodies
+
+    def put_away(self, bodies: Iterable[int]) -> list[str]:
+        """Bodies are to spare from now on, out of sight; gives their labels."""
+        bodies, labels = [*bodies], list[str]()
+        for body in bodies:
+            self._let_go(body)
+            self._leave(body)
+            self._hide(body)
+            labels.append(self._of.pop(body).label)
+            self.free[labels[-1]].append(body)
+        return labels
+
+    def assign(self, units: Mapping[int, int]) -> None:
+        """Bodies are for other units from now on."""
+        for body in units:
+            self._leave(body)
+        for body, unit in units.items():
+            self._enter(body, self._of[body]._replace(unit=unit))
+
+    def _enter(self, body: int, holding: HeldPart) -> None:
+        self._of[body] = holding
+        self._present[holding.label, holding.unit] = body
+        self._welds.masks.enter(holding.label, holding.unit, body)
+
+    def _leave(self, body: int) -> None:
+        label, unit, _ = self._of[body]
+        del self._present[label, unit]
+        self._welds.masks.leave(label, body)
+
+    def _switch(self, body: int, holder: int) -> None:
+        self.changes += 1
+        holding = self._of[body] = self._of[body]._replace(holder=holder)
+        self._held.setdefault(holder, {})[holding.label] = body
+        self._welds.hold([body], holder)
+
+    def _let_go(self, body: int) -> None:
+        """Whoever holds a body does no longer."""
+        label, _, holder = self._of[body]
+        if holder == NOBODY:
+            return
+        self.changes += 1
+        del self._held[holder][label]
+        if not self._held[holder]:
+            del self._held[holder]
+        self._welds.loose([self.weld[holder, label]])
+        self._of[body] = self._of[body]._replace(holder=NOBODY)
+
+    def _hide(self, body: int) -> None:
+        self._welds.place(body, self._place[body])
+        self._welds.hold([body], NOBODY)
+        self._welds.join({self.park[body]: body})
+
+
+def _welds(m: mujoco.MjModel, model: Model) -> dict[tuple[int, str], int]:
+    """The weld by which each holder, by its code, holds a label: robots first, then the tray, then
+    feeders."""
+    factory, outlets, found = model.factory, outlets_of(model.layout), dict[tuple[int, str], str]()
+    for grip in grips_of(model.layout, model.carried):
+        name = names.grip(factory.robots[grip.robot].name, grip.label)
+        found[robot_code(grip.robot), grip.label] = name
+    for product in factory.products:
+        for label in model.carried.carried[product]:
+            found[tray_code(factory), label] = names.hold(label)
+    codes = feeder_codes(factory, outlets)
+    found |= {(codes[outlet.robot], outlet.label): names.feed(outlet.name) for outlet in outlets}
+    return {part: m.equality(name).id for part, name in found.items()}
+
+
+def copies_of(m: mujoco.MjModel, model: Model) -> dict[str, Index]:
+    """The bodies of each label, by number in the engine's model."""
+    return {
+        label: np.array([m.body(names.part(label, n + 1)).id for n in range(count)])
+        for label, count in model.copies.items()
+    }
