@@ -18,7 +18,6 @@ from factory.simulation.mujoco.fast.neighbours import CALM, Neighbours
 from factory.simulation.mujoco.fast.strides import Strides
 from factory.simulation.mujoco.holdings import Holdings
 from factory.simulation.simulation import Simulation
-from factory.study.fidelity.readings import Shadow
 from factory.support.engine import mujoco
 from factory.support.settings import MOST, Settings
 from tests.good_runs import random_marking
@@ -149,21 +148,6 @@ def test_a_small_factory_is_looked_at_as_a_whole(monkeypatch: pytest.MonkeyPatch
     for _ in range(100):
         simulation.supervisor.step()
         assert looked_at(simulation) == 1.0
-
-
-def test_a_fidelity_shadow_sees_what_is_left_out() -> None:
-    simulation, whole = ready("20"), ready("20", fast=False)
-    for each in (simulation, whole):
-        for _ in range(600):
-            each.supervisor.step()
-    world = simulation.physical
-    assert looked_at(simulation) < 1.0
-    shadow = Shadow(world.m, world.d, 0.01)
-    shadow.collide()
-    parts = [*world.parts.masks.solid]
-    expected = whole.physical.m
-    assert np.array_equal(shadow.m.body_contype[parts], expected.body_contype[parts])
-    assert np.array_equal(shadow.m.body_conaffinity[parts], expected.body_conaffinity[parts])
 
 
 # --- what is pushed, touched or off its way -------------------------------------------------------

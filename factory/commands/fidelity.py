@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,13 +21,12 @@ from factory.commands.options import (
     SOURCE,
     Number,
 )
-from factory.commands.outputs import writable, writable_folder
+from factory.commands.outputs import writable
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced
-from factory.support.console import emit, say, table
+from factory.support.console import emit, finite, say, table
 
 if TYPE_CHECKING:
-    from factory.study.fidelity.convergence import Study
     from factory.study.fidelity.record import Fidelity
 
 
@@ -47,12 +47,7 @@ if TYPE_CHECKING:
     help="Draw each robot's speed and gain at random within ± this fraction.",
 )
 @JOBS
-@click.option(
-    "--convergence/--no-convergence",
-    default=True,
-    help="Repeat seed 0 with other timesteps and weld stiffnesses.",
-)
-@click.option("-o", "--output", type=PATH, help="Folder for a report, or a .json file.")
+@click.option("-o", "--output", type=PATH, help="Write the figures to this file, as JSON.")
 @click.option("--max-time", type=SECONDS, help="Stop a run after this simulated time [s].")
 @FLOOR
 @RELAY
@@ -65,62 +60,54 @@ def fidelity(
     units: int | None,
     jitter: float,
     jobs: int | None,
-    convergence: bool,
     output: Path | None,
     max_time: float | None,
 ) -> int:
     """Compare FILE.pag in MuJoCo with the ideal world over the same seeds."""
     from factory.nets.verify import proved
     from factory.study.bar import RunsBar
-    from factory.study.fidelity import measure, study
-    from factory.study.fidelity.comparing import Case
-    from factory.study.fidelity.convergence import runs
-    from factory.study.fidelity.report import check_report, document, write_report
+    from factory.study.fidelity import measure
     from factory.study.pool import cores
+    from factory.support.files import write_text
 
-    check_report(output)
-    if output is not None:
-        is_file = output.suffix.lower() == ".json"
-        writable(options.file, output) if is_file else writable_folder(output)
+    writable(options.file, output)
     project = options.project(out.silent)
     layout, settings = project.layout, project.settings
     proved(layout.factory.net)
     warnings = announced(layout.product.warnings, out)
-    jobs = jobs or cores()
-    with RunsBar(seeds + (runs() if convergence else 0), 0, out.silent) as bar:
+    with RunsBar(seeds, 0, out.silent) as bar:
 
         def done(finished: int) -> None:
             bar.advance()
 
+        jobs = jobs or cores()
         measured = measure(layout, range(seeds), units, jitter, settings, jobs, done, max_time)
-        case = Case(layout, units, jitter, settings, max_time)
-        studied = study(case, 0, jobs, done) if convergence else None
-    written = [] if output is None else write_report(output, measured, studied)
+    document = measured.as_json()
+    if output is not None:
+        write_text(output, json.dumps(finite(document), indent=1) + "\n")
     if out.as_json:
-        emit({**document(measured, studied), "warnings": warnings})
+        emit({**document, "warnings": warnings})
     else:
-        _print(measured, studied, out.verbose)
-        for path in written:
-            say(f"wrote {path}")
+        _print(measured, out.verbose)
+        if output is not None:
+            say(f"wrote {output}")
     for trouble in (t for record in measured.seeds for t in record.trouble):
         print(trouble, file=sys.stderr)
     return 0 if measured.passed else 1
 
 
-def _print(measured: Fidelity, studied: Study | None, verbose: bool) -> None:
+def _print(measured: Fidelity, verbose: bool) -> None:
     """Print the figures as a table."""
     from factory.study.fidelity import QUANTITIES
-    from factory.study.fidelity.report import remark, shown
 
     worst, mean = measured.worst(), measured.mean()
     rows = [
         (
             key,
-            shown(worst[key]),
-            shown(mean[key]),
+            *(_shown(value) for value in (worst[key], mean[key])),
             q.unit,
-            shown(q.limit),
-            remark(key, worst[key], studied),
+            _shown(q.limit),
+            "beyond its limit" if q.exceeded(worst[key]) else "",
         )
         for key, q in QUANTITIES.items()
         if worst[key] is not None
@@ -136,3 +123,10 @@ def _print(measured: Fidelity, studied: Study | None, verbose: bool) -> None:
             say(f"  seed {record.seed}, contact: {pair}")
         for penetration in record.hidden if verbose else ():
             say(f"  seed {record.seed}, penetration: {penetration}")
+
+
+def _shown(value: float | None) -> str:
+    """A figure in few digits."""
+    if value is None:
+        return "–"
+    return f"{value:.4g}" if abs(value) >= 1e-9 else "0"

@@ -5,13 +5,12 @@ seeds.
     >>> QUANTITIES["handoff_gap_max_mm"].unit
     'mm'
 
-`measure(layout, ...)` gives a `record.Fidelity`; `measure_seed` one seed of it; `study` the
-convergence over timestep and weld stiffness. The definitions of all figures are in `quantities`.
+`measure(layout, ...)` gives a `record.Fidelity`, `measure_seed` one seed of it. The definitions of
+all figures are in `quantities`.
 """
 
 from factory.study.fidelity.comparing import measure, measure_seed
-from factory.study.fidelity.convergence import study
 from factory.study.fidelity.quantities import QUANTITIES
 from factory.study.fidelity.record import SeedRecord
 
-__all__ = ["QUANTITIES", "SeedRecord", "measure", "measure_seed", "study"]
+__all__ = ["QUANTITIES", "SeedRecord", "measure", "measure_seed"]

@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
-from time import perf_counter
+from statistics import fmean
 
-import numpy as np
-
-from factory.control.mode import Array
 from factory.layout.layout import Layout
 from factory.mjcf.model import product_name
-from factory.nets.gears import GearNet
+from factory.record.state import Event
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from factory.study.analysis.flow import steady_units
-from factory.study.fidelity.causality import (
-    causal_record,
-    compare,
-    differences,
-    duration_differences,
-)
 from factory.study.fidelity.measuring import Measurement
 from factory.study.fidelity.quantities import QUANTITIES
 from factory.study.fidelity.record import Fidelity, SeedRecord
@@ -114,66 +105,51 @@ def measure_seed(case: Case, seed: int) -> SeedRecord:
     if case.alter is not None:
         case.alter(physical.physical.m)
     measurement = Measurement(physical)
-    begin = perf_counter()
     ideal_run, run = ideal.run(max_time=case.max_time), measurement.run(case.max_time)
-    took = perf_counter() - begin
-    figures, firings, durations = _compared(layout.factory.net, ideal_run, run)
-    figures |= measurement.figures()
+    figures = _compared(ideal_run, run) | measurement.figures()
     return SeedRecord(
         seed,
         run.units,
         {key: figures.get(key) for key in QUANTITIES},
-        measurement.handoffs.all(),
-        measurement.finished.found(),
-        measurement.approaches.found(),
         measurement.hidden.found()[:WORST],
-        tuple(np.round(firings, 9).tolist()),
-        tuple(np.round(durations, 9).tolist()),
         run.physics.contacts if run.physics else (),
         (*ideal_run.verdict.failures, *run.verdict.failures),
-        took - measurement.seconds,
-        measurement.seconds,
     )
 
 
-def _compared(net: GearNet, ideal: Run, run: Run) -> tuple[dict[str, float | None], Array, Array]:
-    """The figures that need both runs; the differences of firing times and of durations [s]."""
-    illegal = (not ideal.refines_net) + (not run.refines_net)
-    figures: dict[str, float | None] = {
-        "illegal_records": illegal,
+def _compared(ideal: Run, run: Run) -> dict[str, float | None]:
+    """The figures that need both runs."""
+    return {
+        "illegal_records": (not ideal.refines_net) + (not run.refines_net),
         "monitor_violations": len(run.monitor.violations) if run.monitor else None,
         "cycle_time_s": run.cycle_time_s,
-        "ideal_cycle_time_s": ideal.cycle_time_s,
         "cycle_from_ideal_percent": _over(run.cycle_time_s, ideal.cycle_time_s),
         "cycle_from_predicted_percent": _over(run.cycle_time_s, run.predicted_cycle_time_s),
+        "duration_difference_mean_s": _later(ideal.lasting, run.lasting),
     }
-    if illegal:
-        return figures, np.empty(0), np.empty(0)
-    one, other = causal_record(net, ideal.lasting), causal_record(net, run.lasting)
-    orders = compare(one, other)
-    firings, durations = differences(one, other), duration_differences(one, other)
-    figures |= {
-        "orders_swapped_percent": orders.percent,
-        "causes_differing": orders.causes,
-        **_distances(firings, durations, ideal.cycle_time_s or ideal.predicted_cycle_time_s),
-    }
-    return figures, firings, durations
 
 
-def _distances(firings: Array, durations: Array, cycle: float | None) -> dict[str, float | None]:
-    """The figures of the differences of firing times and durations [s]; `cycle`: the ideal cycle
-    time [s]."""
-    if not len(firings) or not len(durations):
-        return {}
-    mean, most = float(np.abs(firings).mean()), float(np.abs(firings).max())
-    return {
-        "firing_difference_mean_s": mean,
-        "firing_difference_max_s": most,
-        "firing_difference_mean_percent": 100 * mean / cycle if cycle else None,
-        "firing_difference_max_percent": 100 * most / cycle if cycle else None,
-        "duration_difference_mean_s": float(durations.mean()),
-        "duration_difference_max_s": float(durations[np.abs(durations).argmax()]),
-    }
+def _later(ideal: Iterable[Event], physical: Iterable[Event]) -> float | None:
+    """Mean duration of operations in the second record less that in the first [s]. The n-th time
+    of an operation is compared with the n-th; None if no operation ends in both."""
+    one, other = durations(ideal), durations(physical)
+    pairs = [other[turn] - one[turn] for turn in one if turn in other]
+    return fmean(pairs) if pairs else None
+
+
+def durations(events: Iterable[Event]) -> dict[tuple[str, int], float]:
+    """X_e - X_s [s] of each operation that ends in a record, by its name and number of times."""
+    spent: dict[tuple[str, int], float] = {}
+    began: dict[str, float] = {}
+    times: dict[str, int] = {}
+    for event in events:
+        name = event.transition[:-2]
+        if event.transition.endswith("_s"):
+            began[name] = event.t
+        elif name in began:
+            times[name] = times.get(name, 0) + 1
+            spent[name, times[name]] = event.t - began[name]
+    return spent
 
 
 def _over(value: float | None, reference: float | None) -> float | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from factory.study.fidelity.quantities import QUANTITIES
@@ -11,42 +11,6 @@ from factory.support.errors import Diagnostic
 
 Figures = Mapping[str, float | None]
 """Values by the key of their quantity; None where there is nothing to measure."""
-
-
-@dataclass(frozen=True, slots=True)
-class HandOff:
-    """One hand-off: its time, the new carrier, number and mass of the parts; figures as defined in
-    `quantities`."""
-
-    time_s: float
-    carrier: str
-    parts: int
-    mass_kg: float
-    gap_mm: float
-    speed_step_mm_s: float
-    impulse_mNs: float = 0.0
-    energy_mJ_per_kg: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class Misplaced:
-    """Largest deviation of a part from its place in a finished product."""
-
-    part: str
-    position_mm: float
-    angle_deg: float
-    vertex_mm: float
-
-
-@dataclass(frozen=True, slots=True)
-class ClosestApproach:
-    """The least distance between bodies of two kinds within the detection distance, the certified
-    distance, and the two bodies."""
-
-    kinds: str
-    certified_mm: float
-    least_mm: float
-    bodies: tuple[str, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,25 +29,15 @@ class Penetration:
 
 @dataclass(frozen=True, slots=True)
 class SeedRecord:
-    """One seed: the figures of its runs in both worlds.
-
-    `differences` [s]: time in MuJoCo less time in the ideal world of every firing; `durations`:
-    likewise of every operation. `trouble`: why a run did not succeed.
-    """
+    """One seed: the figures of its runs in both worlds, the deepest `hidden` penetrations, the
+    unintended contacts, and the `trouble` for which a run did not succeed."""
 
     seed: int
     units: int
     figures: Figures
-    handoffs: tuple[HandOff, ...] = ()
-    misplaced: tuple[Misplaced, ...] = ()
-    approaches: tuple[ClosestApproach, ...] = ()
     hidden: tuple[Penetration, ...] = ()
-    differences: tuple[float, ...] = field(default=(), repr=False)
-    durations: tuple[float, ...] = field(default=(), repr=False)
     contacts: tuple[str, ...] = ()
     trouble: tuple[Diagnostic, ...] = ()
-    run_s: float = 0.0
-    measuring_s: float = 0.0
 
     @property
     def passed(self) -> bool:
@@ -91,18 +45,13 @@ class SeedRecord:
         return not self.trouble
 
     def as_json(self) -> dict[str, Any]:
-        """The record as the report lists it."""
+        """The record as `fidelity --json` lists it."""
         return {
             "seed": self.seed,
             "units": self.units,
             "passed": self.passed,
             "figures": dict(self.figures),
-            "handoffs": [asdict(h) for h in self.handoffs],
-            "misplaced": [asdict(m) for m in self.misplaced],
-            "approaches": [asdict(a) for a in self.approaches],
             "hidden_penetrations": [asdict(p) for p in self.hidden],
-            "firing_differences_s": list(self.differences),
-            "duration_differences_s": list(self.durations),
             "contacts": list(self.contacts),
             "errors": [d.as_json() for d in self.trouble],
         }
@@ -147,7 +96,7 @@ class Fidelity:
         return {k: sum(v) / len(v) if (v := self.values(k)) else None for k in QUANTITIES}
 
     def as_json(self) -> dict[str, Any]:
-        """The document of `fidelity --json`, without the convergence study."""
+        """The document of `fidelity --json`."""
         worst, mean = self.worst(), self.mean()
         return {
             "schema": 1,
