@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import random
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
-
-import networkx as nx
 
 from factory.nets.gears import Gear, GearNet
 from factory.nets.marked import MarkedNet, marked
@@ -42,51 +40,6 @@ PHILOSOPHERS = [
     ("takeB2", "putB", 0),
 ]
 """Two philosophers and two forks: each takes one fork and then the other."""
-
-
-@dataclass
-class Truth:
-    """What exploring every marking says."""
-
-    markings: int
-    live: bool
-    safe: bool
-    reversible: bool
-
-
-def explored(net: MarkedNet, limit: int = 3_000, most: int = 6) -> Truth | None:
-    """Every marking by the place/transition rule, with networkx; None beyond `limit` markings, or
-    more than `most` tokens on a place: then only that the net is not safe is known."""
-    graph: nx.MultiDiGraph = nx.MultiDiGraph()
-    start = net.tokens
-    graph.add_node(start)
-    todo = [start]
-    safe = max(start, default=0) <= 1
-    while todo:
-        here = todo.pop()
-        for event in range(len(net.net.transitions)):
-            before, after = net.net.preset[event], net.net.postset[event]
-            if set(before) & set(after) or not all(here[p] for p in before):
-                continue
-            there = list(here)
-            for p in before:
-                there[p] -= 1
-            for p in after:
-                there[p] += 1
-            goal = tuple(there)
-            safe = safe and max(goal) <= 1
-            if max(goal) > most or len(graph) > limit:
-                return None
-            if goal not in graph:
-                todo.append(goal)
-            graph.add_edge(here, goal, event=event)
-    parts = list(nx.strongly_connected_components(graph))
-    bottoms = [c for c in parts if all(v in c for u in c for v in graph.successors(u))]
-    every = set(range(len(net.net.transitions)))
-    live = all(
-        {d["event"] for u, _, d in graph.subgraph(c).edges(data=True)} == every for c in bottoms
-    )
-    return Truth(len(graph), live, safe, len(parts) == 1)
 
 
 def legal_markings(net: GearNet) -> set[Marking]:

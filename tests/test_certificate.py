@@ -143,12 +143,12 @@ def test_certificates_of_altered_documents_pass(
     document = json.loads(json.dumps(certificate(net, verdict)))
     assert check_certificate(document) == []
     for claim in CLAIMS:
-        found = document[claim]["holds"]
-        undecided = found is None and claim not in ("gear_net", "legal")
-        assert undecided or found == getattr(verdict, claim)
+        holds = document[claim]["holds"]
+        undecided = holds is None and claim not in ("gear_net", "legal")
+        assert undecided or holds == getattr(verdict, claim)
     marked = [robot["initial"] for robot in document["robots"]]
-    turned = {"holds": not verdict.legal, "reason": "said so", "marked": marked}
-    assert check_certificate(seal({**document, "legal": turned})) != []
+    claimed = {**document, "legal": {"holds": True, "marked": marked}}
+    assert verdict.legal or check_certificate(seal(claimed)) != []
 
 
 def seal(document: Json) -> Json:
@@ -191,8 +191,7 @@ def test_tampering_is_caught_although_sealed_again() -> None:
     for path in leaves(document):
         changed = tampered(document, path)
         assert check_certificate(changed) != [], path
-        other_way = path[0] == "reversible" and "place" in path
-        if path != ("digest",) and not other_way and not _FREE & set(path):
+        if path != ("digest",) and not _FREE & set(path):
             assert check_certificate(seal(changed)) != [], path
 
 
@@ -211,17 +210,12 @@ def test_leaving_anything_out_is_caught() -> None:
 
 
 @pytest.mark.parametrize("claim", CLAIMS)
-def test_a_false_refutation_is_caught(claim: str) -> None:
+def test_what_is_not_claimed_needs_a_reason(claim: str) -> None:
     document = certified(factory_of(paper()).net)
-    for evidence in (
-        {"circuit": [0, 1], "firing": None},
-        {"circuit": None, "firing": [6], "place": 0},
-        {"circuit": [7], "firing": None, "transition": 6},
-    ):
-        forged = {**document, claim: {"holds": False, "reason": "said so", **evidence}}
-        assert check_certificate(seal(forged)) != []
-    undecided = {**document, claim: {"holds": None, "reason": ""}}
-    assert check_certificate(seal(undecided)) != []
+    for holds in (None, False):
+        assert check_certificate(seal({**document, claim: {"holds": holds, "reason": ""}})) != []
+    said = seal({**document, claim: {"holds": None, "reason": "not certified"}})
+    assert (check_certificate(said) == []) is (claim not in ("live", "safe"))
 
 
 def test_gears_without_slots_are_certified() -> None:
@@ -247,14 +241,12 @@ def test_a_place_without_size_has_that_of_its_slots() -> None:
     assert check_certificate(seal(document)) == []
 
 
-def test_trees_of_ways_show_no_reversibility_where_something_stops() -> None:
+def test_what_is_not_live_is_not_reversible() -> None:
     net = net_from([("a", "b", 0), ("b", "c", 0), ("c", "b", 0), ("c", "a", 1)])
     document = certified(net)
     assert document["live"]["holds"] is document["reversible"]["holds"] is False
-    there = {"place": [None, 0, 1], "depth": [0, 1, 2]}
-    back = {"place": [None, 1, 3], "depth": [0, 2, 1]}
-    document["reversible"] = {"holds": True, "root": 0, "there": there, "back": back}
-    assert any("for live nets only" in fault for fault in check_certificate(seal(document)))
+    document["reversible"] = {"holds": True}
+    assert any("for nets that are live" in fault for fault in check_certificate(seal(document)))
 
 
 @pytest.mark.parametrize("junk", [None, 3, [], {}, {"schema": 1}, {"schema": 2, "digest": ""}, "x"])
@@ -265,9 +257,9 @@ def test_junk_is_no_certificate(junk: object) -> None:
 def test_the_checker_uses_nothing_that_made_the_certificate() -> None:
     folder = Path(factory.exporting.certificate.__file__ or "").parent
     checker = {path.stem: path for path in folder.glob("*.py")}
-    assert set(checker) == {"__init__", "writer", "proof_file", "check", "listing", "refute"}
-    allowed = {f"factory.exporting.certificate.{name}" for name in ("check", "listing", "refute")}
-    for name in ("check", "listing", "refute"):
+    assert set(checker) == {"__init__", "writer", "proof_file", "check", "listing"}
+    allowed = {f"factory.exporting.certificate.{name}" for name in ("check", "listing")}
+    for name in ("check", "listing"):
         tree = ast.parse(checker[name].read_text("utf-8"))
         froms = {n.module or "" for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
         plain = {a.name for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names}

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.foreign_nets.explore import StateSpace, explore
 from factory.nets.exclusion import ORDER, excluding, ordered
 from factory.nets.marked import MarkedNet
 from factory.nets.petri import PetriNet, Place, Transition
 from tests.net_values import net_from
+from tests.state_space import explored
 
 MARKINGS = 3_000
 """Nets with more markings are not explored."""
@@ -42,10 +42,10 @@ def geared(rng: random.Random) -> tuple[MarkedNet, list[int]]:
 def together(net: MarkedNet) -> set[tuple[int, int]] | None:
     """The pairs of places that some reachable marking marks both; None where there are too many
     markings."""
-    space = StateSpace(net, MARKINGS)
-    if not space.complete:
+    truth = explored(net, MARKINGS)
+    if truth is None:
         return None
-    at_once = {tuple(p for p, tokens in enumerate(marking) if tokens) for marking in space.index}
+    at_once = {tuple(p for p, tokens in enumerate(m) if tokens) for m in truth.markings}
     return {pair for marking in at_once for pair in combinations(marking, 2)}
 
 
@@ -85,9 +85,9 @@ def test_ordered_places_are_never_marked_together(rng: random.Random) -> None:
     for circuit, pair in zip(excluding(result.net, result.places), result.places, strict=True):
         assert circuit is not None
         check_circuit(result.net, circuit, pair)
-    space = explore(result.net, MARKINGS)
-    if space.complete:
-        assert not (space.starved or space.unsafe or space.one_way or space.deadlock)
+    truth = explored(result.net, MARKINGS)
+    if truth is not None:
+        assert truth.behaviour == (True, True, True)
         assert not {*result.places} & (together(result.net) or set())
     for place in range(len(net.net.places), len(result.net.net.places)):
         assert result.net.net.places[place].mode == ORDER

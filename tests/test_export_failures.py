@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 from factory.exporting import Subject, exporters
 from factory.exporting.events import rows
 from factory.exporting.pnml import write_pnml
-from factory.foreign_nets.behaviour import analyse
 from factory.foreign_nets.pnml_reader import read_pnml
 from factory.nets.marked import marked
 from factory.nets.undo import marking_after, undo
@@ -26,6 +25,7 @@ from factory.record.log import Log
 from tests.command_line import PAPER, Terminal
 from tests.failing_runs import failing
 from tests.simulation_values import layout_of
+from tests.state_space import explored
 from tests.token_game import enabled, follower
 
 
@@ -101,8 +101,8 @@ def test_the_net_with_failures_is_read_back(run: Terminal) -> None:
     assert {"sub1:again", "part1:scrap", "part1:refused", "part1:scrap/sub1"} <= {*extra}
     assert [p.name for p in subject.net.places] == [p.name for p in net.threaded.places]
     assert subject.tokens == marked(net).tokens
-    verdict = analyse(found)
-    assert verdict.live and verdict.safe and verdict.reversible
+    truth = explored(subject)
+    assert truth is not None and truth.behaviour == (True, True, True)
 
 
 def test_a_net_from_elsewhere_has_no_failures(run: Terminal, tmp_path: Path) -> None:

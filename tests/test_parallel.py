@@ -16,7 +16,6 @@ from factory.compiler.mating.mating import judged
 from factory.compiler.parallel import in_parallel
 from factory.exporting.certificate.check import check_certificate
 from factory.exporting.certificate.writer import certificate
-from factory.foreign_nets.explore import explore
 from factory.layout.bounds import cycle_time_bound
 from factory.layout.durations import Pace, cycle_of
 from factory.layout.hands.choosing import Hands
@@ -39,7 +38,7 @@ from factory.simulation.simulation import Simulation
 from factory.simulation.watched import watched
 from factory.study.analysis.flow import flow
 from factory.study.analysis.timed import timed_net
-from factory.study.analysis.what_if import wip_curve
+from factory.study.analysis.what_if import least_wip
 from factory.support.errors import InputError
 from factory.support.settings import Settings
 from factory.timing.cycle_time import cycle_time
@@ -48,6 +47,7 @@ from factory.timing.timing import Timing
 from tests.command_line import Terminal
 from tests.fold_values import plain, random_fold, simulated_cycle, swapped, table_of
 from tests.pag_values import paper
+from tests.state_space import explored
 
 DWELL = 10.0
 
@@ -84,10 +84,9 @@ def replicated(k: int, label: str = "sub2") -> Factory:
 
 def truth(factory: Factory, limit: int = 150_000) -> tuple[bool, bool, bool]:
     """Live, safe and reversible, by every marking."""
-    found = explore(marked(factory.net), limit)
-    assert found.complete
-    live = found.deadlock is None and found.starved is None
-    return live, found.unsafe is None, found.one_way is None
+    found = explored(marked(factory.net), limit)
+    assert found is not None
+    return found.behaviour
 
 
 # --- the net -------------------------------------------------------------------------------------
@@ -335,7 +334,7 @@ def test_analysis_tells_of_products() -> None:
     found = flow(timing, net, 24)
     assert found.last == pytest.approx(run.dropoffs[-1], rel=0.01)
     assert all(share.cycle == pytest.approx(3 * net.pace) for share in found.shares)
-    assert wip_curve(timing).points[-1][1] == pytest.approx(net.pace)
+    assert timed_net(timing, wip=least_wip(timing)).pace == pytest.approx(net.pace)
 
 
 def test_a_report_links_what_belongs_together() -> None:

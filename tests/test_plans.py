@@ -9,8 +9,8 @@ from itertools import islice
 from pathlib import Path
 
 import pytest
-from net_values import explored
 from random_products import random_product
+from state_space import explored
 
 from factory.compiler.assigning import shared
 from factory.compiler.expanding import joins
@@ -76,7 +76,7 @@ def check(seed: int, folder: Path) -> None:
     factory = layout.factory
     assert verify(factory.net).holds
     truth = explored(marked(factory.net), 500) if len(factory.operations) < 12 else None
-    assert truth is None or (truth.live, truth.safe, truth.reversible) == (True, True, True)
+    assert truth is None or truth.behaviour == (True, True, True)
     when = {number: n for n, number in enumerate(factory.order)}
     for robot in factory.robots:
         steps = [when[number] for number in robot.operations]

@@ -72,15 +72,15 @@ def test_a_certificate_of_another_net(run: Terminal, written: Path, tmp_path: Pa
     other = tmp_path / "other.pag"
     other.write_text(PAPER.read_text().replace("weld", "press"))
     message = refused(run("check", other, "--against", written, "--json"), 1)
-    assert "it is of another net: mode of place 'sub2': \"weld\" in the certificate, " in message
+    assert 'of another net: they differ first in place sub2.mode: "weld" and ' in message
     other.write_text("root = a; a = mate(b, c); b = atomic(); c = atomic();")
     message = refused(run("check", other, "--against", written, "--json"), 1)
-    assert re.search(r"of another net: the net has no transition 'sub3_s', and \d+ more", message)
+    assert "they differ first in transition a_s: nothing and " in message
     net = tmp_path / "net.pnml"
     moved = exported(run, tmp_path).replace("<text>1</text>", "<text>0</text>", 1)
     net.write_text(moved)
     message = refused(run("check", net, "--against", written, "--json"), 1)
-    assert re.search(r"another net: tokens of place '.*': 1 in the certificate, 0 in the", message)
+    assert re.search(r"another net: they differ first in place .*\.tokens: 1 and 0", message)
 
 
 def change_tokens(document: Json) -> None:
@@ -91,38 +91,31 @@ def change_order(document: Json) -> None:
     document["live"]["order"].reverse()
 
 
-def change_root(document: Json) -> None:
-    document["reversible"]["there"]["depth"][1] = 7
-
-
 def leave_out(document: Json) -> None:
     del document["safe"]["cover"]
 
 
-def claim_a_failure(document: Json) -> None:
-    document["live"] = {"holds": False, "reason": "so", "circuit": [0], "firing": None}
+def say_nothing(document: Json) -> None:
+    document["live"] = {"holds": False, "reason": ""}
 
 
 @pytest.mark.parametrize(
-    ("change", "place", "fault"),
+    ("change", "fault"),
     [
-        (change_tokens, "net.places[3].tokens", "of another net: tokens of place"),
-        (change_order, "live.order[0]", "live: the places around sub3_s are out of order"),
-        (change_root, "reversible.there.depth[1]", "reversible: sub3_e is not joined to the root"),
-        (leave_out, "safe.cover", "safe is not of the documented form: 'cover' is missing"),
-        (claim_a_failure, "live.holds", "live: the certificate does not show that it fails"),
+        (change_tokens, "of another net: they differ first in place"),
+        (change_order, "live: the places around sub3_s are out of order"),
+        (leave_out, "safe is not of the documented form: 'cover' is missing"),
+        (say_nothing, "live: holds is False, without a reason"),
     ],
 )
-def test_a_changed_certificate_is_refuted_where_it_was_changed(
-    run: Terminal, written: Path, change: Callable[[Json], None], place: str, fault: str
+def test_a_changed_certificate_is_refuted(
+    run: Terminal, written: Path, change: Callable[[Json], None], fault: str
 ) -> None:
     document = json.loads(written.read_text())
     change(document)
     written.write_text(json.dumps(document))
     message = refused(run("check", PAPER, "--against", written, "--json"), 1)
-    assert "the digest is not that of the document" in message
-    assert f"differs from it, first at {place}" in message
-    assert fault in message
+    assert "the digest is not that of the document" in message and fault in message
     written.write_text(json.dumps({**document, "digest": digest(document)}))
     message = refused(run("check", PAPER, "--against", written, "--json"), 1)
     assert "digest" not in message and fault in message
@@ -173,13 +166,12 @@ def test_a_net_that_fails_has_a_certificate_too(run: Terminal, tmp_path: Path) -
     done = run("check", net, "--against", file, "--json")
     assert done.status == 1
     assert done.json["certificate"]["live"] is False
-    assert "it refutes" in run("check", net, "--against", file).out
+    assert "a reason against gear net" in run("check", net, "--against", file).out
 
 
 def test_the_first_difference_of_documents() -> None:
     one = {"a": [1, {"b": 2}], "c": None}
     assert first_difference(one, json.loads(json.dumps(one))) == ""
-    assert first_difference(one, {**one, "a": [1, {"b": 3}]}) == "a[1].b"
-    assert first_difference(one, {**one, "a": [1]}) == "a[1]"
-    assert first_difference(one, {"a": one["a"]}) == "c"
-    assert first_difference({"a": 1}, {"a": True}) == "a"
+    assert first_difference(one, {**one, "a": [1, {"b": 3}]}) == "a[1].b: 2 and 3"
+    assert first_difference(one, {**one, "a": [1]}) == 'a[1]: {"b": 2} and nothing'
+    assert first_difference({"a": 1}, {"a": True}) == "a: 1 and true"

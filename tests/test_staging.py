@@ -214,7 +214,7 @@ def test_ways_in_the_timed_net(paper: Layout) -> None:
     late = replace(net, ready=dict.fromkeys(net.ready, 50.0))
     for _, number in net.ways:
         end = timing.factory.operations[number].end
-        assert net.firings(1).dates[0, end] < 50.0 <= late.firings(1).dates[0, end]
+        assert net.firings(1)[0, end] < 50.0 <= late.firings(1)[0, end]
 
 
 @given(seeds, shapes)

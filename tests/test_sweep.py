@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import random
 import signal
-import socket
 import sqlite3
 import subprocess
 import sys
@@ -16,7 +14,6 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from subprocess import PIPE
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -34,7 +31,7 @@ from factory.study.sweep.grid import Point, Value
 from factory.study.sweep.store import COLUMNS, Store
 from factory.study.sweep.sweeping import run_local, sweep
 from factory.study.sweep.work import FIGURES, Outcome, Runner
-from factory.support.errors import InputError, MissingError, RunError
+from factory.support.errors import InputError, RunError
 from factory.support.settings import Settings
 from tests.command_line import PAPER, ROOT, Terminal, files_in
 from tests.deadly import Deadly, Stillborn
@@ -273,7 +270,7 @@ def test_another_sweep_is_refused(tmp_path: Path, run: Terminal, here: None) -> 
     product = tmp_path / "paper.pag"
     product.write_text(PAPER.read_text().replace("part3 = atomic()", "part3 = atomic(mass=2)"))
     for more, message in (
-        ([product], "the product, a mesh, a template or a robot type has changed"),
+        ([product], "another product, plan, mesh, template or robot type"),
         ([PAPER, "--speed", "0.3"], "speed 0.5 there, 0.3 here"),
         ([PAPER, "--vary", "units=1"], "varied seed there, seed, units here"),
         ([PAPER, "--max-time", "9"], "max_time - there, 9.0 here"),
@@ -285,10 +282,6 @@ def test_another_sweep_is_refused(tmp_path: Path, run: Terminal, here: None) -> 
     assert database.read_bytes() == before
     product.write_text("// the same\n" + PAPER.read_text())
     assert run(*words, product).status == 0
-    with sqlite3.connect(database) as connection:
-        connection.execute("DELETE FROM sweep WHERE key = 'fuse'")
-    connection.close()
-    assert "it holds another sweep: fuse is in one of them only\n" in run(*words, PAPER).err
 
 
 @pytest.mark.parametrize("seeds", ["seed=0:3", "units=1"])
@@ -362,24 +355,23 @@ def test_files_of_others_are_left_alone(tmp_path: Path, run: Terminal, here: Non
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    "change",
     [
-        ("ALTER TABLE runs DROP COLUMN handoffs", "no such column: handoffs"),
-        ("DROP TABLE runs", "no such table: runs"),
-        ("DELETE FROM sweep", "its table 'sweep' cannot be read"),
-        ("UPDATE sweep SET value = '[\"x\"]' WHERE key = 'varied'", "its table 'sweep' cannot be"),
-        ("UPDATE sweep SET value = '{x' WHERE key = 'wip'", "its table 'sweep' cannot be read"),
-        (f"UPDATE sweep SET value = '{'[' * 50_000}'", "its table 'sweep' cannot be read"),
-        ("UPDATE runs SET cycle_time_s = 'abc'", "row 1 of its table 'runs' cannot be read"),
-        ("UPDATE runs SET speed = NULL WHERE seed = 1", "row 2 of its table 'runs' cannot be read"),
-        ("UPDATE runs SET status = 'lost'", "row 1 of its table 'runs' cannot be read"),
-        ("UPDATE runs SET point = CAST(x'ff' AS TEXT) WHERE seed = 1", "Could not decode to UTF-8"),
+        "ALTER TABLE runs DROP COLUMN handoffs",
+        "DROP TABLE runs",
+        "DELETE FROM sweep",
+        "UPDATE sweep SET value = '[\"x\"]' WHERE key = 'varied'",
+        "UPDATE sweep SET value = '{x' WHERE key = 'wip'",
+        f"UPDATE sweep SET value = '{'[' * 50_000}'",
+        "UPDATE runs SET cycle_time_s = 'abc'",
+        "UPDATE runs SET speed = NULL WHERE seed = 1",
+        "UPDATE runs SET point = CAST(x'ff' AS TEXT) WHERE seed = 1",
     ],
 )
 def test_a_damaged_database_is_refused(
-    run: Terminal, tmp_path: Path, here: None, change: str, message: str
+    run: Terminal, tmp_path: Path, here: None, change: str
 ) -> None:
-    """By the summary, and by a sweep that would go on with it."""
+    """By the summary; by a sweep that would continue it, where it reads what is damaged."""
     database = tmp_path / "r.db"
     words = [PAPER, "--world", "ideal", "--units", "1", "-o", database]
     words += ["--vary", "seed=0:2", "--vary", "speed=0.5"]
@@ -387,11 +379,12 @@ def test_a_damaged_database_is_refused(
     with sqlite3.connect(database) as connection:
         connection.execute(change)
     connection.close()
-    for asked in ([database, "--summary"], words):
-        refused = run("sweep", *asked)
-        assert refused.status == 2
-        assert refused.err.startswith(f"BadFile {database}: it cannot be used: {message}")
-        assert "if the database is damaged, delete it and run the sweep again" in refused.err
+    refused = run("sweep", database, "--summary")
+    assert refused.status == 2
+    assert refused.err.startswith(f"BadFile {database}: it cannot be used: ")
+    assert "if the database is damaged, delete it and run the sweep again" in refused.err
+    continued = run("sweep", *words, "--json")
+    assert continued.status == 0 or continued.codes == ["BadFile"]
 
 
 def test_bytes_that_are_not_what_they_were(run: Terminal, tmp_path: Path, here: None) -> None:
@@ -408,7 +401,7 @@ def test_bytes_that_are_not_what_they_were(run: Terminal, tmp_path: Path, here: 
         done = run("sweep", database, "--summary", "--json")
         assert done.status == 0 or done.codes == ["BadFile"]
         statuses.append(done.status)
-    assert statuses.count(2) > 50
+    assert statuses.count(2) > 20
 
 
 @pytest.mark.parametrize(
@@ -421,8 +414,6 @@ def test_bytes_that_are_not_what_they_were(run: Terminal, tmp_path: Path, here: 
         (["r.db", "--summary"], "BadFile r.db: there is no such file"),
         ([PAPER, "-o", "r.db", "--vary", "sed=1"], "UnknownParameter unknown key 'sed'"),
         ([PAPER, "-o", "r.db", "--vary", "seed=1", "--seed", "2"], "both given and varied"),
-        ([PAPER, "-o", "r.db", "--vary", "seed=1", "--on", "spark://x"], "--on takes `local`"),
-        ([PAPER, "-o", "r.db", "--vary", "seed=1", "--on", "dask://x"], "--on takes `local`"),
         ([PAPER, "-o", "nowhere/r.db", "--vary", "seed=1"], "'nowhere' does not exist"),
         (["no.pag", "-o", "r.db", "--vary", "seed=1"], "no.pag"),
         (
@@ -520,98 +511,6 @@ def test_a_stopped_sweep_keeps_its_rows_and_goes_on(
     assert files_in(tmp_path).keys() == {"r.db"}
 
 
-# A cluster
-
-
-def free_port() -> int:
-    with socket.socket() as found:
-        found.bind(("127.0.0.1", 0))
-        return int(found.getsockname()[1])
-
-
-@pytest.fixture
-def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
-    """A Dask scheduler and two workers on loopback, each a process."""
-    pytest.importorskip("distributed")
-    port, started = free_port(), []
-
-    def start(*words: str) -> None:
-        command = [sys.executable, "-m", "dask", *words, "--no-dashboard"]
-        log = (tmp_path / f"{len(started)}.log").open("wb")
-        with log:
-            started.append(
-                subprocess.Popen(
-                    command,
-                    cwd=tmp_path,
-                    env={**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"},
-                    stdout=log,
-                    stderr=log,
-                )
-            )
-
-    start("scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-show")
-    for _ in range(2):
-        start("worker", f"tcp://127.0.0.1:{port}", "--nthreads", "1", "--no-nanny")
-    try:
-        yield f"dask://127.0.0.1:{port}", started
-    finally:
-        for process in started:
-            process.kill()
-            process.wait()
-
-
-def test_a_cluster_survives_the_death_of_a_worker(
-    tmp_path: Path, cluster: tuple[str, list[subprocess.Popen[bytes]]]
-) -> None:
-    from distributed import Client
-
-    from factory.study.sweep.cluster import run_dask
-
-    place, (_, first, _) = cluster
-    with Client(place.replace("dask", "tcp"), set_as_default=False) as client:
-        client.wait_for_workers(2, timeout=SOON)
-    grid, seen = list(points(read_axes(["seed=0:30"]))), []
-    for outcome in run_dask(recipe_of(jitter=0.3, units=5), grid, place):
-        seen.append(outcome)
-        ours = [o for o in seen if o.worker.endswith(f":{first.pid}")]
-        if ours and first.poll() is None:
-            first.kill()
-            first.wait()
-    assert sorted(dict(o.point)["seed"] for o in seen) == list(range(30))
-    assert all(o.reason == "" for o in seen)
-    assert len({o.worker for o in seen}) == 2
-    at_home = Runner(recipe_of(jitter=0.3, units=5))(grid[7])
-    (there,) = (o for o in seen if o.point == grid[7])
-    assert there.figures["sim_time_s"] == at_home.figures["sim_time_s"]
-
-
-@pytest.mark.parametrize(
-    ("answer", "message"),
-    [
-        (OSError("Stream is closed"), "cannot report its versions: OSError('Stream is closed')"),
-        ({"mujoco": "1.0"}, "has {'mujoco': '1.0'}, not {"),
-    ],
-)
-def test_a_worker_that_is_not_fit(answer: object, message: str) -> None:
-    """A worker that dies as it is asked for its versions is not one of another version."""
-    from factory.study.sweep.cluster import _check_workers
-
-    client: Any = SimpleNamespace(run=lambda *_, **__: {"tcp://w:1": answer})
-    with pytest.raises(MissingError) as caught:
-        _check_workers(client)
-    assert f"the worker at tcp://w:1 {message}" in caught.value.diagnostics[0].message
-
-
-def test_no_scheduler_at_the_address(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("distributed")
-    from factory.study.sweep import cluster
-
-    monkeypatch.setattr(cluster, "PATIENCE", "0.3s")
-    place = f"dask://127.0.0.1:{free_port()}"
-    with pytest.raises(MissingError, match=f"no Dask scheduler answers at {place}"):
-        sweep(recipe_of(), read_axes(["seed=0:2"]), tmp_path / "r.db", on=place)
-
-
 # The summary
 
 
@@ -652,21 +551,16 @@ def test_failed_runs_count_and_nothing_more(tmp_path: Path) -> None:
     assert (told.n, told.mean, told.deviation, told.confidence_low) == (1, 2.0, None, None)
 
 
-def test_summaries_are_told_and_drawn(tmp_path: Path, run: Terminal, here: None) -> None:
-    pytest.importorskip("matplotlib")
+def test_summaries_are_printed(tmp_path: Path, run: Terminal, here: None) -> None:
     database = tmp_path / "r.db"
     words = ["--world", "ideal", "--vary", "seed=0:3", "--vary", "speed=0.3,0.5"]
     quiet = run("sweep", PAPER, *words, "-o", database, "-q")
     assert quiet.err == "" and quiet.out.startswith("6 runs, 0 failed")
     told = run("sweep", database, "--summary")
     assert "speed 0.3: 3 runs" in told.out and "cycle_time_s" in told.out
-    drawn = run("sweep", "--plots", tmp_path / "plots", "-o", database, "--json").json
-    summary = drawn["summary"]
+    summary = run("sweep", "--summary", "-o", database, "--json").json["summary"]
     assert [g["values"] for g in summary["groups"]] == [{"speed": 0.3}, {"speed": 0.5}]
     assert summary["groups"][0]["figures"]["cycle_time_s"]["n"] == 3
-    pictures = files_in(tmp_path / "plots")
-    assert pictures.keys() == {"cycle_time_s.png", "sim_time_s.png"}
-    assert all(picture.startswith(b"\x89PNG") for picture in pictures.values())
 
 
 def test_columns_are_named_once() -> None:

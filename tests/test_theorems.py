@@ -17,13 +17,13 @@ from factory.nets.petri import Marking
 from factory.nets.verify import verify
 from factory.plant.factory import Factory
 from tests.net_values import (
-    explored,
     fair_run,
     glued,
     legal_markings,
     random_legal_marking,
 )
 from tests.pag_values import SHAPES, factories, factory_of, paper, random_pag
+from tests.state_space import explored
 from tests.token_game import enabled, follower
 
 
@@ -46,14 +46,14 @@ def test_theorem_3_1_live_and_3_2_reversible(factory: Factory, rng: random.Rando
 def test_theorems_3_1_and_3_2_by_brute_force(factory: Factory, rng: random.Random) -> None:
     truth = explored(starting_at(factory, random_legal_marking(factory.net, rng)), 1_500)
     if truth is not None:
-        assert (truth.live, truth.safe, truth.reversible) == (True, True, True)
+        assert truth.behaviour == (True, True, True)
 
 
 def test_the_paper_has_342_markings_all_legal() -> None:
     factory = factory_of(paper())
     truth = explored(marked(factory.net))
     assert truth is not None
-    assert truth.markings == 342 == len(legal_markings(factory.net))
+    assert len(truth.markings) == 342 == len(legal_markings(factory.net))
 
 
 @pytest.mark.parametrize("shape", SHAPES)

@@ -22,7 +22,6 @@ from factory.commands.options import (
     WIP,
     gathered,
 )
-from factory.commands.outputs import for_a_pag, writable
 from factory.commands.requests import OutputOptions, ProjectOptions, RunOptions
 from factory.commands.run import carry_out
 from factory.commands.warnings import announced, cut_off, read_partly
@@ -95,8 +94,6 @@ class AnalyzeOptions:
 @click.option("--shorter", multiple=True, help="What-if: its paths shorter by percent, r4=20.")
 @click.option("--measured", type=PATH, help="Compare with the LOG of a run, under its settings.")
 @click.option("--run", "on_the_spot", is_flag=True, help="Compare with a run of --units.")
-@click.option("--delays", type=PATH, help="For a net in PNML: a TOML file of place = seconds.")
-@click.option("-o", "--output", type=PATH, help="Write a picture (.svg or .png).")
 @gathered(AnalyzeOptions, "study")
 @RUNS
 @FLOOR
@@ -108,58 +105,13 @@ def analyze(
     asked: RunOptions,
     study: AnalyzeOptions,
     out: OutputOptions,
-    delays: Path | None,
-    output: Path | None,
 ) -> int:
-    """Find the bottleneck of FILE.pag (or of a net in FILE.pnml), and what would relieve it."""
-    from factory.support.files import is_net
-
-    if is_net(options.file):
-        for_a_pag(options.file, "a net in PNML", "delays", "output")
-        return _analyze_net(options.file, delays, output, out)
-    if delays is not None:
-        message = "--delays is for a net in PNML; of a PAG, delays follow from its layout"
-        raise usage_error(message, "leave it out")
-    return _analyze_pag(options, asked, study, output, out)
-
-
-def _analyze_net(file: Path, delays: Path | None, output: Path | None, out: OutputOptions) -> int:
-    from factory.foreign_nets.pnml_reader import load_net
-    from factory.study.analysis.general import analyse_net, net_document, net_tables, read_delays
-
-    if output is not None:
-        raise usage_error("a net has no robots to draw", "leave out -o")
-    if delays is None:
-        message = "a net needs a table of delays"
-        hint = '--delays FILE.toml, with lines as "p1" = 0.5'
-        raise usage_error(message, hint)
-    net = load_net(file)
-    analysis = analyse_net(net, read_delays(delays, net), str(file))
-    if out.as_json:
-        emit(net_document(file.stem, analysis))
-    else:
-        say(f"{file.stem}: cycle time {analysis.pace:.6g} s")
-        for made in net_tables(analysis, out.verbose):
-            table(made.title, made.columns, made.rows)
-    return 0
-
-
-def _analyze_pag(
-    options: ProjectOptions,
-    asked: RunOptions,
-    study: AnalyzeOptions,
-    output: Path | None,
-    out: OutputOptions,
-) -> int:
+    """Find the bottleneck of FILE.pag, and what would relieve it."""
     from factory.nets.verify import proved
     from factory.study.analysis import Timing, analyse
     from factory.study.analysis.document import document
     from factory.study.analysis.measured import Conditions, conditions, logged_record
-    from factory.study.analysis.picture import check_picture, picture
-    from factory.support.files import write_bytes
 
-    writable(options.file, output)
-    check_picture(output)
     log = study.log(out.silent)
     made = (
         Conditions(options.settings(), asked.world, asked.seed, asked.jitter, asked.wip)
@@ -180,15 +132,10 @@ def _analyze_pag(
         record, status = _run(project, timing, asked, out.silent)
     units = len(record.dropoffs) if record else asked.units
     analysis = analyse(timing, units, made.wip, change, record)
-    if output is not None:
-        write_bytes(output, picture(analysis, output.suffix))
     if out.as_json:
-        drawn = str(output) if output else None
-        emit({**document(analysis), "picture": drawn, "warnings": warnings, **cut_off(log)})
+        emit({**document(analysis), "warnings": warnings, **cut_off(log)})
     else:
         _print(analysis, out.verbose)
-        if output is not None:
-            say(f"wrote {output}")
     return status
 
 

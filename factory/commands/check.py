@@ -101,8 +101,8 @@ def check(
 
 
 def _proved(certificate: Path, checked: Checked) -> dict[str, bool | None]:
-    """The claims of a certificate of the checked net: each property proved (True), refuted (False)
-    or open (None). Raises InputError, or RunError if the certificate is refuted."""
+    """The claims of a certificate of the checked net: each property proved (True), said to fail
+    (False) or open (None). Raises InputError, or RunError if the certificate is refused."""
     from factory.exporting.certificate.listing import CLAIMS, TRAIN
     from factory.exporting.certificate.proof_file import check_against
 
@@ -113,7 +113,7 @@ def _proved(certificate: Path, checked: Checked) -> dict[str, bool | None]:
 
 def _claims(proved: dict[str, bool | None]) -> str:
     """The claims of a certificate in words."""
-    words = {True: "proves", False: "refutes", None: "leaves open"}
+    words = {True: "proves", False: "gives a reason against", None: "leaves open"}
     shown = {c: v for c, v in proved.items() if c != "gear_net" or not proved.get("gear_train")}
     said = {how: [c.replace("_", " ") for c, v in shown.items() if v is how] for how in words}
     return "; ".join(

@@ -25,7 +25,7 @@ from factory.commands.options import (
     Number,
     gathered,
 )
-from factory.commands.outputs import writable, writable_folder
+from factory.commands.outputs import writable
 from factory.commands.requests import OutputOptions, ProjectOptions, check_ideal
 from factory.commands.warnings import announced
 from factory.support.console import emit, say, table
@@ -51,7 +51,6 @@ class SweepOptions:
     max_time: float | None
     fuse: bool | None
     jobs: int | None
-    on: str
     retry: bool
 
 
@@ -66,10 +65,8 @@ class SweepOptions:
 )
 @click.option("-o", "--output", "database", type=PATH, help="Database of the results.")
 @JOBS
-@click.option("--on", default="local", help="Where to run: local, or dask://HOST:PORT (Dask).")
 @click.option("--retry", is_flag=True, help="Repeat failed runs.")
 @click.option("--summary", is_flag=True, help="Print means, deviations and confidence intervals.")
-@click.option("--plots", type=PATH, help="Folder for plots of the summary.")
 @click.option("--world", type=click.Choice(["mujoco", "ideal"]), help="As for `run`.")
 @click.option("--units", type=click.IntRange(1, 10**9), help="Products per run (default: 4).")
 @click.option("--seed", type=SEEDS, help="As for `run`.")
@@ -91,19 +88,12 @@ def sweep(
     database: Path | None,
     vary: tuple[str, ...],
     summary: bool,
-    plots: Path | None,
 ) -> int:
     """Run FILE.pag for every combination of the varied values, and keep the results in SQLite.
 
     Called again, the sweep continues where it stopped. `factory sweep RESULTS --summary`
     summarises the results so far, also during a sweep.
     """
-    writable_folder(plots)
-    if plots is not None:
-        from factory.study.sweep.summary import check_plots
-
-        check_plots()
-    is_summary = summary or plots is not None
     document: dict[str, Any] = {}
     failed = False
     if vary:
@@ -113,14 +103,14 @@ def sweep(
             raise usage_error("there is no database for the results", "for example -o results.db")
         tally, warnings = _carry_out(replace(options, file=source), runs, database, vary, out)
         failed = tally.failed + tally.there_failed > 0
-        document = {"database": str(database), "on": runs.on, **tally.as_json()}
+        document = {"database": str(database), **tally.as_json()}
         document["warnings"] = warnings
         if not out.as_json:
             _print(tally, database)
-    elif not is_summary:
+    elif not summary:
         raise usage_error("there is nothing to vary", "for example --vary seed=0:100")
-    if is_summary:
-        document |= _summarise(database or source, plots, out)
+    if summary:
+        document["summary"] = _summarise(database or source, out)
     if out.as_json:
         emit(document)
     return 1 if failed else 0
@@ -138,12 +128,8 @@ def _carry_out(
     from factory.study.pool import cores
     from factory.study.sweep.grid import DEFAULTS, SETTINGS, read_axes
     from factory.study.sweep.recipe import Recipe
-    from factory.study.sweep.sweeping import LOCAL, sweep
+    from factory.study.sweep.sweeping import sweep
 
-    if runs.on != LOCAL:
-        from factory.study.sweep.cluster import address_of
-
-        address_of(runs.on)
     writable(options.file, database)
     axes = read_axes(vary)
     asked = asdict(options) | asdict(runs)
@@ -165,7 +151,7 @@ def _carry_out(
     about = runs.max_time, project.ground, runs.fuse, laid
     recipe = Recipe(project.plain, project.product, fixed, *about)
     jobs = runs.jobs or cores()
-    return sweep(recipe, axes, database, jobs, runs.on, runs.retry, out.silent), warnings
+    return sweep(recipe, axes, database, jobs, runs.retry, out.silent), warnings
 
 
 def _print(tally: Tally, database: Path) -> None:
@@ -182,25 +168,16 @@ def _print(tally: Tally, database: Path) -> None:
         )
 
 
-def _summarise(database: Path | None, folder: Path | None, out: OutputOptions) -> dict[str, Any]:
-    """Summarise a database, and draw it. Returns the keys of `sweep --summary --json`."""
+def _summarise(database: Path | None, out: OutputOptions) -> dict[str, Any]:
+    """Summarise a database. Returns the key `summary` of `sweep --summary --json`."""
     from factory.study.sweep.summary import summarise
-    from factory.support.files import write_all
 
     if database is None:
         raise usage_error("there is no database", "factory sweep RESULTS --summary")
     result = summarise(database)
-    drawn: dict[Path, bytes] = {}
-    if folder is not None:
-        from factory.study.sweep.summary import plots
-
-        drawn = {folder / name: picture for name, picture in plots(result).items()}
-        write_all(drawn)
     if not out.as_json:
         _print_summary(result, out.verbose)
-        for path in drawn:
-            say(f"wrote {path}")
-    return {"summary": result.as_json(), "files": [str(path) for path in drawn]}
+    return result.as_json()
 
 
 def _print_summary(result: Summary, verbose: bool) -> None:

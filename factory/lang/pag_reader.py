@@ -39,8 +39,8 @@ from factory.support.errors import did_you_mean, usage_error
 KINDS = {
     ".pnml": (
         "a net in PNML",
-        "it has no parts that could be moved: `factory check {}` proves it, `factory analyze {}` "
-        "finds its pace, and `export` draws it; here give a PAG",
+        "it has no parts that could be moved: `factory check {}` proves it, and `export` draws "
+        "it; here give a PAG",
     ),
     ".ldr .mpd .dat": ("an LDraw model", "`factory import {}` makes a PAG of it, `plan` too"),
     ".step .stp .glb .3mf": ("a model of parts in place", "`factory plan {}` makes a PAG of it"),

@@ -13,13 +13,11 @@ from factory.support.interruption import put_off
 EXTRAS: Mapping[str, tuple[tuple[str, ...], str]] = MappingProxyType(
     {
         "decompose": (("coacd",), "meshes that are not convex collide as convex pieces"),
-        "plots": (("matplotlib",), "plots of `fidelity` and `sweep`"),
         "live": (("websockets",), "`view`, in the browser"),
         "export": (("ezdxf", "foxglove-sdk"), "DXF and MCAP"),
         "usd": (("usd-core",), "USD"),
         "yaml": (("pyyaml",), "`import` of trees in YAML"),
         "step": (("cascadio",), "`plan` of STEP files"),
-        "cluster": (("distributed",), "`sweep --on` a Dask cluster"),
     }
 )
 """Each extra: its packages, and what it is for."""

@@ -27,17 +27,13 @@ from factory.support.settings import Settings
 CALM = 3
 """So many ticks after its stroke a slider is at rest."""
 
-AT_ONCE = 1e6
-"""A factor on a speed that leaves only the acceleration as a bound."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Change:
-    """Changes of some robots (index): factors on their `speed`, their `acceleration` and the length
-    of each of their ways (`way`); the number of robots that share the work of one (`copies`)."""
+    """Changes of some robots (index): factors on their `speed` and the length of each of their ways
+    (`way`); the number of robots that share the work of one (`copies`)."""
 
     speed: Mapping[int, float] = field(default_factory=dict)
-    acceleration: Mapping[int, float] = field(default_factory=dict)
     way: Mapping[int, float] = field(default_factory=dict)
     copies: Mapping[int, int] = field(default_factory=dict)
 
@@ -212,11 +208,10 @@ class Timing:
     def _limits(self, axes: Sequence[int], robots: Sequence[int], change: Change) -> Limits:
         """The limits of axes, which are those of robots, with a change."""
         limits = self.limits.of(axes)
-        if (change.speed.keys() | change.acceleration.keys()).isdisjoint(robots):
+        if change.speed.keys().isdisjoint(robots):
             return limits
         speed = [change.speed.get(robot, 1.0) for robot in robots]
-        gain = [change.acceleration.get(robot, 1.0) for robot in robots]
-        return Limits(limits.speed * speed, limits.acceleration * gain)
+        return Limits(limits.speed * speed, limits.acceleration)
 
     @cached_property
     def rest(self) -> float:
@@ -237,10 +232,7 @@ class Timing:
     def changed(self, change: Change) -> tuple[float, ...]:
         """The delay of every operation with a change [s]."""
         delays = list(self.delays)
-        robots = [
-            self.factory.robots[robot]
-            for robot in {*change.speed, *change.acceleration, *change.way}
-        ]
+        robots = [self.factory.robots[robot] for robot in {*change.speed, *change.way}]
         for number in {number for robot in robots for number in robot.operations}:
             delays[number] = self.delay(number, change)
         return tuple(delays)

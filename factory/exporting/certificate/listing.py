@@ -11,7 +11,7 @@ from typing import Any
 Section = dict[str, Any]
 Rows = list[list[int]]
 
-SCHEMA = 1
+SCHEMA = 2
 CLAIMS = ("gear_net", "safe", "live", "reversible", "legal")
 TRAIN = "gear_train"
 """The additional claim in the certificate of a gear train."""

@@ -1,6 +1,6 @@
 """The certificate of a verdict: a JSON document that another program can check.
 
-Keys: `schema` 1; `net` with `transitions` (name, `moves`: its redistribution function as quadruples
+Keys: `schema` 2; `net` with `transitions` (name, `moves`: its redistribution function as quadruples
 place, slot, place, slot, or null) and `places` (name, mode, label, `left`, `right`, `tokens`,
 `size`, the number of robots it acts on, and `slots`: these robots, -1 for one without a gear; a
 place without `size` has that of its slots); `robots` with name, type and gear (`places`,
@@ -9,30 +9,28 @@ property with `holds`:
 
 * `gear_net`: the `order` in which the gears are added, each with the `place` [a; b] it shares, the
   gears it `meets` there and `c`, or why condition (b) is `exempt`;
-* `safe`: for each place the circuit with at most one token that covers it (`cover`: the number of
-  a robot, or, beyond the robots, of a row of `circuits`);
+* `safe`: for each place a robot whose gear, a circuit with at most one token, has it (`cover`);
 * `live`: an `order` of the places without token in which each comes after those it waits for;
-* `reversible`: trees of ways from a `root` to every transition, `there` and `back`; `root` is null
-  where the net falls into parts, each of which is live or never moves;
+* `reversible`: nothing: it follows from live and safe, as each place lies on a circuit;
 * `legal`: the marked place of each robot, whose slots are those of the robots that start there;
 * `gear_train`, of a net that is one and no gear net: an `order` of the transitions, by name, in
   which the gear of every robot, from its token on, ascends; null where the net is not live.
 
-A section that does not hold has a `reason` and what shows it (a firing sequence, a circuit). One
-that holds by exploration only has `holds` null, with the reason: it is not certified. `digest` is
-the SHA-256 of the rest. `check_certificate` (module `check`) gives the faults of such a document.
+A property that fails (`holds` false), or is not proved in this way (null), has a `reason`, and the
+names of the robots, places and transitions concerned. `digest` is the SHA-256 of the rest.
+`check_certificate` (module `check`) gives the faults of such a document.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 from factory.exporting.certificate.listing import CLAIMS, SCHEMA, TRAIN, digest
 from factory.nets.composition import Composition, compose, cover
 from factory.nets.gears import GearNet
-from factory.nets.marked import NONE, MarkedNet, breadth_first, marked, token_free
-from factory.nets.verdict import Verdict, Witness
+from factory.nets.marked import NONE, MarkedNet, marked, token_free
+from factory.nets.verdict import Verdict
 
 Json = dict[str, Any]
 
@@ -110,16 +108,15 @@ def _marked_places(net: MarkedNet) -> list[int | None]:
 
 def _section(claim: str, net: MarkedNet, composition: Composition, verdict: Verdict) -> Json:
     holds = getattr(verdict, claim)
-    by_gears = claim in ("gear_net", "legal")
-    if holds is None or (holds and verdict.method != "structure" and not by_gears):
-        reason = "undecided" if holds is None else "found by exploring every marking: not certified"
-        return {"holds": None, "reason": reason}
-    if not holds:
-        return _failure(claim, net, next(w for w in verdict.witness if w.property == claim))
-    evidence = _EVIDENCE[claim](net, composition)
-    if evidence is None:
-        return {"holds": None, "reason": "proved, but not by circuits alone: not certified"}
-    return {"holds": True, **evidence}
+    if holds:
+        follows = claim != "reversible" or (verdict.live and verdict.safe)
+        evidence = _EVIDENCE[claim](net, composition) if follows else None
+        if evidence is None:
+            return {"holds": None, "reason": "proved, but not by gears: not certified"}
+        return {"holds": True, **evidence}
+    witness = next(w for w in verdict.witness if w.property == claim)
+    names = {key: list(getattr(witness, key)) for key in ("robots", "places", "transitions")}
+    return {"holds": holds, "kind": witness.kind, "reason": witness.reason, **names}
 
 
 def _gear_net(net: MarkedNet, composition: Composition) -> Json:
@@ -145,20 +142,7 @@ def _gear_train(net: MarkedNet, verdict: Verdict) -> Json:
 
 def _safe(net: MarkedNet, composition: Composition) -> Json | None:
     covered = cover(net, composition.closed)
-    circuits: list[list[int]] = []
-    for place in [place for place, gear in enumerate(covered) if gear == NONE]:
-        from factory.foreign_nets.behaviour import overfill  # never for a gear net
-
-        if covered[place] != NONE:
-            continue
-        circuit = overfill(net, place).circuit
-        if not circuit:
-            return None
-        for other in circuit:
-            if covered[other] == NONE:
-                covered[other] = len(net.gears) + len(circuits)
-        circuits.append(list(circuit))
-    return {"cover": covered, "circuits": circuits}
+    return None if NONE in covered else {"cover": covered}
 
 
 def _live(net: MarkedNet, composition: Composition) -> Json:
@@ -170,27 +154,8 @@ def _live(net: MarkedNet, composition: Composition) -> Json:
     return {"order": order}
 
 
-def _reversible(net: MarkedNet, composition: Composition) -> Json:
-    there = _tree(net, net.net.postset, net.left, net.right)
-    back = _tree(net, net.net.preset, net.right, net.left)
-    if token_free(net).stuck or there is None or back is None:
-        return {"root": None}
-    return {"root": 0, "there": there, "back": back}
-
-
-def _tree(
-    net: MarkedNet, beside: Sequence[Sequence[int]], inward: Sequence[int], onward: Sequence[int]
-) -> Json | None:
-    """A breadth-first tree from transition 0: by which place each is reached, and how deep; None
-    where some is not."""
-    events = range(len(net.net.transitions))
-    tree = breadth_first(beside, onward) if events else {}
-    if len(tree) + 1 != len(events):
-        return None
-    depth = {0: 0}
-    for event, place in tree.items():
-        depth[event] = depth[inward[place]] + 1
-    return {"place": [tree.get(e) for e in events], "depth": [depth[e] for e in events]}
+def _reversible(net: MarkedNet, composition: Composition) -> Json | None:
+    return None if _safe(net, composition) is None else {}
 
 
 def _legal(net: MarkedNet, composition: Composition) -> Json:
@@ -204,24 +169,3 @@ _EVIDENCE: dict[str, Callable[[MarkedNet, Composition], Json | None]] = {
     "reversible": _reversible,
     "legal": _legal,
 }
-
-
-def _failure(claim: str, net: MarkedNet, witness: Witness) -> Json:
-    """The reason for the failure of a property, and the evidence that a checker needs."""
-    places = [net.net.place_index[name] for name in witness.places]
-    events = [net.net.transition_index[name] for name in witness.transitions]
-    section: Json = {"holds": False, "kind": witness.kind, "reason": witness.reason}
-    section["robots"] = list(witness.robots)
-    structural = net.is_marked_graph
-    lasting = claim == "reversible" and not structural and [*net.enabled(net.after(events))]
-    if witness.kind == "dead transition" or lasting:
-        return {"holds": None, "reason": f"{witness.reason}; found by exploring: not certified"}
-    if claim == "safe":
-        return {**section, "place": places[0], "firing": events}
-    if claim == "live":
-        dead = witness.kind == "deadlock"
-        return {**section, "circuit": None if dead else places, "firing": events if dead else None}
-    if claim == "reversible":
-        event = events[0] if structural else None
-        return {**section, "transition": event, "firing": None if structural else events}
-    return {**section, "places": places, "transitions": events}

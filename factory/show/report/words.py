@@ -101,13 +101,8 @@ def _live(factory: Factory, section: dict[str, Any]) -> Iterator[str]:
 
 
 def _reversible(factory: Factory, section: dict[str, Any]) -> Iterator[str]:
-    if section.get("root") is None:
-        yield "Live, and firing every transition equally often restores the marking."
-        return
-    first = factory.net.threaded.transitions[section["root"]].name
-    depth = max(section["there"]["depth"], default=0)
-    yield f"From {first} there is a path to every transition, at most {depth} steps long, and one"
-    yield "back from each: firing all of them once restores the marking."
+    yield "Live, and each place lies on a circuit: firing every transition equally often restores"
+    yield "the marking."
 
 
 def _legal(factory: Factory, section: dict[str, Any]) -> Iterator[str]:

@@ -11,11 +11,9 @@ from factory.study.analysis.timed import TimedNet, timed_net
 from factory.study.analysis.what_if import (
     Scenario,
     Sensitivity,
-    WipCurve,
+    least_wip,
     scenario,
-    scenarios,
     sensitivities,
-    wip_curve,
 )
 from factory.timing.timing import AS_IT_IS, Change, Timing
 
@@ -24,7 +22,9 @@ from factory.timing.timing import AS_IT_IS, Change, Timing
 class Analysis:
     """The results of the timed net of a laid-out factory.
 
-    `slack[i]`: increase of the duration of operation i from which it sets the pace [s].
+    `slack[i]`: increase of the duration of operation i from which it sets the pace [s]; `asked`:
+    the change that was asked about, if any; `least_wip`: the least bound on copies of each part
+    with the full pace.
     """
 
     timing: Timing
@@ -33,8 +33,8 @@ class Analysis:
     flow: Flow = field(repr=False)
     slack: tuple[float, ...] = field(repr=False)
     sensitivities: tuple[Sensitivity, ...] = field(repr=False)
-    scenarios: tuple[Scenario, ...] = field(repr=False)
-    curve: WipCurve = field(repr=False)
+    asked: Scenario | None
+    least_wip: int
     measured: Comparison | None = field(repr=False)
 
     @property
@@ -58,10 +58,6 @@ def analyse(
     """
     net = timed_net(timing, AS_IT_IS, wip)
     products = flow(timing, net, units)
-    examined = scenarios(timing, net, wip)
-    if asked is not None:
-        first = scenario(timing, *asked, wip)
-        examined = (first, *(s for s in examined if s.change != first.change))
     return Analysis(
         timing,
         wip,
@@ -69,8 +65,8 @@ def analyse(
         products,
         operation_slacks(timing, net),
         sensitivities(timing, net, wip),
-        examined,
-        wip_curve(timing),
+        None if asked is None else scenario(timing, *asked, wip),
+        least_wip(timing),
         compare(timing, net, products, record) if record else None,
     )
 

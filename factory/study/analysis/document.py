@@ -24,9 +24,6 @@ def document(analysis: Analysis) -> dict[str, Any]:
         "bottlenecks": list(analysis.bottlenecks),
         "first_product_s": flow.first,
         "last_product_s": flow.last,
-        "full_pace_from": flow.full_pace,
-        "settled": flow.settled,
-        "parts_inside": flow.inside,
         "circuits": _circuits(analysis),
         "operations": [
             {"label": o.label, "operation": o.template.name, "delay_s": delay, "slack_s": slack}
@@ -35,18 +32,7 @@ def document(analysis: Analysis) -> dict[str, Any]:
             )
         ],
         "robots": _robots(analysis),
-        "stocks": [
-            {
-                "label": s.label,
-                "part": s.is_part,
-                "mean": s.mean,
-                "most": s.most,
-                "stay_s": s.stay,
-            }
-            for s in flow.stocks
-        ],
-        "wip_curve": [{"wip": wip, "cycle_time_s": pace} for wip, pace in analysis.curve.points],
-        "least_wip": analysis.curve.least,
+        "least_wip": analysis.least_wip,
         "scenarios": [
             {
                 "change": s.words,
@@ -54,7 +40,8 @@ def document(analysis: Analysis) -> dict[str, Any]:
                 "gain_s": net.pace - s.pace,
                 "bottlenecks": list(s.then),
             }
-            for s in analysis.scenarios
+            for s in (analysis.asked,)
+            if s is not None
         ],
         "measured": None if analysis.measured is None else _measured(analysis, analysis.measured),
     }
@@ -87,12 +74,8 @@ def _robots(analysis: Analysis) -> list[dict[str, Any]]:
             "waiting_s": share.waiting,
             "busy": share.busy,
             "slack_s": gain.slack,
-            "gain_10_percent_slower_s": gain.slower,
             "gain_10_percent_faster_s": gain.faster,
-            "gain_10_percent_acceleration_s": gain.quicker,
             "gain_10_percent_shorter_s": gain.shorter,
-            "gain_no_speed_limit_s": gain.most,
-            "enough_speed_factor": gain.enough,
             "gain_second_robot_s": gain.copy,
         }
         for robot, share, gain in zip(

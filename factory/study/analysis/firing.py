@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from types import MappingProxyType
 
 import numpy as np
@@ -12,18 +11,6 @@ from numpy.typing import NDArray
 from factory.nets.marked import MarkedNet, dead_ends, token_free
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Firings:
-    """`dates` (n, T): date of the k-th firing of each transition [s], from the initial marking at
-    time 0. From the k-th to the (k + `period`)-th firing it takes `advance` [s], for all k from
-    `settled` on; None if that does not hold within n firings."""
-
-    dates: Floats = field(repr=False)
-    settled: int | None
-    period: int
-    advance: float
 
 
 def earliest_firings(
@@ -71,29 +58,3 @@ def earliest_firings(
                     latest = max(latest, begun)
             row[event] = latest
     return np.array(dates).reshape(count, len(net.net.transitions))
-
-
-def settled_firings(
-    net: MarkedNet,
-    seconds: Sequence[float],
-    ratio: float,
-    period: int,
-    least: int,
-    first: Mapping[int, float] = MappingProxyType({}),
-    ready: Mapping[int, float] = MappingProxyType({}),
-    work: int = 4_000_000,
-) -> Firings:
-    """At least `least` firings, until all repeat every `period` firings with `ratio` seconds for
-    each; their number is doubled until then, as far as `work` steps allow."""
-    count = max(least, 8 * period, 16)
-    most = max(count, work // max(1, len(net.tokens)))
-    while True:
-        dates = earliest_firings(net, seconds, count, first, ready)
-        apart = dates[period:] - dates[:-period] - ratio * period
-        restless = np.flatnonzero(np.abs(apart).max(axis=1) > 1e-9 * (1.0 + dates.max()))
-        settled = int(restless[-1]) + 1 if len(restless) else 0
-        if settled <= count - 4 * period:
-            return Firings(dates, settled, period, ratio * period)
-        if count >= most:
-            return Firings(dates, None, period, ratio * period)
-        count = min(2 * count, most)

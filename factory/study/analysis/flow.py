@@ -1,4 +1,4 @@
-"""The flow of products in a timed net: filling, work in progress, shares of the robots' time."""
+"""The flow of products in a timed net: their dates, and the shares of the robots' time."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.plant.factory import Operation
-from factory.study.analysis.firing import Firings, Floats
+from factory.study.analysis.firing import Floats
 from factory.study.analysis.timed import TimedNet, timed_net
 from factory.timing.timing import Timing
 
@@ -15,22 +14,6 @@ APART = 1e-3
 """Relative deviation of the mean interval up to which the pace counts as reached."""
 
 LEAST, MOST = 4, 100
-
-
-@dataclass(frozen=True, slots=True)
-class WorkInProgress:
-    """Number of copies of a label at once in the long run, and the time that each stays [s].
-
-    A part stays from the start of the operation that takes it until its product is dropped off; any
-    other sub-assembly from the end of the operation that makes it to the end of the one that takes
-    it.
-    """
-
-    label: str
-    is_part: bool
-    mean: float
-    most: int
-    stay: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,26 +42,16 @@ class Share:
 @dataclass(frozen=True)
 class Flow:
     """Flow of `units` products: the dates of the `first` and the `last` dropoff (in the engine:
-    exit from the outfeed) [s]; `full_pace`: number of the product from which on they come at the
-    pace; `settled`: whether the computed firings become periodic, else `stocks` are those at their
-    end. `durations` (cycles, operations): time from start to end of each operation each time [s];
-    `busy`: share of the time until `last` for which each robot is in operations."""
+    exit from the outfeed) [s]. `durations` (cycles, operations): time from start to end of each
+    operation each time [s]; `busy`: share of the time until `last` for which each robot is in
+    operations."""
 
     units: int
     first: float
     last: float
-    full_pace: int | None
-    settled: bool
-    stocks: tuple[WorkInProgress, ...] = field(repr=False)
     shares: tuple[Share, ...] = field(repr=False)
-    firings: Firings = field(repr=False)
     durations: Floats = field(repr=False)
     busy: tuple[float, ...] = field(repr=False)
-
-    @property
-    def inside(self) -> float:
-        """Mean number of parts in the factory at once."""
-        return sum(stock.mean for stock in self.stocks if stock.is_part)
 
     @property
     def lasting(self) -> Floats:
@@ -89,11 +62,10 @@ class Flow:
 
 
 def flow(timing: Timing, net: TimedNet, units: int) -> Flow:
-    """The flow of at least `units` products from the initial marking, with earliest firings."""
-    firings, factory = net.firings(units), timing.factory
-    products = leaving_dates(timing, firings)
+    """The flow of `units` products from the initial marking, with earliest firings."""
+    dates, factory = net.firings(units), timing.factory
+    products = leaving_dates(timing, dates)
     last = float(products[units - 1]) + timing.leaving
-    dates = firings.dates[: -(-units // factory.period)]
     starts, ends = [o.start for o in factory.operations], [o.end for o in factory.operations]
     durations = dates[:, ends] - dates[:, starts] - timing.settings.tick
     spent = durations.sum(axis=0)
@@ -101,67 +73,15 @@ def flow(timing: Timing, net: TimedNet, units: int) -> Flow:
         units,
         float(products[0]) + timing.leaving,
         last,
-        _full_pace(products, firings, net.units),
-        firings.settled is not None,
-        _stocks(timing, firings),
         tuple(_share(timing, net, robot) for robot in range(len(factory.robots))),
-        firings,
         durations,
         tuple(float(spent[list(robot.operations)].sum()) / last for robot in factory.robots),
     )
 
 
-def leaving_dates(timing: Timing, firings: Firings) -> Floats:
-    """Date of the dropoff of each product [s]."""
-    return np.asarray(firings.dates[:, [o.end for o in timing.factory.dropoffs]].ravel())
-
-
-def _full_pace(products: Floats, firings: Firings, units: int) -> int | None:
-    """The product, counted from 1, from which on the mean interval is the pace."""
-    if firings.settled is None:
-        return None
-    period = firings.period * units
-    apart = products[period:] - products[:-period] - firings.advance
-    late = np.flatnonzero(np.abs(apart) > 1e-9 * (1.0 + products[-1]))
-    return int(late[-1]) + 2 if len(late) else 1
-
-
-def _stocks(timing: Timing, firings: Firings) -> tuple[WorkInProgress, ...]:
-    """Work in progress over the whole periods before the last firing of every transition."""
-    factory, dates, advance = timing.factory, firings.dates, firings.advance
-    end = float(dates[-1].min())
-    settled = 0 if firings.settled is None else firings.settled
-    periods = int((end - float(dates[settled].max())) / advance) if advance else 0
-    begin = end - max(1, periods) * advance
-    stocks = []
-    for operation in factory.making:
-        part = not operation.inputs
-        above = factory.operations[factory.parents[operation.index]]
-        parent = factory.dropoffs[operation.turn] if part else above
-        enters = dates[:, operation.start if part else operation.end]
-        leaves = dates[:, parent.end]
-        stocks.append(_stock(operation, enters, leaves, begin, end))
-    return tuple(stocks)
-
-
-def _stock(
-    operation: Operation, enters: Floats, leaves: Floats, begin: float, end: float
-) -> WorkInProgress:
-    """Time averages between `begin` and `end`. A copy that leaves at the instant at which another
-    comes is not counted with it."""
-    stays = np.clip(leaves, begin, end) - np.clip(enters, begin, end)
-    instants = [(float(t), -1) for t in leaves if begin < t <= end]
-    instants += [(float(t), +1) for t in enters if begin < t <= end]
-    count = most = int(np.sum((enters <= begin) & (leaves > begin)))
-    for _, step in sorted((round(t, 9), step) for t, step in instants):
-        count += step
-        most = max(most, count)
-    counted = (enters > begin) & (enters <= end)
-    whole = (leaves - enters)[counted]
-    stay = float(whole.mean()) if len(whole) else 0.0
-    length = end - begin
-    mean = float(stays.sum()) / length if length > 0 else 0.0
-    return WorkInProgress(operation.label, not operation.inputs, mean, most, stay)
+def leaving_dates(timing: Timing, dates: Floats) -> Floats:
+    """Date of the dropoff of each product [s], by those of all firings (cycles, T)."""
+    return np.asarray(dates[:, [o.end for o in timing.factory.dropoffs]].ravel())
 
 
 def _share(timing: Timing, net: TimedNet, number: int) -> Share:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from factory.study.analysis.analysing import Analysis
 from factory.study.analysis.measured import ComparedFigure, Comparison
-from factory.study.analysis.what_if import listed
+from factory.study.analysis.what_if import Scenario, listed
 
 SHOWN = 12
 """Number of rows of a table; `-v` shows all."""
@@ -38,16 +38,10 @@ def summary(analysis: Analysis) -> Iterator[str]:
         f"{listed(list(analysis.bottlenecks))} {does} the pace"
     )
     yield f"  {critical_words(analysis)}"
-    if flow.full_pace is None:
-        pace = "full pace not yet reached"
-    else:
-        pace = f"full pace from product {flow.full_pace} on"
     yield (
-        f"first product after {flow.first:.2f} s, {flow.units} after {flow.last:.2f} s, {pace}; "
-        f"{flow.inside:.1f} parts inside at once"
+        f"first product after {flow.first:.2f} s, {flow.units} after {flow.last:.2f} s; "
+        f"--wip {analysis.least_wip} or more keeps the full pace"
     )
-    if not flow.settled:
-        yield "the factory is still filling: stocks are those of the last products computed"
 
 
 def critical_words(analysis: Analysis) -> str:
@@ -67,9 +61,8 @@ def tables(analysis: Analysis, verbose: bool) -> Iterator[PrintedTable]:
     most = None if verbose else SHOWN
     yield _shares(analysis, most)
     yield _gains(analysis, most)
-    yield _scenarios(analysis)
-    yield _stocks(analysis, most)
-    yield _curve(analysis)
+    if analysis.asked is not None:
+        yield _asked(analysis.net.pace, analysis.asked)
     if analysis.measured is not None:
         yield _totals(analysis.measured)
         yield _durations(analysis.measured, most)
@@ -92,63 +85,21 @@ def _shares(analysis: Analysis, most: int | None) -> PrintedTable:
 def _gains(analysis: Analysis, most: int | None) -> PrintedTable:
     rows = []
     for s in analysis.sensitivities:
-        worth = max(s.faster, s.quicker, s.shorter, s.most, s.copy)
-        limit = f"{s.most:.3f}"
-        if s.enough is not None:
-            limit += f" at {s.enough:.2f} times"
-        if worth <= 0 and s.slower >= 0 and len(analysis.sensitivities) > SHOWN:
-            continue
-        row = (
-            s.robot,
-            f"{s.slack:.3f}",
-            *(f"{x + 0.0:.3f}" for x in (s.slower, s.faster, s.quicker, s.shorter)),
-            limit,
-            s.then if s.most > 0 else "",
-            f"{s.copy:.3f}",
-        )
-        rows.append((worth, row))
-    columns = (
-        "robot",
-        "slack",
-        "speed -10 %",
-        "speed +10 %",
-        "acceleration +10 %",
-        "ways -10 %",
-        "no speed limit",
-        "then",
-        "second robot",
-    )
+        worth = max(s.faster, s.shorter, s.copy)
+        if worth > 0 or len(analysis.sensitivities) <= SHOWN:
+            times = (s.slack, s.faster, s.shorter, s.copy)
+            rows.append((worth, (s.robot, *(f"{t + 0.0:.3f}" for t in times))))
+    columns = ("robot", "slack", "speed +10 %", "ways -10 %", "second robot")
     ordered = [row for _, row in sorted(rows, key=lambda item: -item[0])]
-    return cut("Cycle time saved by changing one robot [s]", columns, ordered, most)
+    made = cut("Cycle time saved by changing one robot [s]", columns, ordered, most)
+    return replace(made, note=ASSUMED)
 
 
-def _scenarios(analysis: Analysis) -> PrintedTable:
-    pace = analysis.net.pace
-    rows = [
-        (s.words, f"{s.pace:.3f}", f"{pace - s.pace:.3f}", listed(list(s.then), 3))
-        for s in analysis.scenarios
-    ]
+def _asked(pace: float, change: Scenario) -> PrintedTable:
+    then = listed(list(change.then), 3)
+    row = (change.words, f"{change.pace:.3f}", f"{pace - change.pace:.3f}", then)
     columns = ("change", "cycle time [s]", "saved [s]", "then sets the pace")
-    return PrintedTable("What if", columns, rows, ASSUMED)
-
-
-def _stocks(analysis: Analysis, most: int | None) -> PrintedTable:
-    ordered = sorted(analysis.flow.stocks, key=lambda s: (not s.is_part, -s.mean))
-    rows = [
-        (s.label, "part" if s.is_part else "", f"{s.mean:.2f}", str(s.most), f"{s.stay:.3f}")
-        for s in ordered
-    ]
-    title = "Work in progress"
-    return cut(title, ("label", "", "mean", "most", "stay [s]"), rows, most)
-
-
-def _curve(analysis: Analysis) -> PrintedTable:
-    least = analysis.curve.least
-    rows = [
-        (str(wip), f"{pace:.3f}", "least bound with the full pace" if wip == least else "")
-        for wip, pace in analysis.curve.points
-    ]
-    return PrintedTable("Bound on copies of each part (--wip)", ("W", "cycle time [s]", ""), rows)
+    return PrintedTable("What if", columns, [row])
 
 
 def _totals(run: Comparison) -> PrintedTable:

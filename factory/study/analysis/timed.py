@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import lcm
 
 from factory.nets.marked import NONE, MarkedNet
 from factory.nets.petri import PetriNet, Place
-from factory.study.analysis.firing import Firings, settled_firings
+from factory.study.analysis.firing import Floats, earliest_firings
 from factory.study.analysis.slack import Slack, circuits
 from factory.timing.timed import FEEDER, OUTFEED, SAME, Timed, timed
 from factory.timing.timing import AS_IT_IS, Change, Timing
-
-LONGEST_PERIOD = 60
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,15 +94,11 @@ class TimedNet(Timed):
         slack = self.pace * circuit.products - circuit.seconds
         return slack if slack > SAME * self.pace else 0.0
 
-    def firings(self, units: int) -> Firings:
-        """The earliest firings of each transition for at least `units` products from the initial
-        marking."""
-        period = lcm(*(c.tokens for c in self.critical))
-        period, cycle = min(period, LONGEST_PERIOD), self.pace * self.units
-        rounds = -(-units // self.units)
-        return settled_firings(
-            self.net, self.seconds, cycle, period, rounds, self.first, self.ready
-        )
+    def firings(self, units: int) -> Floats:
+        """(cycles, T): the earliest dates [s] of the firings of each transition, from the initial
+        marking, for at least `units` products."""
+        cycles = -(-units // self.units)
+        return earliest_firings(self.net, self.seconds, cycles, self.first, self.ready)
 
 
 def timed_net(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None) -> TimedNet:

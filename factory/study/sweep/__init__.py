@@ -1,5 +1,5 @@
-"""Sweeps: runs over a grid of seeds, speeds, clearances, ..., by processes or a Dask cluster, into
-an SQLite database from which a stopped sweep resumes.
+"""Sweeps: runs over a grid of seeds, speeds, clearances, ..., by processes, into an
+SQLite database from which a stopped sweep resumes.
 
     >>> from factory.study.sweep import points, read_axes
     >>> [dict(point) for point in points(read_axes(["seed=0:2", "jitter=0.1"]))]

@@ -19,7 +19,6 @@ from factory.study.sweep.recipe import name_of
 from factory.study.sweep.work import FAILING_FIGURES, FIGURES, Outcome
 from factory.support.errors import Diagnostic, InputError
 from factory.support.resource import Closing
-from factory.support.settings import AUTO
 
 COLUMNS: Mapping[str, str] = {
     "point": "TEXT PRIMARY KEY",
@@ -160,7 +159,7 @@ def _connect(path: Path, mode: str = "rwc") -> sqlite3.Connection:
 
 def _identity(connection: sqlite3.Connection, path: Path) -> dict[str, Any] | None:
     """The identity kept in a database, None for an empty one. Raises InputError (BadFile) for one
-    of another program, sqlite3.Error where a sweep cannot have written what it contains."""
+    of another program."""
     tables = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
     # both come in one transaction: the id, read last, is there where the tables are
     if connection.execute("PRAGMA application_id").fetchone()[0] != APPLICATION:
@@ -169,52 +168,21 @@ def _identity(connection: sqlite3.Connection, path: Path) -> dict[str, Any] | No
             raise InputError(_bad(path, message, "choose another -o"))
         return None
     rows = connection.execute("SELECT key, value FROM sweep")
-    try:
-        identity = {key: json.loads(text) for key, text in rows}
-        sound = isinstance(identity["product"], str) and set(identity["varied"]) <= set(KEYS)
-    except (KeyError, TypeError, ValueError, RecursionError):
-        sound = False
-    if not sound:
-        raise sqlite3.DatabaseError("its table 'sweep' cannot be read")
-    _check_rows(connection, identity["varied"])
-    return identity
-
-
-def _check_rows(connection: sqlite3.Connection, varied: Sequence[str]) -> None:
-    """Raises sqlite3.Error for the first row without a point, a status or a key that varies, or
-    with a value that is not of the type of its column, which SQLite does not check."""
-    faults = [f"{name} IS NULL" for name in ("point", "status", *varied)]
-    faults.append("status NOT IN ('done', 'failed')")
-    for name, kind in columns_of(varied).items():
-        types = "'text'" if kind.startswith("TEXT") else "'integer', 'real'"
-        faults.append(f"typeof({name}) NOT IN ('null', {types}) AND {name} IS NOT '{AUTO}'")
-    for (row,) in connection.execute(f"SELECT rowid FROM runs WHERE {' OR '.join(faults)} LIMIT 1"):
-        raise sqlite3.DatabaseError(f"row {row} of its table 'runs' cannot be read")
+    return {key: json.loads(text) for key, text in rows}
 
 
 def _compare(path: Path, kept: Mapping[str, Any], asked: Mapping[str, Any]) -> None:
     """Raises InputError (BadFile) with what differs between two sweeps."""
     if kept == asked:
         return
-    differences = [
-        _difference(key, kept[key], asked[key])
-        for key in asked
-        if key in kept and kept[key] != asked[key] and key != "digest"
+    words = [
+        f"{key} {_shown(kept[key])} there, {_shown(value)} here"
+        for key, value in asked.items()
+        if key != "digest" and not isinstance(value, dict) and kept.get(key, value) != value
     ]
-    if not differences:
-        differences = [
-            f"{key} is in one of them only" for key in sorted(kept.keys() ^ asked.keys())
-        ]
-    if not differences:
-        differences = ["the product, a mesh, a template or a robot type has changed"]
-    message = f"it holds another sweep: {'; '.join(differences)}"
-    raise InputError(_bad(path, message, "choose another -o, or ask for the same sweep"))
-
-
-def _difference(key: str, kept: Any, asked: Any) -> str:
-    if isinstance(kept, dict) and isinstance(asked, dict):
-        return f"another {key} there"
-    return f"{key} {_shown(kept)} there, {_shown(asked)} here"
+    message = "; ".join(words) or "another product, plan, mesh, template or robot type"
+    hint = "choose another -o, or ask for the same sweep"
+    raise InputError(_bad(path, f"it holds another sweep: {message}", hint))
 
 
 def _shown(value: Any) -> str:
@@ -229,8 +197,8 @@ def _bad(path: Path, message: str, hint: str) -> Diagnostic:
 
 @contextmanager
 def _sqlite_errors(path: Path) -> Iterator[None]:
-    """Raises InputError (BadFile) for an error of SQLite, and for a text that is not UTF-8."""
+    """Raises InputError (BadFile) for an error of SQLite, and for content that no sweep wrote."""
     try:
         yield
-    except (sqlite3.Error, UnicodeDecodeError) as error:
+    except (sqlite3.Error, LookupError, TypeError, ValueError, RecursionError) as error:
         raise InputError(_bad(path, f"it cannot be used: {error}", REPAIR)) from error

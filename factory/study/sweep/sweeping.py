@@ -18,8 +18,6 @@ from factory.study.sweep.work import Outcome, Runner, failed
 from factory.support.errors import InputError
 from factory.support.interruption import Interruption
 
-LOCAL = "local"
-
 Outcomes = Generator[Outcome, None, None]
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
@@ -82,12 +80,11 @@ def sweep(
     axes: Sequence[Axis],
     database: Path,
     jobs: int = 1,
-    on: str = LOCAL,
     retry: bool = False,
     quiet: bool = True,
 ) -> Tally:
     """Run every point of a grid without a row in the database; with `retry`, also those that
-    failed. `on` is `local`, in `jobs` processes, or dask://HOST:PORT.
+    failed, in `jobs` processes.
 
     After KeyboardInterrupt, or if this process is killed, all rows stay, and the same call resumes.
     Raises InputError if a fixed value is out of range (BadValue), or if the database holds another
@@ -108,7 +105,7 @@ def sweep(
         begin = perf_counter()
         with (
             RunsBar(len(grid), tally.there, quiet) as bar,
-            closing(_outcomes(recipe, wanted, on, jobs)) as outcomes,
+            closing(run_local(recipe, wanted, jobs)) as outcomes,
         ):
             for outcome in outcomes:
                 with Interruption() as interruption:
@@ -130,12 +127,3 @@ def run_local(recipe: Recipe, points: Sequence[Point], jobs: int) -> Outcomes:
                 yield failed(points[run.number], reason, run.tries)
             else:
                 yield replace(run.result, tries=run.tries)
-
-
-def _outcomes(recipe: Recipe, wanted: Sequence[Point], on: str, jobs: int) -> Outcomes:
-    """The outcomes of points, from processes or from the cluster at a place."""
-    if on == LOCAL:
-        return run_local(recipe, wanted, jobs)
-    from factory.study.sweep.cluster import run_dask
-
-    return run_dask(recipe, wanted, on)
