@@ -10,6 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from factory.foreign_nets.behaviour import analyse
+from factory.foreign_nets.explore import explore
 from factory.nets.gears import Gear, GearNet
 from factory.nets.marked import MarkedNet, marked
 from factory.nets.verdict import Verdict, Witness
@@ -71,6 +72,10 @@ def test_agrees_with_brute_force(factory: Factory) -> None:
     assume(truth is not None)
     assert truth is not None
     assert truth.behaviour == (True, True, True)
+    found = explore(marked(factory.net))
+    assert found.markings == len(truth.markings)
+    assert found.complete
+    assert (found.deadlock, found.unsafe, found.starved, found.one_way) == (None,) * 4
 
 
 @given(st.integers(0, 10**9))
@@ -79,6 +84,7 @@ def test_broken_marked_graphs_agree_with_brute_force(seed: int) -> None:
     net = random_marked_net(random.Random(seed))
     truth = explored(net, 1_500)
     verdict = analyse(net)
+    assert verdict.method == "structure"
     if truth is None:
         assert verdict.safe is False
         return
@@ -318,21 +324,56 @@ def test_the_verdict_as_json() -> None:
     assert set(first) >= {"property", "reason", "labels", "places", "transitions"}
 
 
-@pytest.mark.parametrize("edges", [[("b c", "a", 1), ("a", "b c", 0)], PHILOSOPHERS])
-def test_a_net_with_choice_is_refused_with_a_place(edges: list[tuple[str, str, int]]) -> None:
-    net = net_from(edges)
+def test_a_net_with_choice_is_explored() -> None:
+    net = net_from([("b c", "a", 1), ("a", "b c", 0)])
     verdict = analyse(net)
-    assert (verdict.gear_net, verdict.live, verdict.safe) == (False, None, None)
-    assert (verdict.reversible, verdict.legal, verdict.holds) == (None, None, False)
-    against = witness(verdict, "choice")
-    assert "has choice" in against.reason
-    place = net.net.places[net.net.place_index[against.places[0]]]
-    assert max(len(place.left), len(place.right)) > 1
+    assert verdict.method == "exploration"
+    assert (verdict.gear_net, verdict.live, verdict.safe) == (False, True, True)
+    assert (verdict.reversible, verdict.legal) == (True, None)
+    assert "has choice" in witness(verdict, "choice").reason
 
 
-def test_a_token_free_circuit_is_shown() -> None:
-    stuck = [("a", "b", 0), ("b", "a", 0), ("c", "a", 1)]
-    assert len(witness(analyse(net_from(stuck)), "token-free circuit").places) == 2
+def test_a_deadlock_is_shown_by_a_firing_sequence() -> None:
+    net = net_from([("b", "a c", 1), ("a", "b", 0)])
+    verdict = analyse(net)
+    assert (verdict.live, verdict.safe, verdict.reversible) == (False, True, False)
+    assert witness(verdict, "deadlock").transitions == ("c",)
+    assert witness(verdict, "no way back").transitions == ("c",)
+    told = witness(analyse(net_from(PHILOSOPHERS)), "deadlock").reason
+    assert told == "after takeA1, takeB1 nothing is enabled any more, with tokens in p4, p5"
+
+
+def test_a_marked_graph_says_how_it_comes_to_a_stop() -> None:
+    """One with a circuit that never fires; and nothing of a stop where the rest goes on."""
+    stuck = [("a", "b", 0), ("b", "a", 0)]
+    told = witness(analyse(net_from([*stuck, ("a", "c", 1)])), "token-free circuit").reason
+    assert told.endswith("after c nothing is enabled any more")
+    going = [("c", "d", 1), ("d", "c", 0)]
+    assert ";" not in witness(analyse(net_from([*stuck, *going])), "token-free circuit").reason
+
+
+def test_a_livelock_starves_a_transition() -> None:
+    net = net_from([("b", "a c", 1), ("a", "b", 0), ("c e", "d", 0), ("d", "e", 0)])
+    verdict = analyse(net)
+    assert (verdict.live, verdict.reversible) == (False, False)
+    assert "never fire again" in witness(verdict, "dead transition").reason
+
+
+def test_an_unbounded_net_with_choice_is_unsafe_and_otherwise_undecided() -> None:
+    net = net_from([("", "x", 3), ("a", "b c", 0), ("b c x", "a", 1), ("a", "", 0)])
+    verdict = analyse(net, limit=50)
+    assert verdict.safe is False
+    assert verdict.live is None
+    assert witness(verdict, "undecided").reason.startswith("undecided: ")
+
+
+def test_exploring_stops_at_its_limit() -> None:
+    rows = [
+        row for i in range(9) for row in ((f"a{i} c{i}", f"b{i}", 1), (f"b{i}", f"a{i} c{i}", 0))
+    ]
+    verdict = analyse(net_from(rows), limit=100)
+    assert (verdict.live, verdict.safe, verdict.reversible) == (None, None, None)
+    assert not verdict.holds
 
 
 def test_a_net_of_nothing() -> None:

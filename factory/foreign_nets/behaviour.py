@@ -1,9 +1,9 @@
-"""The properties of a net that may come from elsewhere, where it is a marked graph.
+"""The properties of any net: from the structure of a marked graph, else by exploring the markings.
 
-Guarantees: live where no circuit is free of tokens and every place has a producer (Commoner et al.,
-Theorem 1); safe where each place lies on a circuit with at most one token, or its producer cannot
-fire often enough (Theorem 2); live implies reversible (Murata 1989, Theorem 21: a marking is
-reachable where it keeps the tokens of every circuit). A net with choice is undecided.
+Guarantees, for a marked graph: live where no circuit is free of tokens and every place has a
+producer (Commoner et al., Theorem 1); safe where each place lies on a circuit with at most one
+token, or its producer cannot fire often enough (Theorem 2); live implies reversible (Murata 1989,
+Theorem 21: a marking is reachable where it keeps the tokens of every circuit).
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from itertools import islice
 import networkx as nx
 
 from factory.foreign_nets.discover import discover
+from factory.foreign_nets.explore import LIMIT, Exploration, explore
 from factory.nets.composition import compose, cover
 from factory.nets.gears import GearNet
 from factory.nets.marked import NONE, MarkedNet, dead_ends, marked, stuck_circuit, token_free
@@ -27,21 +28,24 @@ from factory.support.errors import Position
 WORK = 5_000_000
 """Greatest number of places visited by the search for an unsafe one."""
 
-NAMED = 12
-"""Greatest number of names in a sentence."""
+RUN_DOWN, NAMED = 10_000, 12
+"""Greatest number of firings to a deadlock of a marked graph, and of names in a sentence."""
 
-CHOICE = "undecided: the net has choice; only marked graphs are decided"
 
 NO_GEARS = "undecided: a legal marking marks each gear once, and the net has no gears"
 
 
 @collector_paused()
-def analyse(net: GearNet | MarkedNet, sources: Mapping[str, Position] | None = None) -> Verdict:
+def analyse(
+    net: GearNet | MarkedNet,
+    sources: Mapping[str, Position] | None = None,
+    limit: int = LIMIT,
+) -> Verdict:
     """The verdict on a net that may come from elsewhere.
 
     Gears that it claims are checked as `verify` does, otherwise those of a gear net are discovered.
-    Without gears there is no legal marking: `legal` and `gear_train` are None. Linear in the net.
-    `sources`: as for `verify`.
+    Without gears there is no legal marking: `legal` and `gear_train` are None. Linear in the net;
+    only a net with choice is explored, up to `limit` markings. `sources`: as for `verify`.
     """
     against: tuple[Defect, ...] = ()
     if isinstance(net, MarkedNet) and not net.gears:
@@ -56,11 +60,10 @@ def analyse(net: GearNet | MarkedNet, sources: Mapping[str, Position] | None = N
         against, train = shape_defects(net, subject, composition)
         illegal = legality_defects(net, subject)
     if subject.is_marked_graph:
-        defects = _of_marked_graph(subject, closed)
+        method, defects = "structure", _of_marked_graph(subject, closed)
     else:
-        undecided = (Defect(name, "undecided", CHOICE) for name in ("live", "safe", "reversible"))
-        defects = iter(undecided)
-    return verdict(subject, (*against, *defects, *illegal), train, sources)
+        method, defects = "exploration", _explored(subject, explore(subject, limit))
+    return verdict(subject, (*against, *defects, *illegal), train, sources, method)
 
 
 def _of_marked_graph(net: MarkedNet, closed: Sequence[bool]) -> Iterator[Defect]:
@@ -86,10 +89,14 @@ def _dying(net: MarkedNet, stuck: tuple[int, ...]) -> Iterator[Defect]:
         elif events[0] in net.blocked:
             text = f"place {shown} is before and after its transition, which is dead (Def. 3.4)"
             kind = "1-gear"
+        if (firing := run_down(net)) is not None:
+            text += f"; {_stopped(net, firing)}"
         yield Defect("live", kind, text, (), circuit, events)
         return
     for p in dead_ends(net)[:1]:
         text = f"nothing marks place {names[p].name} again once its tokens are gone"
+        if (firing := run_down(net)) is not None:
+            text += f"; {_stopped(net, firing)}"
         yield Defect("live", "missing producer", text, (), (p,), (net.right[p],))
 
 
@@ -192,6 +199,25 @@ def play(net: MarkedNet, firings: Mapping[int, int]) -> tuple[int, ...]:
     return tuple(sequence)
 
 
+def run_down(net: MarkedNet, most: int = RUN_DOWN) -> tuple[int, ...] | None:
+    """A sequence from m_0 after which nothing is enabled any more; None where a marked graph has
+    none of at most so many firings: what is enabled in one stays so until it fires, so each way to
+    fire comes as far."""
+    tokens, firing = list(net.tokens), list[int]()
+    ready = [event for event in range(len(net.net.transitions)) if event not in net.blocked]
+    while ready:
+        event = ready.pop()
+        if not all(tokens[p] for p in net.net.preset[event]):
+            continue
+        if len(firing) == most:
+            return None
+        firing.append(event)
+        net.fire(tokens, event)
+        after = [net.right[p] for p in net.net.postset[event]]
+        ready += [event, *(e for e in after if e != NONE and e not in net.blocked)]
+    return tuple(firing)
+
+
 def _after(net: MarkedNet, firing: Sequence[int]) -> str:
     """A firing sequence in words: `after a, b`."""
     names = [net.net.transitions[event].name for event in firing]
@@ -199,6 +225,14 @@ def _after(net: MarkedNet, firing: Sequence[int]) -> str:
         left = len(names) - NAMED
         names[NAMED // 2 : -NAMED // 2] = [f"... ({left} more: --json) ..."]
     return f"after {', '.join(names)}" if names else "initially"
+
+
+def _stopped(net: MarkedNet, firing: Sequence[int]) -> str:
+    """A deadlock in words: the firing sequence, and the places of the tokens after it."""
+    pairs = zip(net.net.places, net.after(firing), strict=True)
+    where = [place.name for place, count in pairs if count]
+    held = f", with tokens in {listing(where)}" if where else ""
+    return f"{_after(net, firing)} nothing is enabled any more{held}"
 
 
 def _one_way(net: MarkedNet, stuck: tuple[int, ...]) -> Iterator[Defect]:
@@ -212,3 +246,29 @@ def _one_way(net: MarkedNet, stuck: tuple[int, ...]) -> Iterator[Defect]:
     ending = {e for part in nx.connected_components(graph) if part & finite for e in part}
     for event in islice((e for e in net.enabled(net.tokens) if e in ending), 1):
         yield no_way_back(net, event)
+
+
+def _explored(net: MarkedNet, found: Exploration) -> Iterator[Defect]:
+    """The defects that an exploration shows, and the properties that it leaves undecided."""
+    names, events = net.net.places, net.net.transitions
+    text = f"undecided: {found.markings} markings were explored, and there are more"
+    if found.deadlock is not None:
+        reason = _stopped(net, found.deadlock)
+        yield Defect("live", "deadlock", reason, transitions=found.deadlock)
+    elif found.starved is not None:
+        firing, event = found.starved
+        reason = f"{_after(net, firing)} {events[event].name} can never fire again"
+        yield Defect("live", "dead transition", reason, transitions=firing or (event,))
+    elif not found.complete:
+        yield Defect("live", "undecided", text)
+    if found.unsafe is not None:
+        firing, place = found.unsafe
+        reason = f"place {names[place].name} holds two tokens {_after(net, firing)}"
+        yield Defect("safe", "two tokens", reason, (), (place,), firing)
+    elif not found.complete:
+        yield Defect("safe", "undecided", text)
+    if one_way := found.one_way or found.deadlock:
+        reason = f"{_after(net, one_way)} the initial marking is unreachable"
+        yield Defect("reversible", "no way back", reason, transitions=one_way)
+    elif not found.complete:
+        yield Defect("reversible", "undecided", text)

@@ -68,7 +68,8 @@ class Verdict:
     """Which properties a net has: True, False, or None where that is undecided.
 
     Each that is not True has a witness; a defect of a gear train may be listed with property
-    `gear_net`. `gears`: the gears, claimed or discovered. A gear net is also a `gear_train`.
+    `gear_net`. `gears`: the gears, claimed or discovered; `method`: how the behaviour was decided,
+    `structure` or `exploration`. A gear net is also a `gear_train`.
     """
 
     gear_net: bool | None
@@ -78,6 +79,7 @@ class Verdict:
     legal: bool | None
     witness: tuple[Witness, ...] = ()
     gears: tuple[Gear, ...] = field(default=(), repr=False)
+    method: str = "structure"
     gear_train: bool | None = None
 
     @property
@@ -102,7 +104,7 @@ class Verdict:
         """The verdict's keys of the `--json` document."""
         names = (*PROPERTIES, "gear_train")
         holds: dict[str, object] = {name: getattr(self, name) for name in names}
-        return {**holds, "witness": [w.as_json() for w in self.witness]}
+        return {**holds, "method": self.method, "witness": [w.as_json() for w in self.witness]}
 
 
 def verdict(
@@ -110,6 +112,7 @@ def verdict(
     defects: Iterable[Defect],
     gear_train: bool | None,
     sources: Mapping[str, Position] | None,
+    method: str = "structure",
 ) -> Verdict:
     """The verdict on a net with these defects: a property without defects holds, one whose defects
     are all `undecided` is None. `sources`: source positions of robots by name."""
@@ -118,7 +121,7 @@ def verdict(
     holds = {name: None if k == {"undecided"} else not k for name, k in kinds.items()}
     witness = tuple(_witness(net, defect, sources or {}) for defect in listed)
     gears = net.gears
-    return Verdict(**holds, witness=witness, gears=gears, gear_train=gear_train)
+    return Verdict(**holds, witness=witness, gears=gears, method=method, gear_train=gear_train)
 
 
 def _witness(net: MarkedNet, against: Defect, sources: Mapping[str, Position]) -> Witness:

@@ -117,8 +117,8 @@ def section(results: dict[str, Any]) -> str:
             f" {results['limit']:g} s; where it was over, the states found until then are shown."
             f" Medians, in turns; {results['versions'] or 'none installed'}.",
             table(head, rows),
-            "They take any net, and the theorem that we use only gear nets: of other nets `check`"
-            " decides marked graphs, and refuses those with choice. Neither tool has a"
+            "They take any net, and the theorem that we use only gear nets: for nets from elsewhere"
+            " that are no gear nets `check` falls back on more general methods. Neither tool has a"
             " structural test for liveness that takes these nets: pm4py's soundness check is for"
             " workflow nets, which have a source and a sink, and SNAKES has none. TINA, LoLA and"
             " LTSmin, which would go further, cannot be installed from PyPI or Debian, so they are"
