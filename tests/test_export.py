@@ -21,7 +21,6 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import lark
 import networkx as nx
 import numpy as np
 import pytest
@@ -35,13 +34,12 @@ from factory.exporting.bodies import file_name
 from factory.exporting.events import COLUMNS
 from factory.exporting.svg import draw_net
 from factory.exporting.swimlanes import swimlanes
-from factory.exporting.tina import write_tina
 from factory.exporting.tree_drawing import draw_tree
 from factory.exporting.urdf import roll_pitch_yaw
 from factory.geometry.solids import rotation
 from factory.modes.modes import operation_modes
 from factory.nets.marked import MarkedNet, marked
-from factory.nets.petri import PetriNet, Place, Transition
+from factory.nets.petri import PetriNet
 from factory.plant.factory import Factory
 from factory.record.log import read_log
 from tests.command_line import PAPER, ROOT, Terminal, files_in
@@ -49,7 +47,7 @@ from tests.export_values import LAMP, MESHES, kept_log, made, project, subject
 from tests.net_values import PHILOSOPHERS, net_from, planted, random_marked_net
 from tests.pag_values import factories
 
-TEXTS = ("pnml", "tina", "dot", "svg", "dxf", "st")
+TEXTS = ("pnml", "dot", "svg", "dxf", "st")
 
 
 @pytest.fixture(scope="module")
@@ -236,68 +234,6 @@ def test_nets_from_elsewhere(run: Terminal, out: Path) -> None:
 
 
 # nets
-
-TINA = lark.Lark(
-    r"""
-    start: "net" name (place | transition)*
-    place: "pl" name [":" name] ["(" INT ")"]
-    transition: "tr" name name* "->" name*
-    name: ANAME | QNAME
-    ANAME.-1: /[A-Za-z0-9_']+/
-    QNAME: /\{(\\.|[^\\{}])*\}/
-    INT: /[0-9]+/
-    %ignore /[ \t\n]+/
-    """,
-    parser="lalr",
-)
-"""The part of TINA's grammar of `.net` that is written, after its manual page."""
-
-
-def read_tina(text: str) -> tuple[dict[str, int], dict[str, tuple[list[str], list[str]]]]:
-    """Tokens by place, and the places before and after each transition."""
-    tokens: dict[str, int] = {}
-    events: dict[str, tuple[list[str], list[str]]] = {}
-    lines = text.splitlines()
-    TINA.parse(text)
-    pattern = r"\{((?:\\.|[^\\{}])*)\}|([A-Za-z0-9_']+)"
-
-    def names(part: str) -> list[str]:
-        return [re.sub(r"\\(.)", r"\1", q) or a for q, a in re.findall(pattern, part)]
-
-    for line in lines[1:]:
-        if line.startswith("pl "):
-            count = re.search(r" \((\d+)\)$", line)
-            head = line[3 : count.start() if count else None]
-            tokens[names(head)[0]] = int(count[1]) if count else 0
-        else:
-            before, _, after = line[3:].rpartition("->")
-            name, *inputs = names(before)
-            events[name] = inputs, names(after)
-    return tokens, events
-
-
-@given(factories(8))
-@settings(max_examples=40)
-def test_tina_reads_back(made_factory: Factory) -> None:
-    net = marked(made_factory.net)
-    tokens, events = read_tina(write_tina(net, "a b"))
-    places = [p.name for p in net.net.places]
-    assert tokens == dict(zip(places, net.tokens, strict=True))
-    assert len(events) == len(net.net.transitions)
-    for (name, (before, after)), number in zip(events.items(), range(len(events)), strict=True):
-        assert name.rstrip("'") == net.net.transitions[number].name.rstrip("'")
-        assert before == [places[p] for p in net.net.preset[number]]
-        assert after == [places[p] for p in net.net.postset[number]]
-
-
-def test_tina_names() -> None:
-    places = (Place("a_s", (0,), (1,)), Place("x{y}\\ z", (1,), (0,)))
-    net = MarkedNet(PetriNet((Transition("a_s"), Transition("b'")), places), (2, 0))
-    assert write_tina(net, "") == (
-        "net {}\npl a_s (2)\npl {x\\{y\\}\\\\ z}\n"
-        "tr a_s' {x\\{y\\}\\\\ z} -> a_s\ntr b' a_s -> {x\\{y\\}\\\\ z}\n"
-    )
-    assert read_tina(write_tina(net, "n"))[0] == {"a_s": 2, "x{y}\\ z": 0}
 
 
 @given(factories(12))

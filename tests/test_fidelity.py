@@ -11,7 +11,6 @@ import pytest
 
 import factory
 from factory.layout.layout import Layout
-from factory.mjcf.weld_frames import soften
 from factory.record.state import Event
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
@@ -21,6 +20,7 @@ from factory.study.fidelity.measuring import Measurement
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
 from tests.command_line import PAPER, ROOT, Terminal
+from tests.fidelity.convergence import soften
 
 
 @cache

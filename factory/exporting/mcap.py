@@ -1,8 +1,7 @@
 """MCAP of a log for Foxglove and Rerun, with Foxglove's Protobuf schemas: `/tf` poses of
-the bodies, `/scene` their shapes, `/joints` positions and speeds of the robots, `/events` the
-transitions that fired.
+the bodies, `/scene` their shapes, `/events` the transitions that fired.
 
-Frames and joints are named as the links and joints of the URDF, and have the same parents.
+Frames are named as the links of the URDF, and have the same parents.
 """
 
 from __future__ import annotations
@@ -22,9 +21,6 @@ from factory.record.log import Log
 from factory.support.extras import optional
 
 FORMAT, TAKES, BINARY = "mcap", "log", True
-
-UNTAPERED = {"bottom_scale": 1.0, "top_scale": 1.0}
-"""The ends of a cylinder that is no cone."""
 
 
 def export(subject: Subject) -> bytes:
@@ -49,7 +45,6 @@ class _Recorder:
         self.motion, self.log, self.m = motion, log, motion.m
         self.tf = channels.FrameTransformsChannel("/tf", context=context)
         self.scene = channels.SceneUpdateChannel("/scene", context=context)
-        self.joints = channels.JointStatesChannel("/joints", context=context)
         self.events = channels.LogChannel("/events", context=context)
 
     def record(self, events: list[EventRow]) -> None:
@@ -63,7 +58,6 @@ class _Recorder:
             self._scene(time, before, unseen[frame])
             before = unseen[frame]
             self._transforms(time, frame, bodies)
-            self._joints(time, int(self.motion.rows[frame]))
         for late in coming:
             self._event(late)
 
@@ -97,18 +91,6 @@ class _Recorder:
         if entities or deletions:
             message = self.messages.SceneUpdate(deletions=deletions, entities=entities)
             self.scene.log(message, log_time=_nanoseconds(time))
-
-    def _joints(self, time: float, row: int) -> None:
-        from factory.support.engine import mujoco
-
-        m, states = self.m, []
-        for joint in np.flatnonzero(m.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE).tolist():
-            at = float(self.log.qpos[row][m.jnt_qposadr[joint]])
-            speed = float(self.log.qvel[row][m.jnt_dofadr[joint]])
-            state = {"name": m.joint(joint).name, "position": at, "velocity": speed}
-            states.append(self.messages.JointState(**state))
-        message = self.messages.JointStates(timestamp=self._stamp(time), joints=states)
-        self.joints.log(message, log_time=_nanoseconds(time))
 
     def _event(self, event: EventRow) -> None:
         what = f"{event.template}({event.operation}) {event.kind}, unit {event.unit}"
@@ -144,7 +126,8 @@ class _Recorder:
                 look["size"] = self._vector(size[[0, 0, 0]])
                 shapes["spheres"].append(messages.SpherePrimitive(**look))
             elif kind == kinds.mjGEOM_CYLINDER:
-                look |= {"size": self._vector(size[[0, 0, 1]]), **UNTAPERED}
+                look |= {"size": self._vector(size[[0, 0, 1]])}
+                look |= {"bottom_scale": 1.0, "top_scale": 1.0}
                 shapes["cylinders"].append(messages.CylinderPrimitive(**look))
             else:
                 look["size"] = self._vector(2 * half_sizes(m, geom))

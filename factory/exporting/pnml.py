@@ -8,7 +8,7 @@ version 1. `foreign_nets.pnml_reader` reads a legally marked gear net back as an
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from xml.sax.saxutils import escape, quoteattr
 
 from factory.exporting.subject import Subject
@@ -20,11 +20,10 @@ from factory.nets.marked import MarkedNet, marked
 from factory.nets.petri import Place, Transition
 from factory.nets.threaded import Redistribution
 from factory.pipeline import Project
-from factory.plant.failing_transitions import FailingTransition, failing_transitions
 from factory.support.errors import Position
 
 FORMAT, TAKES = "pnml", "net"
-OF = "net or, of a PAG, failures"
+OF = "net or, of a PAG, coordinated"
 
 PNML = "http://www.pnml.org/version-2009/grammar/pnml"
 NET_TYPE = "http://www.pnml.org/version-2009/grammar/ptnet"
@@ -35,43 +34,33 @@ BELOW, ABOVE = (0.0, 22.0), (0.0, -26.0)
 ROUND, BAR = (24.0, 24.0), 6.0
 """Size of a place, width of a transition's bar."""
 
-ASIDE = 40.0
-"""Offset of a failure below the start of its operation."""
-
 _ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def export(subject: Subject) -> str:
-    """The net as PNML; `coordinated` with hands, magazines and the tray, as it runs; with
-    `failures`, failures that are the same in every marking are transitions
-    of it. Raises InputError (Usage)."""
-    of_a_project = ["net", "failures", "coordinated"]
-    wanted = of_a_project if isinstance(subject.source, Project) else ["net"]
-    chosen = subject.choose(wanted, "choices")
-    if chosen == "net":
+    """The net as PNML; `coordinated` with hands, magazines and the tray, as it runs. Raises
+    InputError (Usage)."""
+    wanted = ["net", "coordinated"] if isinstance(subject.source, Project) else ["net"]
+    if subject.choose(wanted, "choices") == "net":
         return write_pnml(subject.net)
-    if chosen == "coordinated":
-        return write_pnml(coordinated(subject.project.layout).net)
-    factory = subject.project.factory
-    return write_pnml(factory.net, tuple(failing_transitions(factory)))
+    return write_pnml(coordinated(subject.project.layout).net)
 
 
-def write_pnml(net: GearNet | MarkedNet, failing: Sequence[FailingTransition] = ()) -> str:
-    """The net and its initial marking as a PNML document, the same bytes for the same net. With
-    failures as transitions it has choice, so no gears are claimed."""
-    return "\n".join(_lines(net, failing)) + "\n"
+def write_pnml(net: GearNet | MarkedNet) -> str:
+    """The net and its initial marking as a PNML document, the same bytes for the same net."""
+    return "\n".join(_lines(net)) + "\n"
 
 
-def _lines(net: GearNet | MarkedNet, failing: Sequence[FailingTransition]) -> Iterator[str]:
+def _lines(net: GearNet | MarkedNet) -> Iterator[str]:
     subject = marked(net)
     at = swimlanes(subject)
     moves: tuple[Redistribution, ...] = ()
-    if isinstance(net, GearNet) and not failing:
+    if isinstance(net, GearNet):
         moves = net.threaded.redistribution
     yield '<?xml version="1.0" encoding="UTF-8"?>'
     yield f"<pnml xmlns={quoteattr(PNML)}>"
     yield f'<net id="net" type={quoteattr(NET_TYPE)}>'
-    if subject.gears and not failing:
+    if subject.gears:
         yield _tool(_gear(gear) for gear in subject.gears)
     yield '<page id="page">'
     for index, place in enumerate(subject.net.places):
@@ -81,12 +70,7 @@ def _lines(net: GearNet | MarkedNet, failing: Sequence[FailingTransition]) -> It
         low, high = at.spans[index]
         graphics = _drawn(at.middle(index), (BAR, high - low))
         yield from _transition(index, transition, move, graphics)
-    for number, failure in enumerate(failing, len(subject.net.transitions)):
-        low, high = at.spans[failure.operation.start]
-        x, y = at.middle(failure.operation.start)
-        transition = Transition(failure.name, failure.operation.position)
-        yield from _transition(number, transition, None, _drawn((x, y + ASIDE), (BAR, high - low)))
-    yield from _arcs(subject, failing)
+    yield from _arcs(subject)
     yield "</page>\n</net>\n</pnml>"
 
 
@@ -159,13 +143,10 @@ def _transition(
     yield f'<transition id="t{index}">{name}{graphics}{extra}</transition>'
 
 
-def _arcs(net: MarkedNet, failing: Sequence[FailingTransition]) -> Iterator[str]:
+def _arcs(net: MarkedNet) -> Iterator[str]:
     ends: list[tuple[str, str]] = []
     for index, place in enumerate(net.net.places):
         ends += [(f"t{e}", f"p{index}") for e in place.left]
         ends += [(f"p{index}", f"t{e}") for e in place.right]
-    for event, failure in enumerate(failing, len(net.net.transitions)):
-        ends.append((f"p{failure.takes}", f"t{event}"))
-        ends += [(f"t{event}", f"p{place}") for place in failure.gives]
     for number, (source, target) in enumerate(ends):
         yield f'<arc id="a{number}" source="{source}" target="{target}"/>'

@@ -9,10 +9,10 @@ from functools import partial
 from typing import Any
 
 from factory.mjcf.timestep import timed
-from factory.mjcf.weld_frames import soften
 from factory.study.fidelity import QUANTITIES
 from factory.study.fidelity.comparing import Case, over_cases
 from factory.study.fidelity.record import Figures
+from factory.support.engine import mujoco
 from tests.fidelity.products import PAPER, REAL, layout
 from tests.tables import table
 
@@ -54,6 +54,11 @@ def altered(case: Case, setting: str, factor: float) -> Case:
     other = replace(settings, timestep=settings.step * finer, substeps=substeps)
     alter = None if setting == "timestep" else partial(soften, factor=factor)
     return replace(case, settings=other, alter=alter)
+
+
+def soften(m: mujoco.MjModel, factor: float) -> None:
+    """Multiply the time constants of all welds by a factor."""
+    m.eq_solref[:, 0] *= factor
 
 
 def study(case: Case, quick: bool) -> dict[str, Any]:

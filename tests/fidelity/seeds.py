@@ -68,7 +68,7 @@ PLANS = (
     Plan("5935-1-IslandHopper", units=1),
     Plan("5935-1-IslandHopper", seeds=4),
 )
-"""203 bricks take too long to be watched 200 times: `paces` tells that of all seeds."""
+"""203 bricks take too long to be watched 200 times."""
 
 QUICK = (Plan(PAPER, 2), Plan("gearbox", 1, 2))
 

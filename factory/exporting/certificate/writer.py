@@ -109,10 +109,11 @@ def _marked_places(net: MarkedNet) -> list[int | None]:
 def _section(claim: str, net: MarkedNet, composition: Composition, verdict: Verdict) -> Json:
     holds = getattr(verdict, claim)
     if holds:
+        by_gears = claim in ("gear_net", "legal") or verdict.method == "structure"
         follows = claim != "reversible" or (verdict.live and verdict.safe)
-        evidence = _EVIDENCE[claim](net, composition) if follows else None
+        evidence = _EVIDENCE[claim](net, composition) if by_gears and follows else None
         if evidence is None:
-            return {"holds": None, "reason": "proved, but not by gears: not certified"}
+            return {"holds": None, "reason": "it holds, but not by gears alone: not certified"}
         return {"holds": True, **evidence}
     witness = next(w for w in verdict.witness if w.property == claim)
     names = {key: list(getattr(witness, key)) for key in ("robots", "places", "transitions")}
