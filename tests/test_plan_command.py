@@ -9,13 +9,12 @@ from itertools import count, pairwise
 from pathlib import Path
 
 import imageio.v3 as iio
-import numpy as np
 import pytest
 
 from factory.pipeline import read
 from factory.planning.blocking import blocking
 from factory.planning.cannot import interlocks
-from factory.rendering.interlocked import PAINTS, InterlockedView
+from factory.rendering.interlocked import PAINTS
 from factory.support.progress import StepBar
 from tests.command_line import ROOT, Done, Terminal, files_in
 from tests.opengl import needs_gl
@@ -154,18 +153,6 @@ def test_what_interlocks_is_not_drawn_where_no_pictures_are_wanted(
     done = planning(CHAIN, "--no-look")
     assert (done.status, done.codes, done.json["files"]) == (2, ["CannotAssemble"], [])
     assert not (tmp_path / "out").exists()
-
-
-def test_what_is_drawn_out_is_clear_of_each_other(tmp_path: Path) -> None:
-    found = source(tmp_path, pinwheel())
-    (lock,) = interlocks(blocking(found))
-    view = InterlockedView(found, lock)
-    for axis in range(3):
-        moved = view.boxes + view.drawn_out(axis)[:, None]
-        spans = sorted(map(tuple, moved[:, :, axis]))
-        assert all(one[1] < other[0] for one, other in pairwise(spans))
-        still = np.delete(moved - view.boxes, axis, axis=2)
-        assert not still.any()
 
 
 def test_clashes_that_are_allowed_are_counted_and_written(
