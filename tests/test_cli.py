@@ -530,9 +530,9 @@ def test_a_net_that_fails_has_a_witness(run: Terminal, tmp_path: Path, ending: s
 def test_what_a_net_has_not_is_refused(run: Terminal, out: Path) -> None:
     net = out / "net.pnml"
     net.write_text(run("export", PAPER, "--format", "pnml").out)
-    words = ["--wip", 2, "--relay", "--cycle", 3, "--templates", out]
+    words = ["--wip", 2, "--relay", "--cycle", 3, "--clashes", out / "no", "--templates", out]
     refused = run("check", net, "--certificate", out / "proof.json", *words, "--json")
-    assert refused.codes == ["Usage"] * 4
+    assert refused.codes == ["Usage"] * 5
     for word in words[::2]:
         if isinstance(word, str):
             assert f"{word} applies to a PAG; '{net}' is a net in PNML" in refused.out

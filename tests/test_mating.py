@@ -3,7 +3,9 @@ engine."""
 
 from __future__ import annotations
 
+import re
 import time
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import product as every
@@ -32,6 +34,8 @@ from factory.compiler.mating.mating import matings
 from factory.compiler.mating.meetings import meetings
 from factory.compiler.mating.overlaps import CHUNK
 from factory.compiler.mating.paths import CLEAR, NEAR, TOLERANCE, depths_of, sought
+from factory.exporting.clash_picture import draw
+from factory.exporting.product_view import picture_names
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import Product
 from factory.lang import read_pag
@@ -531,7 +535,7 @@ def test_check_tells_figures_and_names_what_is_blocked(run: Terminal, closed: Pa
         "approach: 5 of 6 operations clear but for overlaps when finished, 5 never deeper,"
         " 5 strictly; 5 lowered, 1 blocked" in out
     )
-    assert "5 strictly; 5 lowered, 1 blocked" in out
+    assert "5 strictly; 5 lowered, 1 blocked (--clashes DIR draws each)" in out
     assert done.err.splitlines() == blocked_lines(closed)
 
 
@@ -617,8 +621,59 @@ def test_check_computes_no_geometry_where_no_part_has_a_shape(
     file = tmp_path / "plain.pag"
     file.write_text("root = r; r = mate ( a, b ); a = atomic(); b = atomic()")
     monkeypatch.setattr("factory.geometry.product.product_geometry", pytest.fail)
-    document = run("check", file, "--json").json
+    document = run("check", file, "--clashes", tmp_path / "none", "--json").json
     assert document["approaches"] is None and document["clashes"] == []
+    assert not (tmp_path / "none").exists()
+
+
+def test_pictures_are_written_into_the_folder_alone(run: Terminal, tmp_path: Path) -> None:
+    file, folder = tmp_path / "odd.pag", tmp_path / "pictures" / "here"
+    file.write_text(
+        CLOSED.replace("root = r", "root = ..").replace("r = mate ( a", ".. = mate ( a")
+    )
+    before = set(tmp_path.rglob("*"))
+    assert run("check", file, "--clashes", folder).status == 0
+    new = set(tmp_path.rglob("*")) - before - {folder, folder.parent}
+    assert {path.parent for path in new} == {folder}
+    blocked, grip = sorted(path.name for path in new)
+    assert grip.startswith("grip-")
+    text = (folder / blocked).read_text()
+    root = ElementTree.fromstring(text)
+    assert root.tag.endswith("svg") and "href" not in text and "url(" not in text
+    words = "".join(root.itertext())
+    assert "b and front overlap by 20.00 mm, 25.00 mm before" in words
+    assert 'class="clash"' in text and " mm" in words
+
+
+def test_a_link_in_the_folder_is_not_followed(run: Terminal, closed: Path, out: Path) -> None:
+    aim = closed.parent / "elsewhere.svg"
+    (out / "clash-001-r.svg").symlink_to(aim)
+    done = run("check", closed, "--clashes", out)
+    assert done.status == 2 and "is a link" in done.err
+    assert not aim.exists()
+
+
+def test_a_file_where_the_folder_should_be_is_refused(run: Terminal, closed: Path) -> None:
+    done = run("check", closed, "--clashes", closed)
+    assert done.status == 2 and "is a file, not a folder" in done.err
+
+
+def test_names_of_pictures_are_safe_and_differ() -> None:
+    labels = ["../../etc/x", "a/2", "a_2", "..", "é" * 300, "c:\\d", "x\0y"]
+    names = picture_names("clash", labels)
+    assert len(set(names)) == len(labels)
+    assert all(re.fullmatch(r"clash-\d{3}-[\w.-]{1,40}\.svg", name) for name in names)
+
+
+def test_a_picture_is_the_same_every_time_and_survives_odd_labels() -> None:
+    pag = read_pag(CLOSED.replace("front", "fé"), TEMPLATES)
+    product = product_geometry(pag)
+    found = matings(expand(pag, TEMPLATES), product)
+    (mating,) = found.of_kind("blocked")
+    picture = draw(mating, found, product)
+    assert picture == draw(mating, matings(expand(pag, TEMPLATES), product), product)
+    odd = ElementTree.fromstring(draw(replace(mating, label="<&>" + "x" * 90), found, product))
+    assert "<&>xxxx" in "".join(odd.itertext())
 
 
 @given(st.integers(0, 10_000))

@@ -230,12 +230,15 @@ def test_commands_options_codes_and_products_are_completed(tmp_path: Path) -> No
 
 def test_cameras_are_completed_with_the_labels_of_the_file(tmp_path: Path) -> None:
     cameras = ["overview", "orbit", "top", "product"]
-    parts = [f"part:{label}" for label in ("part1", "part2", "part3")]
+    labels = ["part1", "part2", "part3", "sub1", "sub2", "sub3"]
+    parts = [f"part:{label}" for label in labels[:3]]
+    taken = [f"handover:{label}" for label in labels]
     log = tmp_path / "run.log"
     assert spawn("run", PAPER, "--log", log, "--max-time", "0.1", "-q").status in (0, 1)
     for file in (PAPER, log):
-        assert completions(f"factory render {file} --camera ", tmp_path) == cameras + parts
+        assert completions(f"factory render {file} --camera ", tmp_path) == cameras + parts + taken
     assert completions(f"factory run {PAPER} --units 2 --camera part:", tmp_path) == parts
+    assert completions(f"factory run {PAPER} --units 2 --camera hand", tmp_path) == taken
     assert completions("factory render --camera o", tmp_path) == ["overview", "orbit"]
     (tmp_path / "broken.pag").write_text("root = ")
     for file in ("broken.pag", "missing.pag"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -151,19 +152,35 @@ def test_a_strong_place_is_nearer_than_a_weak_one(tub: Path) -> None:
     assert all(miss.share <= STRONG for miss in grip.misses)
 
 
-def test_check_lists_it(run: Terminal, tub: Path) -> None:
-    (listed,) = run("check", tub, "--json").json["no_grips"]
+def test_check_lists_and_draws_it(run: Terminal, tub: Path, out: Path) -> None:
+    document = run("check", tub, "--clashes", out, "--json").json
+    (listed,) = document["no_grips"]
     assert (listed["label"], listed["line"], listed["robot"]) == ("axle", 1, "r2")
     above, behind, below = listed["nearest_misses"]
     assert (above["kind"], behind["kind"], below["kind"]) == ("above", "behind", "below")
     assert above["tried"] == 180 and above["at_m"] == [0.0, 0.009, 0.05]
     assert above["in_the_way"] == [{"part": "gear", "why": "lowered onto it"}]
+    (file,) = out.iterdir()
+    assert file.name == "grip-001-axle.svg"
+    text = file.read_text()
+    root = ElementTree.fromstring(text)
+    assert "href" not in text and "url(" not in text
+    words = "".join(root.itertext())
+    assert "No hand can hold axle" in words and "obstacles: gear lowered onto it" in words
+    drawn = [element.get("class") for element in root.iter()]
+    assert drawn.count("nearest") == 6 and drawn.count("hand") == 6 + 1
+    tried = sum(miss["tried"] for miss in listed["nearest_misses"])
+    assert drawn.count("tried") == tried + 1
+    again = run("check", tub, "--clashes", out, "--json").json
+    assert again == document and file.read_text() == text
 
 
-def test_without_hands_nothing_is_listed(run: Terminal, tub: Path) -> None:
-    bare = run("check", tub, "--no-hands", "--json").json
+def test_without_hands_nothing_is_listed_or_drawn(run: Terminal, tub: Path, out: Path) -> None:
+    bare = run("check", tub, "--no-hands", "--clashes", out, "--json").json
     assert "no_grips" not in bare and bare["warnings"] == []
+    assert not list(out.iterdir())
     tub.with_name("factory.toml").write_text("hands = 0\n")
     assert "no_grips" not in run("check", tub, "--json").json
     assert run("check", tub, "--hands", "--json").json["no_grips"]
-    assert run("check", ROOT / "examples" / "stool.pag", "--json").json["no_grips"] == []
+    stool = run("check", ROOT / "examples" / "stool.pag", "--clashes", out, "--json")
+    assert stool.json["no_grips"] == [] and not list(out.iterdir())

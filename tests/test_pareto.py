@@ -4,7 +4,6 @@ made again from its files."""
 from __future__ import annotations
 
 import io
-import json
 import re
 import shlex
 import sys
@@ -17,15 +16,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from factory.pipeline import Project, read
+from factory.show.pareto import floor_plans, front_page
+from factory.show.pareto.chart import ChartAxis, cycle_chart
 from factory.study.allocation.least import least_robots
 from factory.study.pareto import Effort, FrontPoint, FrontSweep, ParetoFront, pareto, sweeping
 from factory.study.pareto.front import undominated
-from factory.study.pareto.point_files import point_files
+from factory.study.pareto.point_files import commands_of, point_files
 from factory.study.pareto.trial import Trial, tried
 from factory.support import progress
 from factory.support.progress import StepBar
 from factory.support.settings import Settings
 from tests.command_line import PAPER, ROOT, Terminal, files_in
+from tests.report_values import EVIL
 
 EXAMPLES = ROOT / "examples"
 MESHES = """
@@ -198,6 +200,44 @@ def own_folder(out: Path) -> Path:
     return folder
 
 
+def test_the_page_refers_to_nothing_outside_itself(front: ParetoFront, tmp_path: Path) -> None:
+    tried_ones = front.with_trial(0, Trial(4, 1.0, 1.01, 1.0)).with_trial(
+        1, Trial(4, 1.0, None, None, (f"mujoco: Contact: {EVIL}",))
+    )
+    evil = replace(tried_ones, name=EVIL, complete=False)
+    plans = floor_plans(evil, tmp_path)
+    commands = [f"factory run '{EVIL}'", *commands_of(evil, tmp_path)[1:]]
+    text = front_page(evil, commands, plans, tmp_path)
+    assert EVIL not in text
+    assert not re.search(r'(?:src|href)="(?!#|data:)', text)
+    assert "default-src 'none'" in text
+    assert text.count('class="plan"') == len(front.points) == len(plans)
+    assert all(f'href="#p{n + 1:02d}"' in text for n in range(len(front.points)))
+    assert "The search is incomplete" in text
+    assert text == front_page(evil, commands, plans, tmp_path)
+
+
+def test_a_page_without_layouts(front: ParetoFront, tmp_path: Path) -> None:
+    given = [
+        replace(p, estimated=p.predicted, predicted=None, area=None, work=None)
+        for p in front.points
+    ]
+    bare = replace(front, points=tuple(given), written=None)
+    text = front_page(bare, ["x"] * len(given), {}, tmp_path)
+    assert "No layouts." in text
+    assert "<img" not in text
+
+
+def test_axes_have_enough_marks(front: ParetoFront) -> None:
+    for values in ([3, 6], [3, 57], [2.5, 3.6], [0.2, 40.0], [7, 7], [1, 1000]):
+        axis = ChartAxis.over(values, 0, 100)
+        marks = axis.marks()
+        assert marks == sorted(marks)
+        assert all(0 <= axis.at(mark) <= 100 for mark in marks)
+        assert len(marks) >= 1
+    assert "<title>as written" in cycle_chart(front)
+
+
 # --- the command ----------------------------------------------------------------------------------
 
 
@@ -217,16 +257,15 @@ def test_the_command_tells_its_points(run: Terminal, out: Path) -> None:
     written = files_in(out / "front")
     assert set(document["files"]) == {str(out / "front" / name) for name in written}
     names = {"p01/plan.json", "p01/layout.json", "p01/floor.svg"}
-    assert {"pareto.json", *names} <= set(written)
-    assert json.loads(written["pareto.json"])["points"] == document["points"]
+    assert {"pareto.html", *names} <= set(written)
     assert not any(p["validated"] for p in document["points"] if p["validation"] is None)
     told = run("pareto", PAPER, "--no-hands", "-o", out / "front")
     count = len(document["points"])
     assert f"{count} points" in told.out
     said = f"{count} of {count} points were not run: their cycle times are predictions"
-    assert said in told.out
+    assert said in told.out and said in (out / "front" / "pareto.html").read_text()
     assert "lower bound: 3 robots, tools included" in told.out
-    assert "pareto.json" in told.out
+    assert "pareto.html" in told.out
 
 
 def test_what_fits_a_floor_is_found_where_the_product_as_written_does_not(run: Terminal) -> None:

@@ -304,6 +304,17 @@ def test_a_part_is_followed_from_its_feeder_to_the_dropoff(fuse: bool) -> None:
 BOX = read_pag("root = all; all = mate(lid, box); lid = atomic(); box = atomic()", TEMPLATES)
 
 
+def test_cameras_may_look_where_a_label_is_taken() -> None:
+    for label in ("lid", "all"):
+        assert camera_named(f"handover:{label}", BOX) == f"handover:{label}"
+    assert camera_named("handover:anything") == "handover:anything"
+    with pytest.raises(InputError) as caught:
+        camera_named("handover:al", BOX)
+    diagnostic = caught.value.diagnostics[0]
+    assert diagnostic.message == "there is no label 'al'"
+    assert diagnostic.hint == "did you mean 'all'? valid labels: all, lid, box"
+
+
 def test_cameras_may_follow_a_part() -> None:
     assert camera_named("part:lid", BOX) == "part:lid"
     assert camera_named("part:anything") == "part:anything"
@@ -494,7 +505,7 @@ def test_a_still_of_a_time_that_does_not_come_is_not_written(tmp_path: Path) -> 
 
 
 def test_a_wrong_camera_lists_the_right_ones() -> None:
-    every = "valid cameras: overview, orbit, top, product, part:LABEL"
+    every = "valid cameras: overview, orbit, top, product, part:LABEL, handover:LABEL"
     for name, hint in (("orbt", f"did you mean 'orbit'? {every}"), ("zzz", every)):
         with pytest.raises(InputError) as caught:
             camera_named(name)

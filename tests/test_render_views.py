@@ -10,6 +10,7 @@ import pytest
 from factory.geometry.sight import Framing, View, fit, towards
 from factory.mjcf import names
 from factory.mjcf.replica import Replica
+from factory.problem.pag import NOPART
 from factory.record.log import Log, LogWriter, read_log
 from factory.rendering.action import Action, action_of, shape_of
 from factory.rendering.camera import orbit, overview
@@ -17,6 +18,7 @@ from factory.rendering.camerawork import Take
 from factory.rendering.fading import FAINT, Fading
 from factory.rendering.film import moment_of, take_of
 from factory.rendering.following import Viewpoint
+from factory.rendering.junction import handover_view
 from factory.rendering.picture import Picture
 from factory.rendering.subject import placed
 from factory.simulation.request import RunRequest
@@ -147,6 +149,68 @@ def test_what_is_followed_is_watched_in_all_its_eighths(log, take, replica, came
 
 
 # --- fading ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("framing", [WIDE, BESIDE_PANELS])
+def test_each_hand_over_is_seen_from_near_by(log, take, framing) -> None:
+    """When the operation that takes a label ends, its parts are where the camera looks, and in the
+    frame with the pads of the robots; they fill it."""
+    factory, m = take.subject.factory, take.m
+    for node in factory.pag.nodes:
+        viewpoint = Viewpoint(Replica(m), f"handover:{node.label}", framing, take.subject)
+        taking = factory.operations[factory.parents[factory.by_label[node.label].index]]
+        times = (t for t, name in log.events if name == f"{taking.label}_e")
+        row = log.row_at(next(times)) - 1
+        replica, moment = Replica(m), moment_of(log, row)
+        replica.place(log.qpos[row])
+        view = viewpoint.view(moment.shown, 0.0, moment.time)
+        there = np.concatenate([placed(m, replica.d, g) for g in _geoms_of(m, factory, node.label)])
+        assert np.abs(there.min(axis=0) - viewpoint.watched[0].min(axis=0)).max() < 2e-3
+        assert np.abs(there.max(axis=0) - viewpoint.watched[0].max(axis=0)).max() < 2e-3
+        at = seen(view, np.concatenate([there, *viewpoint.watched]))
+        assert np.abs(at).max() < 1.0
+        assert np.ptp(at, axis=0).max() > 0.7, node.label
+        assert len(viewpoint.watched) > 1, "no pad is seen"
+        share = shown_share(replica, _geoms_of(m, factory, node.label), view.position)
+        assert share > 0.3, f"{node.label}: {share:.2f} is seen"
+
+
+def shown_share(replica: Replica, geoms: list[int], eye: np.ndarray) -> float:
+    """The share of rays from a camera to geoms that meet these first, or a post, which fades."""
+    m, d, found = replica.m, replica.d, []
+    for geom in geoms:
+        box = placed(m, d, geom)
+        for weights in np.random.default_rng(0).dirichlet(np.ones(8), 40):
+            ray, hit = weights @ box - eye, np.zeros(1, np.int32)
+            mujoco.mj_ray(m, d, eye, ray, None, 1, -1, hit, None)
+            name = m.geom(int(hit[0])).name if hit[0] >= 0 else ""
+            found.append(hit[0] in geoms or name.endswith(("/post", "/boom")))
+    return float(np.mean(found))
+
+
+def _geoms_of(m: mujoco.MjModel, factory, label: str) -> list[int]:
+    """The geoms of the first copies of a label's parts."""
+    bodies = {names.part(part, 1) for part in factory.contents[label]}
+    return [g for g in range(m.ngeom) if m.body(int(m.geom_bodyid[g])).name in bodies]
+
+
+def test_a_hand_over_is_seen_from_aside(take) -> None:
+    """No robot stands in front of it, or behind it, where it can be otherwise; what the view was
+    taken from is left as it was found."""
+    replica = Replica(take.m)
+    before = replica.d.qpos.copy()
+    for label in ("part1", "sub1"):
+        if label not in take.subject.factory.by_label:
+            return
+        _, view = handover_view(replica, take.subject, label, WIDE)
+        assert (replica.d.qpos == before).all()
+        ahead = view.axes[2][:2] / np.linalg.norm(view.axes[2][:2])
+        taking = take.subject.factory.by_label["sub1" if label == "part1" else "sub2"]
+        held = zip(taking.robots, taking.before, taking.after, strict=True)
+        for robot in [robot for robot, *labels in held if set(labels) != {NOPART}]:
+            body = replica.m.body(names.carriage(take.subject.factory.robots[robot].name)).id
+            along = replica.d.xaxis[replica.m.body_jntadr[body]][:2]
+            assert abs(ahead @ along) < 0.9
 
 
 def opacity(replica: Replica, feeder: str) -> float:

@@ -12,7 +12,7 @@ import click
 from factory.commands.allowing import ALLOW
 from factory.commands.grouped import Grouped
 from factory.commands.options import HANDS, OUTPUT, PATH, RELAY, SOURCE, WIP
-from factory.commands.outputs import for_a_pag, writable
+from factory.commands.outputs import for_a_pag, writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced, say_allowed
 from factory.problem.shapes import is_shaped
@@ -31,6 +31,9 @@ if TYPE_CHECKING:
 SHOWN = 24
 """The most robots that are printed, unless `-v` asks for all."""
 
+PICTURES = "Folder for pictures of blocked operations and of parts that no hand can hold."
+"""The help of `--clashes`."""
+
 AGAINST = 3
 """The most that is printed against one property, unless `-v` asks for all."""
 
@@ -44,6 +47,7 @@ POOLED = 8
 @click.option("--against", type=PATH, help="Check a proof written by --certificate.")
 @WIP
 @ALLOW
+@click.option("--clashes", type=PATH, help=PICTURES)
 @RELAY
 @HANDS
 @OUTPUT
@@ -54,15 +58,17 @@ def check(
     certificate: Path | None,
     against: Path | None,
     wip: int | None,
+    clashes: Path | None,
 ) -> int:
     """Parse, compile and prove FILE.pag (or a net in FILE.pnml), or check its certificate."""
     from factory.study.checking import check_net, check_project
-    from factory.support.files import write_text
+    from factory.support.files import own_names, write_all, write_text
 
     file = options.file
     if is_net(file):
         for_a_pag(file, "a net in PNML", "certificate", "against")
     writable(file, certificate)
+    writable_folder(clashes)
     project = None if is_net(file) else options.project(out.silent)
     with Waiting("reading the shapes and proving", out.silent):
         asked = (
@@ -75,6 +81,10 @@ def check(
     if project is not None and not out.silent:
         say_allowed(project)
     proved = None if against is None else _proved(against, checked)
+    if clashes is not None:
+        files = _pictures(checked, clashes)
+        own_names(clashes, files, [file])
+        write_all(files)
     if certificate is not None:
         from factory.exporting.certificate.writer import certificate as document
 
@@ -109,6 +119,21 @@ def _claims(proved: dict[str, bool | None]) -> str:
     return "; ".join(
         f"it {words[how]} {', '.join(claims)}" for how, claims in said.items() if claims
     )
+
+
+def _pictures(checked: Checked, folder: Path) -> dict[Path, bytes]:
+    """The files of `--clashes`: a picture of each blocked operation, and of each sub-assembly that
+    no hand can hold."""
+    from factory.exporting import clash_picture, grip_picture
+
+    found: dict[Path, bytes] = {}
+    if checked.product is None:
+        return found
+    if checked.matings is not None:
+        found |= clash_picture.pictures(folder, checked.matings, checked.product)
+    if checked.no_grips:
+        found |= grip_picture.pictures(folder, checked.no_grips, checked.product)
+    return found
 
 
 def _describe(checked: Checked, verbose: bool) -> None:
@@ -188,7 +213,7 @@ def _describe_approaches(matings: Matings) -> None:
     say(
         f"approach: {left_out} of {len(matings.all)} operations clear but for overlaps"
         f" when finished, {no_deeper} never deeper, {strict} strictly; {lowered} lowered,"
-        f" {blocked} blocked"
+        f" {blocked} blocked{' (--clashes DIR draws each)' if blocked else ''}"
     )
 
 

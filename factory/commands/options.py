@@ -309,7 +309,8 @@ PICTURE = options(
         default="overview",
         metavar="CAMERA",
         shell_complete=cameras,
-        help="overview, orbit, top, product, or part:LABEL to follow a part.",
+        help="overview, orbit, top, product, part:LABEL to follow a part, or handover:LABEL for a"
+        " close-up of its hand-over.",
     ),
     click.option(
         "--with",

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Sequence
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -16,7 +15,7 @@ from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, SECONDS, SOURC
 from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced
-from factory.support.console import emit, finite, say, table
+from factory.support.console import emit, say, table
 from factory.support.errors import Diagnostic, StoppedError, usage_error
 
 if TYPE_CHECKING:
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
     from factory.study.pareto import Effort, FrontPoint, ParetoFront
     from factory.study.pareto.sweeping import Step
 
-DOCUMENT_NAME = "pareto.json"
+PAGE_NAME = "pareto.html"
 
 
 @click.command(cls=Grouped)
@@ -37,7 +36,7 @@ DOCUMENT_NAME = "pareto.json"
     help="Number of points, spread over the front, to run in both worlds.",
 )
 @click.option(
-    "-o", "--output", type=PATH, help="Folder for the figures and the files of each point."
+    "-o", "--output", type=PATH, help="Folder for a web page and the files of each point."
 )
 @click.option(
     "--effort",
@@ -70,7 +69,6 @@ def pareto(
     Ctrl-C ends the search; the points found until then are printed and written. The exit status
     is 1 if a point that was run fails, or differs from its prediction by more than 2 %."""
     from factory.study.pareto import Effort
-    from factory.study.pareto.point_files import commands_of
 
     if trials and not layouts:
         message = "without layouts there is nothing to run"
@@ -80,18 +78,17 @@ def pareto(
     warnings = announced(project.warnings, out)
     effort = Effort(layouts, options.effort, options.limit or inf, options.branches())
     front, stopped = _found(project, effort, trials, out)
-    commands = [None] * len(front.points) if output is None else commands_of(front, output)
-    points = zip(front.points, commands, strict=True)
-    document = front.as_json()
-    document["points"] = [{**p.as_json(), "command": command} for p, command in points]
-    files = [] if output is None else _written(front, document, project, output)
+    commands, files = _written(front, project, output)
     if out.as_json:
+        points = zip(front.points, commands, strict=True)
+        document = front.as_json()
+        document["points"] = [{**p.as_json(), "command": command} for p, command in points]
         errors = {"errors": [d.as_json() for d in stopped.diagnostics]} if stopped else {}
         emit({**document, "files": [*map(str, files)], "warnings": warnings, **errors})
     else:
         _print(front, commands)
         if output is not None:
-            say(f"wrote {output / DOCUMENT_NAME}, and the files of {len(front.points)} points")
+            say(f"wrote {output / PAGE_NAME}, and the files of {len(front.points)} points")
     if stopped is not None:
         print(stopped, file=sys.stderr)
         return stopped.exit_status
@@ -131,23 +128,23 @@ def _found(
 
 
 def _written(
-    front: ParetoFront, document: dict[str, Any], project: Project, folder: Path
-) -> list[Path]:
-    """Write the document, and the files and the floor plan of each point, into a folder. Returns
-    the files."""
-    from factory.exporting.floor_sheet import write_svg
-    from factory.study.pareto.point_files import point_files, point_name
+    front: ParetoFront, project: Project, folder: Path | None
+) -> tuple[Sequence[str | None], list[Path]]:
+    """Write the page and the files of the points into a folder, if there is one. Returns the
+    commands that build the points, and the files."""
+    from factory.show.pareto import floor_plans, front_page
+    from factory.study.pareto.point_files import commands_of, point_files
     from factory.support.files import own_names, write_all
 
-    text = json.dumps(finite({"schema": 1, **document}), indent=1) + "\n"
-    files = {folder / DOCUMENT_NAME: text.encode(), **point_files(front, folder)}
-    for number, point in enumerate(front.points):
-        if point.predicted is not None:
-            plan = write_svg(point.project.layout)
-            files[folder / point_name(number) / "floor.svg"] = plan.encode()
+    if folder is None:
+        return [None] * len(front.points), []
+    commands = commands_of(front, folder)
+    plans = floor_plans(front, folder)
+    page = front_page(front, commands, plans, folder)
+    files = {folder / PAGE_NAME: page.encode(), **point_files(front, folder), **plans}
     own_names(folder, files, [project.file])
     write_all(files)
-    return list(files)
+    return commands, list(files)
 
 
 def _print(front: ParetoFront, commands: Sequence[str | None]) -> None:

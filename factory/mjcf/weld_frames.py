@@ -31,6 +31,31 @@ ROWS = 6
 
 
 @dataclass(frozen=True, eq=False)
+class Slides:
+    """The slide joints that carry each body (nbody, 2), its own before that of its parent:
+    addresses `qpos` and `dof` of each, and its direction `way` (nbody, 2, 3), 0 for none."""
+
+    qpos: Index = field(repr=False)
+    dof: Index = field(repr=False)
+    way: Array = field(repr=False)
+
+    @classmethod
+    def of(cls, m: mujoco.MjModel, d: mujoco.MjData) -> Slides:
+        """Those of a model, whose kinematics in `d` are up to date."""
+        own = np.where(m.body_jntnum > 0, m.body_jntadr, -1)
+        own[m.jnt_type[own] != SLIDE] = -1
+        joint = np.stack([own, own[m.body_parentid]], axis=1)
+        way = np.where(joint[:, :, None] < 0, 0.0, d.xaxis[joint])
+        return cls(m.jnt_qposadr[joint], m.jnt_dofadr[joint], way)
+
+    def velocity(self, bodies: Index, qvel: Array) -> Array:
+        """Velocities of bodies that only slide (..., n, 3) [m/s] from all speeds (..., nv)."""
+        return np.asarray(
+            np.einsum("...nk,nkj->...nj", qvel[..., self.dof[bodies]], self.way[bodies])
+        )
+
+
+@dataclass(frozen=True, eq=False)
 class WeldFrames:
     """Where n welds hold the origins of their parts: at `base` (n, 3) + sum over k of
     `way` (n, 2, 3) · qpos[`along` (n, 2)] [m], turned by the quaternion `turn` (n, 4)."""
@@ -44,8 +69,8 @@ class WeldFrames:
     def of(cls, m: mujoco.MjModel, d: mujoco.MjData) -> WeldFrames:
         """Those of all welds of a model, in order; `d` is in any configuration, and its kinematics
         are up to date."""
-        holder = m.eq_obj1id
-        along, way = _slides(m, d, holder)
+        slides, holder = Slides.of(m, d), m.eq_obj1id
+        along, way = slides.qpos[holder], slides.way[holder]
         base = held_at(m, np.arange(m.neq), d.xpos, d.xmat)
         base -= (way * d.qpos[along][:, :, None]).sum(axis=1)
         return cls(base, along, way, _products(d.xquat[holder], m.eq_data[:, 6:10]))
@@ -90,13 +115,9 @@ def residuals(d: mujoco.MjData) -> Array:
     return np.asarray(d.efc_pos[: d.ne].reshape(-1, ROWS)[:, :3])
 
 
-def _slides(m: mujoco.MjModel, d: mujoco.MjData, bodies: Index) -> tuple[Index, Array]:
-    """Of the slide joints that carry each body, its own before that of its parent: the addresses
-    (n, 2) in qpos, and the directions (n, 2, 3), 0 for none."""
-    own = np.where(m.body_jntnum > 0, m.body_jntadr, -1)
-    own[m.jnt_type[own] != SLIDE] = -1
-    joint = np.stack([own, own[m.body_parentid]], axis=1)[bodies]
-    return m.jnt_qposadr[joint], np.where(joint[:, :, None] < 0, 0.0, d.xaxis[joint])
+def soften(m: mujoco.MjModel, factor: float) -> None:
+    """Multiply the time constants of all welds by a factor."""
+    m.eq_solref[:, 0] *= factor
 
 
 def _products(p: Array, q: Array) -> Array:

@@ -17,36 +17,41 @@ above; `product`: follows the product that is furthest on its way."""
 
 CAMERAS: tuple[Standing, ...] = get_args(Standing)
 
-PART = "part:"
+PART, HANDOVER = "part:", "handover:"
 
 Camera = str
-"""One of CAMERAS; or `part:LABEL`, which follows that part from its feeder to the dropoff."""
+"""One of CAMERAS; or `part:LABEL`, which follows that part from its feeder to the dropoff; or
+`handover:LABEL`, which looks from near by where that part or sub-assembly is taken."""
 
 TURN = 8.0
 """How fast `orbit` goes round [degrees/s]."""
 
 
 def camera_names(pag: PAG | None) -> tuple[Camera, ...]:
-    """The names of all cameras of a product; without those of parts if it is None."""
-    return (*CAMERAS, *(f"{PART}{label}" for label in sorted(_parts(pag))))
+    """The names of all cameras of a product; without those of labels if it is None."""
+    return (*CAMERAS, *(head + k for head, (_, ks) in _labels(pag).items() for k in sorted(ks)))
 
 
 def camera_named(name: str, pag: PAG | None = None) -> Camera:
     """The camera of a name. Raises InputError (BadValue) for an unknown camera, and for an unknown
-    part if the product is given, with the valid names."""
-    if name.startswith(PART):
-        label, valid = name.removeprefix(PART), _parts(pag)
+    part or label if the product is given, with the valid names."""
+    head, colon, label = name.partition(":")
+    labels = _labels(pag)
+    if head + colon in labels:
+        noun, valid = labels[head + colon]
         if pag is None or label in valid:
             return name
-        raise _none_of("part", label, valid)
+        raise _none_of(noun, label, valid)
     if name in CAMERAS:
         return name
-    raise _none_of("camera", name, (*CAMERAS, f"{PART}LABEL"))
+    raise _none_of("camera", name, (*CAMERAS, *(f"{head}LABEL" for head in labels)))
 
 
-def _parts(pag: PAG | None) -> tuple[str, ...]:
-    """The labels of the parts of a product."""
-    return () if pag is None else tuple(node.label for node in pag.nodes if not node.inputs)
+def _labels(pag: PAG | None) -> dict[str, tuple[str, tuple[str, ...]]]:
+    """What the labels of cameras are, by what these begin with, and those of a product."""
+    nodes = () if pag is None else pag.nodes
+    parts = tuple(node.label for node in nodes if not node.inputs)
+    return {PART: ("part", parts), HANDOVER: ("label", tuple(node.label for node in nodes))}
 
 
 def _none_of(noun: str, name: str, valid: Sequence[str]) -> InputError:

@@ -16,7 +16,8 @@ from factory.mjcf import names
 from factory.mjcf.replica import Replica
 from factory.record.monitor.subject import MonitorSubject
 from factory.rendering.action import action_of
-from factory.rendering.camera import PART, Camera, from_above, orbit, overview
+from factory.rendering.camera import HANDOVER, PART, Camera, from_above, orbit, overview
+from factory.rendering.junction import handover_view
 from factory.rendering.subject import SIGNS, Snapshot, corners
 from factory.support.engine import mujoco
 
@@ -38,7 +39,12 @@ class Viewpoint:
         self.d, self.framing = replica.d, framing
         action = action_of(replica.m, replica.d)
         self.watched, self.points = action.robots, action.points
-        self.goes = _standing(camera, self.points, framing)
+        if camera.startswith(HANDOVER):
+            label = camera.removeprefix(HANDOVER)
+            self.watched, near = handover_view(replica, subject, label, framing)
+            self.goes: Callable[[float], View] = lambda time: near
+        else:
+            self.goes = _standing(camera, self.points, framing)
         self.followed: Followed | None = None
         if camera == "product" or camera.startswith(PART):
             part = camera.removeprefix(PART) if ":" in camera else ""

@@ -155,6 +155,10 @@ class Canvas:
         """A line through points."""
         self.add("path", style, d=_way(points))
 
+    def loops(self, rings: Iterable[Sequence[Point]], style: str, title: str = "") -> None:
+        """An area with these edges."""
+        self.add("path", style, title=title, d="".join(f"{_way(ring)}Z" for ring in rings))
+
     def circle(self, at: Point, radius: float, style: str, **attributes: Any) -> None:
         """A circle."""
         self.add("circle", style, cx=at[0], cy=at[1], r=radius, **attributes)

@@ -88,6 +88,8 @@ class Matings:
     """The judgements of a product's operations, inputs before the operations that take them."""
 
     all: tuple[Mating, ...]
+    parts: Mapping[str, tuple[str, ...]] = field(repr=False)
+    """The parts of each input of a blocked operation."""
 
     @cached_property
     def approaches(self) -> Mapping[str, Approach]:

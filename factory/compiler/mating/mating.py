@@ -37,7 +37,7 @@ def matings(nodes: Mapping[str, Node], product: Product, lifts: bool = True) -> 
     parts, except where very many lie behind one another."""
     met = meetings(nodes)
     if not met.all:
-        return Matings(())
+        return Matings((), {})
     finder = Finder(bodies(product, met.parts), met)
     judge = _Judge(met, product, {label: node.last for label, node in nodes.items()})
     for axis in (0, 1):
@@ -46,7 +46,7 @@ def matings(nodes: Mapping[str, Node], product: Product, lifts: bool = True) -> 
     if lifts and unclean.any():
         judge.lower(finder.along(UPRIGHT, unclean), unclean)
     made = tuple(judge.mating(number) for number in range(len(met.all)))
-    return Matings(made)
+    return Matings(made, judge.contents(made))
 
 
 def judged(factory: Factory, product: Product) -> Factory:
@@ -177,6 +177,14 @@ class _Judge:
         parts = self.meetings.parts
         one, other = sorted((parts[overlaps.one[row]], parts[overlaps.other[row]]))
         return one, other
+
+    def contents(self, made: tuple[Mating, ...]) -> dict[str, tuple[str, ...]]:
+        """The parts of all inputs of blocked operations; piles count as one with their last."""
+        parts: dict[str, tuple[str, ...]] = {}
+        for mating, meeting in zip(made, self.meetings.all, strict=True):
+            if mating.approach.kind == "blocked":
+                parts[meeting.inputs[0]], parts[meeting.inputs[-1]] = self._sides(meeting)
+        return parts
 
 
 def levels_of(overlaps: Overlaps, count: int) -> tuple[Ints, Ints]:

@@ -147,7 +147,7 @@ class NoGrip:
         others = [label for label in self.line if label != self.label]
         if others:
             words += f"; so {self.robot} has no hand for {_listed(others)} either"
-        hint = f"{words}; {hint}"
+        hint = f"{words}; {hint} (--clashes DIR draws it)"
         return self._told(f"no hand can hold '{self.label}'", hint, self.label)
 
     def _told(self, message: str, hint: str, about: str) -> Diagnostic:
