@@ -6,7 +6,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -73,6 +73,33 @@ def spawn(*words: object, cwd: Path | None = None, **variables: str) -> Done:
     )
     assert "Traceback" not in done.stderr, done.stderr
     return Done(done.returncode, done.stdout, done.stderr)
+
+
+EACH = """
+import json, sys
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
+from factory.commands import run_command
+for words in json.loads(sys.argv[1]):
+    with redirect_stdout(StringIO()) as out, redirect_stderr(StringIO()) as err:
+        status = run_command(words)
+    print(json.dumps([status, out.getvalue(), err.getvalue()]))
+"""
+
+
+def spawn_each(*commands: Sequence[object], **variables: str) -> list[Done]:
+    """Runs commands one after the other in one process of their own, with environment variables
+    added."""
+    words = json.dumps([[str(word) for word in command] for command in commands])
+    done = subprocess.run(
+        [sys.executable, "-c", EACH, words],
+        env={**os.environ, "PYTHONPATH": str(ROOT), **variables},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 0 and "Traceback" not in done.stdout, (done.stdout, done.stderr)
+    return [Done(*json.loads(line)) for line in done.stdout.splitlines()]
 
 
 @contextmanager

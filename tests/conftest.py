@@ -14,6 +14,7 @@ from hypothesis import HealthCheck, settings
 from factory.lang import load_templates
 from factory.problem.template import Template
 from tests.command_line import Terminal
+from tests.once import ANEW, Stages, stages_once
 
 TESTS = Path(__file__).parent
 ROOT = TESTS.parent
@@ -44,6 +45,34 @@ def _a_cache_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[No
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         yield
+
+
+@pytest.fixture(scope="session")
+def stages() -> Iterator[Stages]:
+    """The stages that tests of a process share."""
+    with stages_once() as stages:
+        yield stages
+
+
+@pytest.fixture(autouse=True)
+def _stages_are_used(request: pytest.FixtureRequest, stages: Stages) -> None:
+    """By tests that are not about a stage."""
+    stages.on = request.node.path.stem not in ANEW
+
+
+@pytest.fixture
+def monkeypatch(stages: Stages) -> Iterator[pytest.MonkeyPatch]:
+    """As pytest's; from the first attribute that a test replaces it computes its stages itself,
+    since a stage under a planted fault is another one."""
+    with pytest.MonkeyPatch.context() as patch:
+        replaced = patch.setattr
+
+        def setattr_(*words: Any, **options: Any) -> None:
+            stages.on = False
+            replaced(*words, **options)
+
+        patch.setattr = setattr_  # type: ignore[method-assign]
+        yield patch
 
 
 @pytest.fixture

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cache
 from itertools import combinations
 
 from factory.compiler.assigning import gear_net
@@ -130,6 +131,7 @@ def table_of(table: Sequence[tuple[str, str, tuple[str, ...]]]) -> PAG:
     return replace(paper(), root=table[0][0], nodes=tuple(nodes))
 
 
+@cache
 def fold_layout(seed: int, settings: Settings) -> Layout:
     """A layout of a random PAG with inserts, many of whose robots share lines."""
     rng = random.Random(seed)

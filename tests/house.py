@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import graphlib
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -87,10 +88,17 @@ class Module:
         return any(path.startswith(f"{folder}/") for folder in folders)
 
 
+CLOCK = re.compile(r"^ *(?:from|import) (?:[^()\n]*, )?time\b", re.M)
+CLOCKED = ("waiting", "reporting")
+"""Modules of the tests that read a clock: one waits for processes, one times benches."""
+
+
 class House:
-    """All modules of a package `factory` below `root`, by name."""
+    """All modules of a package `factory` below `root`, by name, and those beside its tests."""
 
     def __init__(self, root: Path) -> None:
+        tests = sorted((root / "tests").glob("*.py"))
+        self.tests = [Module(path.stem, path.read_text("utf-8")) for path in tests]
         self.modules: dict[str, Module] = {}
         for path in sorted((root / "factory").rglob("*.py")):
             parts = path.relative_to(root / "factory").with_suffix("").parts
@@ -274,6 +282,13 @@ def unexplained(house: House) -> Iterator[str]:
     for module in house.modules.values():
         if module.text.strip() and not ast.get_docstring(module.tree):
             yield f"{module.name}: no docstring"
+
+
+def clocks(house: House) -> Iterator[str]:
+    """Test modules that import `time`: what they find must not depend on how busy a machine is."""
+    for module in house.tests:
+        if CLOCK.search(module.text) and module.name not in CLOCKED:
+            yield f"tests.{module.name} reads a clock"
 
 
 def anys(house: House, name: str) -> Iterator[str]:

@@ -8,6 +8,8 @@ from collections import defaultdict
 from dataclasses import replace
 from functools import cache
 
+from hypothesis import strategies as st
+
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import Product, Solid
 from factory.layout.embedding import lay_out
@@ -73,12 +75,32 @@ def _shape(rng: random.Random, longest: float) -> tuple[str, Value]:
     return (kind, length() / 2) if kind == "sphere" else (kind, (length(), length(), length(0.1)))
 
 
+@cache
 def random_layout(
     size: int, seed: int, shape: str = "any", style: str = "medium", base: bool = False
 ) -> Layout:
-    """A layout of a random factory, always the same for the same arguments."""
+    """A layout of a random factory, always the same for the same arguments, made once for them."""
     factory = factory_of(shaped(random_pag(size, seed, shape), seed, style, base))
     return lay_out(factory, product_geometry(factory.pag))
+
+
+Drawn = tuple[int, int, str, str]
+"""What `random_layout` takes: the number of parts, a seed, the shape of the tree, the style."""
+
+
+def _drawn() -> tuple[Drawn, ...]:
+    rng = random.Random(40)
+    every = [(shape, style) for shape in SHAPES for style in STYLES]
+    sizes = [1, 2, 3, 40, *(rng.randint(2, 24) for _ in every[4:])]
+    return tuple(
+        (size, rng.randint(0, 10_000), *one) for size, one in zip(sizes, every, strict=True)
+    )
+
+
+DRAWN = _drawn()
+"""Layouts of every shape of tree with parts of every style, which properties of layouts share."""
+
+drawn_layouts = st.sampled_from(DRAWN)
 
 
 def many_layouts(size: int, seeds: range) -> list[Layout]:
@@ -109,6 +131,7 @@ def table_pag(root: str, *rows: tuple[str, str, str, dict[str, Value]]) -> PAG:
     )
 
 
+@cache
 def row_of_inserts(parts: int = 5) -> Layout:
     """A carrier that takes its parts one after the other: stations in a row."""
     boxes: list[tuple[str, str, str, dict[str, Value]]] = [

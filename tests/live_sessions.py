@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from threading import Thread
-from time import monotonic, sleep
 from typing import Any
 
 import pytest
@@ -15,6 +14,7 @@ from factory.simulation.recovery import Campaign
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from tests.layout_values import paper_layout
+from tests.waiting import until
 
 
 class Stopped(Exception):
@@ -52,13 +52,9 @@ class Running:
         if self.over:
             raise Stopped
 
-    def until(self, holds: Any, seconds: float = 20.0) -> LiveFrame:
+    def until(self, holds: Any) -> LiveFrame:
         """The first frame of which something holds."""
-        end = monotonic() + seconds
-        while not holds(frame := self.session.frame):
-            assert monotonic() < end, frame
-            sleep(0.01)
-        return frame
+        return until(lambda: frame if holds(frame := self.session.frame) else None)
 
     def close(self) -> None:
         self.over = True

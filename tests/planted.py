@@ -306,12 +306,12 @@ def moved(joint: str, by: float) -> Acts:
     return act
 
 
-def displaced(part: str, by: float = 0.0, degrees: float = 0.0) -> Acts:
-    """A part jumps, or turns."""
+def displaced(part: str, by: float = 0.0, degrees: float = 0.0, axis: int = 0) -> Acts:
+    """A part jumps along an axis, or turns."""
 
     def act(m: Any, d: Any) -> None:
         at = m.jnt_qposadr[m.body_jntadr[m.body(part).id]]
-        d.qpos[at] += by
+        d.qpos[at + axis] += by
         d.qpos[at + 3 : at + 7] = turn(degrees)
 
     return act

@@ -17,6 +17,8 @@ from factory.pipeline import all_templates
 from factory.problem.robot_types import load_catalogue
 from factory.problem.template import Template
 from tests.command_line import ROOT, Terminal, files_in
+from tests.examples import with_hands, without_hands
+from tests.export_values import kept_log
 from tests.good_runs import assert_good
 
 TEMPLATES = sorted((ROOT / "templates").glob("*.op"))
@@ -108,15 +110,20 @@ def test_templates_ask_for_robots_that_exist() -> None:
 # --- exporters ------------------------------------------------------------------------------------
 
 
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The log of a run of the paper's example."""
+    return kept_log(with_hands("paper"), tmp_path_factory.mktemp("log") / "run.log")
+
+
 @pytest.mark.parametrize("form", exporters())
-def test_exporters_run(run: Terminal, form: str, tmp_path: Path) -> None:
+def test_exporters_run(run: Terminal, form: str, tmp_path: Path, log: Path) -> None:
     if form == "usd":
         pytest.importorskip("pxr", reason="the extra `usd` is not installed")
     exporter = exporters()[form]
     source = ROOT / "examples" / "paper.pag"
     if exporter.takes == "log":
-        assert run("run", source, "--log", tmp_path / "run.log", "-q").status == 0
-        source = tmp_path / "run.log"
+        source = log
     for name in ("one", "other"):
         (tmp_path / name).mkdir()
         assert run("export", source, "--format", form, "-o", tmp_path / name / "x").status == 0
@@ -141,9 +148,8 @@ def test_examples_check(run: Terminal, file: Path) -> None:
 
 @pytest.mark.parametrize("file", EXAMPLES, ids=lambda p: p.stem)
 def test_examples_run(file: Path) -> None:
-    plan = factory.compile(factory.load_pag(file))
-    if len(plan.pag) > SMALL:
-        pytest.skip(f"{len(plan.pag)} labels: too large for here")
-    run = factory.run(factory.lay_out(plan), units=1)
+    if (labels := len(factory.load_pag(file))) > SMALL:
+        pytest.skip(f"{labels} labels: too large for here")
+    run = factory.run(without_hands(file.stem), units=1)
     assert run.products == 1
     assert_good(run)

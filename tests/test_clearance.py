@@ -9,10 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from layout_values import (
-    STYLES,
+
+from factory.layout.certificate import ALWAYS, KINDS, PAYLOAD_BODY, STATIONS, Certificate, Region
+from factory.layout.clearance import ClearanceSearch, certify, separation
+from factory.layout.crossings import touching
+from factory.layout.dimensions import PAYLOADS, SIDE
+from factory.layout.layout import Layout
+from tests.layout_values import (
+    DRAWN,
+    Drawn,
     grown,
     many_layouts,
     paper_layout,
@@ -22,13 +27,7 @@ from layout_values import (
     shortened,
     with_path,
 )
-from pag_values import SHAPES
-
-from factory.layout.certificate import ALWAYS, KINDS, PAYLOAD_BODY, STATIONS, Certificate, Region
-from factory.layout.clearance import ClearanceSearch, certify, separation
-from factory.layout.crossings import touching
-from factory.layout.dimensions import PAYLOADS, SIDE
-from factory.layout.layout import Layout
+from tests.pag_values import SHAPES
 
 
 def broken(layout: Layout, *words: str) -> Certificate:
@@ -43,10 +42,9 @@ def broken(layout: Layout, *words: str) -> Certificate:
 # --- it holds -------------------------------------------------------------------------------------
 
 
-@settings(max_examples=40)
-@given(st.integers(1, 40), st.integers(0, 10_000), st.sampled_from(SHAPES), st.sampled_from(STYLES))
-def test_every_layout_is_clear(size: int, seed: int, shape: str, style: str) -> None:
-    layout = random_layout(size, seed, shape, style)
+@pytest.mark.parametrize("drawn", DRAWN, ids=str)
+def test_every_layout_is_clear(drawn: Drawn) -> None:
+    layout = random_layout(*drawn)
     assert layout.certificate is not None and layout.certificate.holds
     assert certify(layout) == layout.certificate
 

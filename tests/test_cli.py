@@ -320,15 +320,6 @@ def test_help_is_in_sections(run: Terminal) -> None:
                 )
 
 
-def test_formats_are_completed() -> None:
-    for line, wanted in (("export x.pag --format s", "stl"), ("render x.pag --with g", "gantt")):
-        words = f"factory {line}"
-        done = spawn(
-            _FACTORY_COMPLETE="bash_complete", COMP_WORDS=words, COMP_CWORD=str(words.count(" "))
-        )
-        assert f"plain,{wanted}" in done.out.split()
-
-
 def test_people_get_a_summary(run: Terminal) -> None:
     out = run("run", PAPER, "--units", 4).out
     for word in ("4 of 4 products", "cycle time", "bottleneck r3", "Utilisation", "refines"):
@@ -415,22 +406,13 @@ def test_unprintable_signs_cannot_break_a_line(run: Terminal, tmp_path: Path) ->
     assert "new line.pag:1:" in err.splitlines()[0]
 
 
-def test_warnings_have_the_form_of_diagnostics(run: Terminal, tmp_path: Path) -> None:
-    file = tmp_path / "big.pag"
-    file.write_text("root = p; p = atomic ( box = (9, 1, 1) );")
-    done = run("build", file)
-    assert done.status == 0
-    assert re.match(rf"{re.escape(str(file))}:\d+:\d+: \w+ warning: ", done.err)
-    assert run("build", file, "-q").err == ""
-    assert run("build", file, "--json").json["warnings"]
-
-
 def test_check_warns_as_build_does(run: Terminal, tmp_path: Path) -> None:
     file = tmp_path / "big.pag"
     file.write_text("root = p; p = atomic ( box = (9, 1, 1) );")
     built, done = (run(word, file) for word in ("build", "check"))
-    assert done.status == 0 and done.err == built.err and "Size warning: " in done.err
-    assert run("check", file, "-q").err == ""
+    assert built.status == done.status == 0 and done.err == built.err
+    assert re.match(rf"{re.escape(str(file))}:\d+:\d+: Size warning: ", done.err)
+    assert run("check", file, "-q").err == run("build", file, "-q").err == ""
     found = run("check", file, "--json").json["warnings"]
     assert found == run("build", file, "--json").json["warnings"]
     assert [warning["code"] for warning in found] == ["Size"]
@@ -573,65 +555,7 @@ def test_options_of_a_film_are_refused_without_one(run: Terminal, out: Path) -> 
     ]
 
 
-# --- factory.toml and templates -------------------------------------------------------------------
-
-
-@pytest.fixture
-def product(tmp_path: Path) -> Path:
-    file = tmp_path / "p.pag"
-    file.write_text(PAPER.read_text())
-    return file
-
-
-def test_a_file_of_settings_and_options_that_beat_it(run: Terminal, product: Path) -> None:
-    def seconds(*words: object) -> float:
-        found = run("run", product, "--world", "ideal", "--json", *words).json["sim_time_s"]
-        assert isinstance(found, float)
-        return found
-
-    plain = seconds()
-    settings = product.with_name("factory.toml")
-    settings.write_text("speed = 0.05 # slow\nacceleration = 1")
-    slow = seconds()
-    assert slow > 2 * plain
-    assert seconds("--speed", 0.5, "--acceleration", 2) == plain
-    settings.write_text("\ufeffspeed = 0.5\r\n")
-    assert seconds() == plain
-
-
-@pytest.mark.parametrize(
-    ("text", "where", "code", "hint"),
-    [
-        ("speed = 1\nsped = 2", "2:1", "UnknownParameter", "did you mean 'speed'?"),
-        ("[motion]\nspeed = 1", "1:2", "UnknownParameter", "keys"),
-        ("clearance = 'much'", "1:1", "BadValue", "clearance = 0.02"),
-        ("  timestep = -1", "1:3", "BadValue", "timestep = 0.002"),
-        ("substeps = 2.5", "1:1", "BadValue", "substeps = 5"),
-        ("speed = true", "1:1", "BadValue", "speed = 0.5"),
-        ("speed = nan", "1:1", "BadValue", "speed = 0.5"),
-        ("speed = 9" + "9" * 500, "1:1", "BadValue", "speed = 0.5"),
-        ("force = 1\nspeed = = 2", "2:9", "Syntax", "toml.io"),
-        ("speed = [", "1:", "Syntax", "toml.io"),
-    ],
-)
-def test_faults_of_the_settings_are_shown_in_place(
-    run: Terminal, product: Path, text: str, where: str, code: str, hint: str
-) -> None:
-    settings = product.with_name("factory.toml")
-    settings.write_text(text)
-    done = run("run", product)
-    assert done.status == 2
-    assert f"{settings}:{where}" in done.err
-    assert code in done.err
-    assert hint in done.err
-
-
-def test_all_faults_of_the_settings_at_once(run: Terminal, product: Path) -> None:
-    product.with_name("factory.toml").write_text("sped = 1\nforce = -1\nclearance = ''")
-    assert run("build", product, "--json").codes == ["UnknownParameter", "BadValue", "BadValue"]
-    product.with_name("factory.toml").write_bytes(b"\xff\xfe")
-    assert run("build", product, "--json").codes == ["Syntax"]
-
+# --- templates ----------------------------------------------------------------------------------
 
 OWN = """{name} = (R, j, ~, <a; b>, F) where R = < dot, tool >; j = 1; ~ = {{ S1 = A2 }};
 <a; b> = < LAB1, nopart; LAB2, nopart >;

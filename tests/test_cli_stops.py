@@ -3,12 +3,10 @@ something."""
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import imageio.v3 as iio
@@ -18,7 +16,8 @@ from factory.record.log import read_log
 from factory.rendering.reel import Reel
 from factory.support.errors import MissingError
 from factory.support.gl import probe
-from tests.command_line import PAPER, ROOT, Terminal, files_in, spawn, started
+from tests.command_line import PAPER, ROOT, Terminal, files_in, spawn_each, started
+from tests.waiting import grown
 
 # --- a run that fails, or is stopped --------------------------------------------------------------
 
@@ -55,7 +54,7 @@ def test_absurd_products_come_to_an_end(
 ) -> None:
     file = out / "p.pag"
     file.write_text(f"root = s; s = mate(a, b); a = atomic({geometry}); b = atomic()")
-    done = run("run", file, "--max-time", 30, "--json")
+    done = run("run", file, "--max-time", 10, "--json")
     assert done.status in status
     if done.status == 2:
         assert done.codes == ["BadValue"]
@@ -70,27 +69,6 @@ def test_a_factory_that_does_not_fit(run: Terminal, out: Path) -> None:
     assert list(out.iterdir()) == []
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda n: n.name)
-def test_a_run_that_is_stopped_closes_its_files(out: Path, number: signal.Signals) -> None:
-    log = out / "run.log"
-    words = ["run", PAPER, "--units", "1000000", "--log", log, "--json"]
-    with started(*words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        deadline = time.monotonic() + 60
-        while not (log.exists() and log.stat().st_size > 20_000):
-            assert time.monotonic() < deadline
-            time.sleep(0.02)
-        process.send_signal(number)
-        answer, errors = process.communicate(timeout=60)
-    assert process.returncode == 130
-    (told,) = json.loads(answer)["errors"]
-    assert told["code"] == "Interrupted" and f"factory run --resume {log}" in told["hint"]
-    assert "Traceback" not in errors
-    assert [path.name for path in out.iterdir()] == ["run.log"]
-    kept = read_log(log)
-    assert kept.complete
-    assert len(kept) > 10
-
-
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT], ids=lambda n: n.name)
 def test_a_film_plays_however_its_run_ends(out: Path, number: signal.Signals) -> None:
     """Under the name that was asked for, and as long as the log that was kept beside it."""
@@ -102,10 +80,7 @@ def test_a_film_plays_however_its_run_ends(out: Path, number: signal.Signals) ->
     words = ["run", PAPER, "--units", "1000000", "--log", log, "--video", film, "-q"]
     words += ["--size", "64x48", "--fps", "10"]
     with started(*words, stderr=subprocess.PIPE) as process:
-        deadline = time.monotonic() + 120
-        while not (film.exists() and film.stat().st_size > 12_000):
-            assert time.monotonic() < deadline and process.poll() is None
-            time.sleep(0.02)
+        grown(film, 12_000, process)
         process.send_signal(number)
         process.communicate(timeout=60)
     assert sorted(path.name for path in out.iterdir()) == ["film.mp4", "run.log"]
@@ -136,26 +111,23 @@ WITHOUT_GL = {
     "EGL drivers": {"__EGL_VENDOR_LIBRARY_FILENAMES": "/nowhere", "LIBGL_DRIVERS_PATH": "/nowhere"},
 }
 
-EACH = """
-import sys
-from factory.commands import run_command
-for words in (["check"], ["build", "--mjcf", sys.argv[2]], ["programs"],
-              ["export", "--format", "pnml"], ["run"]):
-    assert run_command([words[0], sys.argv[1], *words[1:], "-q"]) == 0, words
-"""
+FILMS = (["run", PAPER, "--video"], ["render", PAPER, "-o"])
 
 
 @pytest.mark.parametrize("lacking", WITHOUT_GL)
 def test_only_pictures_need_gl(out: Path, lacking: str) -> None:
-    environment = {**os.environ, **WITHOUT_GL[lacking]}
-    words = [sys.executable, "-c", EACH, PAPER, out / "m.xml"]
-    done = subprocess.run(words, cwd=ROOT, env=environment, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    commands = [
+        *(["check", PAPER, "-q"], ["build", PAPER, "--mjcf", out / "m.xml", "-q"]),
+        *(["programs", PAPER, "-q"], ["export", PAPER, "--format", "pnml", "-q"]),
+        ["run", PAPER, "-q"],
+    ]
+    for done in spawn_each(*commands, **WITHOUT_GL[lacking]):
+        assert done.status == 0, done
 
 
 def test_films_without_gl_say_what_to_install(out: Path) -> None:
-    for words in (["run", "--video"], ["render", "-o"]):
-        done = spawn(words[0], PAPER, words[1], out / "f.mp4", "--json", MUJOCO_GL="bogus")
+    commands = [[*words, out / "f.mp4", "--json"] for words in FILMS]
+    for done in spawn_each(*commands, MUJOCO_GL="bogus"):
         assert done.status == 3
         assert "MUJOCO_GL=egl" in done.json["errors"][0]["hint"]
     assert files_in(out) == {}
@@ -171,15 +143,18 @@ def bare(tmp_path: Path) -> str:
 
 
 def test_without_the_engine(bare: str, out: Path) -> None:
-    for words in (["check"], ["programs"], ["export", "--format", "dot"]):
-        assert spawn(words[0], PAPER, *words[1:], "-q", PYTHONPATH=bare).status == 0
-    assert spawn("run", PAPER, "--world", "ideal", "-q", PYTHONPATH=bare).status == 0
-    for words in (["run", "--log", out / "l"], ["build", "-o", out / "all"]):
-        done = spawn(words[0], PAPER, *words[1:], "--json", PYTHONPATH=bare)
-        assert done.status == 3
+    without = (
+        *(["check", PAPER, "-q"], ["programs", PAPER, "-q"]),
+        *(["export", PAPER, "--format", "dot", "-q"], ["run", PAPER, "--world", "ideal", "-q"]),
+    )
+    needing = (["run", PAPER, "--log", out / "l"], ["build", PAPER, "-o", out / "all"], ["doctor"])
+    commands = *without, *([*words, "--json"] for words in needing)
+    *answers, doctor = spawn_each(*commands, PYTHONPATH=bare)
+    assert [done.status for done in answers] == [0, 0, 0, 0, 3, 3]
+    for done in answers[4:]:
         assert "mujoco" in done.json["errors"][0]["message"]
         assert done.json["errors"][0]["hint"] == "pip install mujoco"
-    done = spawn("doctor", "--json", PYTHONPATH=bare)
+    done = doctor
     assert done.status == 3
     assert {c["name"] for c in done.json["checks"] if not c["ok"]} == {"engine", "rendering"}
     assert list(out.iterdir()) == []

@@ -8,11 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from command_line import Terminal
-from fold_values import dates
-from random_products import random_product
 
-from examples import with_hands
 from factory.layout.clearance import certify
 from factory.layout.exclusions import coordinated
 from factory.layout.layout import Layout
@@ -26,6 +22,10 @@ from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.timing.timed import timed
 from factory.timing.timing import Timing
+from tests.command_line import Terminal
+from tests.examples import with_hands
+from tests.fold_values import dates
+from tests.random_products import random_product
 
 ROOT = Path(__file__).parents[1]
 

@@ -12,7 +12,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -36,6 +35,7 @@ from tests.layout_values import paper_layout
 from tests.report_values import EVIL, Page
 from tests.test_log import block_ends
 from tests.test_log_damage import put_together, taken_apart
+from tests.waiting import grown
 
 
 @contextmanager
@@ -44,10 +44,7 @@ def running(log: Path, size: int = 30_000) -> Iterator[subprocess.Popen[str]]:
     words = ["run", PAPER, "--units", 10**6, "--log", log, "--json"]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     with started(*words, **pipes) as process:
-        deadline = time.monotonic() + 60
-        while not (log.exists() and log.stat().st_size > size):
-            assert time.monotonic() < deadline and process.poll() is None
-            time.sleep(0.02)
+        grown(log, size, process)
         yield process
 
 
@@ -121,10 +118,12 @@ def test_a_signal(run: Terminal, out: Path, number: signal.Signals) -> None:
         process.send_signal(number)
         answer, errors = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert read_log(log).complete
+    assert read_log(log).complete and len(read_log(log)) > 10
+    assert list(files_in(out)) == ["run.log"] and "Traceback" not in errors
     cut = cut_off(log)
     assert (cut.units, cut.code, cut.message) == (10**6, "Interrupted", "stopped by the user")
     (error,) = json.loads(answer)["errors"]
+    assert error["code"] == "Interrupted" and f"factory run --resume {log}" in error["hint"]
     assert error["message"] == f"stopped by the user, {cut}" and error["message"] in errors
     if number is signal.SIGTERM:
         assert_told(run, log, out / "a.html")

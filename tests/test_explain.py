@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from factory.support.explanations import codes, explain
-from tests.command_line import ROOT, Done, Terminal, files_in
+from tests.command_line import Done, Terminal, files_in
+from tests.house import this_house
 
-PACKAGE = ROOT / "factory"
 CODE = re.compile(r"[A-Z][A-Za-z]+")
 
 NOT_PROVOKED = {
@@ -79,8 +79,8 @@ def raised(tree: ast.Module, takes: dict[str, set[int]]) -> Iterator[str]:
 
 @cache
 def raised_anywhere() -> frozenset[str]:
-    texts = [path.read_text("utf-8") for path in PACKAGE.rglob("*.py")]
-    trees = [ast.parse(text) for text in texts]
+    modules = this_house().modules.values()
+    texts, trees = [module.text for module in modules], [module.tree for module in modules]
     takes = takers(trees)
     found = {code for tree in trees for code in raised(tree, takes) if CODE.fullmatch(code)}
     printed = {code for text in texts for code in re.findall(r"([A-Z][a-z]\w+) warning: ", text)}

@@ -13,9 +13,6 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from layout_values import table_pag
-from pag_values import SHAPES, random_pag
-from pag_values import TEMPLATES as OWN
 
 import factory
 from factory.compiler.compiler import compile_pag
@@ -45,6 +42,9 @@ from factory.support.resources import templates_folder
 from factory.support.settings import Settings
 from factory.support.tables import table_of, value_of
 from tests.command_line import Terminal
+from tests.layout_values import table_pag
+from tests.pag_values import SHAPES, random_pag
+from tests.pag_values import TEMPLATES as OWN
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 TEMPLATES = {**OWN, **load_templates([templates_folder()])}

@@ -9,7 +9,6 @@ import pytest
 import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
-from layout_values import table_pag
 
 from factory.geometry.limits import METRES
 from factory.geometry.meshes import (
@@ -27,6 +26,7 @@ from factory.lang import read_pag
 from factory.pipeline import all_templates
 from factory.problem.pag import PAG, Value
 from factory.support.errors import InputError
+from tests.layout_values import table_pag
 
 lengths = st.floats(0.001, 1.0)
 turns = st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: sum(v * v for v in q) > 0.01)

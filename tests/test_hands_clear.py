@@ -188,7 +188,7 @@ def test_the_post_of_a_feeder_stands_behind_its_hand(tmp_path: Path) -> None:
 def test_pads_are_off_all_that_is_under_them() -> None:
     rng = np.random.default_rng(3)
     turns = np.linspace(0, 2 * np.pi, 721)[:-1]
-    for _ in range(20):
+    for _ in range(8):
         cloud = rng.normal(size=(14, 3)) * (0.02, 0.015, 0.01)
         body = Body(cloud.min(axis=0), cloud.max(axis=0), cloud[ConvexHull(cloud).vertices])
         points = np.append(rng.uniform(-0.015, 0.015, size=(8, 2)), np.zeros((8, 1)), axis=1)

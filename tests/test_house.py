@@ -13,6 +13,7 @@ from tests.house import (
     House,
     anys,
     circles,
+    clocks,
     crowded_classes,
     crowded_functions,
     engine_imports,
@@ -38,6 +39,7 @@ LAWS: tuple[Law, ...] = (
     twins,
     long_modules,
     unexplained,
+    clocks,
 )
 FIELDS = "\n".join(f"        self.a{n} = {n}" for n in range(13))
 BREACHES: tuple[tuple[Law, dict[str, str], str], ...] = (
@@ -126,6 +128,8 @@ BREACHES: tuple[tuple[Law, dict[str, str], str], ...] = (
     ),
     (long_modules, {"factory/nets/a.py": "x = 1\n" * 351}, "nets.a: 351 lines"),
     (unexplained, {"factory/nets/a.py": "x = 1"}, "nets.a: no docstring"),
+    (clocks, {"tests/test_a.py": "def f():\n    from time import sleep"}, "tests.test_a reads"),
+    (clocks, {"tests/test_a.py": "import time"}, "tests.test_a reads a clock"),
 )
 
 

@@ -9,9 +9,6 @@ from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
-from layout_values import STYLES, paper_layout, random_layout, row_of_inserts, table_pag
-from pag_values import SHAPES, factory_of
 
 import factory.layout.optimising as optimising
 from factory.geometry.product import product_geometry
@@ -31,12 +28,19 @@ from factory.support.errors import RunError
 from factory.support.settings import Settings
 from factory.timing.timing import Timing
 from tests.command_line import ROOT, Terminal
+from tests.layout_values import (
+    STYLES,
+    Drawn,
+    drawn_layouts,
+    paper_layout,
+    random_layout,
+    row_of_inserts,
+    table_pag,
+)
+from tests.pag_values import SHAPES, factory_of
 
 PACE = Pace.of(Settings())
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
-
-sizes, seeds = st.integers(2, 24), st.integers(0, 10_000)
-shapes, styles = st.sampled_from(SHAPES), st.sampled_from(STYLES)
 
 
 def cycle(layout: Layout) -> float:
@@ -44,12 +48,10 @@ def cycle(layout: Layout) -> float:
 
 
 @settings(max_examples=25)
-@given(sizes, seeds, shapes, styles)
-def test_between_the_bound_and_the_first_layout(
-    size: int, seed: int, shape: str, style: str
-) -> None:
+@given(drawn_layouts)
+def test_between_the_bound_and_the_first_layout(drawn: Drawn) -> None:
     """The bound is that of the first layout too, which no search has touched."""
-    layout = random_layout(size, seed, shape, style)
+    layout = random_layout(*drawn)
     first = first_feasible(layout.factory, layout.product, Clearance())
     bound = cycle_time_bound(layout.factory, layout.product, layout.clearance, PACE)
     assert 0 < bound <= cycle(layout) + 1e-9
@@ -57,10 +59,10 @@ def test_between_the_bound_and_the_first_layout(
 
 
 @settings(max_examples=20)
-@given(sizes, seeds, shapes, styles)
-def test_times_are_those_of_the_modes(size: int, seed: int, shape: str, style: str) -> None:
+@given(drawn_layouts)
+def test_times_are_those_of_the_modes(drawn: Drawn) -> None:
     """Scalar times against those predicted from the modes of the operations."""
-    layout = random_layout(size, seed, shape, style)
+    layout = random_layout(*drawn)
     predicted = Timing(layout, replace(Settings(), stage=False)).delays
     assert operation_times(layout, PACE) == pytest.approx(predicted, abs=1e-6)
 

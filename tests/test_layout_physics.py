@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from layout_values import STYLES, random_layout, row_of_inserts
-from pag_values import SHAPES
 
 from factory.layout.certificate import KINDS, NAMES
 from factory.layout.layout import Box, Layout
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.settings import Settings
+from tests.layout_values import STYLES, random_layout, row_of_inserts
+from tests.pag_values import SHAPES
 
 mujoco = pytest.importorskip("mujoco")
 

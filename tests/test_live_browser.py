@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from time import monotonic
 from typing import Any
 
 import pytest
@@ -16,6 +15,7 @@ from factory.simulation.recovery import Campaign, WorldFault
 from tests import failing_runs
 from tests.live_sessions import Running, a_session
 from tests.test_takeovers import laid_out
+from tests.waiting import until
 
 LONG = 20.0
 """Time limit for a browser that draws in software [s]."""
@@ -47,10 +47,8 @@ class Watched:
 
     def seen(self, holds: str, of: str) -> None:
         """Wait until something holds; the page's policy lets it evaluate nothing by itself."""
-        end = monotonic() + LONG
-        while not self.page.evaluate(f"({holds})({of})"):
-            assert monotonic() < end, self.page.evaluate("factoryView.frame")
-            self.page.wait_for_timeout(30)
+        page = self.page
+        until(lambda: page.evaluate(f"({holds})({of})"), lambda: page.wait_for_timeout(30))
 
     def press(self, name: str) -> None:
         self.page.get_by_role("button", name=name, exact=True).click()

@@ -11,8 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from command_line import Terminal
-from layout_values import table_pag
 
 from factory.geometry.mesh_file import EXPECTED, UnreadableMesh
 from factory.geometry.mesh_reader import read_mesh
@@ -20,6 +18,8 @@ from factory.geometry.product import product_geometry
 from factory.geometry.solids import Product
 from factory.problem.pag import PAG
 from factory.support.errors import InputError
+from tests.command_line import Terminal
+from tests.layout_values import table_pag
 
 EDGE = 0.1
 

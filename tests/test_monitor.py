@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from layout_values import random_layout
 
 import factory
 from factory.lang import read_pag
@@ -33,6 +32,7 @@ from factory.support.settings import Settings
 from tests.command_line import PAPER, ROOT, Terminal
 from tests.examples import with_hands
 from tests.good_runs import random_marking
+from tests.layout_values import random_layout
 from tests.pag_texts import PRODUCTS, UNARY, laid_out
 
 

@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -130,12 +131,17 @@ def test_settings_too(run: Terminal, pag: Path, monkeypatch: pytest.MonkeyPatch)
         return found
 
     plain = seconds()
-    pag.with_name("factory.toml").write_text("speed = 0.1")
+    settings = pag.with_name("factory.toml")
+    settings.write_text("\ufeffspeed = 0.5\r\n")
+    assert seconds() == plain
+    settings.write_text("speed = 0.1 # slow\nacceleration = 1")
     slow = seconds()
+    assert slow > 2 * plain
+    assert seconds("--speed", 0.5, "--acceleration", 2) == plain
     monkeypatch.setenv("FACTORY_SPEED", "0.05")
     slower = seconds()
     assert plain < slow < slower
-    assert seconds("--speed", 0.5) == plain
+    assert seconds("--speed", 0.5, "--acceleration", 2) == plain
     monkeypatch.setenv("FACTORY_SPEED", "")
     assert seconds() == slow
 
@@ -164,17 +170,35 @@ def test_faults_of_the_environment_name_the_variable(
         ("units = 0", "1:1", "units: 0 is not in the range", ""),
         ("jitter = 7", "1:1", "jitter: 7", ""),
         ("jitter = nan", "1:1", "jitter: ", ""),
+        ("speed = 1\nsped = 2", "2:1", "UnknownParameter", "did you mean 'speed'?"),
+        ("[motion]\nspeed = 1", "1:2", "UnknownParameter", "keys"),
+        ("clearance = 'much'", "1:1", "BadValue", "clearance = 0.02"),
+        ("  timestep = -1", "1:3", "BadValue", "timestep = 0.002"),
+        ("substeps = 2.5", "1:1", "BadValue", "substeps = 5"),
+        ("speed = true", "1:1", "BadValue", "speed = 0.5"),
+        ("speed = nan", "1:1", "BadValue", "speed = 0.5"),
+        ("speed = 9" + "9" * 500, "1:1", "BadValue", "speed = 0.5"),
+        ("force = 1\nspeed = = 2", "2:9", "Syntax", "toml.io"),
+        ("speed = [", "1:", "Syntax", "toml.io"),
     ],
 )
-def test_faults_of_options_in_the_file(
+def test_faults_of_the_file_are_shown_in_place(
     run: Terminal, pag: Path, text: str, where: str, message: str, hint: str
 ) -> None:
-    pag.with_name("factory.toml").write_text(text)
+    settings = pag.with_name("factory.toml")
+    settings.write_text(text)
     done = run("run", pag)
     assert done.status == 2
-    assert f"factory.toml:{where}: " in done.err
+    assert f"{settings}:{where}" in done.err
     assert message in done.err
     assert hint in done.err
+
+
+def test_all_faults_of_the_file_at_once(run: Terminal, pag: Path) -> None:
+    pag.with_name("factory.toml").write_text("sped = 1\nforce = -1\nclearance = ''")
+    assert run("build", pag, "--json").codes == ["UnknownParameter", "BadValue", "BadValue"]
+    pag.with_name("factory.toml").write_bytes(b"\xff\xfe")
+    assert run("build", pag, "--json").codes == ["Syntax"]
 
 
 def test_each_command_takes_what_it_has_an_option_for(
@@ -205,51 +229,71 @@ def test_values_of_picture_options(run: Terminal, pag: Path) -> None:
 # --- completion in the shell ----------------------------------------------------------------------
 
 
-def completions(words: str, cwd: Path) -> list[str]:
-    """The completions of the last word in a shell."""
-    number = str(len(words.split(" ")) - 1)
-    variables = {"_FACTORY_COMPLETE": "bash_complete", "COMP_WORDS": words, "COMP_CWORD": number}
-    done = spawn(cwd=cwd, **variables)
-    return [line.partition(",")[2] for line in done.out.splitlines() if line.startswith("plain,")]
+Completions = Callable[[str], list[str]]
 
 
-def test_commands_options_codes_and_products_are_completed(tmp_path: Path) -> None:
+@pytest.fixture
+def completions(run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Completions:
+    """The completions of the last of some words in a shell, in the folder of the test."""
+    monkeypatch.chdir(tmp_path)
+
+    def completed(words: str) -> list[str]:
+        monkeypatch.setenv("_FACTORY_COMPLETE", "bash_complete")
+        monkeypatch.setenv("COMP_WORDS", words)
+        monkeypatch.setenv("COMP_CWORD", str(len(words.split(" ")) - 1))
+        lines = run().out.splitlines()
+        monkeypatch.delenv("_FACTORY_COMPLETE")
+        return [line.partition(",")[2] for line in lines if line.startswith("plain,")]
+
+    return completed
+
+
+def test_commands_options_codes_and_products_are_completed(
+    completions: Completions, tmp_path: Path
+) -> None:
     for name in ("lamp.pag", "log.txt", ".hidden.pag", "stand.pag"):
         (tmp_path / name).write_text("")
     (tmp_path / "more").mkdir()
     (tmp_path / "more" / "chair.pag").write_text("")
-    assert completions("factory im", tmp_path) == ["import"]
-    assert {"check", "run", "new"} <= set(completions("factory ", tmp_path))
-    assert completions("factory check ", tmp_path) == ["lamp.pag", "stand.pag", "more/"]
-    assert completions("factory run l", tmp_path) == ["lamp.pag"]
-    assert completions("factory run more/", tmp_path) == ["more/chair.pag"]
-    assert completions("factory run lamp.pag --wo", tmp_path) == ["--world"]
-    assert completions("factory run --world ", tmp_path) == ["mujoco", "ideal"]
-    assert completions("factory --explain undef", tmp_path) == ["UndefinedLabel"]
+    assert completions("factory im") == ["import"]
+    assert {"check", "run", "new"} <= set(completions("factory "))
+    assert completions("factory check ") == ["lamp.pag", "stand.pag", "more/"]
+    assert completions("factory run l") == ["lamp.pag"]
+    assert completions("factory run more/") == ["more/chair.pag"]
+    assert completions("factory run lamp.pag --wo") == ["--world"]
+    assert completions("factory run --world ") == ["mujoco", "ideal"]
+    assert completions("factory --explain undef") == ["UndefinedLabel"]
+    assert "stl" in completions("factory export x.pag --format s")
+    assert completions("factory render x.pag --with g") == ["gantt"]
 
 
-def test_cameras_are_completed_with_the_labels_of_the_file(tmp_path: Path) -> None:
+def test_cameras_are_completed_with_the_labels_of_the_file(
+    completions: Completions, run: Terminal, tmp_path: Path
+) -> None:
     cameras = ["overview", "orbit", "top", "product"]
     labels = ["part1", "part2", "part3", "sub1", "sub2", "sub3"]
     parts = [f"part:{label}" for label in labels[:3]]
     taken = [f"handover:{label}" for label in labels]
     log = tmp_path / "run.log"
-    assert spawn("run", PAPER, "--log", log, "--max-time", "0.1", "-q").status in (0, 1)
+    assert run("run", PAPER, "--log", log, "--max-time", "0.1", "-q").status in (0, 1)
     for file in (PAPER, log):
-        assert completions(f"factory render {file} --camera ", tmp_path) == cameras + parts + taken
-    assert completions(f"factory run {PAPER} --units 2 --camera part:", tmp_path) == parts
-    assert completions(f"factory run {PAPER} --units 2 --camera hand", tmp_path) == taken
-    assert completions("factory render --camera o", tmp_path) == ["overview", "orbit"]
+        assert completions(f"factory render {file} --camera ") == cameras + parts + taken
+    assert completions(f"factory run {PAPER} --units 2 --camera part:") == parts
+    assert completions(f"factory run {PAPER} --units 2 --camera hand") == taken
+    assert completions("factory render --camera o") == ["overview", "orbit"]
     (tmp_path / "broken.pag").write_text("root = ")
     for file in ("broken.pag", "missing.pag"):
-        assert completions(f"factory run {file} --camera ", tmp_path) == cameras
+        assert completions(f"factory run {file} --camera ") == cameras
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_each_shell_gets_its_script(shell: str, tmp_path: Path) -> None:
+def test_each_shell_gets_its_script(
+    shell: str, run: Terminal, monkeypatch: pytest.MonkeyPatch
+) -> None:
     if shell == "bash" and shutil.which("bash") is None:
         pytest.skip("there is no bash")
-    done = spawn(cwd=tmp_path, _FACTORY_COMPLETE=f"{shell}_source")
+    monkeypatch.setenv("_FACTORY_COMPLETE", f"{shell}_source")
+    done = spawn() if shell == "bash" else run()
     assert done.status == 0
     assert "_FACTORY_COMPLETE" in done.out and "factory" in done.out
     if shell == "bash":

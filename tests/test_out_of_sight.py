@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from opengl import needs_gl
 
 from factory.layout.feeding import feeder_of
 from factory.layout.layout import Layout
@@ -22,6 +21,7 @@ from factory.support import gl
 from factory.support.engine import mujoco
 from factory.support.resource import Closing
 from tests.examples import without_hands
+from tests.opengl import needs_gl
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 

@@ -7,7 +7,6 @@ import io
 import re
 import shlex
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,6 +27,7 @@ from factory.support.progress import StepBar
 from factory.support.settings import Settings
 from tests.command_line import PAPER, ROOT, Terminal, files_in
 from tests.report_values import EVIL
+from tests.waiting import until
 
 EXAMPLES = ROOT / "examples"
 MESHES = """
@@ -345,15 +345,13 @@ def test_a_search_shows_how_far_it_is(run: Terminal, monkeypatch: pytest.MonkeyP
     with StepBar("looking") as steps:
         steps.show("laying out", 3, 12, "5 points")
         steps.show("running", 1, None)
-        time.sleep(0.2)
-    assert "running" in screen.getvalue()
+        until(lambda: "running" in screen.getvalue())
     lines = io.StringIO()
     monkeypatch.setattr(sys, "stderr", lines)
     monkeypatch.setattr(progress, "LINES", 0.01)
     with StepBar("looking") as steps:
         steps.show("laying out", 3, 12, "5 points")
-        time.sleep(0.1)
-    assert "laying out: 3 of 12, 5 points, " in lines.getvalue()
+        until(lambda: "laying out: 3 of 12, 5 points, " in lines.getvalue())
 
 
 def test_a_search_for_few_robots_shows_the_best(

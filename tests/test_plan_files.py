@@ -32,8 +32,11 @@ from factory.support.settings import Settings
 from factory.support.tables import table_of, value_of
 from tests.bench.factories import cube
 from tests.command_line import PAPER, ROOT, Terminal
-from tests.layout_values import STYLES, random_layout
-from tests.pag_values import SHAPES
+from tests.layout_values import (
+    Drawn,
+    drawn_layouts,
+    random_layout,
+)
 from tests.test_relay_hands import sawn
 
 EXAMPLES = ROOT / "examples"
@@ -80,9 +83,9 @@ def with_text(text: str, folder: Path, **ground: Any) -> Project:
 
 
 @settings(max_examples=25)
-@given(st.integers(2, 16), st.integers(0, 10_000), st.sampled_from(SHAPES), st.sampled_from(STYLES))
-def test_a_layout_is_read_as_it_was_written(size: int, seed: int, shape: str, style: str) -> None:
-    layout = random_layout(size, seed, shape, style)
+@given(drawn_layouts)
+def test_a_layout_is_read_as_it_was_written(drawn: Drawn) -> None:
+    layout = random_layout(*drawn)
     table = json.loads(json.dumps(table_of(LayoutTable.of(layout))))
     made = value_of(LayoutTable, table).laid_out(layout.factory, layout.product, layout.factory)
     assert made == layout

@@ -9,8 +9,6 @@ from itertools import islice
 from pathlib import Path
 
 import pytest
-from random_products import random_product
-from state_space import explored
 
 from factory.compiler.assigning import shared
 from factory.compiler.expanding import joins
@@ -29,6 +27,8 @@ from factory.simulation.simulation import Simulation
 from factory.study.allocation.lines import Shift
 from factory.support.errors import Diagnostic, InputError, RunError
 from factory.support.settings import Settings
+from tests.random_products import random_product
+from tests.state_space import explored
 
 FEW, MANY = (4, 7, 8, 10, 16), range(100, 1100)
 """Seeds: the few have forms, robots with several tours, and branches that are there twice."""

@@ -7,8 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -24,6 +22,7 @@ from factory.support.interruption import awaited, side_by_side
 from factory.support.progress import Progress, Waiting
 from tests.command_line import ROOT
 from tests.examples import without_hands
+from tests.waiting import left_alone, until
 
 
 class Terminal(io.StringIO):
@@ -76,18 +75,9 @@ def test_what_takes_long_is_said(monkeypatch, stream, said: str) -> None:
     monkeypatch.setattr(progress, "LINES", 0.01)
     with Waiting("at work"):
         until(lambda: said in stream.getvalue())
-    told = stream.getvalue()
-    assert said in told
-    with Waiting("quiet work", quiet=True):
-        time.sleep(0.05)
-    assert stream.getvalue() == told
-
-
-def until(holds: Callable[[], bool]) -> None:
-    """Wait until something holds, for ten seconds at most."""
-    end = time.monotonic() + 10
-    while not holds() and time.monotonic() < end:
-        time.sleep(0.01)
+    with Waiting("quiet work", quiet=True), Waiting("other work"):
+        until(lambda: "other work" in stream.getvalue())
+    assert "quiet" not in stream.getvalue()
 
 
 @pytest.mark.parametrize("name", ["paper", "gearbox", "chest"])
@@ -113,7 +103,7 @@ def test_a_signal_is_heard_while_the_engine_works(tmp_path: Path, done: str, hea
     command = [sys.executable, str(script)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as child:
         assert child.stdout is not None and child.stdout.readline() == "begun\n"
-        time.sleep(0.5)
+        left_alone(0.5)
         child.send_signal(signal.SIGINT)
         if heard:
             assert child.stdout.readline() == "heard\n"

@@ -14,8 +14,6 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from layout_values import STYLES, paper_layout, random_layout, row_of_inserts
-from pag_values import SHAPES
 
 from factory.compiler.compiler import compile_pag
 from factory.compiler.expanding import expand, nodes_of
@@ -44,6 +42,14 @@ from factory.support.settings import Settings
 from factory.timing.pool import part_pool
 from tests.bench.factories import cube, laid_out
 from tests.command_line import Terminal
+from tests.layout_values import (
+    Drawn,
+    drawn_layouts,
+    paper_layout,
+    random_layout,
+    row_of_inserts,
+)
+from tests.pag_values import SHAPES
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 SETTINGS = Settings(hands=0)
@@ -54,8 +60,7 @@ BARE = ("--no-hands",)
 
 PACE = Pace.of(SETTINGS)
 
-sizes, seeds = st.integers(2, 20), st.integers(0, 10_000)
-shapes, styles = st.sampled_from(SHAPES), st.sampled_from(STYLES)
+seeds = st.integers(0, 10_000)
 
 
 SMALL = cube(8, side=0.15)
@@ -114,12 +119,10 @@ def middles(layout: Layout) -> dict[str, tuple[float, float]]:
 
 
 @settings(max_examples=25)
-@given(sizes, seeds, shapes, styles, st.booleans())
-def test_relays_anywhere_are_proved_and_certified(
-    size: int, seed: int, shape: str, style: str, most: bool
-) -> None:
+@given(drawn_layouts, seeds, st.booleans())
+def test_relays_anywhere_are_proved_and_certified(drawn: Drawn, seed: int, most: bool) -> None:
     """Also that they are gear nets as the language writes them."""
-    before, after, added = cut_at_random(random_layout(size, seed, shape, style), seed, most)
+    before, after, added = cut_at_random(random_layout(*drawn), seed, most)
     assert len(after.factory.robots) == len(before.factory.robots) + added
     assert verify(after.factory.net).holds
     assert [str(fault.message) for fault in certify(after).faults] == []
@@ -131,10 +134,10 @@ def test_relays_anywhere_are_proved_and_certified(
 
 
 @settings(max_examples=10)
-@given(sizes, seeds, shapes, styles)
-def test_everything_goes_where_it_went(size: int, seed: int, shape: str, style: str) -> None:
+@given(drawn_layouts, seeds)
+def test_everything_goes_where_it_went(drawn: Drawn, seed: int) -> None:
     """All is made at the same places, and the robots of a way run it all between them."""
-    before, after, added = cut_at_random(random_layout(size, seed, shape, style), seed)
+    before, after, added = cut_at_random(random_layout(*drawn), seed)
     here, there = middles(before), middles(after)
     same = [label for label in here if label in there]
     assert all(here[label] == there[label] for label in same)

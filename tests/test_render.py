@@ -4,11 +4,8 @@ and nothing lost when the work is broken off. Without EGL only what needs none i
 from __future__ import annotations
 
 import colorsys
-import os
-import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -195,20 +192,17 @@ def test_a_killed_process_leaves_all_but_the_last_second(
 ) -> None:
     path = tmp_path / f"k{ending}"
     code = (
-        "import time, numpy as np; from pathlib import Path;"
+        "import sys, numpy as np; from pathlib import Path;"
         "from factory.rendering.video import VideoFile;"
         f"v = VideoFile(Path({str(path)!r}), (64, 48), {fps});"
         "noise = np.random.default_rng(0).integers(0, 255, (60, 48, 64, 3), np.uint8);"
         "[v.write(frame) for frame in noise];"
-        "print('written', flush=True); time.sleep(60)"
+        "print('written', flush=True); sys.stdin.read()"
     )
-    child = subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, cwd=ROOT
-    )
-    assert child.stdout is not None and child.stdout.readline() == "written\n"
-    os.kill(child.pid, signal.SIGKILL)
-    child.wait()
-    child.stdout.close()
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen([sys.executable, "-c", code], **pipes, cwd=ROOT) as child:
+        assert child.stdout is not None and child.stdout.readline() == b"written\n"
+        child.kill()
     assert [left.name for left in tmp_path.iterdir()] == [path.name]
     assert 60 - fps <= len(film_of(path)) <= 60
 
@@ -446,21 +440,6 @@ def test_missing_gl_is_explained_with_what_mends_it(monkeypatch, variable, value
     found = caught.value.diagnostics[0]
     assert hint in found.hint and "\n" not in found.message and len(found.message) < 250
     assert caught.value.exit_status == 3
-    begin = time.perf_counter()
+    monkeypatch.setattr(subprocess, "run", None)
     with pytest.raises(MissingError):
         gl.probe()
-    assert time.perf_counter() - begin < 0.05
-
-
-@pytest.mark.parametrize("backend", ["bogus", "egl", "osmesa", "glfw"])
-def test_a_run_needs_no_gl_whatever_mujoco_gl_says(backend: str) -> None:
-    code = (
-        "import factory;"
-        f"layout = factory.lay_out(factory.compile(factory.load_pag({str(PAPER)!r})));"
-        "print(factory.run(layout).products)"
-    )
-    variables = {**os.environ, "MUJOCO_GL": backend, "__EGL_VENDOR_LIBRARY_DIRS": "/nowhere"}
-    done = subprocess.run(
-        [sys.executable, "-c", code], env=variables, cwd=ROOT, capture_output=True, text=True
-    )
-    assert (done.returncode, done.stdout.strip()) == (0, "1"), done.stderr

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from time import monotonic
 from typing import Any
 
 import pytest
@@ -17,6 +16,7 @@ from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from tests.command_line import PAPER
 from tests.report_values import EVIL, altered
+from tests.waiting import until
 
 
 @pytest.fixture(scope="module")
@@ -106,9 +106,7 @@ def test_it_plays_and_pauses_by_keyboard(tab: Tab) -> None:
     tab.seek(0)
     tab.page.locator("#net").focus()
     tab.page.keyboard.press("Space")
-    deadline = monotonic() + 20
-    while tab.ask("time") == 0 and monotonic() < deadline:
-        tab.page.wait_for_timeout(10)
+    until(lambda: tab.ask("time") > 0, lambda: tab.page.wait_for_timeout(10))
     tab.page.keyboard.press("Space")
     stopped = tab.ask("time")
     tab.page.wait_for_timeout(60)

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import signal
 import sys
-import time
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -31,6 +30,7 @@ from tests.command_line import PAPER, ROOT, Terminal, spawn, started
 from tests.simulation_values import FINE, layout_of
 from tests.test_log import block_ends
 from tests.test_log_damage import put_together, taken_apart
+from tests.waiting import grown
 
 UNITS = 2
 JITTER = "--seed", 7, "--jitter", 0.2
@@ -333,11 +333,7 @@ def killed_and_gone_on(
     for kill in range(kills):
         wanted = size * chance.uniform(kill + 0.05, kill + 0.9) / kills
         with started(*command) as process:
-            deadline = time.monotonic() + 600
-            while not log.exists() or log.stat().st_size < wanted:
-                assert process.poll() is None and time.monotonic() < deadline
-                time.sleep(0.001)
-            time.sleep(chance.uniform(0.0, 0.01))
+            grown(log, wanted, process)
             process.send_signal(signal.SIGKILL)
             assert process.wait() == -signal.SIGKILL
         came.append([0.0, *read_log(log).time.tolist()][-1])

@@ -47,7 +47,12 @@ from factory.timing.timed import timed
 from factory.timing.timing import Change
 from tests.command_line import PAPER, ROOT, Terminal
 from tests.examples import without_hands
-from tests.layout_values import STYLES, random_layout
+from tests.layout_values import (
+    STYLES,
+    Drawn,
+    drawn_layouts,
+    random_layout,
+)
 from tests.pag_values import SHAPES
 
 STAGED, STILL = Settings(stage=1), Settings()
@@ -83,12 +88,9 @@ def test_what_goes_ahead_in_the_papers_example(paper: Layout) -> None:
     assert found == {(1, "sub3"), (3, "sub1")}
 
 
-@given(sizes, seeds, shapes, styles)
-@settings(max_examples=40)
-def test_only_empty_hands_go_ahead_and_only_to_others(
-    size: int, seed: int, shape: str, style: str
-) -> None:
-    layout = random_layout(size, seed, shape, style)
+@given(drawn_layouts)
+def test_only_empty_hands_go_ahead_and_only_to_others(drawn: Drawn) -> None:
+    layout = random_layout(*drawn)
     for stage in stages(layout, operation_modes(layout, STAGED.eps)):
         operation = layout.factory.operations[stage.operation]
         assert operation.robots[stage.slot] == stage.robot
@@ -108,13 +110,13 @@ def test_what_would_meet_another_on_its_way_does_not_go(
 # --- the pace -------------------------------------------------------------------------------------
 
 
-@given(sizes, seeds, shapes, styles, worlds, st.sampled_from([None, 1, 2]))
+@given(drawn_layouts, seeds, worlds, st.sampled_from([None, 1, 2]))
 @settings(max_examples=40)
 def test_the_slowest_gear_sets_the_pace(
-    size: int, seed: int, shape: str, style: str, world: Any, wip: int | None
+    drawn: Drawn, seed: int, world: Any, wip: int | None
 ) -> None:
     """Though the ways make circuits of their own; and analysis and prediction are one."""
-    layout = random_layout(size, seed, shape, style)
+    layout = random_layout(*drawn)
     timing = Timing(layout, STAGED, world, seed, 0.3)
     net = timed_net(timing, wip=wip)
     assert net.pace == pytest.approx(max_cycle_ratio(net.net, net.seconds).seconds)
@@ -175,10 +177,10 @@ def test_tokens_may_be_ready_later() -> None:
     assert earliest_firings(net, (1.0, 1.0), 3, {}, {0: 3.0})[:, 0].tolist() == [3.0, 5.0, 7.0]
 
 
-@given(sizes, seeds, shapes, styles)
+@given(drawn_layouts)
 @settings(max_examples=25)
-def test_the_layout_is_made_for_that_pace(size: int, seed: int, shape: str, style: str) -> None:
-    layout = random_layout(size, seed, shape, style)
+def test_the_layout_is_made_for_that_pace(drawn: Drawn) -> None:
+    layout = random_layout(*drawn)
     net = timed_net(Timing(layout, STAGED, "ideal"))
     still, staged = Pace.of(STILL), Pace.of(STAGED)
     timing = Timing(layout, STAGED)

@@ -8,8 +8,7 @@ import sqlite3
 import subprocess
 import sys
 import threading
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -35,6 +34,7 @@ from factory.support.errors import InputError, RunError
 from factory.support.settings import Settings
 from tests.command_line import PAPER, ROOT, Terminal, files_in
 from tests.deadly import Deadly, Stillborn
+from tests.waiting import until
 
 FACTORY = [sys.executable, "-m", "factory"]
 SOON = 90.0
@@ -60,13 +60,6 @@ def has_rows(path: Path, least: int) -> bool:
         return len(rows_of(path)) >= least
     except sqlite3.OperationalError:
         return False
-
-
-def wait_for(what: Callable[[], bool]) -> None:
-    end = time.monotonic() + SOON
-    while not what():
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 @pytest.fixture
@@ -493,14 +486,14 @@ def test_a_stopped_sweep_keeps_its_rows_and_goes_on(
     kept: list[tuple[Any, ...]] = []
     for number, status in ((signal.SIGINT, 130), (signal.SIGKILL, -9)):
         process = subprocess.Popen([*FACTORY, *words, "--jobs", "2"], cwd=ROOT, stderr=PIPE)
-        wait_for(partial(has_rows, database, len(kept) + 3))
+        until(partial(has_rows, database, len(kept) + 3))
         workers = children(process.pid)
         process.send_signal(number)
         _, errors = process.communicate(timeout=SOON)
         assert process.returncode == status
         assert errors.strip() == (b"Interrupted stopped by the user" if status == 130 else b"")
         assert len(workers) >= 2
-        wait_for(partial(all_dead, workers))
+        until(partial(all_dead, workers))
         rows = rows_of(database, "*")
         assert rows[: len(kept)] == kept
         assert len(kept) + 3 <= len(rows) < 40

@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import mutations
-from strategies import templates as random_templates
 
 from factory.lang import load_templates, read_template, write_template
 from factory.problem.template import LOST, Failure, Law, Point, Response, Template
 from factory.support.errors import Diagnostic, InputError
 from tests.pag_texts import MATE, read_or_refused
+from tests.strategies import mutations
+from tests.strategies import templates as random_templates
 
 HERE = Path(__file__).parent
 BROKEN = HERE / "broken"

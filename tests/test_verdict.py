@@ -4,14 +4,12 @@ beside the run and from its log; honest runs succeed."""
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from layout_values import random_layout
 
 import factory
 from factory.layout.layout import Layout
@@ -19,7 +17,6 @@ from factory.layout.request import Ground
 from factory.mjcf import loading, names
 from factory.mjcf.model import Model
 from factory.pipeline import read
-from factory.plant.factory import Operation
 from factory.record.log import read_log
 from factory.record.log.writer import LogWriter
 from factory.record.monitor import beside
@@ -29,23 +26,20 @@ from factory.record.verdict import LIMITS, RunVerdict, check_figures, judged
 from factory.simulation.disturbance import Gain, Mass, Noise, disturb
 from factory.simulation.mujoco import world as mujoco_world
 from factory.simulation.mujoco.interference import Interference
-from factory.simulation.mujoco.parts import Parts
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.simulation.watched import watched
-from factory.support.engine import mujoco
 from factory.support.errors import Diagnostic
 from factory.support.settings import Settings
 from tests.bench.factories import balanced
 from tests.command_line import PAPER, ROOT, Terminal
 from tests.examples import with_hands
 from tests.good_runs import random_marking
+from tests.layout_values import random_layout
 from tests.pag_texts import laid_out
+from tests.planted import before_the_switch, displaced, into, moved, warns
 
 EXAMPLES = sorted(path.stem for path in (ROOT / "examples").glob("*.pag"))
-
-Act = Callable[[Parts, Any, Any], None]
-"""Acts on the parts, the engine's model and its data."""
 
 
 @pytest.fixture(scope="module")
@@ -57,36 +51,8 @@ def codes(verdict: RunVerdict) -> set[str]:
     return {failure.code for failure in verdict.failures}
 
 
-def before_the_switch(monkeypatch: pytest.MonkeyPatch, label: str, act: Act) -> None:
-    """Act on the engine once, where an operation has ended and no weld is switched yet."""
-    hand_over, done = Parts.hand_over, list[str]()
-
-    def acted(self: Parts, ended: Sequence[tuple[Operation, int]]) -> None:
-        if not done and any(operation.label == label for operation, _ in ended):
-            done.append(label)
-            act(self, self.welds._m, self.welds._d)
-        hand_over(self, ended)
-
-    monkeypatch.setattr(Parts, "hand_over", acted)
-
-
-def moved(joint: str, by: float) -> Act:
-    def act(parts: Parts, m: Any, d: Any) -> None:
-        d.qpos[m.jnt_qposadr[m.joint(joint).id]] += by
-
-    return act
-
-
-def displaced(part: str, axis: int, by: float) -> Act:
-    def act(parts: Parts, m: Any, d: Any) -> None:
-        d.qpos[m.jnt_qposadr[m.body_jntadr[m.body(part).id]] + axis] += by
-
-    return act
-
-
-def failed(run: Terminal, log: Path, *more: object) -> set[str]:
-    """The codes of a run of the paper's example that fails, in its document, in its summary and
-    from its log; and that succeeds with --lenient."""
+def failed(run: Terminal, *more: object) -> set[str]:
+    """The codes of a run of the paper's example that fails."""
     done = run("run", PAPER, "--json", *more)
     assert done.status == 1
     verdict = done.json["verdict"]
@@ -185,14 +151,15 @@ def test_a_monitor_of_a_run_looks_where_operations_end(paper: Layout) -> None:
 # --- planted faults -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("by", [0.06, 0.005, 0.0015, 0.0006])
-@pytest.mark.parametrize("robot", ["r3", "r5"])
+@pytest.mark.parametrize(
+    ("robot", "by"), [("r3", 0.06), ("r3", 0.0015), ("r3", 0.0006), ("r5", 0.005), ("r5", 0.0006)]
+)
 def test_a_carriage_that_jumps_before_its_weld_switches(
-    run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, robot: str, by: float
+    run: Terminal, tmp_path: Path, robot: str, by: float
 ) -> None:
-    before_the_switch(monkeypatch, "sub1", moved(names.slide(robot), -by))
     log = tmp_path / "log"
-    found = failed(run, log, "--log", log)
+    with before_the_switch("sub1", moved(names.slide(robot), -by)):
+        found = failed(run, "--log", log)
     takes = robot == "r3"  # the other one has let go of its part
     assert found >= ({"Early", "Missed"} if takes else {"Early"})
     assert ("HandOffGap" in found) == (takes and by > 0.001)
@@ -203,27 +170,19 @@ def test_a_carriage_that_jumps_before_its_weld_switches(
     assert again.json["violations"][0]["robot"] == robot
 
 
-@pytest.mark.parametrize("by", [0.06, 0.005, 0.0015, 0.0006])
-@pytest.mark.parametrize("axis", [0, 2])
-def test_a_part_that_jumps_before_its_weld_switches(
-    run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, axis: int, by: float
-) -> None:
-    before_the_switch(monkeypatch, "sub1", displaced("part/part1#1", axis, by))
-    assert "Missed" in failed(run, tmp_path / "log")
+@pytest.mark.parametrize(("axis", "by"), [(0, 0.0015), (2, 0.06), (2, 0.0006)])
+def test_a_part_that_jumps_before_its_weld_switches(run: Terminal, axis: int, by: float) -> None:
+    """By what the table of planted faults has not."""
+    with before_the_switch("sub1", displaced("part/part1#1", by, axis=axis)):
+        assert "Missed" in failed(run)
 
 
-def test_an_error_that_welds_pull_back_is_told(
-    run: Terminal, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_error_that_welds_pull_back_is_told(run: Terminal) -> None:
     """A part that jumps or is turned as it is taken is in its place when the product is done."""
-
-    def turned(parts: Parts, m: Any, d: Any) -> None:
-        at = m.jnt_qposadr[m.body_jntadr[m.body("part/part1#1").id]]
-        d.qpos[at + 3 : at + 7] = (np.cos(0.01), 0, 0, np.sin(0.01))
-
-    for act, least in ((displaced("part/part1#1", 0, 0.005), 4.9), (turned, 0.3)):
-        before_the_switch(monkeypatch, "sub1", act)
-        document = run("run", PAPER, "--lenient", "--json").json
+    turned = displaced("part/part1#1", degrees=np.degrees(0.02))
+    for act, least in ((displaced("part/part1#1", 0.005), 4.9), (turned, 0.3)):
+        with before_the_switch("sub1", act):
+            document = run("run", PAPER, "--lenient", "--json").json
         assert document["product_error_max_mm"] < 0.02
         assert document["joining_error_max_mm"] > least
     honest = run("run", PAPER, "--json").json
@@ -236,10 +195,10 @@ def test_a_lenient_run_of_bodies_that_disagree(
     act = moved(names.slide("r3"), -0.06)
     log, page = tmp_path / "log", tmp_path / "page.html"
     for words in ((), ("-q",)):
-        before_the_switch(monkeypatch, "sub1", act)
-        assert run("run", PAPER, "--lenient", *words).status == 0
-    before_the_switch(monkeypatch, "sub1", act)
-    done = run("run", PAPER, "--lenient", "--json", "--log", log)
+        with before_the_switch("sub1", act):
+            assert run("run", PAPER, "--lenient", *words).status == 0
+    with before_the_switch("sub1", act):
+        done = run("run", PAPER, "--lenient", "--json", "--log", log)
     verdict = done.json["verdict"]
     assert done.status == 0 and verdict["succeeded"] and verdict["lenient"]
     assert {failure["code"] for failure in verdict["failures"]} >= {"Missed", "HandOffGap"}
@@ -252,15 +211,13 @@ def test_a_lenient_run_of_bodies_that_disagree(
     assert run("report", log, "-o", page, "--lenient").status == 0
     (tmp_path / "factory.toml").write_text("lenient = true\n")
     monkeypatch.chdir(tmp_path)
-    before_the_switch(monkeypatch, "sub1", act)
-    assert run("run", PAPER).status == 0
+    with before_the_switch("sub1", act):
+        assert run("run", PAPER).status == 0
 
 
-def test_each_failed_part_is_a_line_of_the_summary(
-    run: Terminal, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    before_the_switch(monkeypatch, "sub1", moved(names.slide("r3"), -0.06))
-    done = run("run", PAPER)
+def test_each_failed_part_is_a_line_of_the_summary(run: Terminal) -> None:
+    with before_the_switch("sub1", moved(names.slide("r3"), -0.06)):
+        done = run("run", PAPER)
     lines = [line.strip() for line in done.out.splitlines()]
     assert lines[0].startswith("the run FAILED: Early: ") and "60.0 mm from its goal" in lines[0]
     assert any(line.startswith("HandOffGap: a hand-off with a gap of 60.0") for line in lines)
@@ -269,9 +226,9 @@ def test_each_failed_part_is_a_line_of_the_summary(
     assert "the run succeeded" in run("run", PAPER).out
 
 
-def test_a_monitor_that_is_not_wanted(run: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
-    before_the_switch(monkeypatch, "sub1", moved(names.slide("r3"), -0.0006))
-    done = run("run", PAPER, "--no-monitor", "--json")
+def test_a_monitor_that_is_not_wanted(run: Terminal) -> None:
+    with before_the_switch("sub1", moved(names.slide("r3"), -0.0006)):
+        done = run("run", PAPER, "--no-monitor", "--json")
     assert done.status == 0 and "monitor_time_s" not in done.json
     assert run("run", PAPER, "--world", "ideal", "--no-monitor").status == 0
 
@@ -344,17 +301,11 @@ def test_a_sensor_that_would_have_a_robot_leave_its_rail(paper: Layout) -> None:
     assert 0.0005 < at - paper.guidepaths[4].length < 0.0015
 
 
-def test_bodies_that_touch(run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bodies_that_touch(run: Terminal, tmp_path: Path) -> None:
     """A parked copy is put into a carriage that goes by."""
-
-    def act(parts: Parts, m: Any, d: Any) -> None:
-        body = m.body("part/part1#1").id
-        at = m.jnt_qposadr[m.body_jntadr[body]]
-        d.qpos[at : at + 3] = d.xpos[m.body("r2/carriage").id]
-
-    before_the_switch(monkeypatch, "sub1", act)
     log, page = tmp_path / "log", tmp_path / "page.html"
-    found = failed(run, log, "--log", log, "--max-time", 30)
+    with before_the_switch("sub1", into("part/part1#1", "r2/carriage")):
+        found = failed(run, "--log", log, "--max-time", 30)
     assert "Contact" in found
     document = run("monitor", log, "--json").json
     contact = next(f for f in document["verdict"]["failures"] if f["code"] == "Contact")
@@ -377,12 +328,9 @@ def test_an_engine_that_warns(paper: Layout, monkeypatch: pytest.MonkeyPatch) ->
     assert Simulation(paper, RunRequest()).physical.figures().engine_warnings > 0
 
 
-def test_a_run_whose_engine_has_warned(run: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
-    def act(parts: Parts, m: Any, d: Any) -> None:
-        d.warning[int(mujoco.mjtWarning.mjWARN_CNSTRFULL)].number += 1
-
-    before_the_switch(monkeypatch, "sub1", act)
-    done = run("run", PAPER, "--json")
+def test_a_run_whose_engine_has_warned(run: Terminal) -> None:
+    with before_the_switch("sub1", warns):
+        done = run("run", PAPER, "--json")
     assert done.status == 1 and done.json["engine_warnings"] > 0
     assert [f["code"] for f in done.json["verdict"]["failures"]] == ["EngineWarning"]
 

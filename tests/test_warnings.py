@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from command_line import Terminal
 
 from factory.commands.warnings import condensed
 from factory.support.errors import Diagnostic
+from tests.command_line import Terminal
 
 OPENED, TURNED = 4, 2
 LINES = [

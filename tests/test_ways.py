@@ -13,8 +13,6 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from random_products import random_product
-from ways_checker import check
 
 from factory.exporting.ways import ways
 from factory.layout.clearance import certify
@@ -32,6 +30,8 @@ from factory.problem.robot_types import load_catalogue
 from factory.simulation.ordering import Ordering
 from factory.support.errors import RunError
 from factory.support.settings import Settings
+from tests.random_products import random_product
+from tests.ways_checker import check
 
 Json = dict[str, Any]
 
