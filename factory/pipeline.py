@@ -54,6 +54,31 @@ class Project:
     plan: Plan = field(default_factory=Plan)
     laid: LayoutTable | None = field(default=None, repr=False)
 
+    @classmethod
+    def of_made(cls, made: Factory | Layout, settings: Settings | None = None) -> Project:
+        """The project of a factory or a layout, neither of which is made again. Without `settings`
+        they are the default ones, with the clearance and the hands of a layout."""
+        layout = None if isinstance(made, Factory) else made
+        plain = made if isinstance(made, Factory) else (made.plain or made).factory
+        ground, known = Ground(), dict[str, Any](plain=plain, planned=plain)
+        if layout is not None:
+            hands = int(bool(layout.hands))
+            settings = settings or Settings(clearance=layout.clearance, hands=hands)
+            ground = Ground(relay=layout.plain is not None, deputies=layout.standby is not None)
+            known["layout"] = layout
+            if plain.period == 1:
+                known["product"] = layout.product
+        used = {o.template.name: o.template for o in plain.operations}
+        project = cls(
+            plain.pag,
+            {**all_templates(), **used},
+            settings=settings or Settings(),
+            ground=ground,
+            plan=plain.plan,
+        )
+        project.__dict__.update(known)
+        return project
+
     def with_pag(self, pag: PAG) -> Project:
         """The same parts with another PAG."""
         return self._changed({"product"}, pag=pag)
@@ -252,7 +277,7 @@ def _is_shipped(template: Template) -> bool:
     return at is not None and Path(at.file).parent == templates_folder()
 
 
-def all_templates(folders: Sequence[Path] = ()) -> Mapping[str, Template]:
+def all_templates(folders: Sequence[str | PathLike[str]] = ()) -> Mapping[str, Template]:
     """The templates of the user's folders and the shipped ones. Raises InputError."""
     for folder in folders:
         if not Path(folder).is_dir():
@@ -265,7 +290,7 @@ def all_templates(folders: Sequence[Path] = ()) -> Mapping[str, Template]:
 
 def read(
     path: str | PathLike[str],
-    folders: Sequence[Path] = (),
+    folders: Sequence[str | PathLike[str]] = (),
     settings: Settings | None = None,
     ground: Ground = Ground(),  # noqa: B008 (frozen)
 ) -> Project:

@@ -32,8 +32,9 @@ FLOORS = (
 )
 """Rooms from the ground up. A room imports itself and the floors below it, nothing beside it."""
 
-ENTRANCES = ("__init__", "__main__")
-"""Loose modules above all floors."""
+ENTRANCES = ("stages", "studies", "notebook", "__init__", "__main__")
+"""Loose modules above all floors, from the lowest up: the functions that a user calls, how values
+are shown, the command."""
 
 ENGINE_ROOMS = (
     "support",
@@ -126,9 +127,10 @@ class House:
 
 
 def floor(room: str) -> int:
-    """The number of a room's floor from the ground up; entrances are above all."""
+    """The number of a room's floor from the ground up; entrances are above all, in
+    their order."""
     if room in ENTRANCES:
-        return len(FLOORS)
+        return len(FLOORS) + ENTRANCES.index(room)
     return next((n for n, rooms in enumerate(FLOORS) if room in rooms), -1)
 
 
@@ -242,12 +244,14 @@ def crowded_classes(house: House) -> Iterator[str]:
 
 
 def crowded_functions(house: House) -> Iterator[str]:
-    """Functions with more parameters than there may be (self and cls are not counted)."""
+    """Functions with more parameters than there may be (self and cls are not counted). In the
+    entrances they are a user's options, as those of commands are: keywords are not counted."""
     for module in house.modules.values():
         for node in ast.walk(module.tree):
             if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
                 a = node.args
-                every = [p.arg for p in (*a.posonlyargs, *a.args, *a.kwonlyargs)]
+                keywords = [] if module.room in ENTRANCES else a.kwonlyargs
+                every = [p.arg for p in (*a.posonlyargs, *a.args, *keywords)]
                 count = len([p for p in every if p not in ("self", "cls")])
                 if count > MOST_PARAMETERS and not is_command(node):
                     yield f"{module.name}.{node.name}: {count} parameters"

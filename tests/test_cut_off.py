@@ -19,12 +19,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from factory.commands.run import carry_out
 from factory.record.ending import CutOff
 from factory.record.log import LogWriter, read_log
 from factory.record.state import State
 from factory.rendering.video import VideoFile
 from factory.show.report import page, recording_of
+from factory.simulation.executing import carry_out
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.claim import claimed, is_claimed

@@ -122,6 +122,11 @@ BREACHES: tuple[tuple[Law, dict[str, str], str], ...] = (
         "nets.a.f: 9 parameters",
     ),
     (
+        crowded_functions,
+        {"factory/stages.py": "def f(a, b, c, d, e, f, g, h, i, *, j): ..."},
+        "stages.f: 9 parameters",
+    ),
+    (
         twins,
         {"factory/nets/a.py": "class A: ...", "factory/lang/b.py": "class A: ..."},
         "A: lang.b, nets.a",

@@ -30,12 +30,17 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "factory"
 
-CALLS = ("load_pag", "compile", "verify", "lay_out", "run", "to_networkx")
+CALLS = (
+    *("load_pag", "compile", "verify", "lay_out", "run", "build", "render", "report", "analyze"),
+    *("export", "sweep", "plan", "to_networkx"),
+)
 VALUES = (
     *("support.settings.Settings", "problem.pag.PAG", "problem.pag.Assembly"),
     *("problem.template.Template", "plant.factory.Factory", "plant.factory.Operation"),
     *("plant.factory.Robot", "nets.verdict.Verdict", "layout.layout.Layout"),
-    *("simulation.run.Run", "simulation.run.PhysicsFigures"),
+    *("simulation.run.Run", "record.figures.PhysicsFigures", "exporting.build.Built"),
+    *("rendering.rendering.Rendered", "show.report.reporting.RunReport"),
+    *("study.analysis.Analysis", "study.sweep.summary.Summary", "studies.PlannedAssembly"),
 )
 """What the calls take and give."""
 

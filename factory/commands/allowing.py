@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Collection, Sequence
 from typing import Any
 
 import click
 
-from factory.problem.pag import ANY_DEPTH, AllowedOverlap
+from factory.problem.pag import AllowedOverlap
+from factory.support.errors import InputError
 
 
 class OverlapOption(click.ParamType[AllowedOverlap]):
@@ -17,20 +16,12 @@ class OverlapOption(click.ParamType[AllowedOverlap]):
     name = "[part:part][:depth]"
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        if isinstance(value, AllowedOverlap):
-            return value
-        parts, depth = value.split(":"), ANY_DEPTH
-        if len(parts) in (1, 3):
-            length = length_of(parts.pop())
-            if length is None or length < 0:
-                from factory.lang.words import UNITS
+        from factory.lang.overlaps import overlap_in
 
-                units = ", ".join(UNITS)
-                self.fail(f"'{value}' ends in no length in one of {units}.", param, ctx)
-            depth = length
-        if len(parts) not in (0, 2) or not all(parts) or len({*parts}) == 1:
-            self.fail(f"'{value}' is neither part:part, part:part:depth nor depth.", param, ctx)
-        return AllowedOverlap(depth, tuple(parts))
+        try:
+            return value if isinstance(value, AllowedOverlap) else overlap_in(value)
+        except InputError as error:
+            self.fail(error.diagnostics[0].message, param, ctx)
 
 
 ALLOW = click.option(
@@ -39,28 +30,3 @@ ALLOW = click.option(
     type=OverlapOption(),
     help="Accept an overlap: a:b, a:b:0.5mm, or 0.5mm everywhere (repeatable).",
 )
-
-
-def allowed_in(
-    words: Sequence[str], labels: Collection[str]
-) -> tuple[list[AllowedOverlap], tuple[str, ...]]:
-    """The words of `plan --allow` in two groups: those with a depth, as overlaps to accept, and
-    labels, or pairs of labels, of parts that may pass through others."""
-    lengths = {
-        word
-        for word in words
-        if word not in labels
-        and word.count(":") != 1
-        and length_of(word.split(":")[-1]) is not None
-    }
-    overlaps = [OverlapOption().convert(word, None, None) for word in lengths]
-    return overlaps, tuple(word for word in words if word not in lengths)
-
-
-def length_of(word: str) -> float | None:
-    """Length [m] of a word such as `0.5mm`, in metres without a unit; None if it is none."""
-    from factory.lang.words import UNITS, number
-
-    match = re.fullmatch(r"(.*?)\s*([a-z]*)", word)
-    unit = (match[2] or "m") if match else ""
-    return number(match[1], unit) if match and unit in UNITS else None

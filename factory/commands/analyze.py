@@ -22,11 +22,11 @@ from factory.commands.options import (
     WIP,
     gathered,
 )
-from factory.commands.requests import OutputOptions, ProjectOptions, RunOptions
-from factory.commands.run import carry_out
+from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced, cut_off, read_partly
+from factory.simulation.options import RunOptions
 from factory.support.console import emit, say, table
-from factory.support.errors import Diagnostic, InputError, did_you_mean, usage_error
+from factory.support.errors import Diagnostic, InputError, usage_error
 
 if TYPE_CHECKING:
     from factory.pipeline import Project
@@ -56,26 +56,11 @@ class AnalyzeOptions:
 
     def change(self, factory: Factory) -> tuple[str, Change] | None:
         """The change of a what-if question and its description; None without. Raises InputError."""
-        from factory.study.analysis import Change
+        from factory.study.analysis.changes import change_of
 
-        robots = {robot.name: robot.index for robot in factory.robots}
-        copies = {_robot(robots, name): 1 for name in self.seconds}
-        for name in self.seconds:
-            copies[robots[name]] += 1
-        speed = dict(_percent(robots, text, "--faster", 1e6) for text in self.faster)
-        way = dict(_percent(robots, text, "--shorter", 100.0) for text in self.shorter)
-        names = factory.robots
-        words = [f"{count} × {names[r].name}" for r, count in copies.items()]
-        words += [f"{names[r].name} {100 * share:g} % faster" for r, share in speed.items()]
-        words += [f"ways of {names[r].name} {100 * share:g} % shorter" for r, share in way.items()]
-        if not words:
-            return None
-        change = Change(
-            speed={robot: 1 + share for robot, share in speed.items()},
-            way={robot: 1 - share for robot, share in way.items()},
-            copies=copies,
-        )
-        return ", ".join(words), change
+        faster = dict(_percent(text, "--faster") for text in self.faster)
+        shorter = dict(_percent(text, "--shorter") for text in self.shorter)
+        return change_of(factory, self.seconds, faster, shorter)
 
 
 @click.command(cls=Grouped)
@@ -154,6 +139,7 @@ def _run(
     project: Project, timing: Timing, asked: RunOptions, silent: bool
 ) -> tuple[RunRecord, int]:
     """A run without fused parts, and its exit status."""
+    from factory.simulation.executing import carry_out
     from factory.simulation.simulation import Simulation
     from factory.study.analysis.measured import record_of
 
@@ -164,22 +150,12 @@ def _run(
     return record_of(run), 0 if run.succeeded else 1
 
 
-def _robot(robots: dict[str, int], name: str) -> int:
-    if name not in robots:
-        hint = did_you_mean(name, list(robots), "robots")
-        raise usage_error(f"there is no robot '{name}'", hint)
-    return robots[name]
-
-
-def _percent(robots: dict[str, int], text: str, option: str, most: float) -> tuple[int, float]:
-    """`r4=20` as a robot and a share, of more than 0 and at most `most` percent."""
+def _percent(text: str, option: str) -> tuple[str, float]:
+    """`r4=20` as the name of a robot and a number. Raises InputError (BadValue)."""
     name, _, number = text.partition("=")
     try:
-        percent = float(number)
-        if not 0 < percent <= most:
-            raise ValueError
+        return name, float(number)
     except ValueError:
-        message = f"{option} takes a robot and percent above 0, at most {most:g}, not '{text}'"
+        message = f"{option} takes a robot and percent above 0, not '{text}'"
         hint = f"for example {option} r1=20"
         raise InputError(Diagnostic("BadValue", message, None, hint)) from None
-    return _robot(robots, name), percent / 100

@@ -9,14 +9,12 @@ from typing import TYPE_CHECKING
 
 import click
 
+from factory.support.bounds import LENGTHS
 from factory.support.errors import InputError
 
 if TYPE_CHECKING:
     from factory.planning.parts import InPlace
     from factory.planning.source import SourceOptions
-
-UNITS = ("m", "cm", "mm", "in", "ldu")
-"""The names of units of length; `ldu` is that of LDraw, 0.4 mm."""
 
 
 def is_terminal() -> bool:
@@ -39,7 +37,7 @@ def asked(
                 raise
             click.echo("\n".join(d.message for d in error.diagnostics), err=True)
             if codes == {"Unit"}:
-                unit = click.prompt("unit of lengths", type=click.Choice(UNITS), err=True)
+                unit = click.prompt("unit of lengths", type=click.Choice(LENGTHS), err=True)
                 options = replace(options, unit=unit)
             elif click.confirm("plan them where they are?", err=True):
                 options = replace(options, in_place=True)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from factory.commands.grouped import Grouped
-from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, RELAY, SOURCE, WIP
+from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, RELAY, SOURCE, UNITS, WIP
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import condensed
@@ -34,9 +34,7 @@ SHOWN = 20
 @SOURCE
 @click.option("--mjcf", type=PATH, help="Write the MJCF model as one XML file.")
 @click.option("-o", "--output", type=PATH, help="Folder for all output files.")
-@click.option(
-    "--units", type=click.IntRange(1, 10**9), help="Number of products to size the part pool for."
-)
+@click.option("--units", type=UNITS, help="Number of products to size the part pool for.")
 @WIP
 @FLOOR
 @RELAY

@@ -13,6 +13,7 @@ from factory.commands.requests import OutputOptions
 from factory.support.console import emit, say
 from factory.support.errors import FactoryError
 from factory.support.extras import EXTRAS, installs
+from factory.support.namesake import MEND, clash
 from factory.support.version import release
 
 PACKAGES = (
@@ -54,7 +55,7 @@ def doctor(out: OutputOptions) -> int:
         )
     else:
         for finding in findings:
-            say(f"{'ok     ' if finding.ok else 'MISSING'} {finding.name}: {finding.found}")
+            say(f"{'ok     ' if finding.ok else 'FAULTY '} {finding.name}: {finding.found}")
             if not finding.ok:
                 say(f"        {finding.mend}")
         say("optional extras:")
@@ -78,12 +79,17 @@ def examine() -> list[Finding]:
     """The checks: Python, packages, assets, the engine and headless rendering."""
     engine = _engine()
     rendering = _rendering() if engine.ok else Finding("rendering", False, "no engine", engine.mend)
-    return [_python(), *map(_package, PACKAGES), _assets(), engine, rendering]
+    return [_python(), _name(), *map(_package, PACKAGES), _assets(), engine, rendering]
 
 
 def _python() -> Finding:
     good = sys.version_info >= (3, 11)
     return Finding("python", good, platform.python_version(), "install Python 3.11 or newer")
+
+
+def _name() -> Finding:
+    wrong = clash()
+    return Finding("import name", not wrong, wrong or "factory is this package", MEND)
 
 
 def _package(name: str) -> Finding:

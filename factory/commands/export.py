@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,21 +12,12 @@ from factory.commands.grouped import Grouped
 from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, RELAY, SOURCE
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
-from factory.commands.warnings import announced, cut_off, read_partly
-from factory.support.console import emit, say
-from factory.support.errors import did_you_mean, usage_error
+from factory.commands.warnings import announced, cut_off
+from factory.support.console import emit, say, warn
+from factory.support.errors import usage_error
 
 if TYPE_CHECKING:
-    from factory.exporting import Exporter, Made
     from factory.exporting.subject import Source
-
-TAKEN = {
-    "net": ("a PAG", "a net in PNML"),
-    "pag": ("a PAG",),
-    "log": ("a log",),
-    "factory": ("a PAG", "a log"),
-}
-"""The kinds of file that an exporter can take."""
 
 
 class _Listing(Grouped):
@@ -77,20 +67,32 @@ def export(
     options: ProjectOptions, out: OutputOptions, form: str, output: Path | None, of: str
 ) -> int:
     """Write FILE.pag, a net in FILE.pnml or a LOG of a run for other tools."""
-    from factory.exporting import Subject
+    from factory.exporting.writing import check_taken, exporter, read_source, takes_folder
+    from factory.exporting.writing import export as exported
     from factory.pipeline import Project
     from factory.record.log import Log
     from factory.support.files import write_all
 
-    chosen = _exporter(form, of)
-    whole = chosen.folder and output is not None and _is_folder(output)
-    _writable(options.file, output, whole, chosen)
-    source = _source(options, chosen, out.silent)
-    name = output.name if output else ""
-    made = chosen.export(Subject(options.file, source, of, name, whole))
+    chosen = exporter(form, of)
+    if output is None and chosen.binary:
+        message = f"{chosen.format} is binary and is not written to a terminal"
+        raise usage_error(message, f"give -o OUT.{chosen.ending or chosen.format}")
+    if takes_folder(chosen, output):
+        writable_folder(output)
+    else:
+        writable(options.file, output)
+    source: Source | None = read_source(options.file)
+    check_taken(chosen, options.file, source)
+    if isinstance(source, Log) and source.cut_off:
+        warn([source.cut_off.diagnostic(options.file)], out.silent)
+    source = options.project(out.silent) if source is None else source
+    made, files = exported(chosen, options.file, source, output, of)
+    if output is None and not isinstance(made, str):
+        raise usage_error(
+            f"this format writes {len(made)} files", "give -o OUT for the first of them"
+        )
     seen = source.product if isinstance(source, Project) and source.has_geometry else None
     warnings = announced(seen.warnings if seen else (), out)
-    files = _files(made, output, whole)
     if output is not None:
         write_all(files)
     if out.as_json:
@@ -105,68 +107,3 @@ def export(
     elif output is not None:
         say(f"{form}: {output}" + (f", {len(files)} files" if len(files) > 1 else ""))
     return 0
-
-
-def _source(options: ProjectOptions, chosen: Exporter, silent: bool) -> Source:
-    """The input of an exporter. Raises InputError, of code Usage if the exporter does not take such
-    a file."""
-    from factory.record.log import is_log
-    from factory.support.files import is_net
-
-    file = options.file
-    kind = "a log" if is_log(file) else "a net in PNML" if is_net(file) else "a PAG"
-    wanted = TAKEN[chosen.takes]
-    if kind not in wanted:
-        message = f"{chosen.format} is made from {' or '.join(wanted)}; '{file}' is {kind}"
-        hint = f"give {wanted[0]}"
-        if chosen.takes == "log":
-            hint = "keep one first: `factory run FILE.pag --log OUT`"
-        raise usage_error(message, hint)
-    if kind == "a log":
-        return read_partly(file, silent)
-    if kind == "a PAG":
-        return options.project(silent)
-    from factory.foreign_nets.pnml_reader import load_net
-
-    return load_net(file)
-
-
-def _exporter(form: str, of: str) -> Exporter:
-    from factory.exporting import exporters
-
-    known = exporters()
-    if form not in known:
-        hint = did_you_mean(form, list(known), "formats")
-        raise usage_error(f"unknown format '{form}'", hint)
-    if of and not known[form].of:
-        some = ", ".join(f"{e.format} ({e.of})" for e in known.values() if e.of)
-        message = f"format {form} offers no choice, so no --of"
-        raise usage_error(message, f"a choice is offered by {some}")
-    return known[form]
-
-
-def _is_folder(output: Path) -> bool:
-    """Whether an output is a folder, or a new name without an ending."""
-    return output.is_dir() or not (output.suffix or output.exists())
-
-
-def _writable(file: Path, output: Path | None, whole: bool, chosen: Exporter) -> None:
-    if output is None and chosen.binary:
-        message = f"{chosen.format} is binary and is not written to a terminal"
-        raise usage_error(message, f"give -o OUT.{chosen.ending or chosen.format}")
-    if whole:
-        writable_folder(output)
-    else:
-        writable(file, output)
-
-
-def _files(made: Made, output: Path | None, whole: bool) -> dict[Path, bytes]:
-    """Content of each output file. Raises InputError (Usage) for several files without -o."""
-    if not isinstance(made, Mapping):
-        content = made.encode() if isinstance(made, str) else made
-        return {} if output is None else {output: content}
-    if output is None:
-        message = f"this format writes {len(made)} files"
-        raise usage_error(message, "give -o OUT for the first of them")
-    folder = output if whole else output.parent
-    return {folder / name if name else output: content for name, content in made.items()}

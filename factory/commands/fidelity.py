@@ -19,7 +19,7 @@ from factory.commands.options import (
     RELAY,
     SECONDS,
     SOURCE,
-    Number,
+    bounded,
 )
 from factory.commands.outputs import writable
 from factory.commands.requests import OutputOptions, ProjectOptions
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--jitter",
-    type=Number(0, 0.9),
+    type=bounded("jitter"),
     default=0.3,
     help="Draw each robot's speed and gain at random within ± this fraction.",
 )

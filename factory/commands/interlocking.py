@@ -7,12 +7,10 @@ from typing import TYPE_CHECKING
 
 from factory.commands.requests import OutputOptions
 from factory.commands.warnings import announced
-from factory.nets.verdict import listing
-from factory.support.errors import Diagnostic, InputError, MissingError
+from factory.support.errors import InputError, MissingError
 from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
-    from factory.planning.cannot import Interlock
     from factory.planning.parts import InPlace
     from factory.planning.plan import CannotAssemble
 
@@ -24,6 +22,7 @@ def refuse(
     placed: InPlace, why: CannotAssemble, folder: Path, look: bool, out: OutputOptions
 ) -> int:
     """Print why there is no assembly tree, and draw it; returns the exit status."""
+    from factory.planning.outcome import refusal
     from factory.support.console import fail
 
     pictures = _interlocked(placed, why, folder, out) if look else []
@@ -32,39 +31,7 @@ def refuse(
         "removal": {"labels": list(why.removal.labels), "smallest": why.removal.smallest},
         "files": [str(path) for path in pictures],
     }
-    return fail(InputError(cannot(why, pictures)), out.as_json, details)
-
-
-def cannot(why: CannotAssemble, pictures: list[Path]) -> Diagnostic:
-    """The error: the interlocked parts, their pictures, and a remedy."""
-    stuck = "; ".join(map(_held, why.interlocks))
-    more = " and ".join(why.removal.labels)
-    fewest = "the fewest parts" if why.removal.smallest else "perhaps fewer suffice"
-    pairs = [":".join(lock.labels) for lock in why.interlocks if len(lock.labels) == 2]
-    every = len(pairs) == len(why.interlocks)
-    options = " ".join(f"--allow {name}" for name in (pairs if every else why.removal.labels))
-    shown = f" (see {listing(map(str, pictures), 2)})" if pictures else ""
-    message = f"no straight motion along x, y or z separates these parts: {stuck}{shown}"
-    hint = f"without {more} the rest can be joined ({fewest}); {options} accepts the clash"
-    if why.needs:
-        from factory.planning.posing import in_words
-
-        ways = [f"{listing(labels)} along {in_words(way)}" for labels, way in why.needs]
-        hint = f"no orientation aligns all motions with axes ({'; '.join(ways)}); {hint}"
-    return Diagnostic("CannotAssemble", message, None, hint)
-
-
-def _held(lock: Interlock) -> str:
-    """Interlocked parts, and the pair of them with the smallest overlap on the way out."""
-    from factory.planning.cannot import named
-
-    words = listing(lock.labels)
-    if lock.clashes:
-        least = lock.clashes[0]
-        by = f"by {1e3 * least.depth:.2f} mm or more on each way"
-        words += f" ({least.one} and {least.other} pass through each other {by},"
-        words += f" least where {least.one} leaves to {named(least.way)})"
-    return words
+    return fail(InputError(refusal(why, pictures)), out.as_json, details)
 
 
 def _interlocked(

@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 import click
 from click.shell_completion import CompletionItem
 
-from factory.commands.requests import OutputOptions, PictureOptions, ProjectOptions, RunOptions
+from factory.commands.requests import OutputOptions, PictureOptions, ProjectOptions
+from factory.simulation.options import RunOptions
+from factory.support.bounds import BOUNDS, TIMES
 from factory.support.errors import FactoryError
-from factory.support.settings import LEAST, LONGEST, MOST_BRANCHES
+from factory.support.settings import LEAST, MOST_BRANCHES
 
 if TYPE_CHECKING:
     from factory.problem.pag import PAG
@@ -133,8 +135,16 @@ class Number(click.FloatRange):
         return number
 
 
-SECONDS = Number(0, LONGEST, min_open=True)
-SEEDS = click.IntRange(0, 2**63 - 1)
+def bounded(name: str) -> click.ParamType[Any]:
+    """The type of an option whose bounds are in BOUNDS."""
+    low, high = BOUNDS[name]
+    whole = isinstance(low, int)
+    return click.IntRange(int(low), int(high)) if whole else Number(low, high, name in TIMES)
+
+
+SECONDS = bounded("seconds")
+SEEDS = bounded("seed")
+UNITS = bounded("units")
 
 
 class Timestep(click.ParamType[float | str]):
@@ -168,7 +178,7 @@ class RobotCount(click.ParamType[int | str]):
     name = "number|least"
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        return value if value == LEAST else click.IntRange(1).convert(value, param, ctx)
+        return value if value == LEAST else bounded("robots").convert(value, param, ctx)
 
 
 HANDS = click.option(
@@ -235,7 +245,7 @@ RELAY = options(
     ),
     click.option(
         "--effort",
-        type=click.IntRange(1, 10**6),
+        type=bounded("effort"),
         help="Number of factories to lay out in the search for few robots (default: 8 to 100).",
     ),
     click.option(
@@ -247,12 +257,12 @@ RELAY = options(
 )
 WIP = click.option(
     "--wip",
-    type=click.IntRange(1, 10**9),
+    type=bounded("wip"),
     help="Work in progress: most copies of each part inside.",
 )
 RUNS = gathered(RunOptions, "asked")
 JOBS = click.option(
-    "--jobs", type=click.IntRange(1, 1024), help="Number of processes (default: one per core)."
+    "--jobs", type=bounded("jobs"), help="Number of processes (default: one per core)."
 )
 LIBRARY = click.option(
     "--library", type=PATH, envvar="LDRAWDIR", help="Folder of an LDraw parts library."
@@ -266,7 +276,7 @@ DRAW = options(
     click.option("--seed", type=SEEDS, default=0, help="Random seed of --jitter."),
     click.option(
         "--jitter",
-        type=Number(0, 0.9),
+        type=bounded("jitter"),
         default=0.0,
         help="Draw each robot's speed and gain at random within ± this fraction.",
     ),
@@ -278,9 +288,7 @@ RUN = options(
         default="mujoco",
         help="MuJoCo's physics, or the paper's ideal world.",
     ),
-    click.option(
-        "--units", type=click.IntRange(1, 10**9), default=1, help="Number of products to make."
-    ),
+    click.option("--units", type=UNITS, default=1, help="Number of products to make."),
     DRAW,
     WIP,
     click.option(
@@ -296,14 +304,12 @@ RUN = options(
 )
 FAULTS = options(
     click.option("--faults", type=PATH, help="Faults to inject into the run (.toml)."),
-    click.option(
-        "--spares", type=click.IntRange(0, 10**6), default=0, help="Number of spare robots."
-    ),
+    click.option("--spares", type=bounded("spares"), default=0, help="Number of spare robots."),
     click.option("--swap", type=SECONDS, help="Time to replace a dead robot [s]."),
 )
 PICTURE = options(
     click.option("--size", default="1280x720", help="Picture size, for example 1280x720."),
-    click.option("--fps", type=click.IntRange(1, 120), default=30, help="Frames per second."),
+    click.option("--fps", type=bounded("fps"), default=30, help="Frames per second."),
     click.option(
         "--camera",
         default="overview",

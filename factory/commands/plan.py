@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from factory.commands.allowing import allowed_in
-from factory.commands.asking import UNITS, asked
+from factory.commands.asking import asked
 from factory.commands.interlocking import refuse
 from factory.commands.options import LIBRARY, OUTPUT, PATH, SECONDS, TEMPLATES
 from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions
 from factory.commands.warnings import announced, say_allowed
+from factory.support.bounds import AIMS, LENGTHS, UPS
 from factory.support.console import emit, say
 from factory.support.errors import MissingError
 from factory.support.progress import StepBar, Waiting
@@ -29,13 +29,6 @@ if TYPE_CHECKING:
     from factory.planning.plan import CannotAssemble, Planned, PlannedJoin, PlanOptions
     from factory.planning.searching import Aim
     from factory.plant.approaches import Approach, Kind
-
-AIMS = ("cycle", "robots", "floor")
-
-UPS = {
-    f"{sign}{name}": (n, -1 if sign else 1) for sign in ("", "-") for n, name in enumerate("xyz")
-}
-"""The directions that may be up: an axis and its side."""
 
 LOOKS = ("exploded.png", "assembly.mp4")
 """Suffixes of the names of the still and of the film."""
@@ -78,7 +71,7 @@ KINDS: tuple[Kind, ...] = ("slide", "lower", "blocked")
 @click.option(
     "--hulls", is_flag=True, help="Plan with convex hulls, even where they hide openings."
 )
-@click.option("--unit", type=click.Choice(UNITS), help="Unit of lengths (default: detected).")
+@click.option("--unit", type=click.Choice(LENGTHS), help="Unit of lengths (default: detected).")
 @click.option("--in-place", is_flag=True, help="Assume that the parts are in place.")
 @LIBRARY
 @click.option("--boxes", is_flag=True, help="Use boxes for LDraw parts without a shape.")
@@ -110,11 +103,11 @@ def plan(
     write the assembly tree as a PAG with its meshes. SOURCE is a folder of meshes, a file with
     named bodies (.glb, .3mf, .step), an LDraw model (.ldr, .mpd), or a PAG whose assembly tree is
     to be ignored."""
+    from factory.lang.overlaps import overlaps_in
     from factory.pipeline import all_templates, read
+    from factory.planning.outcome import write_planned
     from factory.planning.plan import CannotAssemble, PlanOptions
     from factory.planning.source import SourceOptions, read_source
-    from factory.planning.writing import planned_product
-    from factory.support.files import own_names, write_all
 
     templates = all_templates(folders)
     writable_folder(output)
@@ -125,7 +118,7 @@ def plan(
 
     options = SourceOptions(unit, keep, replan, library, boxes, in_place)
     placed = asked(read_as, options, out.silent)
-    meant, allow = allowed_in(allow, {part.label for part in placed.parts})
+    meant, allow = overlaps_in(allow, {part.label for part in placed.parts})
     placed = replace(placed, allowed=(*placed.allowed, *meant))
     folder = output or Path(f"{placed.name}-planned")
     writable_folder(folder)
@@ -139,12 +132,8 @@ def plan(
     planned, stopped = _sought(placed, search, out)
     if isinstance(planned, CannotAssemble):
         return refuse(placed, planned, folder, look, out)
-    made = planned_product(placed, planned.tree, planned.orientation, source.name, allow, templates)
-    files = {folder / name: content for name, content in made.files.items()}
-    own_names(folder, files, [source])
-    write_all(files)
-    pag = next(iter(files))
-    project = read(pag, folders)
+    files = write_planned(placed, planned, folder, source, allow, templates)
+    project = read(files[0], folders)
     looked = _looks(project, out) if look and not stopped else []
     if stopped and not out.silent:
         say("  stopped: the best tree so far, without pictures")

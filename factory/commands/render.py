@@ -20,11 +20,11 @@ from factory.commands.options import (
     SOURCE,
 )
 from factory.commands.outputs import for_a_pag, writable
-from factory.commands.requests import OutputOptions, PictureOptions, ProjectOptions, RunOptions
-from factory.commands.run import carry_out
+from factory.commands.requests import OutputOptions, PictureOptions, ProjectOptions
 from factory.commands.warnings import announced, cut_off, read_partly
+from factory.simulation.options import RunOptions
 from factory.support.console import emit, say, warn
-from factory.support.errors import Diagnostic, InputError, usage_error
+from factory.support.errors import Diagnostic, InputError
 
 if TYPE_CHECKING:
     Moment = float | Literal["end"]
@@ -56,42 +56,26 @@ def render(
 ) -> int:
     """Film FILE.pag, or the run in a LOG written by `run --log`, headless through EGL."""
     from factory.record.log import is_log
-    from factory.rendering import Film, Still, check_output, render_log
-    from factory.support.gl import probe
+    from factory.rendering.rendering import Shot
+    from factory.rendering.rendering import render as taken
 
     file = options.file
     if is_log(file):
         for_a_pag(file, "a log", "output", "at", *OF_A_PICTURE)
     writable(file, output, shown.poster)
-    size, moment = shown.area(), _moment(at)
-    is_still = check_output(output, size, shown.fps, still=None)
-    picture = shown.picture()
-    if is_still and shown.poster is not None:
-        raise usage_error("--poster applies to a film; this is a still", "leave out --poster")
-    probe()
+    shot = Shot(output, shown.picture(), shown.fps, _moment(at), shown.poster)
+    size, is_still, moment = shot.picture.size, shot.is_still, shot.at
     log = None
     warnings: list[dict[str, object]] = []
     if is_log(file):
         log = read_partly(file, out.silent)
-        frames = render_log(log, output, picture, shown.fps, moment, shown.poster)
+        frames, _ = taken(log, shot)
     else:
-        from factory.simulation.simulation import Simulation
-
         project = options.project(out.silent)
         warnings = announced(project.layout.product.warnings, out)
-        made = Simulation(project.layout, asked.request(project))
-        films: list[Film] = []
-
-        def taken() -> Film | Still:
-            if is_still:
-                return Still(made, output, picture, moment)
-            films.append(Film(made, output, picture, shown.fps, shown.poster))
-            return films[0]
-
-        enough = moment if is_still and moment != "end" else asked.max_time
-        run = carry_out(made, out.silent, enough, [taken])
-        warn(run.verdict.bodies, out.silent)
-        frames = films[0].frames if films else 1
+        frames, run = taken(project, shot, asked, out.silent)
+        if run is not None:
+            warn(run.verdict.bodies, out.silent)
     seconds = 0.0 if is_still else round(frames / shown.fps, 6)
     if out.as_json:
         width, height = size
@@ -112,10 +96,7 @@ def _moment(at: str) -> Moment:
     if at == "end":
         return "end"
     try:
-        seconds = float(at)
-        if not 0 <= seconds < float("inf"):
-            raise ValueError
+        return float(at)
     except ValueError:
         message = f"--at takes seconds or `end`, not '{at}'"
         raise InputError(Diagnostic("BadValue", message, None, "for example --at 2.5")) from None
-    return seconds

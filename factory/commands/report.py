@@ -5,8 +5,6 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
 
 import click
 
@@ -25,16 +23,11 @@ from factory.commands.options import (
     WIP,
 )
 from factory.commands.outputs import for_a_pag, writable
-from factory.commands.requests import OutputOptions, ProjectOptions, RunOptions
-from factory.commands.run import run_project, summarise
+from factory.commands.requests import OutputOptions, ProjectOptions
+from factory.commands.run import summarise
 from factory.commands.warnings import announced
+from factory.simulation.options import RunOptions
 from factory.support.console import emit, say
-
-if TYPE_CHECKING:
-    from factory.show.report.recording import Recording
-    from factory.simulation.run import Run
-
-    _Made = tuple[Recording, Run, list[dict[str, object]]]
 
 
 @click.command(cls=Grouped)
@@ -61,20 +54,22 @@ def report(options: ProjectOptions, asked: RunOptions, out: OutputOptions, outpu
     The page is always written. The exit status is 1 if the run failed, or was cut off before its
     units were made; --lenient ignores what its bodies do."""
     from factory.record.log import is_log
-    from factory.show.report import page, recording_of
+    from factory.show.report.reporting import report_on
     from factory.support.files import write_text
 
-    writable(options.file, output)
-    run = None
+    file = options.file
+    writable(file, output)
     warnings: list[dict[str, object]] = []
-    if is_log(options.file):
-        for_a_pag(options.file, "a log", "output", "lenient")
-        recording = recording_of(options.file)
+    if is_log(file):
+        for_a_pag(file, "a log", "output", "lenient")
+        made = report_on(file)
     else:
-        recording, run, warnings = _run(options, asked, out)
-    text = page(recording)
-    write_text(output, text)
-    size, cut = len(text.encode()), recording.log.cut_off
+        project = options.project(out.silent)
+        warnings = announced(project.layout.product.warnings, out)
+        made = report_on(project, asked, out.silent)
+    write_text(output, made.text)
+    recording, run = made.recording, made.run
+    size, cut = len(made.text.encode()), recording.log.cut_off
     verdict = run.verdict if run else replace(recording.verdict, lenient=asked.lenient)
     document = {
         "output": str(output),
@@ -95,21 +90,7 @@ def report(options: ProjectOptions, asked: RunOptions, out: OutputOptions, outpu
         if run is not None and out.verbose:
             summarise(run, recording.factory, out.verbose)
     if cut and run is None:
-        print(cut.diagnostic(options.file), file=sys.stderr)
+        print(cut.diagnostic(file), file=sys.stderr)
     for failure in verdict.failures if run else verdict.failures[bool(cut) :]:
         print(failure, file=sys.stderr)
     return 0 if verdict.succeeded else 1
-
-
-def _run(options: ProjectOptions, asked: RunOptions, out: OutputOptions) -> _Made:
-    """A run without fused parts, since the report follows each part; its log is temporary. Returns
-    the warnings too."""
-    from factory.show.report import recording_of
-
-    project = options.project(out.silent)
-    warnings = announced(project.layout.product.warnings, out)
-    with TemporaryDirectory(prefix="factory-") as folder:
-        log = Path(folder) / "run.log"
-        run = run_project(project, replace(asked, fuse=False), out.silent, log)
-        recording = recording_of(log, project.layout)
-    return recording, run, warnings

@@ -2,48 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import count
 from math import inf, prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from factory.simulation.options import check_together
 from factory.support.errors import Diagnostic, InputError, did_you_mean, usage_error
 
 if TYPE_CHECKING:
     from factory.layout.request import Ground
     from factory.pipeline import Project
-    from factory.plant.factory import Factory
     from factory.problem.pag import PAG, AllowedOverlap
     from factory.record.plan_file import PlanFile
     from factory.rendering import Picture
-    from factory.simulation.recovery.faults import Campaign
-    from factory.simulation.request import RunRequest, WorldName
     from factory.study.allocation.candidate import Candidate
     from factory.support.settings import Settings
-
-
-APART = (
-    ("--deputies", ("--relay", "--cycle"), "no robot can take over for one that relays"),
-    ("[lines]", ("--robots", "--cycle"), "the search chooses which labels share a robot"),
-    (
-        "--distributed",
-        ("--faults", "--spares", "--deputies"),
-        "robots that run their own programs do not recover",
-    ),
-)
-"""Options that exclude others, with the reason. All other pairs can be combined, except --relay and
-robots with several tours, which is refused at the layout."""
-
-
-def check_together(values: Mapping[str, bool]) -> None:
-    """Raises InputError (BadValue) for options that exclude each other."""
-    for one, others, reason in APART:
-        for other in others:
-            if values.get(one) and values.get(other):
-                message = f"{one} cannot be combined with {other}: {reason}"
-                raise InputError(Diagnostic("BadValue", message, None, "leave out one of the two"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +77,7 @@ class ProjectOptions:
 
     def ground(self) -> Ground:
         """The request of FLOOR and RELAY. Raises InputError (BadValue)."""
-        from factory.layout.request import Ground
+        from factory.layout.request import WIDEST, Ground
         from factory.support.user_defaults import defaults_for
 
         floor = None if self.floor is None else pair(self.floor, "--floor", "4x3", float, WIDEST)
@@ -201,72 +176,6 @@ class ProjectOptions:
 
 
 @dataclass(frozen=True, slots=True)
-class RunOptions:
-    """The options of RUN, DRAW, WIP and LENIENT that a command has."""
-
-    world: WorldName = "mujoco"
-    units: int = 1
-    seed: int = 0
-    jitter: float = 0.0
-    wip: int | None = None
-    start: str | None = None
-    fuse: bool | None = None
-    max_time: float | None = None
-    distributed: bool = False
-    lenient: bool = False
-    faults: Path | None = None
-    spares: int = 0
-    swap: float | None = None
-
-    @property
-    def recovers(self) -> bool:
-        """Whether the run recovers from failures."""
-        return self.faults is not None or self.spares > 0
-
-    def campaign(self, factory: Factory) -> Campaign:
-        """The faults of the run, and its spares. Raises InputError."""
-        from factory.simulation.recovery.fault_file import check_names, read_campaign
-        from factory.simulation.recovery.faults import SWAP, Campaign
-
-        swap = SWAP if self.swap is None else self.swap
-        if self.faults is None:
-            return Campaign(seed=self.seed, spares=self.spares, swap=swap)
-        campaign = read_campaign(self.faults, self.spares, swap)
-        check_names(campaign, factory)
-        return campaign
-
-    def request(self, project: Project, shown: bool = True) -> RunRequest:
-        """The request of a run; `shown`: whether it is filmed or logged. Raises InputError."""
-        from factory.nets.history import legal_marking
-        from factory.plant.fused_bodies import fusing_pays
-        from factory.simulation.request import RunRequest
-
-        check_together(
-            {
-                "--distributed": self.distributed,
-                "--faults": self.faults is not None,
-                "--spares": self.spares > 0,
-                "--deputies": project.ground.deputies,
-            }
-        )
-        layout, start = project.layout, self.start
-        return RunRequest(
-            self.world,
-            self.units,
-            self.seed,
-            self.jitter,
-            project.settings,
-            None if start is None else legal_marking(layout.factory.net, start),
-            self.wip,
-            self.distributed,
-            fusing_pays(layout.factory, layout.product) if self.fuse is None else self.fuse,
-            shown,
-            recovers=self.recovers,
-            catalogue=project.catalogue,
-        )
-
-
-@dataclass(frozen=True, slots=True)
 class PictureOptions:
     """The options of PICTURE."""
 
@@ -311,8 +220,8 @@ PLANNED = {
 
 OF_A_PLAN = "leave it out, or give the PAG and make another plan: `factory build FILE.pag -o DIR`"
 
-WIDEST, LARGEST = 10**5, 10**5
-"""Upper bounds on the width and depth of a floor [m], and on those of a picture [px]."""
+LARGEST = 10**5
+"""Upper bound on the width and height of a picture [px]."""
 
 
 def pair(text: str, option: str, example: str, number: type, most: int) -> tuple[Any, Any]:
@@ -327,10 +236,3 @@ def pair(text: str, option: str, example: str, number: type, most: int) -> tuple
             Diagnostic("BadValue", message, None, f"for example {option} {example}")
         ) from None
     return width, depth
-
-
-def check_ideal(fuse: bool | None, monitor: bool = False) -> None:
-    """Raises InputError (Usage) for options that need bodies, which the ideal world lacks."""
-    for wanted, purpose in ((monitor, "for a monitor to observe"), (fuse, "that could become one")):
-        if wanted:
-            raise usage_error(f"the ideal world has no bodies {purpose}", "leave out --world ideal")

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
-from dataclasses import replace
+from collections.abc import Sequence
 from pathlib import Path
-from shlex import quote
 from typing import TYPE_CHECKING
 
 import click
@@ -31,28 +28,20 @@ from factory.commands.requests import (
     OutputOptions,
     PictureOptions,
     ProjectOptions,
-    RunOptions,
-    check_ideal,
 )
 from factory.commands.resuming import resumed
 from factory.commands.warnings import announced, say_allowed
-from factory.support.console import POOL_BOUND, emit, say, table
-from factory.support.errors import Diagnostic, StoppedError, usage_error
-from factory.support.progress import Progress, Waiting
+from factory.simulation.options import RunOptions, check_ideal
+from factory.support.console import emit, say, table
+from factory.support.errors import usage_error
+from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
     from factory.pipeline import Project
     from factory.plant.factory import Factory
-    from factory.record.figures import PhysicsFigures
-    from factory.record.state import Recorder
-    from factory.rendering import Film
+    from factory.simulation.executing import Filming
     from factory.simulation.resuming import Resumed
     from factory.simulation.run import Run
-    from factory.simulation.simulation import Simulation
-
-    Filming = Callable[[Simulation], Film]
-    Opening = Callable[[], Recorder]
-    """Opens a recorder of a run, such as a log, as a context."""
 
 
 @click.command(cls=Grouped)
@@ -107,6 +96,8 @@ def run(
     shown.area()
     if asked.world == "ideal":
         check_ideal(asked.fuse, bool(monitor))
+    from factory.simulation.executing import run_project
+
     film = _film(project, asked, video, shown)
     record = run_project(project, asked, out.silent, log, film, monitor)
     status = _print(record, layout.factory, warnings, monitor, out)
@@ -117,8 +108,10 @@ def run(
 
 def _continue(going: Resumed, asked: RunOptions, monitor: bool | None, out: OutputOptions) -> int:
     """Continue the run in a log to its end; returns the exit status."""
+    from factory.simulation.executing import carry_on
+
     made = going.simulation
-    record = _judged(made, asked, out.silent, going.path, [going.recorder], monitor)
+    record = carry_on(made, asked, out.silent, going.path, [going.recorder], monitor)
     status = _print(record, made.layout.factory, [], monitor, out)
     if not out.as_json:
         say_files(log=going.path)
@@ -165,152 +158,14 @@ def _film(
     return lambda made: Film(made, video, picture, shown.fps, shown.poster)
 
 
-def run_project(
-    project: Project,
-    asked: RunOptions,
-    silent: bool,
-    log: Path | None = None,
-    film: Filming | None = None,
-    monitor: bool | None = None,
-) -> Run:
-    """One run, with a log and a film if options. `monitor`: True for a monitor that observes every
-    tick, False for none, None for one that observes events."""
-    from factory.nets.verify import proved
-    from factory.simulation.simulation import Simulation
-
-    proved(project.factory.net)
-    seen = log is not None or film is not None
-    with Waiting("compiling the model", silent):
-        made = Simulation(project.layout, asked.request(project, seen))
-        if asked.recovers:
-            from factory.simulation.recovery import recover
-
-            recover(made, asked.campaign(project.layout.factory))
-    recorders: list[Opening] = []
-    if log is not None:
-        from factory.record.log import LogWriter
-
-        recorders.append(lambda: LogWriter(log, made, project))
-    if film is not None:
-        recorders.append(lambda: film(made))
-    return _judged(made, asked, silent, log, recorders, monitor)
-
-
-def _judged(
-    made: Simulation,
-    asked: RunOptions,
-    silent: bool,
-    log: Path | None,
-    recorders: Sequence[Opening],
-    monitor: bool | None,
-) -> Run:
-    """A run with its verdict, as the options describe."""
-    record = carry_out(made, silent, asked.max_time, recorders, monitor, log)
-    account = made.world.hooks.account
-    failures = None if account is None else account.report()
-    if failures is not None and log is not None and monitor is not False and made.model is not None:
-        from factory.record.log import read_log
-        from factory.record.monitor.record import watch_log
-
-        with Waiting("judging the run between failures", silent):
-            record = replace(record, monitor=watch_log(read_log(log))[0])
-    return replace(record, lenient=asked.lenient, failures=failures)
-
-
-def carry_out(
-    made: Simulation,
-    silent: bool,
-    max_time: float | None = None,
-    recorders: Sequence[Opening] = (),
-    monitor: bool | None = None,
-    log: Path | None = None,
-) -> Run:
-    """A run with a progress bar. A signal stops it at the end of a tick, so that the recorders'
-    files are complete; StoppedError then says how far it came and how to continue the run in a
-    `log`. Recorders see every tick only from their `since` on."""
-    from factory.record.ending import CutOff
-    from factory.simulation.watched import watched
-    from factory.support.interruption import Interruption
-
-    since = 0.0
-    try:
-        with Interruption() as stop, ExitStack() as stack:
-            opened = [stack.enter_context(recorder()) for recorder in recorders]
-            since = max((recorder.since for recorder in opened), default=0.0)
-            bar = stack.enter_context(Progress(made.request.units, silent, made.duration))
-            seeing, glances = [r.observe for r in opened], [stop.observe, bar.observe]
-            if monitor is False:
-                record = made.run(seeing, max_time, glances, since)
-            else:
-                record = watched(made, seeing, max_time, glances, bool(monitor), since)
-            for recorder in opened:
-                recorder.end(record.trouble)
-            return record
-    except KeyboardInterrupt as error:
-        came = CutOff(made.world.time, made.world.delivered() - made.before, made.request.units)
-        message = f"stopped by the user, {came}"
-        if made.world.time < since:
-            message = f"stopped by the user before {since:.2f} s, so '{log}' is as it was"
-        hint = f"log: {log}; continue: factory run --resume {quote(str(log))}" if log else ""
-        raise StoppedError(Diagnostic("Interrupted", message, None, hint)) from error
-
-
-def not_tested(physics: PhysicsFigures) -> str:
-    """The number of pairs of parts without collision checks, in words."""
-    return f"{physics.pairs_excluded} of {physics.pairs} pairs of parts not checked for collisions"
-
-
 def summarise(record: Run, factory: Factory, verbose: bool) -> None:
     """Print a run in a few lines; the first line of a failed run says why."""
+    from factory.simulation.figures import figures
+
     if not record.succeeded:
         say_verdict(record.verdict, verbose)
-    cycle = f"{record.cycle_time_s:.3f} s" if record.cycle_time_s is not None else "not yet steady"
-    of_all = " with all robots" if record.exchanges else ""
-    say(
-        f"{record.products} of {record.units} products in {record.sim_time_s:.2f} s "
-        f"({record.realtime_factor:.1f} times real time, {record.world})"
-    )
-    say(
-        f"cycle time {cycle}, predicted {record.predicted_cycle_time_s:.3f} s{of_all}; "
-        f"bottleneck {record.bottleneck}"
-    )
-    say(
-        f"{record.fired} transitions fired, "
-        f"the record {'refines' if record.replays else 'DOES NOT REFINE'} the net"
-    )
-    physics = record.physics
-    if physics is not None:
-        chosen = physics.timestep_chosen
-        how = "chosen automatically (--timestep)" if chosen else "as requested"
-        say(f"timestep {1000 * physics.timestep_s:g} ms, {how}")
-        if physics.wip_chosen:
-            say(f"at most {physics.wip_chosen} units inside at once: {POOL_BOUND}")
-        error = physics.product_error_max_mm
-        contacts = f"{physics.unintended_contacts} unintended contacts"
-        warnings = f"{physics.engine_warnings} engine warnings"
-        say(
-            f"{physics.handoffs} hand-offs, largest gap {physics.handoff_gap_max_mm:.3f} mm; "
-            f"product error {'none measured' if error is None else f'{error:.3f} mm'}, "
-            f"{physics.joining_error_max_mm:.3f} mm when grips close; "
-            + (warnings if physics.excluded else f"{contacts}, {warnings}")
-        )
-        if physics.grip_gap_max_mm is not None:
-            say(f"largest gap between part and gripper: {physics.grip_gap_max_mm:.3f} mm")
-        if physics.grip_strength_share_max is not None:
-            where = f"{physics.grip_strength_robot} with '{physics.grip_strength_label}'"
-            used = 100 * physics.grip_strength_share_max
-            say(f"highest grip load: {used:.0f} % of the hand's strength ({where})")
-        if physics.excluded:
-            say(f"{contacts}; {not_tested(physics)}{'' if verbose else ' (list: -v)'}")
-        for one, other in physics.excluded if verbose else ():
-            say(f"  not checked: {one} - {other}")
-        for pair in physics.contacts[:8]:
-            say(f"  contact: {pair}")
-        if physics.mating_forces:
-            most = max(physics.mating_forces, key=physics.mating_forces.__getitem__)
-            say(f"largest force between inputs: {physics.mating_force_max_n:.3f} N, in {most}")
-        if physics.fused:
-            say("parts joined for good are merged into one rigid body (--no-fuse: kept separate)")
+    for line in figures(record, verbose):
+        say(line)
     if record.failures is not None:
         say_failures(record.failures, verbose)
     for exchange in record.exchanges:

@@ -21,12 +21,13 @@ from factory.commands.options import (
     SECONDS,
     SEEDS,
     TEMPLATES,
+    UNITS,
     WIP,
-    Number,
+    bounded,
     gathered,
 )
 from factory.commands.outputs import writable
-from factory.commands.requests import OutputOptions, ProjectOptions, check_ideal
+from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced
 from factory.support.console import emit, say, table
 from factory.support.errors import usage_error
@@ -68,9 +69,9 @@ class SweepOptions:
 @click.option("--retry", is_flag=True, help="Repeat failed runs.")
 @click.option("--summary", is_flag=True, help="Print means, deviations and confidence intervals.")
 @click.option("--world", type=click.Choice(["mujoco", "ideal"]), help="As for `run`.")
-@click.option("--units", type=click.IntRange(1, 10**9), help="Products per run (default: 4).")
+@click.option("--units", type=UNITS, help="Products per run (default: 4).")
 @click.option("--seed", type=SEEDS, help="As for `run`.")
-@click.option("--jitter", type=Number(0, 0.9), help="As for `run` (default: 0).")
+@click.option("--jitter", type=bounded("jitter"), help="As for `run` (default: 0).")
 @WIP
 @click.option("--max-time", type=SECONDS, help="Stop a run after this time [s].")
 @click.option("--fuse/--no-fuse", default=None, help="As for `run`.")
@@ -124,32 +125,20 @@ def _carry_out(
     out: OutputOptions,
 ) -> tuple[Tally, list[dict[str, object]]]:
     """Plan, prove and run a sweep. Returns the warnings too. Raises InputError."""
-    from factory.nets.verify import proved
     from factory.study.pool import cores
-    from factory.study.sweep.grid import DEFAULTS, SETTINGS, read_axes
-    from factory.study.sweep.recipe import Recipe
+    from factory.study.sweep.grid import read_axes
+    from factory.study.sweep.recipe import recipe_of
     from factory.study.sweep.sweeping import sweep
 
     writable(options.file, database)
     axes = read_axes(vary)
-    asked = asdict(options) | asdict(runs)
+    asked = asdict(options)
     for axis in axes:
         if asked.get(axis.key) is not None:
             raise usage_error(f"{axis.key} is both given and varied", "leave one of them out")
-    worlds = next((axis.values for axis in axes if axis.key == "world"), (runs.world,))
-    if set(worlds) == {"ideal"}:
-        check_ideal(runs.fuse)
     project = options.project(out.silent)
-    varies = any(axis.key == "clearance" for axis in axes)
-    # a factory that does not fit its floor is refused before the first run
-    factory = project.plain if varies else project.layout.factory
-    proved(factory.net)
+    recipe = recipe_of(project, axes, asdict(runs), runs.max_time, runs.fuse)
     warnings = announced(project.product.warnings, out)
-    fixed = {name: getattr(project.settings, name) for name in SETTINGS}
-    fixed |= {key: asked[key] for key in DEFAULTS if asked[key] is not None}
-    laid = project.layout if project.laid else None
-    about = runs.max_time, project.ground, runs.fuse, laid
-    recipe = Recipe(project.plain, project.product, fixed, *about)
     jobs = runs.jobs or cores()
     return sweep(recipe, axes, database, jobs, runs.retry, out.silent), warnings
 

@@ -11,8 +11,9 @@ import click
 
 from factory.commands.grouped import Grouped
 from factory.commands.options import DRAW, FAULTS, FLOOR, MOTION, OUTPUT, RELAY, RUNS, SOURCE, WIP
-from factory.commands.requests import OutputOptions, ProjectOptions, RunOptions
+from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced
+from factory.simulation.options import RunOptions
 from factory.support.console import emit, say
 
 if TYPE_CHECKING:

@@ -26,13 +26,14 @@ from factory.layout.level import LEAST, Level
 from factory.plant.approaches import Overlap
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
+from factory.support.showing import Pictured
 
 BESIDE = 0.001
 """What is to be lowered stays this far short of its meeting point until the others stand [m]."""
 
 
 @dataclass(frozen=True)
-class Layout:
+class Layout(Pictured):
     """A factory laid out: a guidepath for each robot, and for each operation the arc length at
     which each of its robots has its goal.
 
@@ -64,6 +65,9 @@ class Layout:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "payloads", MappingProxyType(dict(self.payloads)))
+
+    def __repr__(self) -> str:
+        return f"<Layout of {self.factory}: {self.area:.2f} m²>"
 
     def hand(self, robot: int) -> Hand | None:
         """The hand of a robot; None for a tool, and where hands are not chosen."""

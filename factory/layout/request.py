@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from factory.plant.factory import Factory
+from factory.support.bounds import check_values
 from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import Settings
 
@@ -22,18 +23,27 @@ SEVERAL_TOURS = Diagnostic(
     hint="leave out --relay, or what shares robots: --robots, --parallel, [lines] in factory.toml",
 )
 
+WIDEST = 10**5
+"""Upper bound on the width and depth of a floor [m]."""
+
 
 @dataclass(frozen=True, slots=True)
 class Ground:
     """What a layout is made for, beside settings: width and depth of the floor [m], None for as
     much as it takes; whether guidepaths are shared among `relay` robots, or the `cycle` time [s]
     that those are to reach, None for the shortest; `deputies`: whether robots can take over for
-    others."""
+    others. Raises InputError: BadValue for a wrong floor, Usage for a wrong time."""
 
     floor: tuple[float, float] | None = None
     relay: bool = False
     cycle: float | None = None
     deputies: bool = False
+
+    def __post_init__(self) -> None:
+        check_values({"cycle": self.cycle})
+        if self.floor is not None and not all(0 < side <= WIDEST for side in self.floor):
+            message = f"floor = {self.floor} is not two positive lengths up to {WIDEST} m"
+            raise InputError(Diagnostic("BadValue", message, None, "for example (4.0, 3.0)"))
 
     @property
     def relays(self) -> bool:

@@ -7,6 +7,7 @@ from functools import cached_property
 
 from factory.nets.petri import Marking
 from factory.nets.threaded import Slot, ThreadedNet
+from factory.support.showing import Pictured
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +25,7 @@ class Gear:
 
 
 @dataclass(frozen=True)
-class GearNet:
+class GearNet(Pictured):
     """A threaded net that is claimed to be composed of gears, one for each robot (Definition 3.6).
 
     `initial` is the marked place of each gear, in the gears' order; slot i of an operation's place
@@ -35,6 +36,11 @@ class GearNet:
     gears: tuple[Gear, ...]
     initial: tuple[int, ...]
     slots: tuple[tuple[int, ...], ...] = field(repr=False)
+
+    def __repr__(self) -> str:
+        net = self.threaded.net
+        counts = f"{len(net.places)} places, {len(net.transitions)} transitions"
+        return f"<GearNet: {len(self.gears)} gears, {counts}>"
 
     @cached_property
     def initial_marking(self) -> Marking:

@@ -15,6 +15,7 @@ from functools import cached_property
 
 from factory.nets.gears import Gear, GearNet
 from factory.nets.petri import PetriNet
+from factory.support.showing import Pictured
 
 NONE = -1
 """The producer or consumer of a place that has none."""
@@ -23,7 +24,7 @@ MANY = -2
 
 
 @dataclass(frozen=True)
-class MarkedNet:
+class MarkedNet(Pictured):
     """(T, P) with m_0, for each place the number of its tokens; it may have choice.
 
     `gears` are those that are claimed, or () where none are known; `slots` as in `GearNet`, or ().
@@ -38,6 +39,10 @@ class MarkedNet:
     def __post_init__(self) -> None:
         if len(self.tokens) != len(self.net.places) or min(self.tokens, default=0) < 0:
             raise ValueError("one number of tokens, not negative, is needed for each place")
+
+    def __repr__(self) -> str:
+        counts = f"{len(self.tokens)} places, {len(self.net.transitions)} transitions"
+        return f"<MarkedNet: {counts}, {sum(self.tokens)} tokens>"
 
     @cached_property
     def left(self) -> tuple[int, ...]:

@@ -19,6 +19,7 @@ from factory.problem.pag import NOPART, PAG
 from factory.problem.plan import Plan
 from factory.problem.template import Template, variable_number
 from factory.support.errors import Position
+from factory.support.showing import Pictured
 
 
 def in_turn(label: str, turn: int) -> str:
@@ -116,7 +117,7 @@ class Robot:
 
 
 @dataclass(frozen=True)
-class Factory:
+class Factory(Pictured):
     """F = (R, ~, N) with the operations it is made of; the last operation is dropoff.
 
     ~ is the union of the templates' identifications over `operations`. `parents[i]` is the
@@ -135,6 +136,10 @@ class Factory:
     plan: Plan = field(default_factory=Plan, repr=False)
     adjusted: frozenset[int] = frozenset()
     period: int = 1
+
+    def __repr__(self) -> str:
+        counts = f"{len(self.robots)} robots, {len(self.operations)} operations"
+        return f"<Factory of {self.pag.root}: {counts}>"
 
     @cached_property
     def by_label(self) -> Mapping[str, Operation]:

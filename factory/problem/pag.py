@@ -8,6 +8,7 @@ from functools import cached_property
 from types import MappingProxyType
 
 from factory.support.errors import Position
+from factory.support.showing import Pictured
 
 NOPART = "nopart"
 RESERVED = frozenset({NOPART, "root", "parts", "dropoff"})
@@ -73,7 +74,7 @@ def most_allowed(allowed: Iterable[AllowedOverlap], one: str, other: str) -> flo
 
 
 @dataclass(frozen=True)
-class PAG:
+class PAG(Pictured):
     """A product assembly graph: one tree over its labels, in the order of the text, which
     `factory.lang.read_pag` checks. `count` is the number in `N parts`, None without it; `folder` is
     where mesh paths start; `allowed`: overlaps that are meant."""
@@ -84,6 +85,10 @@ class PAG:
     folder: str = field(default=".", compare=False)
     file: str = field(default="<text>", compare=False)
     allowed: tuple[AllowedOverlap, ...] = ()
+
+    def __repr__(self) -> str:
+        parts = sum(1 for _ in self.parts())
+        return f"<PAG {self.root}: {parts} parts, {len(self) - parts} operations, {self.file}>"
 
     @cached_property
     def by_label(self) -> Mapping[str, Assembly]:

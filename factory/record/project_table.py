@@ -28,7 +28,7 @@ from factory.problem.robot_types import load_catalogue
 from factory.problem.template import Template
 from factory.support.errors import Diagnostic, InputError
 from factory.support.files import AGAIN
-from factory.support.settings import RANGES, Settings, wrong_type
+from factory.support.settings import Settings
 from factory.support.tables import table_of, value_of
 
 
@@ -55,12 +55,6 @@ class ProjectTable:
     plan: Plan
     templates: Mapping[str, str]
     settings: Settings
-
-    def __post_init__(self) -> None:
-        for name in RANGES:
-            value = getattr(self.settings, name)
-            if value is not None and (fault := wrong_type(name, value)):
-                raise ValueError(f"settings: {fault.message}")
 
     @classmethod
     def of(cls, table: Mapping[str, Any]) -> ProjectTable:

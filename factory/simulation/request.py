@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
 
 from factory.nets.petri import Marking
 from factory.problem.robot_types import Catalogue
+from factory.support.bounds import WORLDS, WorldName, check_choice, check_values
 from factory.support.settings import Settings
-
-WorldName = Literal["mujoco", "ideal"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +19,8 @@ class RunRequest:
     own programs. `fuse`: parts joined for good become one rigid body. `shown`: it is filmed, logged
     or watched; if not, the model has nothing that is only shown, and the run is the same and
     faster. `recovers`: with some bodies more, for parts that are scrapped. `fast`: with what only
-    makes it faster. `catalogue`: robot types, the shipped ones where None.
+    makes it faster. `catalogue`: robot types, the shipped ones where None. Raises InputError
+    (Usage) with every value out of its bounds.
     """
 
     world: WorldName = "mujoco"
@@ -37,3 +36,7 @@ class RunRequest:
     recovers: bool = False
     fast: bool = True
     catalogue: Catalogue | None = field(default=None, hash=False)
+
+    def __post_init__(self) -> None:
+        check_choice("world", self.world, WORLDS)
+        check_values({n: getattr(self, n) for n in ("units", "seed", "jitter", "wip")})

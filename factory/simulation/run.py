@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 
 from factory.nets.undone import Entry, Undone, lasting
 from factory.plant.factory import Factory
@@ -15,6 +16,7 @@ from factory.record.monitor.report import Report
 from factory.record.state import Event
 from factory.record.verdict import RunVerdict, judged, kept_figures
 from factory.support.errors import Diagnostic
+from factory.support.showing import drawn
 
 
 def entries_of(events: Iterable[Event | Undone]) -> Iterator[Entry]:
@@ -67,7 +69,7 @@ class Run:
     run of the net; `trouble` is None for a run that reached its end; `monitor` is what a monitor
     reports that watched it, if one did. `lenient`: what is wrong with the bodies does not count;
     `period`: how many units come in a cycle of the net; `failures`: what went wrong, in a run that
-    goes on when something does; `exchanges`: the nets that it went on in."""
+    goes on when something does; `exchanges`: the nets that it went on in; `log`: its log."""
 
     world: str
     units: int
@@ -92,6 +94,15 @@ class Run:
     period: int = 1
     failures: Failures | None = None
     exchanges: tuple[Exchange, ...] = ()
+    log: Path | None = field(default=None, repr=False, compare=False)
+
+    def __repr__(self) -> str:
+        made = f"{self.products} of {self.units} products in {self.sim_time_s:.2f} s"
+        how = "succeeded" if self.succeeded else "FAILED"
+        return f"<Run in {self.world}: {how}, {made}>"
+
+    def _repr_html_(self) -> str | None:
+        return drawn(self)
 
     @property
     def fired(self) -> int:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
@@ -160,12 +161,24 @@ class _Pool(Generic[Item, Result]):
     def _start(self) -> None:
         parent_end, child_end = CONTEXT.Pipe()
         process = CONTEXT.Process(target=_work, args=(self.work, child_end), daemon=True)
-        with _uninterrupted(), ExitStack() as stack:
+        with _uninterrupted(), _without_main(), ExitStack() as stack:
             for name, value in self.variables.items():
                 stack.enter_context(environment(name, value))
             process.start()
         child_end.close()
         self.workers.append(_Worker(process, parent_end))
+
+
+@contextmanager
+def _without_main() -> Iterator[None]:
+    """Processes started in here do not run the user's script again: they need nothing of it."""
+    main = sys.modules["__main__"].__dict__
+    before: dict[str, Any] = {n: main[n] for n in ("__spec__", "__file__") if n in main}
+    main.update(dict.fromkeys(before))
+    try:
+        yield
+    finally:
+        main.update(before)
 
 
 @contextmanager

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from numbers import Integral, Real
 from types import MappingProxyType
 from typing import Any, Literal
 
@@ -54,6 +55,8 @@ MOST = 10
 WHOLE = ("substeps", "stage", "hands")
 """Settings that are whole numbers."""
 
+SWITCHES = ("stage", "hands")
+"""Settings that are 0 or 1, or False or True."""
 
 EXAMPLES: Mapping[str, str] = MappingProxyType({"timestep": '0.002, or "auto"', "substeps": "5"})
 """Examples of settings whose default is not a number."""
@@ -72,7 +75,7 @@ class Settings:
     are chosen from the geometry of the parts.
 
     With AUTO a tick is TICK, whatever is chosen for a layout (`factory.mjcf.timestep`): so layouts
-    and predictions need not know.
+    and predictions need not know. Raises InputError (BadValue) with every value out of its range.
     """
 
     speed: float = 0.5
@@ -87,6 +90,13 @@ class Settings:
     outfeed: float = 1.0
     stage: int = 0
     hands: int = 1
+
+    def __post_init__(self) -> None:
+        values = {name: getattr(self, name) for name in RANGES}
+        values |= {name: int(values[name]) for name in SWITCHES if values[name] in (True, False)}
+        found = [wrong_type(n, v) for n, v in values.items() if (n, v) != ("substeps", None)]
+        if faults := [fault for fault in found if fault]:
+            raise InputError(faults)
 
     @property
     def outfeed_acceleration(self) -> float:
@@ -140,9 +150,6 @@ class Settings:
         Raises InputError (BadValue) with every number that is not within its range.
         """
         values = {name: value for name, value in options.items() if value is not None}
-        faults = [_out_of_range(name, value) for name, value in values.items()]
-        if any(faults):
-            raise InputError(fault for fault in faults if fault)
         return replace(self, **values)  # type: ignore[arg-type]
 
 
@@ -178,20 +185,17 @@ def is_auto(name: str, value: object) -> bool:
     return name == "timestep" and value == AUTO
 
 
-def wrong_type(name: str, value: object) -> Diagnostic | None:
+def wrong_type(name: str, value: Any) -> Diagnostic | None:
     """The error of the value of a setting that is neither a number within its range nor AUTO where
     that is valid; None for a valid value."""
     if is_auto(name, value):
         return None
     kind = "whole number" if name in WHOLE else "number"
-    if isinstance(value, bool) or not isinstance(value, int if name in WHOLE else int | float):
+    right: bool = isinstance(value, Integral if name in WHOLE else Real)
+    if isinstance(value, bool) or not right:
         return Diagnostic("BadValue", f"{name} must be a {kind}", None, _example(name))
-    return _out_of_range(name, value)
-
-
-def _out_of_range(name: str, value: Any) -> Diagnostic | None:
     low, high = RANGES[name]
-    if is_auto(name, value) or low <= value <= high:
+    if low <= value <= high:
         return None
     shown = f"{value:g}" if isinstance(value, float) else f"{value}"[:20]
     message = f"{name} = {shown} is not between {low:g} and {high:g}"
@@ -199,4 +203,6 @@ def _out_of_range(name: str, value: Any) -> Diagnostic | None:
 
 
 def _example(name: str) -> str:
-    return f"for example {name} = {EXAMPLES.get(name) or getattr(Settings(), name)}"
+    return (
+        f"for example {name} = {EXAMPLES.get(name) or Settings.__dataclass_fields__[name].default}"
+    )

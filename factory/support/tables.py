@@ -13,7 +13,7 @@ from reprlib import repr as shortened
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from factory.support.errors import did_you_mean
+from factory.support.errors import InputError, did_you_mean
 
 T = TypeVar("T")
 
@@ -76,7 +76,7 @@ def _value(kind: Any, table: Any, place: str) -> Any:
 
 
 def _record(kind: Any, table: Any, place: str) -> Any:
-    """A dataclass; a ValueError of its own gets the place."""
+    """A dataclass; an error of its own gets the place."""
     if not isinstance(table, dict):
         raise _wrong(place, "a table", table)
     valid = {field.name: field for field in fields(kind)}
@@ -93,6 +93,8 @@ def _record(kind: Any, table: Any, place: str) -> Any:
         return kind(**values)
     except ValueError as error:
         raise ValueError(f"{_named(place)}: {error}") from error
+    except InputError as error:
+        raise ValueError(f"{_named(place)}: {error.diagnostics[0].message}") from error
 
 
 def _one_of(kinds: tuple[Any, ...], table: Any, place: str) -> Any:

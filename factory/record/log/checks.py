@@ -65,7 +65,6 @@ class LogHeader(ProjectTable):
     faults: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        ProjectTable.__post_init__(self)
         counts = {"nq": (self.nq, 0), "nv": (self.nv, 0), "units": (self.units, 1)}
         counts |= {"seed": (self.seed, 0), "wip": (self.wip or 1, 1)}
         for name, (count, least) in counts.items():

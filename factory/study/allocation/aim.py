@@ -7,6 +7,7 @@ from math import inf
 from typing import Literal
 
 from factory.compiler.parallel import Branches
+from factory.support.bounds import check_values
 from factory.support.settings import LEAST
 
 STEP = 1.15
@@ -28,13 +29,20 @@ class Aim:
     """Number of `robots`, LEAST for as few as found, None for any number; the `cycle` time to be
     reached [s], None for the shortest. `effort`: greatest number of factories that are laid out,
     None for the default; none is begun after `seconds`. `branches`: labels, with the number of
-    copies of the branch that brings each."""
+    copies of the branch that brings each. Raises InputError (Usage) for a wrong value."""
 
     robots: int | Literal["least"] | None = None
     cycle: float | None = None
     effort: int | None = None
     seconds: float = inf
     branches: Branches = ()
+
+    def __post_init__(self) -> None:
+        robots = None if self.robots == LEAST else self.robots
+        seconds = None if self.seconds == inf else self.seconds
+        check_values(
+            {"robots": robots, "cycle": self.cycle, "effort": self.effort, "seconds": seconds}
+        )
 
     @property
     def asks(self) -> bool:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, fields
 from itertools import product
 from math import ceil, isfinite, prod
 
+from factory.support.bounds import BOUNDS
 from factory.support.errors import Diagnostic, InputError, did_you_mean
 from factory.support.settings import RANGES, Settings, is_auto
 from factory.support.settings import WHOLE as WHOLE_SETTINGS
@@ -23,9 +24,7 @@ Point = tuple[tuple[str, Value], ...]
 SETTINGS = tuple(field.name for field in fields(Settings))
 
 WHOLE: Mapping[str, tuple[int, int]] = {
-    "seed": (0, 2**63 - 1),
-    "units": (1, 10**9),
-    "wip": (1, 10**9),
+    **{name: (int(BOUNDS[name][0]), int(BOUNDS[name][1])) for name in ("seed", "units", "wip")},
     **{name: (int(RANGES[name][0]), int(RANGES[name][1])) for name in WHOLE_SETTINGS},
 }
 """Keys of whole numbers, with the least and the greatest value."""
@@ -39,7 +38,7 @@ input has slipped. It has columns in a database only if it varies; else nothing 
 KEYS = ("seed", "jitter", "units", "wip", "world", FAULT_RATE, *SETTINGS)
 """All keys that may vary."""
 
-SHARES: Mapping[str, tuple[float, float]] = {"jitter": (0, 0.9), FAULT_RATE: (0, 0.5)}
+SHARES: Mapping[str, tuple[float, float]] = {"jitter": BOUNDS["jitter"], FAULT_RATE: (0, 0.5)}
 """Keys of shares, with the least and the greatest value."""
 
 DEFAULTS: Mapping[str, Value] = {
@@ -108,7 +107,7 @@ def check_value(key: str, value: Value) -> Diagnostic | None:
     if isinstance(value, int | float):
         low, high = SHARES[key] if key in SHARES else WHOLE[key]
         if not low <= value <= high:
-            message = f"{key} = {value} is not between {low} and {high}"
+            message = f"{key} = {value} is not between {low:g} and {high:g}"
             return Diagnostic("BadValue", message, None, f"for example {_example(key)}")
     return None
 

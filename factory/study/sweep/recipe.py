@@ -16,8 +16,12 @@ from factory.lang.writer import write_pag, write_template
 from factory.layout.layout import Layout
 from factory.layout.request import Ground
 from factory.layout.saved import LayoutTable
+from factory.nets.verify import proved
+from factory.pipeline import Project
 from factory.plant.factory import Factory
-from factory.study.sweep.grid import DEFAULTS, Axis, Point, Value
+from factory.simulation.options import check_ideal
+from factory.study.sweep.grid import DEFAULTS, SETTINGS, Axis, Point, Value
+from factory.support.errors import usage_error
 from factory.support.pickling import pickle_locked_mappings
 from factory.support.resources import mjcf_folder
 from factory.support.tables import table_of
@@ -64,6 +68,32 @@ class Recipe:
             **({"layout": table_of(LayoutTable.of(self.laid))} if self.laid else {}),
             **fixed,
         }
+
+
+def recipe_of(
+    project: Project,
+    axes: Sequence[Axis],
+    shared: Mapping[str, Value],
+    max_time: float | None = None,
+    fuse: bool | None = None,
+) -> Recipe:
+    """The recipe of a sweep of a project along axes, with `shared` values of the keys in DEFAULTS,
+    None where they are not given. Its net is proved, and it is laid out unless the clearance
+    varies, so that what does not fit its floor is refused before the first run. Raises InputError,
+    of code Usage for a value that is given and varied; RunError."""
+    for axis in axes:
+        if shared.get(axis.key) is not None:
+            raise usage_error(f"{axis.key} is both given and varied", "leave one of them out")
+    worlds = next((axis.values for axis in axes if axis.key == "world"), (shared.get("world"),))
+    if set(worlds) == {"ideal"}:
+        check_ideal(fuse)
+    varies = any(axis.key == "clearance" for axis in axes)
+    proved((project.plain if varies else project.layout.factory).net)
+    fixed = {name: getattr(project.settings, name) for name in SETTINGS}
+    fixed |= {key: shared[key] for key in DEFAULTS if shared.get(key) is not None}
+    laid = project.layout if project.laid else None
+    about = max_time, project.ground, fuse, laid
+    return Recipe(project.plain, project.product, fixed, *about)
 
 
 def versions() -> dict[str, str]:

@@ -1,0 +1,82 @@
+"""One export: the choice of its format, and its files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from factory.exporting import Exporter, Made, exporters
+from factory.exporting.subject import Source, Subject
+from factory.nets.gears import GearNet
+from factory.nets.marked import MarkedNet
+from factory.pipeline import Project
+from factory.record.log import Log, is_log, read_log
+from factory.support.errors import did_you_mean, usage_error
+from factory.support.files import is_net
+
+TAKEN = {
+    "net": ("a PAG", "a net in PNML"),
+    "pag": ("a PAG",),
+    "log": ("a log",),
+    "factory": ("a PAG", "a log"),
+}
+"""The kinds of source that an exporter can take."""
+
+
+def exporter(form: str, of: str = "") -> Exporter:
+    """The exporter of a format, with a choice `of` what it exports. Raises InputError (Usage)."""
+    known = exporters()
+    if form not in known:
+        raise usage_error(f"unknown format '{form}'", did_you_mean(form, list(known), "formats"))
+    if of and not known[form].of:
+        some = ", ".join(f"{e.format} ({e.of})" for e in known.values() if e.of)
+        message = f"format {form} offers no choice, so no --of"
+        raise usage_error(message, f"a choice is offered by {some}")
+    return known[form]
+
+
+def read_source(file: Path) -> Log | GearNet | MarkedNet | None:
+    """The log or the net in a file; None for a PAG. Raises InputError."""
+    if is_log(file):
+        return read_log(file)
+    if not is_net(file):
+        return None
+    from factory.foreign_nets.pnml_reader import load_net
+
+    return load_net(file)
+
+
+def check_taken(chosen: Exporter, file: Path, source: Source | None) -> None:
+    """Check that an exporter takes a source, which is that of a PAG where it is None. Raises
+    InputError (Usage)."""
+    kind = "a PAG" if source is None or isinstance(source, Project) else "a net in PNML"
+    kind, wanted = "a log" if isinstance(source, Log) else kind, TAKEN[chosen.takes]
+    if kind not in wanted:
+        message = f"{chosen.format} is made from {' or '.join(wanted)}; '{file}' is {kind}"
+        hint = f"give {wanted[0]}"
+        if chosen.takes == "log":
+            hint = "keep one first: `factory run FILE.pag --log OUT`"
+        raise usage_error(message, hint)
+
+
+def takes_folder(chosen: Exporter, output: Path | None) -> bool:
+    """Whether an output is the folder of an export: a folder, or a new name without an ending."""
+    if not chosen.folder or output is None:
+        return False
+    return output.is_dir() or not (output.suffix or output.exists())
+
+
+def export(
+    chosen: Exporter, file: Path, source: Source, output: Path | None = None, of: str = ""
+) -> tuple[Made, dict[Path, bytes]]:
+    """What an exporter makes of a source, read from a `file`, and the contents of the files to
+    write, none without an output. Raises InputError."""
+    check_taken(chosen, file, source)
+    whole = takes_folder(chosen, output)
+    made = chosen.export(Subject(file, source, of, output.name if output else "", whole))
+    if output is None:
+        return made, {}
+    if not isinstance(made, Mapping):
+        return made, {output: made.encode() if isinstance(made, str) else made}
+    folder = output if whole else output.parent
+    return made, {folder / name if name else output: content for name, content in made.items()}

@@ -1,0 +1,63 @@
+"""The pictures of values in a notebook, put in when the package is imported."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING
+
+from factory.support.showing import DRAWINGS
+
+if TYPE_CHECKING:
+    from factory.layout.layout import Layout
+    from factory.nets.gears import GearNet
+    from factory.nets.marked import MarkedNet
+    from factory.plant.factory import Factory
+    from factory.problem.pag import PAG
+    from factory.simulation.run import Run
+
+LARGE = 400
+"""The most nodes of a tree, places of a net or robots of a layout that are drawn."""
+
+
+def _tree(pag: PAG) -> str | None:
+    from factory.exporting.tree_drawing import draw_tree
+
+    return draw_tree(pag) if len(pag) <= LARGE else None
+
+
+def _net(net: GearNet | MarkedNet, title: str = "net") -> str | None:
+    from factory.exporting.svg import draw_net
+    from factory.nets.marked import marked
+
+    made = marked(net)
+    return draw_net(made, title) if len(made.tokens) <= LARGE else None
+
+
+def _factory(factory: Factory) -> str | None:
+    return _net(factory.net, factory.pag.root)
+
+
+def _floor(layout: Layout) -> str | None:
+    from factory.exporting.floor_sheet import write_svg
+
+    return write_svg(layout) if len(layout.factory.robots) <= LARGE else None
+
+
+def _run(run: Run) -> str:
+    """The report of a run that was logged; of another its figures."""
+    from factory.show.report.reporting import inline, report_on
+    from factory.simulation.figures import figures
+
+    if run.log is not None and run.world == "mujoco" and run.log.is_file():
+        return inline(report_on(run.log).text)
+    return f"<pre>{escape(chr(10).join(figures(run)))}</pre>"
+
+
+DRAWINGS |= {
+    "PAG": _tree,
+    "GearNet": _net,
+    "MarkedNet": _net,
+    "Factory": _factory,
+    "Layout": _floor,
+    "Run": _run,
+}

@@ -1,0 +1,125 @@
+"""The options of a run as values, for the command line and for functions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from factory.support.bounds import WORLDS, WorldName, check_choice, check_values
+from factory.support.errors import Diagnostic, InputError, usage_error
+
+if TYPE_CHECKING:
+    from factory.nets.petri import Marking
+    from factory.pipeline import Project
+    from factory.plant.factory import Factory
+    from factory.simulation.recovery.faults import Campaign
+    from factory.simulation.request import RunRequest
+
+APART = (
+    ("--deputies", ("--relay", "--cycle"), "no robot can take over for one that relays"),
+    ("[lines]", ("--robots", "--cycle"), "the search chooses which labels share a robot"),
+    (
+        "--distributed",
+        ("--faults", "--spares", "--deputies"),
+        "robots that run their own programs do not recover",
+    ),
+)
+"""Options that exclude others, with the reason. All other pairs can be combined, except --relay and
+robots with several tours, which is refused at the layout."""
+
+
+def check_together(values: Mapping[str, bool]) -> None:
+    """Raises InputError (BadValue) for options that exclude each other."""
+    for one, others, reason in APART:
+        for other in others:
+            if values.get(one) and values.get(other):
+                message = f"{one} cannot be combined with {other}: {reason}"
+                raise InputError(Diagnostic("BadValue", message, None, "leave out one of the two"))
+
+
+@dataclass(frozen=True, slots=True)
+class RunOptions:
+    """How a run is made: in a `world`, until so many `units` are dropped off; `seed` and `jitter`
+    draw each robot's speed and gain within ± jitter. `wip`: most copies of each part inside;
+    `start`: a legal marking, or the names of its places, separated by commas, m_0 where None;
+    `fuse`: whether parts joined for good become one body, None where that pays; `max_time`: at most
+    so long [simulated s]; `distributed`: robots run their own programs; `lenient`: what its bodies
+    do does not count; `faults`: a file of what goes wrong, `spares`: robots in reserve, `swap`: how
+    long an exchange takes [s]. Raises InputError (Usage) with every value out of its bounds."""
+
+    world: WorldName = "mujoco"
+    units: int = 1
+    seed: int = 0
+    jitter: float = 0.0
+    wip: int | None = None
+    start: str | Marking | None = None
+    fuse: bool | None = None
+    max_time: float | None = None
+    distributed: bool = False
+    lenient: bool = False
+    faults: Path | None = None
+    spares: int = 0
+    swap: float | None = None
+
+    def __post_init__(self) -> None:
+        check_choice("world", self.world, WORLDS)
+        names = ("units", "seed", "jitter", "wip", "max_time", "spares", "swap")
+        check_values({name: getattr(self, name) for name in names})
+
+    @property
+    def recovers(self) -> bool:
+        """Whether the run recovers from failures."""
+        return self.faults is not None or self.spares > 0
+
+    def campaign(self, factory: Factory) -> Campaign:
+        """The faults of the run, and its spares. Raises InputError."""
+        from factory.simulation.recovery.fault_file import check_names, read_campaign
+        from factory.simulation.recovery.faults import SWAP, Campaign
+
+        swap = SWAP if self.swap is None else self.swap
+        if self.faults is None:
+            return Campaign(seed=self.seed, spares=self.spares, swap=swap)
+        campaign = read_campaign(self.faults, self.spares, swap)
+        check_names(campaign, factory)
+        return campaign
+
+    def request(self, project: Project, shown: bool = True) -> RunRequest:
+        """The request of a run; `shown`: whether it is filmed or logged. Raises InputError."""
+        from factory.nets.history import legal_marking
+        from factory.plant.fused_bodies import fusing_pays
+        from factory.simulation.request import RunRequest
+
+        check_together(
+            {
+                "--distributed": self.distributed,
+                "--faults": self.faults is not None,
+                "--spares": self.spares > 0,
+                "--deputies": project.ground.deputies,
+            }
+        )
+        layout, start = project.layout, self.start
+        if isinstance(start, str):
+            start = legal_marking(layout.factory.net, start)
+        return RunRequest(
+            self.world,
+            self.units,
+            self.seed,
+            self.jitter,
+            project.settings,
+            start,
+            self.wip,
+            self.distributed,
+            fusing_pays(layout.factory, layout.product) if self.fuse is None else self.fuse,
+            shown,
+            recovers=self.recovers,
+            catalogue=project.catalogue,
+        )
+
+
+def check_ideal(fuse: bool | None, monitor: bool = False) -> None:
+    """Raises InputError (Usage) for options that need bodies, which the ideal world lacks."""
+    for wanted, purpose in ((monitor, "for a monitor to observe"), (fuse, "that could become one")):
+        if wanted:
+            raise usage_error(f"the ideal world has no bodies {purpose}", "leave out --world ideal")

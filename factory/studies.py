@@ -1,0 +1,259 @@
+"""The public functions that show a factory, study it, and plan the assembly of a product."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+from factory.stages import AnyPath, Stage, maybe, path_of, project_of
+from factory.support.settings import Settings
+
+if TYPE_CHECKING:
+    from factory.planning.plan import Planned
+    from factory.problem.pag import PAG
+    from factory.rendering.picture import PanelName
+    from factory.rendering.rendering import Rendered
+    from factory.show.report.reporting import RunReport
+    from factory.simulation.executing import Tell
+    from factory.simulation.run import Run
+    from factory.study.analysis import Analysis
+    from factory.study.sweep.summary import Summary
+    from factory.support.bounds import WorldName
+
+
+def _logged(product: Stage) -> Path | None:
+    """The path of the log of a run; None where a product is given."""
+    from factory.record.log import is_log
+
+    path = Path(product) if isinstance(product, str | PathLike) else None
+    return path if path is not None and is_log(path) else None
+
+
+def render(
+    product: Stage,
+    output: AnyPath,
+    *,
+    size: tuple[int, int] = (1280, 720),
+    camera: str = "overview",
+    panels: Sequence[PanelName] = (),
+    title: str = "",
+    fps: float = 30,
+    at: float | Literal["end"] = "end",
+    poster: AnyPath | None = None,
+    units: int = 1,
+    seed: int = 0,
+    jitter: float = 0.0,
+    wip: int | None = None,
+    max_time: float | None = None,
+    settings: Settings | None = None,
+    progress: Tell | None = None,
+) -> Rendered:
+    """Film a run (.mp4), or take a still of it (.png) at a time [s] or at its end; of a log, of the
+    run that is in it.
+
+    `size` (width, height) [px]; `camera`: overview, orbit, top, product, part:LABEL or
+    handover:LABEL; `panels` beside the 3-D: net, gantt; `poster`: a still of a film's best moment.
+    The others are those of `run`. Raises InputError, MissingError without GL, RunError.
+    """
+    from factory.record.log import read_log
+    from factory.rendering.camera import camera_named
+    from factory.rendering.picture import Picture, panels_named, shared
+    from factory.rendering.rendering import Shot
+    from factory.rendering.rendering import render as taken
+    from factory.simulation.options import RunOptions
+
+    asked = RunOptions("mujoco", units, seed, jitter, wip, max_time=max_time)
+    shown, view = panels_named(",".join(panels)), camera_named(camera)
+    picture = Picture(size, view, panels=shown, title=title)
+    shared(size, shown)
+    shot = Shot(path_of(output), picture, fps, at, maybe(poster))
+    log = _logged(product)
+    source = read_log(log) if log else project_of(product, settings)
+    return taken(source, shot, asked, progress=progress)
+
+
+def report(
+    product: Stage,
+    output: AnyPath | None = None,
+    *,
+    units: int = 4,
+    seed: int = 0,
+    jitter: float = 0.0,
+    wip: int | None = None,
+    max_time: float | None = None,
+    settings: Settings | None = None,
+    progress: Tell | None = None,
+) -> RunReport:
+    """The page about a run of a product, or about the run in a log; a notebook shows it. Written to
+    `output` where that is given. The others are those of `run`. Raises InputError, RunError."""
+    from factory.show.report.reporting import report_on
+    from factory.simulation.options import RunOptions
+    from factory.support.files import write_text
+
+    asked = RunOptions("mujoco", units, seed, jitter, wip, max_time=max_time)
+    made = report_on(_logged(product) or project_of(product, settings), asked, progress=progress)
+    if output is not None:
+        write_text(path_of(output), made.text)
+    return made
+
+
+def analyze(
+    product: Stage,
+    *,
+    units: int = 20,
+    world: WorldName = "mujoco",
+    seed: int = 0,
+    jitter: float = 0.0,
+    wip: int | None = None,
+    second: Sequence[str] = (),
+    faster: Mapping[str, float] | None = None,
+    shorter: Mapping[str, float] | None = None,
+    measured: Run | AnyPath | None = None,
+    settings: Settings | None = None,
+) -> Analysis:
+    """The cycle time of a factory by its timed net, what limits it, and what would relieve it.
+
+    What if: a `second` robot like each of some, robots that are `faster` or whose ways are
+    `shorter` by percent ({"r4": 20}). `measured`: a run, or the log of one, to compare with, under
+    its seed, jitter and, of a log, settings. Raises InputError, RunError.
+
+    >>> import factory
+    >>> factory.analyze("examples/paper.pag").bottlenecks
+    ('r3',)
+    """
+    from factory.nets.verify import proved
+    from factory.record.log import read_log
+    from factory.simulation.options import RunOptions
+    from factory.simulation.run import Run
+    from factory.study.analysis import Timing, analyse
+    from factory.study.analysis.changes import change_of
+    from factory.study.analysis.measured import Conditions, conditions, logged_record, record_of
+
+    asked = RunOptions(world, units, seed, jitter, wip)
+    run = measured if isinstance(measured, Run) else None
+    log = None if measured is None or run else read_log(path_of(measured))
+    project = project_of(product, conditions(log.header).settings if log else settings)
+    made = Conditions(project.settings, world, seed, jitter, wip)
+    if run is not None:
+        made = replace(made, seed=run.seed, jitter=run.jitter)
+    elif log is not None:
+        made = conditions(log.header)
+    layout = project.layout
+    proved(layout.factory.net)
+    timing = Timing(layout, made.settings, made.world, made.seed, made.jitter)
+    change = change_of(layout.factory, second, faster, shorter)
+    record = None if run is None else record_of(run)
+    if log is not None:
+        record = logged_record(str(measured), log, layout.factory)
+    count = len(record.dropoffs) if record else asked.units
+    return analyse(timing, count, made.wip, change, record)
+
+
+def sweep(
+    product: Stage,
+    database: AnyPath,
+    vary: Mapping[str, Iterable[float | str]],
+    *,
+    world: WorldName | None = None,
+    units: int | None = None,
+    seed: int | None = None,
+    jitter: float | None = None,
+    wip: int | None = None,
+    max_time: float | None = None,
+    fuse: bool | None = None,
+    jobs: int | None = None,
+    retry: bool = False,
+    settings: Settings | None = None,
+) -> Summary:
+    """Run a product for every combination of the varied values ({"seed": range(100)}), keep the
+    results in a database (SQLite) and summarise them. Called again, it continues where it stopped.
+
+    `jobs`: processes, one per core by default; `retry`: failed runs are repeated. The others are
+    those of `run`. Raises InputError, RunError.
+    """
+    from factory.study.pool import cores
+    from factory.study.sweep.grid import read_axes
+    from factory.study.sweep.recipe import recipe_of
+    from factory.study.sweep.summary import summarise
+    from factory.study.sweep.sweeping import sweep as swept
+    from factory.support.bounds import WORLDS, check_choice, check_values
+
+    shared = {"units": units, "seed": seed, "jitter": jitter, "wip": wip}
+    check_values({**shared, "max_time": max_time, "jobs": jobs})
+    if world is not None:
+        check_choice("world", world, WORLDS)
+    axes = read_axes([f"{key}={','.join(map(str, values))}" for key, values in vary.items()])
+    project = project_of(product, settings)
+    recipe = recipe_of(project, axes, {**shared, "world": world}, max_time, fuse)
+    swept(recipe, axes, Path(database), jobs or cores(), retry)
+    return summarise(Path(database))
+
+
+class PlannedAssembly(NamedTuple):
+    """The assembly tree that was planned, as a PAG; the plan with its figures; the files that were
+    written, that of the PAG first."""
+
+    pag: PAG
+    planned: Planned
+    files: tuple[Path, ...]
+
+
+def plan(
+    source: AnyPath,
+    output: AnyPath,
+    *,
+    aim: Literal["cycle", "robots", "floor"] = "cycle",
+    seconds: float | None = None,
+    keep: Sequence[str] = (),
+    replan: bool = False,
+    allow: Sequence[str] = (),
+    up: Literal["x", "y", "z", "-x", "-y", "-z"] | None = None,
+    base: str = "",
+    screws: Sequence[str] | None = (),
+    hulls: bool = False,
+    unit: Literal["m", "cm", "mm", "in", "ldu"] | None = None,
+    in_place: bool = False,
+    library: AnyPath | None = None,
+    boxes: bool = False,
+    templates: Sequence[AnyPath] = (),
+) -> PlannedAssembly:
+    """The assembly tree of parts that are in their places in the finished product, written as a PAG
+    with its meshes into the folder `output`.
+
+    `source`: a folder of meshes, a file with named bodies, an LDraw model, or a PAG, of whose tree
+    the sub-trees `keep` stay, or all unless `replan`. `aim`: what to minimise; `seconds`: time to
+    search; `allow`: parts that may pass through others, or pairs `a:b`, or depths `0.5mm`; `up`:
+    the axis of the source that points up; `base`: what the others are assembled onto; `screws`:
+    parts that are screws, None where none is; `hulls`: plan with convex hulls; `unit`: of lengths;
+    `in_place`: the parts are not checked for their places; `library`: of LDraw parts, `boxes` for
+    those without a shape. Raises InputError, of code CannotAssemble for parts that interlock.
+    """
+    from factory.lang.overlaps import overlaps_in
+    from factory.pipeline import all_templates, read
+    from factory.planning.outcome import refusal, write_planned
+    from factory.planning.plan import CannotAssemble, PlanOptions
+    from factory.planning.plan import plan as planned_for
+    from factory.planning.source import SourceOptions, read_source
+    from factory.support.bounds import AIMS, LENGTHS, UPS, check_choice, check_values
+    from factory.support.errors import InputError
+
+    check_values({"seconds": seconds})
+    check_choice("aim", aim, AIMS)
+    for name, value, valid in (("up", up, tuple(UPS)), ("unit", unit, LENGTHS)):
+        if value is not None:
+            check_choice(name, value, valid)
+    operations, file = all_templates(templates), path_of(source)
+    options = SourceOptions(unit, tuple(keep), replan, maybe(library), boxes, in_place)
+    placed = read_source(file, operations, options)
+    meant, passing = overlaps_in(allow, {part.label for part in placed.parts})
+    placed = replace(placed, allowed=(*placed.allowed, *meant))
+    fast = None if screws is None else tuple(screws)
+    search = PlanOptions(aim, seconds, passing, hulls, UPS[up] if up else None, base, fast)
+    found = planned_for(placed, replace(search, templates=operations))
+    if isinstance(found, CannotAssemble):
+        raise InputError(refusal(found))
+    files = write_planned(placed, found, Path(output), file, passing, operations)
+    return PlannedAssembly(read(files[0], templates).pag, found, files)
