@@ -59,16 +59,13 @@ def render(
     The others are those of `run`. Raises InputError, MissingError without GL, RunError.
     """
     from factory.record.log import read_log
-    from factory.rendering.camera import camera_named
-    from factory.rendering.picture import Picture, panels_named, shared
+    from factory.rendering.picture import Picture
     from factory.rendering.rendering import Shot
     from factory.rendering.rendering import render as taken
     from factory.simulation.options import RunOptions
 
     asked = RunOptions("mujoco", units, seed, jitter, wip, max_time=max_time)
-    shown, view = panels_named(",".join(panels)), camera_named(camera)
-    picture = Picture(size, view, panels=shown, title=title)
-    shared(size, shown)
+    picture = Picture(size, camera, panels=tuple(panels), title=title)
     shot = Shot(path_of(output), picture, fps, at, maybe(poster))
     log = _logged(product)
     source = read_log(log) if log else project_of(product, settings)

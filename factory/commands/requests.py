@@ -195,14 +195,12 @@ class PictureOptions:
         None for any. Raises InputError (BadValue) for an unknown name, a size without room for
         the panels, or a poster that cannot be a still."""
         from factory.rendering import Picture, camera_named, check_output, panels_named
-        from factory.rendering.picture import shared
 
-        size = self.area()
         camera, panels = camera_named(self.camera, pag), panels_named(self.panels)
-        shared(size, panels)
+        picture = Picture(self.area(), camera, panels=panels, title=self.title)
         if self.poster is not None:
-            check_output(self.poster, size, still=True)
-        return Picture(size, camera, panels=panels, title=self.title)
+            check_output(self.poster, picture.size, still=True)
+        return picture
 
 
 PLANNED = {

@@ -28,7 +28,8 @@ LEAST = 240
 @dataclass(frozen=True, slots=True)
 class Picture:
     """How a still or a film is taken: its `size`, the `camera`, whether it has a `caption`, the
-    `panels` beside the 3-D, and a `title` shown at the beginning."""
+    `panels` beside the 3-D, and a `title` shown at the beginning. Raises InputError (BadValue) for
+    an unknown camera or panel, and where there is no room for the panels."""
 
     size: Size = (1280, 720)
     camera: Camera = "overview"
@@ -36,14 +37,13 @@ class Picture:
     panels: tuple[PanelName, ...] = ()
     title: str = ""
 
+    def __post_init__(self) -> None:
+        camera_named(self.camera)
+        shared(self.size, panels_named(",".join(self.panels)))
+
     def check(self, pag: PAG) -> None:
-        """Raises InputError (BadValue) for a camera of a label that is not in the product, and
-        where there is no room for the panels."""
+        """Raises InputError (BadValue) for a camera of a label that is not in the product."""
         camera_named(self.camera, pag)
-        shared(self.size, self.panels)
-
-
-USUAL = Picture()
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,3 +87,6 @@ def shared(size: Size, panels: Sequence[PanelName]) -> tuple[Area, dict[PanelNam
         panel: Area(left, top + edges[n], wide, edges[n + 1] - edges[n])
         for n, panel in enumerate(panels)
     }
+
+
+USUAL = Picture()
