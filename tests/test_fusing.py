@@ -17,8 +17,8 @@ from factory.plant.fused_bodies import FUSE_FROM, bodies_of, fused_copies, fusin
 from factory.record.monitor import beside
 from factory.simulation.disturbance import Mass, disturb
 from factory.simulation.modelling import physical_model
-from factory.simulation.mujoco.feeders import Feeders
 from factory.simulation.mujoco.fusing import SETTLING, Fusion, rotations
+from factory.simulation.mujoco.holdings import Holdings
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
@@ -238,13 +238,13 @@ def test_the_monitor_catches_a_body_made_of_another_unit(
 ) -> None:
     """Planted: the product appears in the output robot's hands, but one input stays there."""
     simulation = Simulation(layout_of("paper"), RunRequest(units=2, fuse=True))
-    parts, retire = simulation.physical.parts, Feeders.retire
+    parts, put_away = simulation.physical.parts, Holdings.put_away
     kept: list[str] = []
 
-    def faulty(self: Feeders, bodies: Iterable[int]) -> None:
+    def faulty(self: Holdings, bodies: Iterable[int]) -> None:
         bodies = [*bodies]
         labels = [parts.holdings.of(body).label for body in bodies]
-        retire(self, bodies)
+        put_away(self, bodies)
         if "part1" in labels and not kept:
             kept.append("part1")
             robot = simulation.layout.factory.by_label["sub1"].carrier
@@ -252,7 +252,7 @@ def test_the_monitor_catches_a_body_made_of_another_unit(
             parts.welds.loose([parts.holdings.park[parts.holdings.free["part1"][0]]])
             parts.welds.join({grip: int(simulation.physical.m.eq_obj2id[grip])})
 
-    monkeypatch.setattr(Feeders, "retire", faulty)
+    monkeypatch.setattr(Holdings, "put_away", faulty)
     monitor = beside(simulation)
     simulation.run([monitor.observe], max_time=20)
     assert kept and not monitor.report().refines_net

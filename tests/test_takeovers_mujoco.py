@@ -26,6 +26,7 @@ from factory.layout.layout import Layout
 from factory.layout.request import Ground
 from factory.layout.standby import Repertoire, deputies_in, part_of
 from factory.mjcf import names
+from factory.mjcf.masks import feeder_codes
 from factory.pipeline import read
 from factory.record.log import LogWriter, read_log
 from factory.record.monitor.record import watch_log
@@ -273,10 +274,15 @@ def test_a_robot_that_dies_where_it_went_ahead() -> None:
 
 
 def test_what_a_dead_robots_feeder_shows_goes_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Planted: it does not, and the deputy pulls it out of there."""
-    monkeypatch.setattr(Feeders, "elsewhere", lambda feeders, layout: [])
-    run = simulated(STEPS, "r3", 5.0)[0].run(max_time=60.0)
-    assert len(run.exchanges) == 1 and figures(run)[2] > 1.0
+    """Planted: it does not, and hangs there for good."""
+    layout = laid_out(STEPS)
+    feeder = feeder_codes(layout.factory, outlets_of(layout))[2]
+    for goes_back in (True, False):
+        if not goes_back:
+            monkeypatch.setattr(Feeders, "elsewhere", lambda feeders, layout: [])
+        simulation = simulated(STEPS, "r3", 5.0)[0]
+        run, holdings = simulation.run(max_time=60.0), simulation.physical.parts.holdings
+        assert (len(run.exchanges), not holdings.held(feeder)) == (1, goes_back)
 
 
 def test_what_a_robot_that_is_gone_stood_under_goes_back() -> None:

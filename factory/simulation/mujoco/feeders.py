@@ -1,13 +1,14 @@
 """Feeders: each presents the next part of its label, the n-th for unit n.
 
 A copy gets into a housing while the slider is up, where nothing of it can be seen. It comes down
-when the robot that has taken the last one is out of the way. Feeders of one line take turns, in the
-order of their robot's program: no part comes down before all their sliders are at rest.
+when the robot that has taken the last one is out of the way. Feeders of one line, whose parts one
+robot takes, take turns in the order of its program: no part comes down before all their sliders are
+at rest. Whose turn it is follows from how many parts each has shown.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +24,6 @@ from factory.simulation.mujoco.holdings import Holdings
 from factory.simulation.mujoco.passing import Passing
 from factory.simulation.mujoco.sliders import NEVER, Sliders
 from factory.simulation.mujoco.supply import Supply, TakenBack
-from factory.simulation.mujoco.turns import Turns
 from factory.simulation.mujoco.welds import Place, Welds
 
 
@@ -64,11 +64,10 @@ class Feeders:
         self.back = TakenBack()
         self.lacking = set[str]()
         self.due = NEVER
-        self._turns = Turns([station.label for station in self._stations])
-        self._serve(model.layout, supply.rounds())
+        self._serve(model.layout)
 
-    def _serve(self, layout: Layout, rounds: Mapping[str, int]) -> None:
-        """From now on robots take parts as in a layout, after so many rounds."""
+    def _serve(self, layout: Layout) -> None:
+        """From now on robots take parts as in a layout."""
         by_label = layout.factory.by_label
         self._number = {
             station.label: n
@@ -76,8 +75,22 @@ class Feeders:
             if by_label[station.label].carrier == station.robot
         }
         robots = range(len(layout.factory.robots))
-        lines = [[self._number[label] for label in layout.magazine(robot)] for robot in robots]
-        self._turns.serve([line for line in lines if line], rounds)
+        lines = ([self._number[label] for label in layout.magazine(robot)] for robot in robots)
+        self._lines = {self._stations[line[0]].code: line for line in lines if line}
+        self._first = np.arange(len(self._stations))
+        for line in self._lines.values():
+            self._first[line] = line[0]
+
+    def _turn(self, line: Sequence[int], rounds: Mapping[str, int]) -> int:
+        """Whose turn it is in a line, after so many rounds of each label: the first that is
+        behind."""
+        return min(line, key=lambda number: rounds[self._stations[number].label])
+
+    def _vacant(self) -> list[int]:
+        """The feeders whose turn it is in lines that show nothing, and take nothing back."""
+        lines = [self._lines[code] for code in self._lines.keys() - self._holdings.holders]
+        rounds = self.supply.rounds() if any(len(line) > 1 for line in lines) else {}
+        return sorted(self._turn(line, rounds) if rounds else line[0] for line in lines)
 
     def serves(self, label: str) -> bool:
         """Whether robots take such things from feeders."""
@@ -98,7 +111,7 @@ class Feeders:
     def begin(self) -> None:
         """Where the run starts, each feeder presents a part if it can and its robot is not yet
         under way with another."""
-        due = np.flatnonzero(self._turns.now & ~self._passing.holds)
+        due = [number for number in self._vacant() if not self._passing.holds[number]]
         self._sliders.begin(self._load(due, down=True))
 
     def presents(self, label: str, unit: int) -> bool:
@@ -119,9 +132,7 @@ class Feeders:
 
     def taken(self, label: str) -> None:
         """The robot takes the part."""
-        number = self._number[label]
-        self._passing.holding(self._stations[number].robot)
-        self._turns.vacant[self._turns.taken(number)] = True
+        self._passing.holding(self._stations[self._number[label]].robot)
 
     def end(self, operations: Sequence[Operation]) -> None:
         """These operations have ended: sliders whose parts have been taken go up."""
@@ -130,29 +141,21 @@ class Feeders:
         taken = [self._number[o.label] for o in operations if o.label in self._number]
         self._send(np.array(taken, np.intp), down=False)
 
-    def retire(self, bodies: Iterable[int]) -> None:
-        """Put bodies out of sight; their feeders may be empty."""
-        for label in self._holdings.put_away(bodies):
-            number = self._number.get(label, -1)
-            if number >= 0 and self.shows(label) is None and self._turns.now[number]:
-                self._turns.vacant[number] = True
-
     def tend(self) -> bool:
         """Let the next parts come down from housings whose sliders have come up, where the robots
         are out of the way. Whether one comes that a robot has asked for."""
         self._sliders.settle()
         if self.back.numbers:
             self._take_back()
-        if not np.count_nonzero(self._turns.vacant):
+        vacant, free = np.array(self._vacant(), np.intp), list[int]()
+        if len(vacant):
+            vacant = vacant[~self._are_busy()[vacant]]
+        if len(vacant):
+            late, clear = self._obstructed(), self._passing.clear()
+            free = [n for n in vacant[clear[vacant]].tolist() if n not in late]
+        if not free:
             return False
-        busy = self._turns.any_of((self._sliders.ends < NEVER) | self._held_back())
-        free = self._turns.vacant & ~busy
-        if np.count_nonzero(free):
-            free &= self._passing.clear()
-            free[self._obstructed()] = False
-        if not np.count_nonzero(free):
-            return False
-        loaded = self._load(free.nonzero()[0])
+        loaded = self._load(free)
         self._welds.write()
         self._send(loaded, down=True)
         come = self.lacking & {self._stations[number].label for number in loaded.tolist()}
@@ -181,7 +184,8 @@ class Feeders:
         it waits for them."""
         for number in self.back.numbers:
             if self._passing.is_aside(number):
-                yield from (self._stations[n].label for n in self._turns.lines[number])
+                line = self._lines.get(self._stations[number].code, ())
+                yield from (self._stations[n].label for n in line)
 
     def shown(self) -> dict[str, int]:
         """The unit of the part that is shown of each label, as they came."""
@@ -199,21 +203,19 @@ class Feeders:
         """The next part of each label is for another unit, after so many rounds; what it is no
         longer the turn of is taken back."""
         self.lacking.clear()
-        self._turns.recount(rounds)
+        turns = {self._turn(line, rounds) for line in self._lines.values()}
         for label, unit in units.items():
             number, is_shown = self._number[label], self.shows(label) is not None
             self.supply.next[label] = unit + self.supply.period * is_shown
-            if is_shown and not self._turns.now[number]:
+            if is_shown and number not in turns:
                 self.take_back(label, scrap + number)
-            waits = self.shows(label) is None and number not in self.back.numbers
-            self._turns.vacant[number] = self._turns.now[number] and waits
 
     def exchange(self, robot: int, layout: Layout) -> None:
         """A robot (index) is gone, and others take parts as in a layout. What is shown `elsewhere`
-        has been taken back, and `undone` will say whose turn it is."""
+        has been taken back."""
         self._passing.gone(robot)
         self.lacking.clear()
-        self._serve(layout, self.supply.rounds())
+        self._serve(layout)
 
     def elsewhere(self, layout: Layout) -> list[str]:
         """The labels of parts that are shown where they are not taken in a layout."""
@@ -223,7 +225,8 @@ class Feeders:
 
     def in_the_way(self) -> set[int]:
         """The robots (index) under which a part comes late that they wait for."""
-        due = (self._stations[n] for n in self._obstructed() if self._turns.vacant[n])
+        vacant = self._vacant()
+        due = (self._stations[n] for n in self._obstructed() if n in vacant)
         return {station.robot for station in due if self._supplied(station.label)}
 
     def _obstructed(self) -> list[int]:
@@ -249,27 +252,27 @@ class Feeders:
             station = self._stations[number]
             self._holdings.put_away([self._holdings.held(station.code)[station.label]])
             self.back.numbers.remove(number)
-            self._turns.vacant[number] = self._turns.now[number]
         self._welds.write()
 
-    def _held_back(self) -> Truth:
-        """Whether each (n,) is to show nothing yet."""
-        held = np.zeros(len(self._stations), bool)
-        held[self.back.numbers] = True
+    def _are_busy(self) -> Truth:
+        """Whether each (n,) is in a line of which a slider is on its way, or that is to show
+        nothing yet."""
+        busy = self._sliders.ends < NEVER
         if self.back.awaited:
-            held[[n for n, s in enumerate(self._stations) if s.label in self.back.awaited]] = True
-        return held
+            busy[[n for n, s in enumerate(self._stations) if s.label in self.back.awaited]] = True
+        lines = np.zeros(len(busy), bool)
+        lines[self._first[busy]] = True
+        return np.asarray(lines[self._first])
 
     def _send(self, numbers: Index, down: bool) -> None:
         self._sliders.send(numbers, down)
         self._welds.masks.fresh.update(self._stations[n].code for n in numbers.tolist())
 
-    def _load(self, numbers: Index, down: bool = False) -> Index:
+    def _load(self, numbers: Sequence[int], down: bool = False) -> Index:
         """Put the next copies into feeders, where there are some to spare and units that need
-        them; where not, they are looked for again when one has become free. Gives which."""
-        self._turns.vacant[numbers] = False
-        loaded = [n for n in numbers.tolist() if self._supplied(self._stations[n].label)]
-        self.back.late = self.back.late.union(numbers.tolist()).difference(loaded)
+        them. Gives which."""
+        loaded = [n for n in numbers if self._supplied(self._stations[n].label)]
+        self.back.late = self.back.late.union(numbers).difference(loaded)
         for number in loaded:
             station, supply = self._stations[number], self.supply
             unit = supply.next[station.label]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Set
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -69,6 +69,11 @@ class Holdings:
         """All bodies that are in the factory, as they came into it."""
         return iter(self._of.items())
 
+    @property
+    def holders(self) -> Set[int]:
+        """The codes of those that have something."""
+        return self._held.keys()
+
     def held(self, holder: int) -> Mapping[str, int]:
         """The bodies that a holder (its code) has, by label."""
         return self._held.get(holder, NOTHING)
@@ -124,16 +129,13 @@ class Holdings:
             self._let_go(body)
         return bodies
 
-    def put_away(self, bodies: Iterable[int]) -> list[str]:
-        """Bodies are to spare from now on, out of sight; gives their labels."""
-        bodies, labels = [*bodies], list[str]()
-        for body in bodies:
+    def put_away(self, bodies: Iterable[int]) -> None:
+        """Bodies are to spare from now on, out of sight."""
+        for body in [*bodies]:
             self._let_go(body)
             self._leave(body)
             self._hide(body)
-            labels.append(self._of.pop(body).label)
-            self.free[labels[-1]].append(body)
-        return labels
+            self.free[self._of.pop(body).label].append(body)
 
     def assign(self, units: Mapping[int, int]) -> None:
         """Bodies are for other units from now on."""

@@ -9,7 +9,6 @@ import numpy as np
 
 from factory.mjcf.masks import robot_code
 from factory.mjcf.model import Model
-from factory.simulation.mujoco.feeders import Feeders
 from factory.simulation.mujoco.fusing import RIGID, SETTLING, Fusion
 from factory.simulation.mujoco.holdings import Holdings
 from factory.simulation.mujoco.product_error import Misfit
@@ -24,9 +23,8 @@ class Joining:
     has joined and since when [s]; `misfit`: how far out of place a unit's parts were when
     they became one."""
 
-    def __init__(self, model: Model, holdings: Holdings, feeders: Feeders, welds: Welds) -> None:
-        self._model, self._holdings = model, holdings
-        self._feeders, self._welds = feeders, welds
+    def __init__(self, model: Model, holdings: Holdings, welds: Welds) -> None:
+        self._model, self._holdings, self._welds = model, holdings, welds
         self.waiting: dict[int, tuple[str, float]] = {}
         self.misfit: dict[int, Misfit] = {}
         self._asleep: set[int] = set()
@@ -84,4 +82,4 @@ class Joining:
         off = Misfit(misfit, self.fusion.turns(bodies), label)
         self.misfit[unit] = off.worse(self.misfit.get(unit, Misfit()))
         self.fusion.fuse(bodies, self._holdings.take(label, unit, robot_code(robot)))
-        self._feeders.retire(bodies)
+        self._holdings.put_away(bodies)

@@ -57,7 +57,7 @@ class Parts:
         passing, supply = Passing(m, d, model, request), Supply(model, request, counts)
         self.feeders = Feeders(model, self.holdings, self.welds, motion.sliders, passing, supply)
         self.strength = Strength(m, d, model, self.holdings.grips())
-        self.joining = Joining(model, self.holdings, self.feeders, self.welds)
+        self.joining = Joining(model, self.holdings, self.welds)
         self.joining.weigh(m, d)
         mujoco.mj_kinematics(m, d)
         for label, unit, robot in self._under_way(counts, passing):
@@ -109,7 +109,7 @@ class Parts:
         """Return the bodies of the product on the tray to their feeders, out of sight."""
         assert self.on_tray is not None
         self.joining.misfit.pop(self.on_tray, None)
-        self.feeders.retire(self.holdings.held(self.tray).values())
+        self.holdings.put_away(self.holdings.held(self.tray).values())
         self.welds.write()
 
     def finished(self, unit: int) -> tuple[np.ndarray, Misfit]:

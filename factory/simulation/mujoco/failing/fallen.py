@@ -58,7 +58,7 @@ class Fallen:
         for heap in over:
             self.heaps.remove(heap)
             self.binned += self._is_in_bin(heap)
-            parts.feeders.retire(heap.bodies.values())
+            parts.holdings.put_away(heap.bodies.values())
         if over:
             parts.welds.write()
         self._forget()

@@ -270,7 +270,7 @@ class MujocoPlant:
     def _empty(self, robot: int) -> None:
         """What a robot that is taken away holds is put out of sight."""
         world = self._world
-        world.parts.feeders.retire(self._holdings.hand(robot).values())
+        world.parts.holdings.put_away(self._holdings.hand(robot).values())
         world.parts.welds.write()
         world.motion.load([robot], [0.0])
 
