@@ -7,10 +7,12 @@ import signal
 from collections.abc import Callable
 from itertools import count, pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import imageio.v3 as iio
 import pytest
 
+from factory.commands.plan import _by_label
 from factory.pipeline import read
 from factory.planning.blocking import blocking
 from factory.planning.cannot import interlocks
@@ -145,6 +147,25 @@ def test_a_circuit_is_a_proof(tmp_path: Path, parts: Parts) -> None:
         locks = found.locks[axis] if side > 0 else found.locks[axis].T
         units = [found.labels.index(label) for label in (*way, way[0])]
         assert all(locks[one, other] for one, other in pairwise(units))
+
+
+def test_joins_find_their_operations_whenever_screws_are_driven() -> None:
+    """Screw s is driven before b comes, and screw t before c: the joins of b and c omit them."""
+    labels = ["a", "b", "c", "s", "t"]
+    operations = [("as", "a", "s"), ("ab", "as", "b"), ("abt", "ab", "t"), ("abc", "abt", "c")]
+    steps = [SimpleNamespace(label=whole, inputs=(one, other)) for whole, one, other in operations]
+    made = [("a", "b"), ("ab", "c"), ("a", "s"), ("ab", "t")]
+    joins = [SimpleNamespace(pile=tuple(pile), come=(come,)) for pile, come in made]
+    parts = [(label, [SimpleNamespace(label=label)]) for label in labels]
+    project = SimpleNamespace(
+        pag=SimpleNamespace(postorder=lambda: steps), matings=SimpleNamespace(all=steps)
+    )
+    told = _by_label(
+        SimpleNamespace(units=lambda: parts), SimpleNamespace(operations=joins), project
+    )
+    assert {label: join.come for label, join in told.items()} == {
+        whole: (come,) for whole, _, come in operations
+    }
 
 
 def test_what_interlocks_is_not_drawn_where_no_pictures_are_wanted(

@@ -224,23 +224,20 @@ def _document(
 
 
 def _by_label(placed: InPlace, planned: Planned, project: Project) -> dict[str, PlannedJoin]:
-    """The joins of a plan by the labels of their operations. The two are matched by the units that
-    they make, without screws that are driven earlier, which joins omit. Operations of sub-trees
-    that were kept have no join."""
+    """The joins of a plan by the labels of their operations: each is that of the first operation
+    that has all its units. A join omits screws that are driven earlier; operations of sub-trees
+    that were kept have none."""
     made = {frozenset((*join.pile, *join.come)): join for join in planned.operations}
     inside = {part.label: frozenset([label]) for label, own in placed.units() for part in own}
-    matings = project.matings.all if project.matings else ()
-    steps = {mating.label: mating.inputs for mating in matings}
     for node in project.pag.postorder():
         if node.inputs:
             inside[node.label] = frozenset[str]().union(*(inside[name] for name in node.inputs))
-    for label, inputs in steps.items():
-        inside[label] = frozenset[str]().union(*(inside[name] for name in inputs))
-    joins = {label: made.pop(inside[label]) for label in steps if inside[label] in made}
-    joined = frozenset[str]().union(*made)
-    for label in steps:
-        if label not in joins and inside[label] & joined in made:
-            joins[label] = made.pop(inside[label] & joined)
+    joins: dict[str, PlannedJoin] = {}
+    for mating in project.matings.all if project.matings else ():  # inputs before what takes them
+        units = frozenset[str]().union(*(inside[name] for name in mating.inputs))
+        inside[mating.label] = units
+        if (whole := next((key for key in made if key <= units), None)) is not None:
+            joins[mating.label] = made.pop(whole)
     return joins
 
 
