@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +60,13 @@ class Terminal:
         assert "Traceback" not in err
         assert "Internal" not in err, err
         return Done(status, out, err)
+
+
+class Screen(StringIO):
+    """A stream that is a terminal."""
+
+    def isatty(self) -> bool:
+        return True
 
 
 def spawn(*words: object, cwd: Path | None = None, **variables: str) -> Done:

@@ -30,11 +30,6 @@ from tests.random_products import random_product
 ROOT = Path(__file__).parents[1]
 
 
-@pytest.fixture
-def terminal(capsys: pytest.CaptureFixture[str]) -> Terminal:
-    return Terminal(capsys)
-
-
 HANDS = ("lamp", "stool", "truck", "chair")
 
 
@@ -175,12 +170,12 @@ def test_machines_without_a_program_are_in_it() -> None:
     assert made.away.keys() == {dropoff.index for dropoff in layout.factory.dropoffs}
 
 
-def test_check_and_export_tell_of_it(terminal: Terminal, tmp_path: Path) -> None:
+def test_check_and_export_tell_of_it(run: Terminal, tmp_path: Path) -> None:
     file, out = ROOT / "examples" / "stool.pag", tmp_path / "stool.pnml"
-    told = terminal("check", file, "-v").out
+    told = run("check", file, "-v").out
     assert "live: yes" in told.split("coordinated")[1].splitlines()[0]
     assert "order place" in told
-    assert not terminal("export", file, "--format", "pnml", "--of", "coordinated", "-o", out).status
-    again = terminal("check", out).out
+    assert not run("export", file, "--format", "pnml", "--of", "coordinated", "-o", out).status
+    again = run("check", out).out
     assert "live: yes, safe: yes, reversible: yes" in again
     assert "tray" in out.read_text()

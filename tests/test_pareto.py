@@ -25,7 +25,7 @@ from factory.study.pareto.trial import Trial, tried
 from factory.support import progress
 from factory.support.progress import StepBar
 from factory.support.settings import Settings
-from tests.command_line import PAPER, ROOT, Terminal, files_in
+from tests.command_line import PAPER, ROOT, Screen, Terminal, files_in
 from tests.report_values import EVIL
 from tests.waiting import until
 
@@ -332,11 +332,6 @@ def test_a_search_that_is_stopped_at_once_writes_nothing(
 
 
 # --- progress -------------------------------------------------------------------------------------
-
-
-class Screen(io.StringIO):
-    def isatty(self) -> bool:
-        return True
 
 
 def test_a_search_shows_how_far_it_is(run: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:

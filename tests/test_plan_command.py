@@ -28,17 +28,12 @@ Planning = Callable[..., Done]
 
 
 @pytest.fixture
-def terminal(capsys: pytest.CaptureFixture[str]) -> Terminal:
-    return Terminal(capsys)
-
-
-@pytest.fixture
-def planning(terminal: Terminal, tmp_path: Path) -> Planning:
+def planning(run: Terminal, tmp_path: Path) -> Planning:
     """Plans a puzzle, or a PAG, with its tree thrown away, into `out`."""
 
     def planned(what: Parts | Path, *words: object, out: str = "out") -> Done:
         file = what if isinstance(what, Path) else puzzle(tmp_path, what)
-        return terminal("plan", file, "--replan", "-o", tmp_path / out, *words, "--json")
+        return run("plan", file, "--replan", "-o", tmp_path / out, *words, "--json")
 
     return planned
 
@@ -51,13 +46,13 @@ def puzzle(folder: Path, parts: Parts) -> Path:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["gearbox", "chest", "truck", "chair"])
 def test_a_plan_is_free_and_no_slower_than_the_tree_drawn_by_hand(
-    planning: Planning, terminal: Terminal, name: str
+    planning: Planning, run: Terminal, name: str
 ) -> None:
     from factory.timing.prediction import pace
 
     done = planning(EXAMPLES / f"{name}.pag", "--no-look", "--seconds", 20)
     assert done.status == 0, done.err
-    checked = terminal("check", done.json["pag"], "--json").json
+    checked = run("check", done.json["pag"], "--json").json
     assert checked["live"] and checked["approaches"]["blocked"] == 0
     assert checked["robots"] == done.json["figures"]["robots"]
     by_hand, planned = read(EXAMPLES / f"{name}.pag"), read(Path(done.json["pag"]))
@@ -78,15 +73,13 @@ def test_few_robots_a_small_floor_or_a_short_cycle(planning: Planning) -> None:
     assert asked["floor"]["area"] <= slack * min(one["area"] for one in asked.values())
 
 
-def test_each_operation_has_its_room(
-    planning: Planning, terminal: Terminal, tmp_path: Path
-) -> None:
+def test_each_operation_has_its_room(planning: Planning, run: Terminal, tmp_path: Path) -> None:
     joins = planning(PEG, "--no-look").json["joins"]
     assert {join["label"] for join in joins} == labels_of(tmp_path / "out" / "puzzle.pag")
     rooms = [join["clearance"] for join in joins]
     assert all(room is None or room >= -1e-5 for room in rooms)
     words = ("plan", tmp_path / "puzzle.pag", "--replan", "-o", tmp_path / "out", "--no-look")
-    told = terminal(*words, "-v").out
+    told = run(*words, "-v").out
     for join in joins:
         (line,) = [line for line in told.splitlines() if line.startswith(f"  {join['label']}: ")]
         room = join["clearance"]
@@ -95,14 +88,14 @@ def test_each_operation_has_its_room(
 
 @pytest.mark.parametrize("drawn", [False, True])
 def test_the_report_has_the_way_and_the_room_of_an_operation(
-    planning: Planning, terminal: Terminal, tmp_path: Path, drawn: bool
+    planning: Planning, run: Terminal, tmp_path: Path, drawn: bool
 ) -> None:
     """That of the plan; and that a pair is left out that is drawn into each other, by 0.03 mm which
     nobody has allowed."""
     wall = (-20, -20, 0.2), (-4.97 if drawn else -5.2, 20, 30.2)
     done = planning({**PEG, "cap": [*PEG["cap"][1:], wall]}, "--no-look")
     (join,), to = done.json["joins"], tmp_path / "report.html"
-    assert terminal("report", done.json["pag"], "--units", 1, "-o", to).status == int(drawn)
+    assert run("report", done.json["pag"], "--units", 1, "-o", to).status == int(drawn)
     text = to.read_text().partition("How parts come together")[2].partition("</table>")[0]
     (row,) = [row for row in text.split("<tr>") if f">{join['label']}<" in row]
     assert "<td>peg + cap</td><td>cap is lowered " in row
@@ -177,7 +170,7 @@ def test_what_interlocks_is_not_drawn_where_no_pictures_are_wanted(
 
 
 def test_clashes_that_are_allowed_are_counted_and_written(
-    planning: Planning, terminal: Terminal
+    planning: Planning, run: Terminal
 ) -> None:
     """Of a part that may pass through all others, or of a pair, whatever overlaps when finished:
     `check` knows that they are allowed, as deep as they are and no deeper."""
@@ -194,7 +187,7 @@ def test_clashes_that_are_allowed_are_counted_and_written(
     for one in (done, again):
         found = read(Path(one.json["pag"])).pag
         assert found.allowed and all(0 < a.depth < 0.1 for a in found.allowed)
-        checked = terminal("check", one.json["pag"], "--json").json
+        checked = run("check", one.json["pag"], "--json").json
         codes = [w["code"] for w in (*one.json["warnings"], *checked["warnings"])]
         assert checked["approaches"]["blocked"] > 0 and "Blocked" not in codes
 
@@ -207,10 +200,10 @@ third = atomic ( box = ( 0.1, 0.1, 0.1 ), pos = ( 0, 0, 0.25 ) )
 """
 
 
-def test_a_sub_tree_is_kept(terminal: Terminal, tmp_path: Path) -> None:
+def test_a_sub_tree_is_kept(run: Terminal, tmp_path: Path) -> None:
     (tmp_path / "stack.pag").write_text(STACK)
     words = ("--keep", "pair", "--no-look", "-o", tmp_path / "out")
-    done = terminal("plan", tmp_path / "stack.pag", *words, "--json")
+    done = run("plan", tmp_path / "stack.pag", *words, "--json")
     assert done.status == 0, done.err
     assert done.json["kept"] == ["pair"]
     after = read(Path(done.json["pag"])).pag
@@ -306,12 +299,12 @@ slab = atomic ( box = ( 0.6, 0.6, 0.1 ), pos = ( 0, 0, 0.65 ), density = 8000 )
 
 
 def test_what_is_too_heavy_for_every_hand_is_said_by_plan_and_check(
-    terminal: Terminal, tmp_path: Path
+    run: Terminal, tmp_path: Path
 ) -> None:
     (tmp_path / "all.pag").write_text(HEAVY)
     words = ("--replan", "--no-look", "-o", tmp_path / "out")
-    done = terminal("plan", tmp_path / "all.pag", *words, "--json")
-    checked = terminal("check", done.json["pag"], "--json")
+    done = run("plan", tmp_path / "all.pag", *words, "--json")
+    checked = run("check", done.json["pag"], "--json")
     for warnings in (done.json["warnings"], checked.json["warnings"]):
         grips = [w for w in warnings if w["code"] == "NoGrip"]
         assert {w["message"] for w in grips} == {

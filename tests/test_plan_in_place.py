@@ -1,5 +1,5 @@
 """Parts that are not where they are in the finished product, and units that no one states: refused,
-or asked about on a terminal."""
+or asked about on a run."""
 
 from __future__ import annotations
 
@@ -20,11 +20,6 @@ from tests.command_line import ROOT, Terminal
 TEMPLATES = all_templates(())
 CASES = ROOT.parent / "shared" / "cases"
 Parts = Mapping[str, trimesh.Trimesh]
-
-
-@pytest.fixture
-def terminal(capsys: pytest.CaptureFixture[str]) -> Terminal:
-    return Terminal(capsys)
 
 
 def block(low: tuple[float, ...], high: tuple[float, ...]) -> trimesh.Trimesh:
@@ -72,13 +67,13 @@ def peg(thicker: float, width: float = 40.0) -> dict[str, trimesh.Trimesh]:
 
 
 @pytest.mark.skipif(not CASES.exists(), reason="shared inputs are not here")
-def test_parts_about_their_own_origins_are_refused(terminal: Terminal, tmp_path: Path) -> None:
+def test_parts_about_their_own_origins_are_refused(run: Terminal, tmp_path: Path) -> None:
     words = ("plan", CASES / "all_at_origin", "-o", tmp_path / "out", "--no-look")
-    done = terminal(*words, "--json")
+    done = run(*words, "--json")
     assert (done.status, done.codes) == (2, ["NotInPlace"])
     assert "100% of 'lid' is in 'housing'" in done.json["errors"][0]["message"]
     assert not (tmp_path / "out").exists()
-    again = terminal(*words, "--in-place", "--json")
+    again = run(*words, "--in-place", "--json")
     assert again.status == 0 or "NotInPlace" not in again.codes
 
 
@@ -146,7 +141,7 @@ def test_parts_with_some_play_touch(tmp_path: Path) -> None:
     assert len(read_source(tmp_path / "parts", TEMPLATES, SourceOptions("cm")).parts) == 4
 
 
-def test_a_sheet_of_two_sides_is_said_to_bound_nothing(terminal: Terminal, tmp_path: Path) -> None:
+def test_a_sheet_of_two_sides_is_said_to_bound_nothing(run: Terminal, tmp_path: Path) -> None:
     """It is neither "-0%" of its hull, nor a fault of ours."""
     turns = np.linspace(0, np.pi, 13)
     points = [(200 * np.cos(t), y, 200 * np.sin(t)) for t in turns for y in (0.0, 500.0)]
@@ -157,7 +152,7 @@ def test_a_sheet_of_two_sides_is_said_to_bound_nothing(terminal: Terminal, tmp_p
         "block": block((-150, 0, -50), (150, 500, 50)),
     }
     words = ("plan", folder_of(tmp_path / "parts", parts), "-o", tmp_path / "out", "--no-look")
-    done = terminal(*words, "--json")
+    done = run(*words, "--json")
     assert (done.status, done.codes) == (2, ["Hulls"])
     message = done.json["errors"][0]["message"]
     assert message.startswith("'gutter' bounds no volume, and its hull overlaps 'block'")
@@ -187,7 +182,7 @@ def test_a_unit_that_is_clear_is_taken_and_said(tmp_path: Path, scale: float, un
     [("unit", 0.01, "in\n", 0), ("place", 1.0, "y\n", 0), ("no", 1.0, "n\n", 2)],
 )
 def test_on_a_terminal_the_user_is_asked(
-    terminal: Terminal,
+    run: Terminal,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     name: str,
@@ -199,7 +194,7 @@ def test_on_a_terminal_the_user_is_asked(
     words = ("plan", folder_of(tmp_path / "parts", parts, scale), "-o", tmp_path / "out")
     monkeypatch.setattr("factory.commands.asking.is_terminal", lambda: True)
     monkeypatch.setattr("sys.stdin", io.StringIO(answer))
-    done = terminal(*words, "--no-look", "--seconds", 1)
+    done = run(*words, "--no-look", "--seconds", 1)
     assert done.status == status, done.err
     asked = "unit of lengths" if name == "unit" else "plan them where they are?"
     assert asked in done.err

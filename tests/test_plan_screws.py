@@ -89,17 +89,12 @@ def test_words_are_told_from_names_that_have_them_inside(tmp_path: Path) -> None
     assert set(fasteners(found, ())) == {*names}
 
 
-def test_what_is_screwed_runs(tmp_path: Path, terminal: Terminal) -> None:
+def test_what_is_screwed_runs(tmp_path: Path, run: Terminal) -> None:
     parts = {k: v for k, v in lidded("screw").items() if k not in ("screw3", "screw4", "filling")}
     model_source(tmp_path, parts)
     words = ("plan", tmp_path / "model.pag", "--replan", "-o", tmp_path / "out", "--no-look")
-    done = terminal(*words, "--json")
+    done = run(*words, "--json")
     assert done.status == 0, done.err
     assert all_templates()["screw"].parameters
-    run = terminal("run", done.json["pag"], "--units", 1, "--json")
-    assert run.json["refines_net"] and run.status == 0, run.err
-
-
-@pytest.fixture
-def terminal(capsys: pytest.CaptureFixture[str]) -> Terminal:
-    return Terminal(capsys)
+    done = run("run", done.json["pag"], "--units", 1, "--json")
+    assert done.json["refines_net"] and done.status == 0, done.err

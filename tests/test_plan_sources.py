@@ -34,11 +34,6 @@ from tests.step_boxes import step_of
 TEMPLATES = all_templates(())
 
 
-@pytest.fixture
-def terminal(capsys: pytest.CaptureFixture[str]) -> Terminal:
-    return Terminal(capsys)
-
-
 def block(low: Any, high: Any) -> trimesh.Trimesh:
     """A box from corner to corner."""
     return trimesh.creation.box(bounds=[low, high])
@@ -147,11 +142,11 @@ def test_a_step_file_has_its_bodies_by_name(tmp_path: Path) -> None:
 
 
 def test_what_reads_step_may_be_missing(
-    terminal: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(__import__("sys").modules, "cascadio", None)
     (tmp_path / "a.step").write_text("ISO-10303-21;")
-    done = terminal("plan", tmp_path / "a.step", "-o", tmp_path / "out", "--json")
+    done = run("plan", tmp_path / "a.step", "-o", tmp_path / "out", "--json")
     assert (done.status, done.codes) == (3, ["Missing"])
     assert "klavins-factory[" in done.json["errors"][0]["hint"]
 
@@ -264,10 +259,10 @@ def test_a_part_with_a_corner_moved_is_another_kind(
 # Broken input, through the command line
 
 
-def refused(terminal: Terminal, source: Path, *words: object) -> dict[str, Any]:
+def refused(run: Terminal, source: Path, *words: object) -> dict[str, Any]:
     """The one error with which a source is refused; nothing is written."""
     out = source.parent / "out"
-    done = terminal("plan", source, "-o", out, "--no-look", "--json", *words)
+    done = run("plan", source, "-o", out, "--no-look", "--json", *words)
     assert done.status == 2
     assert not out.exists()
     (error,) = done.json["errors"]
@@ -275,40 +270,40 @@ def refused(terminal: Terminal, source: Path, *words: object) -> dict[str, Any]:
     return dict(error)
 
 
-def test_no_part_and_one_part_are_refused(terminal: Terminal, tmp_path: Path) -> None:
+def test_no_part_and_one_part_are_refused(run: Terminal, tmp_path: Path) -> None:
     empty = tmp_path / "parts"
     empty.mkdir()
-    assert refused(terminal, empty)["code"] == "TooFewParts"
+    assert refused(run, empty)["code"] == "TooFewParts"
     folder_of(empty, {"top": table()["top"]})
-    error = refused(terminal, empty)
+    error = refused(run, empty)
     assert error["code"] == "TooFewParts"
     assert "'top'" in error["message"]
 
 
-def test_a_part_in_another_unit_is_told(terminal: Terminal, tmp_path: Path) -> None:
+def test_a_part_in_another_unit_is_told(run: Terminal, tmp_path: Path) -> None:
     meshes = table()
     meshes["leg 3"].apply_scale(0.001)
-    error = refused(terminal, folder_of(tmp_path / "parts", meshes))
+    error = refused(run, folder_of(tmp_path / "parts", meshes))
     assert error["code"] == "Size"
     assert "'leg-3'" in error["message"]
     assert "in metres, and the others in millimetres" in error["message"]
     for name, mesh in (meshes := table()).items():
         mesh.apply_scale(1.0 if name == "leg 3" else 0.001)
-    error = refused(terminal, folder_of(tmp_path / "parts", meshes))
+    error = refused(run, folder_of(tmp_path / "parts", meshes))
     assert "in millimetres, and the others in metres" in error["message"]
 
 
-def test_two_parts_in_one_place_are_told(terminal: Terminal, tmp_path: Path) -> None:
+def test_two_parts_in_one_place_are_told(run: Terminal, tmp_path: Path) -> None:
     meshes = {**table(), "leg 5": table()["leg 2"]}
-    error = refused(terminal, folder_of(tmp_path / "parts", meshes))
+    error = refused(run, folder_of(tmp_path / "parts", meshes))
     assert error["code"] == "UsedTwice"
     assert "'leg-5' has the shape and the place of 'leg-2'" in error["message"]
 
 
-def test_a_part_far_away_is_told(terminal: Terminal, tmp_path: Path) -> None:
+def test_a_part_far_away_is_told(run: Terminal, tmp_path: Path) -> None:
     meshes = table()
     meshes["leg 4"].apply_translation((0, 3000, 0))
-    error = refused(terminal, folder_of(tmp_path / "parts", meshes))
+    error = refused(run, folder_of(tmp_path / "parts", meshes))
     assert error["code"] == "FarAway"
     assert "'leg-4'" in error["message"]
     assert "2.96 m away" in error["message"]
@@ -324,11 +319,11 @@ BROKEN = {
 }
 
 
-def test_every_file_that_cannot_be_read_is_told(terminal: Terminal, tmp_path: Path) -> None:
+def test_every_file_that_cannot_be_read_is_told(run: Terminal, tmp_path: Path) -> None:
     parts = folder_of(tmp_path / "parts", table())
     for name, content in BROKEN.items():
         (parts / name).write_bytes(content)
-    done = terminal("plan", parts, "-o", tmp_path / "out", "--json")
+    done = run("plan", parts, "-o", tmp_path / "out", "--json")
     assert done.status == 2
     assert done.codes == ["BadMesh"] * len(BROKEN)
     for name in BROKEN:
@@ -336,20 +331,20 @@ def test_every_file_that_cannot_be_read_is_told(terminal: Terminal, tmp_path: Pa
 
 
 @pytest.mark.parametrize("name", ["gone", "gone.glb", "gone.pag", "text.docx", "broken.glb"])
-def test_what_is_no_source_is_refused(terminal: Terminal, tmp_path: Path, name: str) -> None:
+def test_what_is_no_source_is_refused(run: Terminal, tmp_path: Path, name: str) -> None:
     if not name.startswith("gone"):
         (tmp_path / name).write_bytes(b"x")
-    assert refused(terminal, tmp_path / name, *(["--replan"] * name.endswith(".pag")))["code"] in (
+    assert refused(run, tmp_path / name, *(["--replan"] * name.endswith(".pag")))["code"] in (
         "BadFile",
         "BadMesh",
     )
 
 
-def test_an_open_mesh_is_mended_and_that_is_said(terminal: Terminal, tmp_path: Path) -> None:
+def test_an_open_mesh_is_mended_and_that_is_said(run: Terminal, tmp_path: Path) -> None:
     meshes = table()
     top = meshes["top"].subdivide()
     top.update_faces(np.arange(len(top.faces)) > 0)
-    done = terminal(
+    done = run(
         *("plan", folder_of(tmp_path / "parts", {**meshes, "top": top}, ".obj")),
         *("-o", tmp_path / "out", "--no-look", "--json"),
     )
@@ -358,13 +353,13 @@ def test_an_open_mesh_is_mended_and_that_is_said(terminal: Terminal, tmp_path: P
 
 
 def test_a_hull_that_stands_for_a_mesh_is_told(
-    terminal: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("factory.geometry.decomposition.release", lambda package: "")
     ring = trimesh.creation.annulus(20, 40, 30)
     ring.apply_translation((300, 200, 440))
     parts = folder_of(tmp_path / "parts", {**table(), "ring": ring})
-    done = terminal("plan", parts, "-o", tmp_path / "out", "--no-look", "--json")
+    done = run("plan", parts, "-o", tmp_path / "out", "--no-look", "--json")
     (warning,) = done.json["warnings"]
     assert "ring.obj is not convex" in warning["message"]
     assert "decompose" in warning["hint"]
@@ -380,72 +375,72 @@ def sleeve() -> dict[str, trimesh.Trimesh]:
 
 
 def test_a_peg_comes_out_of_a_sleeve_that_no_library_decomposes(
-    terminal: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The hull of the sleeve hides its hole; its volume does not."""
     monkeypatch.setattr("factory.geometry.decomposition.release", lambda package: "")
     parts, out = folder_of(tmp_path / "parts", sleeve()), tmp_path / "out"
-    done = terminal("plan", parts, "-o", out, "--no-look", "--json")
+    done = run("plan", parts, "-o", out, "--no-look", "--json")
     join = next(j for j in done.json["joins"] if {"peg", "ring"} <= {*j["pile"], *j["come"]})
     assert [abs(x) for x in join["direction"]] == [0, 0, 1]
 
 
 def test_a_plan_that_rests_on_the_hull_of_an_open_mesh_is_refused_unless_hulls_are_asked_for(
-    terminal: Terminal, tmp_path: Path
+    run: Terminal, tmp_path: Path
 ) -> None:
     made = sleeve()
     made["ring"].update_faces(np.arange(len(made["ring"].faces)) >= 9)
     parts, out = folder_of(tmp_path / "parts", made), tmp_path / "out"
-    error = refused(terminal, parts)
+    error = refused(run, parts)
     assert error["code"] == "Hulls"
     assert "'ring' is open" in error["message"] and "overlaps 'peg' by" in error["message"]
     assert "'plate'" not in error["message"] and "--hulls" in error["hint"]
     words = ("plan", parts, "-o", out, "--no-look", "--hulls")
-    (pair,) = terminal(*words, "--json").json["hulls"]
+    (pair,) = run(*words, "--json").json["hulls"]
     assert {pair["one"], pair["other"]} == {"peg", "ring"} and pair["depth"] > 0.018
-    told = terminal(*words, "-v").out.splitlines()
+    told = run(*words, "-v").out.splitlines()
     (ways,) = [line for line in told if "; ways: " in line]
     assert ways.endswith("for hulls only: a pair overlaps")
     assert sum(line.endswith("for hulls only: a pair overlaps") for line in told) == 2
     # with a tree, the hulls of open meshes are what `check` takes
     again = ("plan", out / "parts.pag", "--replan", "-o", tmp_path / "again", "--no-look")
-    done = terminal(*again, "--json")
+    done = run(*again, "--json")
     assert done.status == 0 and "hulls" not in done.json
     assert any("ring.obj is open" in w["message"] for w in done.json["warnings"])
 
 
-def test_a_tree_is_not_thrown_away_unasked(terminal: Terminal, tmp_path: Path) -> None:
+def test_a_tree_is_not_thrown_away_unasked(run: Terminal, tmp_path: Path) -> None:
     paper = ROOT / "examples" / "paper.pag"
     chair = ROOT / "examples" / "chair.pag"
-    done = terminal("plan", chair, "-o", tmp_path / "out", "--json")
+    done = run("plan", chair, "-o", tmp_path / "out", "--json")
     assert (done.status, done.codes) == (2, ["Usage"])
-    done = terminal("plan", paper, "--replan", "-o", tmp_path / "out", "--json")
+    done = run("plan", paper, "--replan", "-o", tmp_path / "out", "--json")
     assert (done.status, set(done.codes)) == (2, {"MissingPart"})
-    done = terminal("plan", chair, "--keep", "lft", "-o", tmp_path / "out", "--json")
+    done = run("plan", chair, "--keep", "lft", "-o", tmp_path / "out", "--json")
     assert (done.status, done.codes) == (2, ["UndefinedLabel"])
     assert "did you mean 'left'" in done.json["errors"][0]["hint"]
-    done = terminal("plan", chair, "--keep", "chair", "-o", tmp_path / "out", "--json")
+    done = run("plan", chair, "--keep", "chair", "-o", tmp_path / "out", "--json")
     assert (done.status, done.codes) == (2, ["Usage"])
 
 
 # What is written
 
 
-def test_what_is_written_checks_and_runs_as_it_is(terminal: Terminal, tmp_path: Path) -> None:
+def test_what_is_written_checks_and_runs_as_it_is(run: Terminal, tmp_path: Path) -> None:
     parts, out = folder_of(tmp_path / "my table", table()), tmp_path / "out"
-    done = terminal("plan", parts, "-o", out, "--no-look", "--json")
+    done = run("plan", parts, "-o", out, "--no-look", "--json")
     assert done.status == 0, done.err
     assert done.json["parts"] == 5
     assert done.json["kinds"] == 2
     assert sorted(files_in(out)) == ["meshes/leg-1.obj", "meshes/top.obj", "my-table.pag"]
     pag = out / "my-table.pag"
-    again = terminal("plan", parts, "-o", tmp_path / "again", "--no-look", "--json")
+    again = run("plan", parts, "-o", tmp_path / "again", "--no-look", "--json")
     assert again.status == 0
     assert files_in(out) == files_in(tmp_path / "again")
-    assert terminal("check", pag, "--json").json["live"]
-    run = terminal("run", pag, "--json")
-    assert run.status == 0, run.err
-    assert run.json["product_error_max_mm"] < 1
+    assert run("check", pag, "--json").json["live"]
+    done = run("run", pag, "--json")
+    assert done.status == 0, done.err
+    assert done.json["product_error_max_mm"] < 1
 
 
 @settings(max_examples=15, deadline=None)
@@ -493,9 +488,9 @@ def test_the_exploded_view_takes_back_what_is_assembled() -> None:
     assert clear[~np.eye(len(solids), dtype=bool)].all()
 
 
-def test_json_says_what_was_found(terminal: Terminal, tmp_path: Path) -> None:
+def test_json_says_what_was_found(run: Terminal, tmp_path: Path) -> None:
     parts = folder_of(tmp_path / "table", table())
-    done = terminal("plan", parts, "-o", tmp_path / "out", "--no-look", "--json")
+    done = run("plan", parts, "-o", tmp_path / "out", "--no-look", "--json")
     document = json.loads(done.out)
     assert {"pag", "parts", "kinds", "notes", "approaches", "files", "warnings"} <= set(document)
     assert io.StringIO(done.out).read().count("\n") == 1

@@ -20,14 +20,9 @@ from factory.simulation.simulation import Simulation
 from factory.support import progress
 from factory.support.interruption import awaited, side_by_side
 from factory.support.progress import Progress, Waiting
-from tests.command_line import ROOT
+from tests.command_line import ROOT, Screen
 from tests.examples import without_hands
 from tests.waiting import left_alone, until
-
-
-class Terminal(io.StringIO):
-    def isatty(self) -> bool:
-        return True
 
 
 def watch(progress: Progress) -> None:
@@ -36,7 +31,7 @@ def watch(progress: Progress) -> None:
             progress.observe(SimpleNamespace(time=float(n), made=n))
 
 
-@pytest.mark.parametrize("stream", [io.StringIO(), Terminal()])
+@pytest.mark.parametrize("stream", [io.StringIO(), Screen()])
 def test_it_is_silent_when_quiet(monkeypatch, stream) -> None:
     monkeypatch.setattr(sys, "stderr", stream)
     monkeypatch.setattr(progress, "LINES", 0.0)
@@ -63,13 +58,13 @@ def test_a_long_run_writes_a_line_now_and_then_without_a_terminal(monkeypatch) -
 
 
 def test_it_shows_units_and_speed(monkeypatch) -> None:
-    stream = Terminal()
+    stream = Screen()
     monkeypatch.setattr(sys, "stderr", stream)
     watch(Progress(3))
     assert "3/3" in stream.getvalue() and "real time" in stream.getvalue()
 
 
-@pytest.mark.parametrize(("stream", "said"), [(Terminal(), "at work"), (io.StringIO(), "so far")])
+@pytest.mark.parametrize(("stream", "said"), [(Screen(), "at work"), (io.StringIO(), "so far")])
 def test_what_takes_long_is_said(monkeypatch, stream, said: str) -> None:
     monkeypatch.setattr(sys, "stderr", stream)
     monkeypatch.setattr(progress, "LINES", 0.01)
