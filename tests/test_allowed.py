@@ -124,6 +124,8 @@ def test_a_pag_allows_overlaps_and_is_written_so() -> None:
     assert read_pag(write_pag(pag), TEMPLATES) == pag
     scaled = read_pag("unit = mm; allow ( 0.5 ); root = allow; allow = atomic ()", TEMPLATES)
     assert scaled.allowed == (AllowedOverlap(0.0005),) and scaled.root == "allow"
+    none = read_pag(TEXT % 0.0247 + "; allow ( 0 )", TEMPLATES)
+    assert none.allowed == (AllowedOverlap(0.0),)
     copies = "root = r; r = mate ( a, b ); b[2] = atomic (); a = atomic (); allow ( a, b, 0.1 )"
     allowed = read_pag(copies, TEMPLATES).allowed
     assert [one.parts for one in allowed] == [("a", "b1"), ("a", "b2")]

@@ -42,6 +42,7 @@ def two(**changes: Any) -> Mode:
         ({"pairs": [[0, 5]]}, "pairs"),
         ({"touch": [R, R]}, "1 pairs, 1 meet, 2 touch"),
         ({"touch": [4 * R]}, "robots 1 and 2 at their goals touch"),
+        ({"touch": [4 * R - 1.5e-3]}, "the goal ball needs more than 0.002"),
         ({"pairs": [[1, 1]]}, "robots 2 and 2"),
         ({"lower": [0.0]}, r"lower of shape \(1,\), expected \(2,\)"),
     ],
@@ -49,6 +50,10 @@ def two(**changes: Any) -> Mode:
 def test_refuses_what_is_no_mode(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         two(**changes)
+
+
+def test_a_goal_ball_may_be_as_near_as_its_diameter() -> None:
+    assert two(touch=[4 * R - 2.5e-3]).eps == 1e-3
 
 
 def test_values_are_copied_and_locked() -> None:

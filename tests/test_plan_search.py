@@ -102,6 +102,12 @@ def judged(found: Blocking, stance: Stance, all_: Iterator[Tree]) -> list[Judged
     return [one for one in map(judge.judged, all_) if not one.count(LOCKED)]
 
 
+def test_estimated_times_are_those_of_the_trapezoid() -> None:
+    ways = np.linspace(0.0, 1.0, 101)
+    times = [EXPECTED.pace.rest(way) for way in ways.tolist()]
+    assert EXPECTED.rest(ways) == pytest.approx(times)
+
+
 @settings(max_examples=60, deadline=None)
 @given(graphs())
 def test_parts_interlock_if_and_only_if_no_tree_joins_them(found: Blocking) -> None:
