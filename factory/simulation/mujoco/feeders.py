@@ -64,6 +64,7 @@ class Feeders:
         self.back = TakenBack()
         self.lacking = set[str]()
         self.due = NEVER
+        self._spent, self._returns = set[int](), 0
         self._serve(model.layout)
 
     def _serve(self, layout: Layout) -> None:
@@ -87,8 +88,13 @@ class Feeders:
         return min(line, key=lambda number: rounds[self._stations[number].label])
 
     def _vacant(self) -> list[int]:
-        """The feeders whose turn it is in lines that show nothing, and take nothing back."""
-        lines = [self._lines[code] for code in self._lines.keys() - self._holdings.holders]
+        """The feeders whose turn it is in lines that show nothing and take nothing back, but for
+        those for which nothing was left, and has not come back since."""
+        if self._returns != self._holdings.returns:
+            self._returns = self._holdings.returns
+            self._spent.clear()
+        empty = self._lines.keys() - self._holdings.holders - self._spent
+        lines = [self._lines[code] for code in empty]
         rounds = self.supply.rounds() if any(len(line) > 1 for line in lines) else {}
         return sorted(self._turn(line, rounds) if rounds else line[0] for line in lines)
 
@@ -203,6 +209,7 @@ class Feeders:
         """The next part of each label is for another unit, after so many rounds; what it is no
         longer the turn of is taken back."""
         self.lacking.clear()
+        self._spent.clear()
         turns = {self._turn(line, rounds) for line in self._lines.values()}
         for label, unit in units.items():
             number, is_shown = self._number[label], self.shows(label) is not None
@@ -215,6 +222,7 @@ class Feeders:
         has been taken back."""
         self._passing.gone(robot)
         self.lacking.clear()
+        self._spent.clear()
         self._serve(layout)
 
     def elsewhere(self, layout: Layout) -> list[str]:
@@ -272,7 +280,9 @@ class Feeders:
         """Put the next copies into feeders, where there are some to spare and units that need
         them. Gives which."""
         loaded = [n for n in numbers if self._supplied(self._stations[n].label)]
-        self.back.late = self.back.late.union(numbers).difference(loaded)
+        missing = {*numbers}.difference(loaded)
+        self._spent.update(self._stations[number].code for number in missing)
+        self.back.late = self.back.late.union(missing).difference(loaded)
         for number in loaded:
             station, supply = self._stations[number], self.supply
             unit = supply.next[station.label]

@@ -35,7 +35,8 @@ class Holdings:
     """The parts of a factory, by body. Those in no unit are to spare, parked out of sight.
 
     `body[label]`: all bodies of a label; `free[label]`: those to spare, the next first. `weld`:
-    what a holder, by its code, holds a label by. `changes`: how often something has changed hands.
+    what a holder, by its code, holds a label by. `changes`: how often something has changed hands;
+    `returns`: how often something has been put away.
     """
 
     def __init__(
@@ -43,7 +44,8 @@ class Holdings:
     ) -> None:
         self.body, self._welds, self._mass = body, welds, model.carried.mass
         self.free = {label: deque(map(int, ids)) for label, ids in body.items()}
-        self.weld, self._tray, self.changes = _welds(m, model), tray_code(model.factory), 0
+        self.weld, self._tray = _welds(m, model), tray_code(model.factory)
+        self.changes = self.returns = 0
         self._of: dict[int, HeldPart] = {}
         self._present: dict[tuple[str, int], int] = {}
         self._held: dict[int, dict[str, int]] = {}
@@ -132,6 +134,7 @@ class Holdings:
     def put_away(self, bodies: Iterable[int]) -> None:
         """Bodies are to spare from now on, out of sight."""
         for body in [*bodies]:
+            self.returns += 1
             self._let_go(body)
             self._leave(body)
             self._hide(body)
