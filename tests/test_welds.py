@@ -213,6 +213,14 @@ def test_every_part_has_one_holder(name: str, given: dict[str, Any]) -> None:
                 assert parts.holdings[label, parts.holdings.of(body).unit] == body
 
 
+def test_a_feeder_that_ran_dry_shows_a_part_once_one_has_come_back() -> None:
+    """All copies of a part but the one that is shown are missing."""
+    simulation = ready("paper", units=3)
+    simulation.physical.parts.holdings.free["part1"].clear()
+    run = simulation.run(max_time=60.0)
+    assert (run.products, run.trouble) == (3, None)
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_a_run_from_a_marking_begins_with_what_robots_hold(seed: int) -> None:
     """Where the welds hold it: nothing jumps."""
