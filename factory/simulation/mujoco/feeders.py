@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.control.mode import Index, Truth
+from factory.control.mode import Index
 from factory.layout.feeding import Outlet, outlets_of
 from factory.layout.layout import Layout
 from factory.mjcf.masks import feeder_codes
@@ -64,7 +64,7 @@ class Feeders:
         self.back = TakenBack()
         self.lacking = set[str]()
         self.due = NEVER
-        self._spent, self._returns = set[int](), 0
+        self._spent = dict[int, int]()
         self._serve(model.layout)
 
     def _serve(self, layout: Layout) -> None:
@@ -78,9 +78,6 @@ class Feeders:
         robots = range(len(layout.factory.robots))
         lines = ([self._number[label] for label in layout.magazine(robot)] for robot in robots)
         self._lines = {self._stations[line[0]].code: line for line in lines if line}
-        self._first = np.arange(len(self._stations))
-        for line in self._lines.values():
-            self._first[line] = line[0]
 
     def _turn(self, line: Sequence[int], rounds: Mapping[str, int]) -> int:
         """Whose turn it is in a line, after so many rounds of each label: the first that is
@@ -90,11 +87,8 @@ class Feeders:
     def _vacant(self) -> list[int]:
         """The feeders whose turn it is in lines that show nothing and take nothing back, but for
         those for which nothing was left, and has not come back since."""
-        if self._returns != self._holdings.returns:
-            self._returns = self._holdings.returns
-            self._spent.clear()
-        empty = self._lines.keys() - self._holdings.holders - self._spent
-        lines = [self._lines[code] for code in empty]
+        empty, returns = self._lines.keys() - self._holdings.holders, self._holdings.returns
+        lines = [self._lines[code] for code in empty if self._spent.get(code) != returns]
         rounds = self.supply.rounds() if any(len(line) > 1 for line in lines) else {}
         return sorted(self._turn(line, rounds) if rounds else line[0] for line in lines)
 
@@ -153,12 +147,10 @@ class Feeders:
         self._sliders.settle()
         if self.back.numbers:
             self._take_back()
-        vacant, free = np.array(self._vacant(), np.intp), list[int]()
-        if len(vacant):
-            vacant = vacant[~self._are_busy()[vacant]]
-        if len(vacant):
+        free = [number for number in self._vacant() if not self._is_busy(number)]
+        if free:
             late, clear = self._obstructed(), self._passing.clear()
-            free = [n for n in vacant[clear[vacant]].tolist() if n not in late]
+            free = [number for number in free if clear[number] and number not in late]
         if not free:
             return False
         loaded = self._load(free)
@@ -262,15 +254,12 @@ class Feeders:
             self.back.numbers.remove(number)
         self._welds.write()
 
-    def _are_busy(self) -> Truth:
-        """Whether each (n,) is in a line of which a slider is on its way, or that is to show
-        nothing yet."""
-        busy = self._sliders.ends < NEVER
-        if self.back.awaited:
-            busy[[n for n, s in enumerate(self._stations) if s.label in self.back.awaited]] = True
-        lines = np.zeros(len(busy), bool)
-        lines[self._first[busy]] = True
-        return np.asarray(lines[self._first])
+    def _is_busy(self, number: int) -> bool:
+        """Whether a feeder is in a line of which a slider is on its way, or is to show nothing
+        yet."""
+        ends, line = self._sliders.ends, self._lines[self._stations[number].code]
+        awaited = self.back.awaited
+        return any(ends[n] < NEVER or self._stations[n].label in awaited for n in line)
 
     def _send(self, numbers: Index, down: bool) -> None:
         self._sliders.send(numbers, down)
@@ -281,7 +270,8 @@ class Feeders:
         them. Gives which."""
         loaded = [n for n in numbers if self._supplied(self._stations[n].label)]
         missing = {*numbers}.difference(loaded)
-        self._spent.update(self._stations[number].code for number in missing)
+        codes = (self._stations[number].code for number in missing)
+        self._spent |= dict.fromkeys(codes, self._holdings.returns)
         self.back.late = self.back.late.union(missing).difference(loaded)
         for number in loaded:
             station, supply = self._stations[number], self.supply

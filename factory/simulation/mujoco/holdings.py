@@ -36,7 +36,8 @@ class Holdings:
 
     `body[label]`: all bodies of a label; `free[label]`: those to spare, the next first. `weld`:
     what a holder, by its code, holds a label by. `changes`: how often something has changed hands;
-    `returns`: how often something has been put away.
+    `returns`: how often something has been put away. `parking`: the weld that parks a body, and
+    where [m].
     """
 
     def __init__(
@@ -50,9 +51,11 @@ class Holdings:
         self._present: dict[tuple[str, int], int] = {}
         self._held: dict[int, dict[str, int]] = {}
         copies = [(label, n, int(b)) for label, ids in body.items() for n, b in enumerate(ids, 1)]
-        self.park = {b: m.equality(names.park(label, n)).id for label, n, b in copies}
-        self._place = {b: parked_at(model.layout, label, n) for label, n, b in copies}
-        for each in self.park:
+        self.parking = {
+            each: (m.equality(names.park(label, n)).id, parked_at(model.layout, label, n))
+            for label, n, each in copies
+        }
+        for each in self.parking:
             self._hide(each)
         self._welds.loose(w for (holder, _), w in self.weld.items() if holder >= self._tray)
 
@@ -109,7 +112,7 @@ class Holdings:
     def take(self, label: str, unit: int, holder: int) -> int:
         """A holder (its code) gets a part to spare, for a unit; gives its body."""
         body = self.free[label].popleft()
-        self._welds.loose([self.park[body]])
+        self._welds.loose([self.parking[body][0]])
         self._enter(body, HeldPart(label, unit, NOBODY))
         self._switch(body, holder)
         self._welds.join({self.weld[holder, label]: body})
@@ -176,9 +179,10 @@ class Holdings:
         self._of[body] = self._of[body]._replace(holder=NOBODY)
 
     def _hide(self, body: int) -> None:
-        self._welds.place(body, self._place[body])
+        weld, place = self.parking[body]
+        self._welds.place(body, place)
         self._welds.hold([body], NOBODY)
-        self._welds.join({self.park[body]: body})
+        self._welds.join({weld: body})
 
 
 def _welds(m: mujoco.MjModel, model: Model) -> dict[tuple[int, str], int]:
