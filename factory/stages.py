@@ -51,7 +51,7 @@ def project_of(
     from factory.support.files import is_plan
 
     if isinstance(product, Project):
-        return product
+        return product if settings is None else replace(product, settings=settings)
     if isinstance(product, PAG):
         return Project(product, all_templates(templates), settings=settings or Settings())
     if isinstance(product, Factory | Layout):
@@ -174,7 +174,7 @@ def lay_out(
     settings = settings or Settings()
     if clearance is not None:
         settings = replace(settings, clearance=clearance)
-    return replace(project_of(product, settings), settings=settings).with_ground(ground).layout
+    return project_of(product, settings).with_ground(ground).layout
 
 
 def run(

@@ -20,6 +20,8 @@ from factory.pipeline import read
 from factory.support import namesake
 from tests.command_line import PAPER, ROOT, Terminal
 from tests.opengl import needs_gl
+from tests.plan_puzzles import pinwheel, source
+from tests.test_plan_puzzles import PEG
 
 # --- values are checked when made, with the codes of the command line -----------------------------
 
@@ -158,6 +160,23 @@ def test_a_log_serves_report_analysis_and_export(run: Terminal, tmp_path: Path) 
         compared = factory.analyze(PAPER, measured=measured).measured
         assert compared is not None and compared.cycle.measured == made.cycle_time_s
     assert str(factory.export(log, "csv")).startswith("time_s,")
+
+
+def test_a_plan_is_a_product_and_what_interlocks_is_refused(tmp_path: Path) -> None:
+    source(tmp_path, PEG)
+    made = factory.plan(tmp_path / "puzzle.pag", tmp_path / "out", replan=True, seconds=1)
+    assert made.pag == factory.load_pag(made.files[0]) and made.planned.optimal
+    assert {part.label for part in made.pag.parts()} == {*PEG}
+    source(tmp_path, pinwheel())
+    with pytest.raises(factory.InputError) as caught:
+        factory.plan(tmp_path / "puzzle.pag", tmp_path / "none", replan=True)
+    assert [diagnostic.code for diagnostic in caught.value.diagnostics] == ["CannotAssemble"]
+    assert not (tmp_path / "none").exists()
+
+
+def test_settings_replace_those_of_a_project() -> None:
+    slow = factory.Settings(speed=0.1)
+    assert factory.analyze(read(PAPER), settings=slow).timing.settings.speed == 0.1
 
 
 def test_a_sweep_runs_in_a_script(tmp_path: Path) -> None:
