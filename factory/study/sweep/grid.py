@@ -38,7 +38,10 @@ input has slipped. It has columns in a database only if it varies; else nothing 
 KEYS = ("seed", "jitter", "units", "wip", "world", FAULT_RATE, *SETTINGS)
 """All keys that may vary."""
 
-SHARES: Mapping[str, tuple[float, float]] = {"jitter": BOUNDS["jitter"], FAULT_RATE: (0, 0.5)}
+SHARES: Mapping[str, tuple[float, float]] = {
+    "jitter": (0, BOUNDS["jitter"][1]),
+    FAULT_RATE: (0, 0.5),
+}
 """Keys of shares, with the least and the greatest value."""
 
 DEFAULTS: Mapping[str, Value] = {
@@ -107,7 +110,7 @@ def check_value(key: str, value: Value) -> Diagnostic | None:
     if isinstance(value, int | float):
         low, high = SHARES[key] if key in SHARES else WHOLE[key]
         if not low <= value <= high:
-            message = f"{key} = {value} is not between {low:g} and {high:g}"
+            message = f"{key} = {value} is not between {low} and {high}"
             return Diagnostic("BadValue", message, None, f"for example {_example(key)}")
     return None
 
