@@ -96,9 +96,11 @@ def _unprepared(operation: Operation, inside: bool) -> Diagnostic:
 
 def operation_mode(layout: Layout, operation: Operation, eps: float) -> Mode:
     """The mode of one operation. The way of a robot that is not the carrier ends at its goal: what
-    is left of its guidepath is taken by the others. A robot that brings something to a carrier that
-    brings something too keeps its distance until the carrier stands: they would meet diagonally. So
-    does one that is to lower what it brings: it does so when all others stand."""
+    is left of its guidepath is taken by the others. A carrier stands where its station is: beyond
+    its B end, if it has several tours and its parts are held elsewhere on this one. A robot that
+    brings something to a carrier that brings something too keeps its distance until the carrier
+    stands: they would meet diagonally. So does one that is to lower what it brings: it does so when
+    all others stand."""
     paths = [layout.guidepaths[robot] for robot in operation.robots]
     carrier = operation.template.carrier - 1
     gate, standoff = np.full(len(paths), -1), np.zeros(len(paths))
@@ -121,9 +123,13 @@ def operation_mode(layout: Layout, operation: Operation, eps: float) -> Mode:
         path.length - layout.stations[operation.index] - path.reach if slot == carrier else np.nan
         for slot, path in enumerate(paths)
     ]
+    ends = np.array([layout.ends(robot)[1] for robot in operation.robots])
+    template, end = operation.template, np.array([path.length for path in paths])
+    if template.before[carrier] != NOPART or layout.stations[operation.index]:
+        template, end[carrier] = _inside(template), ends[carrier]
     setting = Setting(
         lower=np.array([layout.apart(operation.index, s)[0] for s in range(len(paths))]),
-        upper=np.array([path.length for path in paths]),
+        upper=end,
         r=r,
         eps=eps,
         station=np.array(stations),
@@ -132,10 +138,8 @@ def operation_mode(layout: Layout, operation: Operation, eps: float) -> Mode:
         gate=gate,
         standoff=standoff,
     )
-    template = operation.template
-    if template.before[carrier] != NOPART:
-        template = _inside(template)
     mode = law_of(template)(template, setting)
+    mode = replace(mode, upper=np.maximum(mode.upper, ends))
     if operation.inputs and not layout.factory.drops(operation.index):
         guests = np.arange(len(paths)) != carrier
         mode = replace(mode, lower=np.where(guests, mode.goals, mode.lower))
@@ -166,8 +170,8 @@ def _with_lifts(mode: Mode, layout: Layout, operation: Operation) -> Mode:
 
 @lru_cache(maxsize=256)
 def _inside(template: Template) -> Template:
-    """A template whose carrier brings something, with its B end written as the station where the
-    layout puts it: B = S + 2r."""
+    """A template with the B end of its carrier written as the station where the layout puts it:
+    B = S + 2r."""
     j = template.carrier
 
     def moved(point: Point) -> Point:
