@@ -50,7 +50,7 @@ def test_a_plan_is_free_and_no_slower_than_the_tree_drawn_by_hand(
 ) -> None:
     from factory.timing.prediction import pace
 
-    done = planning(EXAMPLES / f"{name}.pag", "--no-look", "--seconds", 20)
+    done = planning(EXAMPLES / f"{name}.pag", "--no-look")
     assert done.status == 0, done.err
     checked = run("check", done.json["pag"], "--json").json
     assert checked["live"] and checked["approaches"]["blocked"] == 0
@@ -274,6 +274,18 @@ def test_a_signal_is_heard_at_once(
     assert (done.status, done.codes) == (130, ["Interrupted"])
     assert (tmp_path / "out" / "puzzle.pag").exists() == kept
     assert not list(tmp_path.glob("out/*.mp4"))
+
+
+def test_the_answer_does_not_wait_for_pictures(
+    run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(*_: object) -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr("factory.rendering.exploded.ExplodedView.still", stop)
+    done = run("plan", puzzle(tmp_path, LOADED), "--replan", "-o", tmp_path / "out")
+    assert done.status == 130
+    assert "robots, cycle time about" in done.out and "factory run" in done.out
 
 
 def test_no_pictures_are_made_after_a_signal(

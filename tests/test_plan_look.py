@@ -31,7 +31,7 @@ def test_the_film_begins_apart_and_ends_together(tmp_path: Path) -> None:
     film = iio.imread(tmp_path / "film.mp4", plugin="pyav")
     assert is_apart(film[0])
     assert not is_apart(film[-1])
-    assert film[0].shape == (800, 600, 3)
+    assert film[0].shape == (640, 480, 3)
 
 
 @needs_gl

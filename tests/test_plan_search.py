@@ -20,12 +20,13 @@ from factory.pipeline import all_templates
 from factory.planning.blocking import CLASHES, DEEPER, FREE, LOCKED, SCRAPES, Blocking, blocking
 from factory.planning.cannot import cores, interlocks, removal
 from factory.planning.dividing import Divider
+from factory.planning.divisions import divisions
 from factory.planning.estimate import Expected
 from factory.planning.exact import Best, Tree, TreeTask, tables
 from factory.planning.growing import Site, bettered, divided, units_of
 from factory.planning.judging import Judge, Judged
 from factory.planning.parts import InPlace
-from factory.planning.searching import Budget, Sought, trees
+from factory.planning.searching import Sought, budget_of, trees
 from factory.planning.source import placed
 from factory.planning.stance import ROOT_AXIS, Stance, stances
 from factory.planning.subsets import subsets
@@ -150,8 +151,8 @@ def test_the_hub_of_many_pairs_is_removed() -> None:
 @settings(max_examples=25, deadline=None)
 @given(graphs(most=4), st.sampled_from(stances()))
 def test_least_price_and_cycle_are_those_of_all_trees(found: Blocking, stance: Stance) -> None:
-    task = TreeTask(subsets(found), EXPECTED, stance.axes[2], stance.up, apart=True)
-    known, at = tables(task), task.level.index(stance.axes[ROOT_AXIS])
+    task = TreeTask(divisions(subsets(found), stance.axes[2], stance.up, apart=True), EXPECTED)
+    known, at = tables(task), task.divisions.level.index(stance.axes[ROOT_AXIS])
     all_ = judged(found, stance, (t for t in binary(tuple(range(len(found))))))
     price, time = known.price[at, -1], known.time[at, -1]
     if not all_:
@@ -167,8 +168,8 @@ def test_least_price_and_cycle_are_those_of_all_trees(found: Blocking, stance: S
 @settings(max_examples=25, deadline=None)
 @given(graphs(most=4), st.sampled_from(stances()))
 def test_no_tree_of_that_price_has_fewer_robots(found: Blocking, stance: Stance) -> None:
-    task = TreeTask(subsets(found), EXPECTED, stance.axes[2], stance.up, apart=True)
-    best, at = Best(task), task.level.index(stance.axes[ROOT_AXIS])
+    task = TreeTask(divisions(subsets(found), stance.axes[2], stance.up, apart=True), EXPECTED)
+    best, at = Best(task), task.divisions.level.index(stance.axes[ROOT_AXIS])
     all_ = judged(found, stance, piled(tuple(range(len(found)))))
     if not np.isfinite(best.made[at, -1]):
         assert not all_
@@ -209,7 +210,7 @@ def test_a_search_that_is_stopped_gives_a_tree() -> None:
     low = np.random.default_rng(0).random((count, 3))
     found = Blocking(tuple("abcdefghij"), levels, levels > 0, touch, low, low + 0.1)
     given_ = np.zeros((2, count))
-    budget = Budget(60.0, stopped=lambda: True)
+    budget = budget_of(count, 60.0, lambda: True)
     stopped = trees(Sought(found, EXPECTED, lambda _: given_, budget=budget))
     assert not stopped.optimal
     assert units_of(stopped.all[0].tree) == tuple(range(count))

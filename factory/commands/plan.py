@@ -51,7 +51,7 @@ KINDS: tuple[Kind, ...] = ("slide", "lower", "blocked")
 @click.option(
     "--seconds",
     type=SECONDS,
-    help="Time to search for a better tree [s] (default: 30 up to 16 parts, else 0.2 per part).",
+    help="Time to search for a better tree [s] (default: a fixed number of candidates).",
 )
 @click.option("--keep", multiple=True, help="Sub-tree of a PAG to keep (repeatable).")
 @click.option("--replan", is_flag=True, help="Ignore the assembly tree of a PAG.")
@@ -134,17 +134,19 @@ def plan(
         return refuse(placed, planned, folder, look, out)
     files = write_planned(placed, planned, folder, source, allow, templates)
     project = read(files[0], folders)
-    looked = _looks(project, out) if look and not stopped else []
     if stopped and not out.silent:
         say("  stopped: the best tree so far, without pictures")
     known = set(map(id, project.product.warnings))
     warnings += announced([w for w in project.warnings if id(w) not in known], out)
     if not out.silent:
         say_allowed(project)
+    if not out.as_json:
+        _print(placed, planned, project, out)
+    looked = _looks(project, out) if look and not stopped else []
     if out.as_json:
         emit(_document(placed, planned, project, [*files, *looked], warnings))
     else:
-        _print(placed, planned, project, [*files, *looked], out)
+        _print_files([*files, *looked], out)
     return 0
 
 
@@ -155,13 +157,11 @@ def _sought(
     whether there was a signal. Before a first tree is found a signal is raised at once."""
     from factory.planning.plan import LAYING
     from factory.planning.plan import plan as sought
-    from factory.planning.searching import usual_seconds
     from factory.support.interruption import Interruption
 
-    limit = asked.seconds or usual_seconds(len(placed.units()))
     with (
         Interruption(False, lambda: print(STOPPING, file=sys.stderr)) as stop,
-        StepBar("searching for a tree", out.silent, limit) as bar,
+        StepBar("searching for a tree", out.silent, asked.seconds) as bar,
     ):
 
         def show(what: str, done: int, total: int | None, words: str) -> None:
@@ -241,10 +241,8 @@ def _by_label(placed: InPlace, planned: Planned, project: Project) -> dict[str, 
     return joins
 
 
-def _print(
-    placed: InPlace, planned: Planned, project: Project, files: list[Path], out: OutputOptions
-) -> None:
-    """Print the plan and the files."""
+def _print(placed: InPlace, planned: Planned, project: Project, out: OutputOptions) -> None:
+    """Print the plan, before its pictures are drawn: these take longer than most plans do."""
     parts = sum(1 for _ in project.pag.parts())
     matings = project.matings
     kinds = [(kind, len(matings.of_kind(kind))) for kind in KINDS] if matings else []
@@ -266,9 +264,13 @@ def _print(
             if join:
                 words += f", {_room(join.clearance)}{_for_hulls(_hidden_at(join, placed, planned))}"
             say(f"  {words}")
+    say(f"  factory run {project.file} --units 3 --video {project.file.with_suffix('.mp4')}")
+
+
+def _print_files(files: Sequence[Path], out: OutputOptions) -> None:
+    """Print the files that were written: the pictures alone unless it is verbose."""
     for path in files if out.verbose else files[-2:]:
         say(f"  {path}")
-    say(f"  factory run {project.file} --units 3 --video {project.file.with_suffix('.mp4')}")
 
 
 def _way(approach: Approach, orientation: Array) -> str:

@@ -15,7 +15,7 @@ A robot that takes over a sub-assembly from another changes its axis (`relay`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -23,8 +23,9 @@ from typing import Any
 import numpy as np
 
 from factory.geometry.meshes import Array
+from factory.planning.divisions import Batch, Divisions, Late, TooLate, never
 from factory.planning.estimate import Expected
-from factory.planning.subsets import APART, TIPS, Masks, Subsets, splits
+from factory.planning.subsets import LEVEL_PRICES, Masks, Subsets
 
 RELAY = 1.0
 """The price of a relay."""
@@ -38,9 +39,6 @@ ROBOT = 100.0
 STOPS = 4
 """The most inputs beyond two that a carrier takes if the cycle is bounded."""
 
-Late = Callable[[], bool]
-"""Tells whether a search must end."""
-
 Leaf = Callable[[int, int], Any]
 """The tree of a unit whose own inputs come along an axis."""
 
@@ -49,85 +47,34 @@ Tree = Any
 one robot takes one after the other."""
 
 
-class TooLate(Exception):
-    """A search ran out of time before it had a proof."""
-
-
-def never() -> bool:
-    """A search without a time limit."""
-    return False
-
-
 @dataclass(frozen=True)
 class TreeTask:
-    """Units whose best trees are wanted: tables of their `subsets`, what stands upright (`axis`,
-    and `up`, +1 or -1); `unit_prices` (2, n): the price of each unit if its own inputs come along
-    either horizontal axis; `apart`: whether sub-assemblies may be in pieces, at a price."""
+    """Units whose best trees are wanted, of some `divisions`; `unit_prices` (2, n): the price of
+    each unit if its own inputs come along either horizontal axis."""
 
-    subsets: Subsets
+    divisions: Divisions
     expected: Expected
-    axis: int = 2
-    up: int = +1
     unit_prices: Array | None = field(default=None, repr=False)
-    apart: bool = False
 
     @property
-    def level(self) -> tuple[int, int]:
-        """The horizontal axes of the product."""
-        first, second = (axis for axis in range(3) if axis != self.axis)
-        return first, second
+    def subsets(self) -> Subsets:
+        """The tables of the subsets."""
+        return self.divisions.subsets
 
     @cached_property
     def leg(self) -> Array:
         """The longer horizontal extent of each subset (s,) [m]."""
-        return np.maximum(*(self.subsets.extent(axis) for axis in self.level))
+        return np.maximum(*(self.subsets.extent(axis) for axis in self.divisions.level))
 
     @cached_property
     def delivering(self) -> Array:
         """The time to deliver each subset (s,) [s]."""
         return self.expected.delivering(self.leg)
 
-    def divisions(self, whole: int) -> tuple[Masks, Masks, Array]:
-        """The divisions of a subset: both sides (k,), and the least prices (k, 3) along the first
-        and second horizontal axis, whichever side moves, and along the vertical. The base is on the
-        first side, which is then not lowered."""
-        one = splits(whole)
-        other = whole ^ one
-        swapped = self.subsets.based[other]
-        one, other = np.where(swapped, other, one), np.where(swapped, one, other)
-        if not self.apart:
-            hangs = self.subsets.hangs[one] & self.subsets.hangs[other]
-            one, other = one[hangs], other[hangs]
-        prices = np.stack(
-            [
-                np.minimum(*(self.subsets.price(axis, side, one, other) for side in (0, 1)))
-                for axis in (*self.level, self.axis)
-            ],
-            axis=-1,
-        )
-        if self.subsets.based[whole]:
-            prices[:, 2] = self.subsets.price(self.axis, 0 if self.up > 0 else 1, other, one)
-        open_ = np.isfinite(prices).any(axis=1)
-        return one[open_], other[open_], prices[open_]
-
     def strokes(self, one: Masks, other: Masks) -> Array:
         """The stroke by which the side that needs the shorter one is lowered (k,) [m]."""
-        low, high = self.subsets.low[self.axis], self.subsets.high[self.axis]
+        low, high = self.subsets.low[self.divisions.axis], self.subsets.high[self.divisions.axis]
         return np.asarray(np.minimum(high[other] - low[one], high[one] - low[other]))
-
-    def subassemblies(self) -> Iterator[int]:
-        """The subsets of two units or more, smaller ones first."""
-        order = np.argsort(self.subsets.size, kind="stable")
-        useful = self.subsets.hangs | self.apart
-        useful[-1] = True
-        yield from order[(self.subsets.size[order] > 1) & useful[order]].tolist()
-
-    def penalty(self, whole: int) -> float:
-        """The price of a sub-assembly in pieces, or that would tip over."""
-        if whole == self.subsets.whole:
-            return 0.0
-        pieces, tips = not self.subsets.hangs[whole], bool(self.subsets.tips[whole])
-        return APART * pieces + TIPS * tips
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,31 +94,39 @@ def tables(task: TreeTask, late: Late = never) -> Tables:
     price[:, units] = 0.0 if task.unit_prices is None else task.unit_prices
     time[:, units] = task.expected.pace.lost + task.delivering[units]
     stop = task.expected.stop(task.leg)
-    for whole in task.subassemblies():
+    for batch in task.divisions.batches:
         if late():
             raise TooLate
-        one, other, prices = task.divisions(whole)
-        if not len(one):
-            continue
-        base = np.maximum(stop[one], stop[other]) + task.delivering[whole]
+        one, other, prices, starts = batch.one, batch.other, batch.prices, batch.starts
+        penalty = task.subsets.penalty[batch.whole]
+        base = np.maximum(stop[one], stop[other]) + task.delivering[batch.whole]
         lift = task.expected.lift(task.strokes(one, other))
+        wholes = batch.whole[starts]
         for axis in (0, 1):
             slides = prices[:, axis] <= prices[:, 2]
             cost = np.where(slides, prices[:, axis], prices[:, 2])
-            cost = cost + price[1 - axis, one] + price[1 - axis, other] + task.penalty(whole)
+            cost = cost + price[1 - axis, one] + price[1 - axis, other] + penalty
             below = np.maximum(time[1 - axis, one], time[1 - axis, other])
             mine = np.maximum(below, base + np.where(slides, 0.0, lift))
-            n = int(np.argmin(cost * LONG + mine))
-            price[axis, whole], time[axis, whole] = cost[n], mine[n]
-        _relayed(whole, price, time)
+            best = _first_least(cost * LONG + mine, starts)
+            price[axis, wholes], time[axis, wholes] = cost[best], mine[best]
+        _relayed(wholes, price, time)
     return Tables(price, time)
 
 
-def _relayed(whole: int, price: Array, time: Array) -> None:
+def _first_least(values: Array, starts: Masks) -> Masks:
+    """The first of the least values in each of the stretches that begin at some rows."""
+    least = np.minimum.reduceat(values, starts)
+    counts = np.diff(starts, append=len(values))
+    equal = np.flatnonzero(values == np.repeat(least, counts))
+    return np.asarray(equal[np.searchsorted(equal, starts)])
+
+
+def _relayed(wholes: Masks, price: Array, time: Array) -> None:
     for axis in (0, 1):
-        if price[1 - axis, whole] + RELAY < price[axis, whole]:
-            price[axis, whole] = price[1 - axis, whole] + RELAY
-            time[axis, whole] = time[1 - axis, whole]
+        turned = wholes[price[1 - axis, wholes] + RELAY < price[axis, wholes]]
+        price[axis, turned] = price[1 - axis, turned] + RELAY
+        time[axis, turned] = time[1 - axis, turned]
 
 
 class Best:
@@ -194,43 +149,45 @@ class Best:
         self.made[:, units] = prices * LONG**2 + ROBOT
         self.stop = task.expected.stop(task.leg)
         self.step = task.expected.step(task.leg)
-        for whole in task.subassemblies():
+        for batch in task.divisions.batches:
             if late():
                 raise TooLate
-            self._solve(whole)
+            self._solve(batch)
 
-    def _solve(self, whole: int) -> None:
-        divisions = self.task.divisions(whole)
-        if not len(divisions[0]):
-            return
+    def _solve(self, batch: Batch) -> None:
+        starts = batch.starts
+        wholes = batch.whole[starts]
         for axis in (0, 1):
             for stops in range(self.stops):
-                options = self._options(whole, axis, stops, divisions)
-                self.piles[stops, axis, whole] = min((o[0].min() for o in options), default=np.inf)
-            self.made[axis, whole] = self.piles[:, axis, whole].min()
+                options = self._options(batch, axis, stops)
+                least = [np.minimum.reduceat(worth, starts) for worth, *_ in options]
+                if least:
+                    self.piles[stops, axis, wholes] = np.minimum.reduce(least)
+            self.made[axis, wholes] = self.piles[:, axis, wholes].min(axis=0)
         for axis in (0, 1):
-            turned = self.made[1 - axis, whole] + RELAY * LONG**2 + ROBOT
-            self.made[axis, whole] = min(self.made[axis, whole], turned)
+            turned = self.made[1 - axis, wholes] + RELAY * LONG**2 + ROBOT
+            self.made[axis, wholes] = np.minimum(self.made[axis, wholes], turned)
 
     def _options(
-        self, whole: int, axis: int, stops: int, divisions: tuple[Masks, Masks, Array]
+        self, batch: Batch, axis: int, stops: int
     ) -> list[tuple[Array, Masks, Masks, str]]:
-        """All ways to form a pile: their worth (less is better), both sides (the pile first), and
+        """All ways to form piles: their worth (less is better), both sides (the pile first), and
         the operation."""
-        one, other, prices = divisions
-        fixed = self.task.penalty(whole) * LONG**2 + self.task.leg[whole]
+        one, other, prices = batch.one, batch.other, batch.prices
+        fixed = self.task.subsets.penalty[batch.whole] * LONG**2 + self.task.leg[batch.whole]
         options = []
         if stops == 0:
-            worth = self._mates(whole, axis, one, other, prices) + fixed
+            worth = self._mates(batch.whole, axis, one, other, prices) + fixed
             options.append((worth, one, other, "mate"))
         if stops > 0 or (self.bound == np.inf and not self.mates):
-            sides = ((one, other), (other, one))
-            for pile, come in sides[: 1 if self.task.subsets.based[whole] else 2]:
-                worth = self._inserts(whole, axis, stops, pile, come, prices) + fixed
-                options.append((worth, pile, come, "insert"))
+            worth = self._inserts(batch.whole, axis, stops, one, other, prices) + fixed
+            options.append((worth, one, other, "insert"))
+            worth = self._inserts(batch.whole, axis, stops, other, one, prices) + fixed
+            worth[self.task.subsets.based[batch.whole]] = np.inf
+            options.append((worth, other, one, "insert"))
         return options
 
-    def _mates(self, whole: int, axis: int, one: Masks, other: Masks, prices: Array) -> Array:
+    def _mates(self, whole: Masks, axis: int, one: Masks, other: Masks, prices: Array) -> Array:
         slides = prices[:, axis] <= prices[:, 2]
         cost = np.where(slides, prices[:, axis], prices[:, 2])
         worth = self.made[1 - axis, one] + self.made[1 - axis, other]
@@ -242,11 +199,11 @@ class Best:
         return np.asarray(worth)
 
     def _inserts(
-        self, whole: int, axis: int, stops: int, pile: Masks, come: Masks, prices: Array
+        self, whole: Masks, axis: int, stops: int, pile: Masks, come: Masks, prices: Array
     ) -> Array:
-        side = 0 if self.task.up > 0 else 1
-        lowered = self.task.subsets.price(self.task.axis, side, come, pile)
-        cost = np.minimum(prices[:, axis], lowered)
+        side = 0 if self.task.divisions.up > 0 else 1
+        level = self.task.subsets.level(self.task.divisions.axis, side, come, pile)
+        cost = np.minimum(prices[:, axis], LEVEL_PRICES[level])
         before = self.piles[max(stops - 1, 0), axis, pile]
         worth = before + self.made[1 - axis, come] + cost * LONG**2
         if self.bound < np.inf:
@@ -266,7 +223,7 @@ class Best:
         return tuple(self._inputs(whole, axis, stops, leaf))
 
     def _inputs(self, whole: int, axis: int, stops: int, leaf: Leaf) -> list[Tree]:
-        options = self._options(whole, axis, stops, self.task.divisions(whole))
+        options = self._options(self.task.divisions.of(whole), axis, stops)
         worth, one, other, how = min(options, key=lambda o: float(o[0].min()))
         n = int(worth.argmin())
         last = self.tree(int(other[n]), 1 - axis, leaf)

@@ -17,8 +17,9 @@ from factory.geometry.meshes import Array
 from factory.planning.blocking import Blocking
 from factory.planning.cannot import Units
 from factory.planning.dividing import Divider
+from factory.planning.divisions import Late, divisions, never
 from factory.planning.estimate import Expected
-from factory.planning.exact import RELAY, Best, Late, Tree, TreeTask, never
+from factory.planning.exact import RELAY, Best, Tree, TreeTask
 from factory.planning.judging import Judge, Judged
 from factory.planning.stance import ROOT_AXIS, Stance
 from factory.planning.subsets import subsets
@@ -70,7 +71,8 @@ def solved(
         return group.tree if group.axis in (-1, turn[k]) else (group.tree,)
 
     for apart in (False, True):
-        task = TreeTask(tables, site.expected, stance.axes[2], stance.up, prices, apart)
+        possible = divisions(tables, stance.axes[2], stance.up, apart)
+        task = TreeTask(possible, site.expected, prices)
         best = Best(task, bound, late)
         if np.isfinite(best.made[at, tables.whole]):
             return best.tree(tables.whole, at, leaf)

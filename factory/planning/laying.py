@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import inf
 from time import perf_counter
 
 import numpy as np
@@ -17,15 +18,19 @@ from factory.pipeline import Project
 from factory.planning.exact import Tree
 from factory.planning.judging import Judged
 from factory.planning.parts import InPlace
-from factory.planning.searching import Aim, Budget
+from factory.planning.searching import Aim
 from factory.planning.stance import Stance
 from factory.planning.writing import Screwed, planned_product
 from factory.planning.writing import Tree as LabelTree
 from factory.problem.robot_types import load_catalogue
 from factory.problem.template import Template
+from factory.support.allowance import Allowance
 from factory.support.errors import FactoryError
 from factory.support.settings import Settings
 from factory.timing.prediction import pace
+
+LAID = 120
+"""Trees are laid out until they have more robots together, unless a time is given."""
 
 ALIKE = 0.01
 """Figures that differ by less than this share are equal."""
@@ -58,7 +63,7 @@ class LaidOut:
         try:
             return pace(self.project.layout, self.project.settings)[0].seconds
         except FactoryError:
-            return float("inf")
+            return inf
 
     @property
     def robots(self) -> int:
@@ -71,7 +76,7 @@ class LaidOut:
         try:
             return float(self.project.layout.area)
         except FactoryError:
-            return float("inf")
+            return inf
 
     def rank(self, aim: Aim) -> tuple[float, ...]:
         """The rank of a factory, less is better: blocked operations, sub-assemblies that cannot be
@@ -133,16 +138,19 @@ class Layouts:
         self,
         trees: Sequence[Judged],
         aim: Aim,
-        budget: Budget,
+        budget: Allowance,
         report: Callable[[LaidOut], None] = lambda _: None,
     ) -> LaidOut:
-        """The best of some trees. As many are laid out as time permits, at least the first; the
-        next one is assumed to take as long as the longest did. A KeyboardInterrupt ends the layout
-        of any but the first."""
+        """The best of some trees. As many are laid out as the budget permits, at least the first:
+        those of LAID robots together, or as many as time permits, where the next one is assumed to
+        take as long as the longest did. A KeyboardInterrupt ends the layout of any but the
+        first."""
         best: LaidOut | None = None
-        longest = 0.0
+        longest, robots = 0.0, 0
         for judged in trees:
-            if best is not None and budget.left < longest:
+            robots += judged.robots
+            enough = robots > LAID if budget.seconds == inf else budget.left < longest
+            if best is not None and (enough or budget.left == 0.0):
                 break
             begin = perf_counter()
             try:

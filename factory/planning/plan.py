@@ -23,7 +23,7 @@ from factory.planning.judging import Join, Judged
 from factory.planning.laying import LaidOut, Layouts
 from factory.planning.parts import InPlace
 from factory.planning.posing import Pose, along, posed, said, screwing, toppling
-from factory.planning.searching import Aim, Budget, Sought, Trees, trees, usual_seconds
+from factory.planning.searching import Aim, Sought, Trees, budget_of, trees
 from factory.planning.stance import ROOT_AXIS, Stance, stances
 from factory.planning.standing import feet
 from factory.planning.subsets import BLOCKED
@@ -31,6 +31,7 @@ from factory.planning.turning import only
 from factory.planning.writing import Tree, planned_product, screws_in
 from factory.problem.pag import PAG
 from factory.problem.template import Template
+from factory.support.allowance import Allowance
 from factory.support.errors import Diagnostic, InputError, did_you_mean
 from factory.support.settings import Settings
 
@@ -43,11 +44,11 @@ DWELL = 1.0
 
 @dataclass(frozen=True)
 class PlanOptions:
-    """`aim`: the objective; `seconds`: the search time, None for the default time and proofs that
-    are always completed (`searching`); `allow`: units that may pass through others, or two, `a:b`,
-    through each other; `hulls`: whether hulls may hide parts in their cavities; `up`: the axis and
-    side of the file that is up, None for z unless the product tips over; `base`: the unit onto
-    which all others come, "" for any; `screws`: units that are screws besides those that are
+    """`aim`: the objective; `seconds`: the search time, None for a number of candidates that is
+    the same on any machine (`searching`); `allow`: units that may pass through others, or two,
+    `a:b`, through each other; `hulls`: whether hulls may hide parts in their cavities; `up`: the
+    axis and side of the file that is up, None for z unless the product tips over; `base`: the unit
+    onto which all others come, "" for any; `screws`: units that are screws besides those that are
     recognised, None for no screws at all; `lay_out`: whether layouts decide, or estimates alone;
     `settings` and `templates` of the factory, None for those shipped; `told` is called with the
     stage, the progress, and a text; `stopped` tells whether the best tree so far is wanted at
@@ -143,8 +144,7 @@ def plan(source: InPlace, options: PlanOptions | None = None) -> Planned | Canno
     `base` names no unit, or the product tips over with `up` upwards (Usage), or if hulls hide parts
     in their cavities (Hulls)."""
     asked = options or PlanOptions()
-    usual = usual_seconds(len(source.units()))
-    budget = Budget(asked.seconds or usual, asked.seconds is not None, stopped=asked.stopped)
+    budget = budget_of(len(source.units()), asked.seconds, asked.stopped)
     asked.told("computing what blocks what", 0, None, "")
     graphs = blocking(source)
     named = (*asked.allow, *([asked.base] if asked.base else ()), *(asked.screws or ()))
@@ -166,7 +166,7 @@ def plan(source: InPlace, options: PlanOptions | None = None) -> Planned | Canno
     return replace(planned, hidden=pairs if asked.hulls else (), notes=notes)
 
 
-def _planned(pose: Pose, asked: PlanOptions, budget: Budget) -> Planned:
+def _planned(pose: Pose, asked: PlanOptions, budget: Allowance) -> Planned:
     source = pose.source
     base = pose.graphs.labels.index(asked.base) if asked.base else -1
     stands = feet([parts for _, parts in source.units()], along(pose.up))

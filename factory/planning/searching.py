@@ -3,29 +3,32 @@ on the expected cycle time."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from time import perf_counter
+from functools import cache
+from math import inf
 from typing import Literal
 
 import numpy as np
 
 from factory.geometry.meshes import Array
 from factory.planning.blocking import Blocking
+from factory.planning.divisions import Divisions, Late, TooLate, divisions
 from factory.planning.estimate import Expected
-from factory.planning.exact import Best, Late, TooLate, TreeTask, tables
+from factory.planning.exact import RELAY, Best, Tables, TreeTask, tables
 from factory.planning.growing import Site, bettered, divided
 from factory.planning.judging import Judge, Judged
 from factory.planning.stance import ROOT_AXIS, Stance, stances
 from factory.planning.subsets import MOST, Subsets, subsets
+from factory.support.allowance import Allowance
 
 Aim = Literal["cycle", "robots", "floor"]
 """The objective of planning."""
 
 BOUNDS: dict[Aim, tuple[float, ...]] = {
     "cycle": (1.0, 1.4, 1.15, 1.8),
-    "robots": (np.inf,),
-    "floor": (1.0, 1.4, np.inf),
+    "robots": (inf,),
+    "floor": (1.0, 1.4, inf),
 }
 """The bounds on expected cycles, as multiples of the least."""
 
@@ -35,54 +38,31 @@ SEVERAL = 3
 EVEN = (1.0, 0.3, 0.0)
 """How even divisions of many units are preferred to be, in order: 1 for halves, 0 for any."""
 
-PROOF, EACH = 30.0, 0.2
-"""Default search times [s]: for up to MOST units, whose trees may be proved optimal; per unit for
-more."""
+CANDIDATES = 40
+"""The search for a tree ends after so many candidates for each unit: neighbourhoods of a tree."""
 
-SURE = 12
-"""The trees of up to so many units are proved optimal, however long that takes, unless the search
-is stopped or has a given time limit."""
-
-GROWN, PROVED = 0.4, 0.6
-"""Shares of the time after which the local search ends, and proofs are abandoned: the rest is for
+PROVING, GROWING = 0.3, 0.6
+"""Shares of the budget after which proofs are abandoned, and the local search ends: the rest is for
 layouts."""
+
+DIVISIONS = 1_000_000
+"""The most divisions of subsets of units for which there are proofs: 13 units that all touch, and
+block nothing, have 800,000."""
+
+RELAYS = 50 * RELAY
+"""The price of the most relays that a tree of few units is expected to have."""
 
 UnitPrices = Callable[[Stance], Array]
 """The price (2, n) of each unit in a stance if its own inputs come along x or y of the floor."""
 
 
-def usual_seconds(units: int) -> float:
-    """The default search time for so many units [s]."""
-    return PROOF if units <= MOST else EACH * units
-
-
-@dataclass(frozen=True)
-class Budget:
-    """A time limit [s] that starts when the value is made. `asked`: whether the user gave it, so
-    that it bounds proofs too; `stopped` tells whether the search must end at once."""
-
-    seconds: float
-    asked: bool = True
-    begin: float = field(default_factory=perf_counter)
-    stopped: Callable[[], bool] = lambda: False
-
-    def late(self) -> bool:
-        """Whether the time is used up."""
-        return self.stopped() or perf_counter() - self.begin > self.seconds
-
-    @property
-    def left(self) -> float:
-        """The remaining time [s]; 0 if the search must end at once."""
-        return 0.0 if self.late() else self.seconds * (1 - self.gone)
-
-    @property
-    def gone(self) -> float:
-        """The share of the time that is used up."""
-        return (perf_counter() - self.begin) / self.seconds
-
-    def share(self, part: float) -> Late:
-        """A function that tells whether a share of the time, from its start, is used up."""
-        return replace(self, seconds=part * self.seconds).late
+def budget_of(
+    units: int, seconds: float | None = None, stopped: Callable[[], bool] = lambda: False
+) -> Allowance:
+    """The budget of a search: CANDIDATES for each unit, or the time that the user gave [s]. A
+    search that is `stopped` ends at once."""
+    effort = CANDIDATES * units if seconds is None else inf
+    return Allowance(effort / GROWING, inf if seconds is None else seconds, stopped)
 
 
 @dataclass(frozen=True)
@@ -94,7 +74,7 @@ class Sought:
     expected: Expected
     unit_prices: UnitPrices
     aim: Aim = "cycle"
-    budget: Budget = field(default_factory=lambda: Budget(60.0))
+    budget: Allowance = field(default_factory=lambda: budget_of(MOST))
     told: Callable[[Judged], None] = field(default=lambda _: None)
     stances: tuple[Stance, ...] = field(default_factory=stances)
 
@@ -117,25 +97,20 @@ def trees(sought: Sought) -> Trees:
     """Candidate trees for layout, at least one."""
     kept: dict[object, Judged] = {}
     optimal = False
-    few = len(sought.graphs) <= MOST
-    sure = len(sought.graphs) <= SURE
 
     def keep(batch: Iterator[Judged]) -> None:
         for judged in batch:
             sought.told(judged)
             kept.setdefault((judged.tree, judged.stance), judged)
 
-    if not sure:
-        keep(_grown(sought, GROWN / 2 if few else GROWN))
     try:
-        if few:
-            endless = sure and not sought.budget.asked
-            late = sought.budget.stopped if endless else sought.budget.share(PROVED)
-            keep(_proved(sought, late))
+        if len(sought.graphs) <= MOST:
+            keep(_proved(sought))
             optimal = True
     except TooLate:
-        if not kept:
-            keep(_grown(sought, GROWN))
+        pass
+    if not kept:
+        keep(_grown(sought))
     by_robots = sought.aim == "robots"
     ranks = {j: (j.price, j.robots if by_robots else 0, j.seconds, j.robots) for j in kept.values()}
     least = min(judged.price for judged in ranks)
@@ -143,59 +118,90 @@ def trees(sought: Sought) -> Trees:
     return Trees(tuple(sorted(best, key=ranks.__getitem__)), optimal)
 
 
-def _proved(sought: Sought, late: Late) -> Iterator[Judged]:
+@dataclass(frozen=True, slots=True)
+class Rank:
+    """A stance with its least price, the least expected cycle at that price [s], and the divisions
+    of trees at that price."""
+
+    stance: Stance
+    price: float
+    seconds: float
+    divisions: Divisions
+
+
+def _proved(sought: Sought) -> Iterator[Judged]:
     """The best trees of a small product, in the best stances. Raises TooLate."""
     table = subsets(sought.graphs)
+
+    def late() -> bool:
+        return sought.budget.late_by() > PROVING
+
     for apart in (False, True):
-        ranks = _ranks(
-            sought.stances,
-            lambda stance, a=apart: _task(sought, table, stance, a),  # type: ignore[misc]
-            late,
-        )
+        ranks = _ranks(sought, table, apart, late)
         if ranks:
             break
-    judges = {stance: Judge(sought.graphs, stance, sought.expected) for stance, _, _ in ranks}
+    judges = {r.stance: Judge(sought.graphs, r.stance, sought.expected) for r in ranks}
     for factor in BOUNDS[sought.aim]:
-        for stance, _, seconds in ranks:
-            task = _task(sought, table, stance, apart)
-            at = task.level.index(stance.axes[ROOT_AXIS])
-            best = Best(task, factor * seconds if factor < np.inf else np.inf, late)
-            yield judges[stance].judged(best.tree(table.whole, at))
+        for rank in ranks:
+            task = _task(sought, rank.stance, rank.divisions)
+            at = rank.divisions.level.index(rank.stance.axes[ROOT_AXIS])
+            best = Best(task, factor * rank.seconds if factor < inf else inf, late)
+            yield judges[rank.stance].judged(best.tree(table.whole, at))
 
 
-def _task(sought: Sought, table: Subsets, stance: Stance, apart: bool) -> TreeTask:
-    level = sorted(stance.axes[:2])
-    prices = sought.unit_prices(stance)[[stance.axes.index(axis) for axis in level]]
-    return TreeTask(table, sought.expected, stance.axes[2], stance.up, prices, apart)
+def _task(sought: Sought, stance: Stance, some: Divisions) -> TreeTask:
+    prices = sought.unit_prices(stance)[[stance.axes.index(axis) for axis in some.level]]
+    return TreeTask(some, sought.expected, prices)
 
 
-def _ranks(
-    choice: Sequence[Stance], task_of: Callable[[Stance], TreeTask], late: Late
-) -> list[tuple[Stance, float, float]]:
-    """The cheapest stances, each with its least price and its least expected cycle [s]."""
-    ranks: list[tuple[Stance, float, float]] = []
-    solved: dict[bytes, tuple[Array, Array]] = {}
-    for stance in choice:
-        task = task_of(stance)
-        key = bytes([task.axis]) + (b"" if task.unit_prices is None else task.unit_prices.tobytes())
-        if key not in solved:
-            solution = tables(task, late)
-            solved[key] = solution.price[:, -1], solution.time[:, -1]
-        at = task.level.index(stance.axes[ROOT_AXIS])
-        price, time = solved[key]
-        if np.isfinite(price[at]):
-            ranks.append((stance, float(price[at]), float(time[at])))
-    if not ranks:
-        return []
-    least = min(price for _, price, _ in ranks)
-    good = [rank for rank in ranks if rank[1] == least]
-    return good[:SEVERAL]
+def _ranks(sought: Sought, table: Subsets, apart: bool, late: Late) -> list[Rank]:
+    """The cheapest stances."""
+
+    @cache
+    def all_of(axis: int, up: int) -> Divisions:
+        return divisions(table, axis, up, apart, late, DIVISIONS)
+
+    ranks: list[Rank] = []
+    solved: dict[tuple[int, int, bytes], Tables] = {}
+    for stance in sought.stances:
+        every = all_of(stance.axes[2], stance.up)
+        at = every.level.index(stance.axes[ROOT_AXIS])
+        for some in _cheap_first(every):
+            task = _task(sought, stance, some)
+            assert task.unit_prices is not None
+            key = every.axis, every.up * (1 if some is every else 2), task.unit_prices.tobytes()
+            if key not in solved:
+                solved[key] = tables(task, late)
+            price, seconds = float(solved[key].price[at, -1]), float(solved[key].time[at, -1])
+            if price <= some.most:
+                break
+        if price < inf:
+            ranks.append(Rank(stance, price, seconds, every))
+    least = min((rank.price for rank in ranks), default=inf)
+    good = [rank for rank in ranks if rank.price == least]
+    return [replace(rank, divisions=rank.divisions.within(least)) for rank in good[:SEVERAL]]
 
 
-def _grown(sought: Sought, share: float) -> Iterator[Judged]:
-    """Ever better trees of a large product, until a share of the time is used up or the search
+def _cheap_first(every: Divisions) -> Iterator[Divisions]:
+    """The divisions at little more than the lower bound on the price, which are few, and all of
+    them, in case the bound is wide of the mark."""
+    if every.least[-1] < inf:
+        yield every.within(float(every.least[-1]) + RELAYS)
+    yield every
+
+
+def _grown(sought: Sought) -> Iterator[Judged]:
+    """Ever better trees of a large product, until its share of the budget is used up or the search
     converges."""
-    late = sought.budget.share(share)
+
+    def late_after(share: float) -> Late:
+        def late() -> bool:
+            sought.budget.spend()
+            return sought.budget.gone > share
+
+        return late
+
+    late = late_after(GROWING)
     random = np.random.default_rng(0)
     first: list[Judged] = []
     for stance in sought.stances:
@@ -213,7 +219,7 @@ def _grown(sought: Sought, share: float) -> Iterator[Judged]:
     factors, begin = BOUNDS[sought.aim], sought.budget.gone
     for number, factor in enumerate(factors):
         bound = factor * best.seconds
-        late = sought.budget.share(begin + (share - begin) * (number + 1) / len(factors))
+        late = late_after(begin + (GROWING - begin) * (number + 1) / len(factors))
         site, last = sought.site(best.stance), best
         for judged in bettered(site, best.tree, bound, late, random):
             sought.told(judged)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,9 @@ BLOCKED, PASSES, LOOSE = 1e6, 1e4, 1e2
 """The price of an operation with accepted clashes (`check` calls it blocked); with parts that were
 drawn into each other and pass through each other; with such parts that get a little deeper. A relay
 costs less than any of these."""
+
+LEVEL_PRICES = np.array([0.0, LOOSE, PASSES, BLOCKED, np.inf])
+"""The prices of an operation by its level: free, as named above, and impossible."""
 
 APART, TIPS = 1e5, 2e4
 """The price of a sub-assembly that is not connected, and of one that would tip over by itself."""
@@ -41,6 +45,13 @@ class Subsets:
     tips: NDArray[np.bool_] = field(repr=False)
     based: NDArray[np.bool_] = field(repr=False)
 
+    @cached_property
+    def penalty(self) -> Array:
+        """The prices (s,) of sub-assemblies in pieces, or that would tip over."""
+        prices = APART * ~self.hangs + TIPS * self.tips
+        prices[-1] = 0.0
+        return np.asarray(prices)
+
     @property
     def whole(self) -> int:
         """All units."""
@@ -50,17 +61,22 @@ class Subsets:
         """The length of each subset along an axis (s,) [m]."""
         return np.asarray(self.high[axis] - self.low[axis])
 
-    def price(self, axis: int, side: int, going: Masks, staying: Masks) -> Array:
-        """The prices (k,) of subsets that leave along an axis to the upper (0) or lower (1) side,
-        past those that stay; infinite where they cannot."""
-        locked, deeper, through, clash = (
-            self.ways[n, axis, side][going] & staying for n in range(4)
-        )
-        prices = np.where(deeper != 0, LOOSE, 0.0)
-        prices[through != 0] = PASSES
-        prices[clash != 0] = BLOCKED
-        prices[locked != 0] = np.inf
-        return prices
+    def separable(self, one: Masks, other: Masks) -> NDArray[np.bool_]:
+        """Whether two sides (k,) are free of each other along some axis, or their clashes are
+        accepted."""
+        free = np.zeros(len(one), bool)
+        for axis in AXES:
+            for side in (0, 1):
+                free |= (self.ways[0, axis, side][one] & other) == 0
+        return free
+
+    def level(self, axis: int, side: int, going: Masks, staying: Masks) -> NDArray[np.uint8]:
+        """The levels (k,) of blocking, by which LEVEL_PRICES has the prices, of subsets that leave
+        along an axis to the upper (0) or lower (1) side, past those that stay."""
+        levels = np.zeros(len(going), np.uint8)
+        for number, ways in ((1, 1), (2, 2), (3, 3), (4, 0)):
+            levels[(self.ways[ways, axis, side][going] & staying) != 0] = number
+        return levels
 
 
 def subsets(graphs: Blocking) -> Subsets:
@@ -89,17 +105,6 @@ def subsets(graphs: Blocking) -> Subsets:
     tips = np.zeros(size, bool) if graphs.feet is None else graphs.feet.subsets()
     based = (np.arange(size) >> max(graphs.base, 0) & 1 == 1) & (graphs.base >= 0)
     return Subsets(count, ways, _hanging(graphs.touch, members), low, high, members, tips, based)
-
-
-def splits(whole: int) -> Masks:
-    """The proper subsets of a mask that contain its lowest unit: each, with its complement, is a
-    division in two."""
-    bits = [1 << n for n in range(whole.bit_length()) if whole >> n & 1]
-    masks = np.full(1 << (len(bits) - 1), bits[0], np.int64)
-    for number, bit in enumerate(bits[1:]):
-        step = 1 << number
-        masks[step : 2 * step] = masks[:step] | bit
-    return masks[:-1]
 
 
 def _unions(table: NDArray[np.bool_]) -> Masks:

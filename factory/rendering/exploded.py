@@ -13,21 +13,21 @@ from factory.geometry.solids import Product
 from factory.planning.exploding import Explosion
 from factory.planning.source import surface
 from factory.rendering.ink import Pixels
-from factory.rendering.painter import LooseParts
+from factory.rendering.painter import LOOSE_SAMPLES, LooseParts
 from factory.rendering.picture import Size
-from factory.rendering.reel import SAMPLES, write_still
+from factory.rendering.reel import write_still
 from factory.rendering.video import VideoFile, check_output
 
-FPS = 20.0
+FPS = 15.0
 
 STILL: tuple[Size, Size] = (1280, 720), (900, 1200)
-FILM: tuple[Size, Size] = (960, 540), (600, 800)
+FILM: tuple[Size, Size] = (800, 450), (480, 640)
 """Of pictures: wide, or upright."""
 
 AZIMUTH, ELEVATION, TURN = -58.0, 31.0, 40.0
 """From where the camera looks, and how far round it goes in a film [degrees]."""
 
-BEFORE, AFTER, SLOWEST, LONGEST = 1.2, 1.8, 0.7, 8.0
+BEFORE, AFTER, SLOWEST, LONGEST = 1.2, 1.8, 0.7, 5.0
 """Parts stand apart and the product stands for these times; an operation takes at most the third,
 and all together the fourth [s]."""
 
@@ -37,7 +37,7 @@ MANY = 10_000
 AROUND = 3.0
 """So many times the product's depth of the floor gets clean shadows: beyond it is speckled."""
 
-EVEN = 12
+EVEN = 9
 """Half the frames over which the camera's way is evened out."""
 
 
@@ -115,7 +115,7 @@ class _Stage(LooseParts):
         self._place(0.0)
         axes = towards(AZIMUTH, ELEVATION)
         view = fit(self.shown._points(0.0), axes, self.framing)
-        return self.renderer.mean(replace(view, depth=AROUND * view.depth), SAMPLES)
+        return self.renderer.mean(replace(view, depth=AROUND * view.depth), LOOSE_SAMPLES)
 
     def picture(self, done: float, view: View) -> Pixels:
         """When so many operations are done."""

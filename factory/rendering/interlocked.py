@@ -14,9 +14,9 @@ from factory.planning.cannot import Interlock
 from factory.planning.parts import InPlace
 from factory.rendering.colours import GROUND, INK
 from factory.rendering.ink import Colour, Ink, Pixels, fitted, width
-from factory.rendering.painter import LooseParts
+from factory.rendering.painter import LOOSE_SAMPLES, LooseParts
 from factory.rendering.picture import Size
-from factory.rendering.reel import SAMPLES, write_still
+from factory.rendering.reel import write_still
 from factory.rendering.video import check_output
 
 SIZE: Size = (1280, 720)
@@ -89,7 +89,7 @@ class InterlockedView:
         with LooseParts(surfaces, colours, floor, extent, SIZE) as stage:
             stage.move(np.zeros((len(colours), 3)))
             view = fit(points, towards(AZIMUTH, ELEVATION), stage.framing)
-            return stage.renderer.mean(view, SAMPLES)
+            return stage.renderer.mean(view, LOOSE_SAMPLES)
 
 
 def _placed(labels: tuple[str, ...]) -> Iterator[tuple[int, float, str]]:

@@ -30,6 +30,9 @@ MANY = 110
 SOFT = 0.11
 """Radius of the sun as a still sees it [rad]: the softness of shadows."""
 
+LOOSE_SAMPLES = 12
+"""A still of loose parts, which is drawn while a user waits, is the mean of so many pictures."""
+
 Sample = tuple[int, int]
 """The number of one of several pictures that a still is the mean of, and how many there are."""
 
@@ -223,7 +226,16 @@ def _moved(direction: Array, sample: Sample) -> Array:
 
 @cache
 def _spread(count: int) -> Array:
-    """Points (count, 2) that are spread evenly over the unit square, all within it."""
-    from scipy.stats.qmc import Halton
+    """Halton points (count, 2): spread evenly over the unit square, all within it. (Those of SciPy
+    are the same, but its statistics take longer to import than a still takes to draw.)"""
+    return np.array([[_inverse(n, base) for base in (2, 3)] for n in range(1, count + 1)])
 
-    return np.asarray(Halton(2, scramble=False).random(count + 1)[1:])
+
+def _inverse(number: int, base: int) -> float:
+    """The radical inverse: the digits of a number in a base, mirrored at the point."""
+    mirrored, place = 0.0, 1.0 / base
+    while number:
+        number, digit = divmod(number, base)
+        mirrored += digit * place
+        place /= base
+    return mirrored
