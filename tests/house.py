@@ -64,6 +64,20 @@ ENGINE_FIELDS = frozenset(
 )
 """Fields of MjModel and MjData that a run may write."""
 
+VARIANTS = re.compile(r"(^|_)(fold(s|ed|ing)?|relay(s|ed|ing)?|deput\w*|parallel|forms?)(_|$)")
+"""What variants of a factory are called, in identifiers of small letters."""
+
+VARIANT_ROOMS = ("compiler", "layout/relaying", "problem/plan")
+"""Where variants are made. All others know the factory that was made."""
+
+VARIANT_MARKS = {
+    **{"study": 121, "commands": 47, "lang": 28, "simulation": 28, "layout": 23, "planning": 19},
+    **{"pipeline": 18, "record": 14, "show": 13, "stages": 11, "exporting": 7, "support": 5},
+    **{"foreign_nets": 4, "plant": 2, "rendering": 2},
+}
+"""How many identifiers of other rooms may still name a variant. A mark may fall, and never rises:
+what needs it is told by the plan, or by what the factory is."""
+
 MOST_ROOMS, MOST_LINES, MOST_ATTRIBUTES, MOST_PARAMETERS = 23, 350, 12, 8
 
 
@@ -293,6 +307,34 @@ def clocks(house: House) -> Iterator[str]:
     for module in house.tests:
         if CLOCK.search(module.text) and module.name not in CLOCKED:
             yield f"tests.{module.name} reads a clock"
+
+
+def identifiers(module: Module) -> Iterator[str]:
+    """What a module defines, uses, takes and imports, in small letters with underscores."""
+    for node in ast.walk(module.tree):
+        names: list[str | None] = []
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            names = [node.name]
+        elif isinstance(node, ast.Name):
+            names = [node.id]
+        elif isinstance(node, ast.Attribute):
+            names = [node.attr]
+        elif isinstance(node, ast.arg | ast.keyword):
+            names = [node.arg]
+        elif isinstance(node, ast.ImportFrom):
+            names = [*(node.module or "").split("."), *(alias.name for alias in node.names)]
+        yield from (re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower() for name in names if name)
+
+
+def variants(house: House) -> Iterator[str]:
+    """Rooms that name variants of a factory oftener than they may."""
+    found: Counter[str] = Counter()
+    for module in house.modules.values():
+        if not module.within(VARIANT_ROOMS):
+            found[module.room] += sum(map(bool, map(VARIANTS.search, identifiers(module))))
+    for room, count in found.items():
+        if count > (most := VARIANT_MARKS.get(room, 0)):
+            yield f"{room}: names variants {count} times; at most {most}"
 
 
 def anys(house: House, name: str) -> Iterator[str]:

@@ -5,16 +5,22 @@ from __future__ import annotations
 
 import random
 from collections import defaultdict
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
+from types import MappingProxyType
 
 from hypothesis import strategies as st
 
+from factory.compiler import taking_over
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import Product, Solid
 from factory.layout.embedding import lay_out
+from factory.layout.guidepath import moved as displaced
+from factory.layout.hands.hand import Point3
 from factory.layout.layout import Layout, carriers
 from factory.layout.shapes import is_tool
+from factory.layout.visits import visits_of
 from factory.problem.pag import PAG, Assembly, Parameter, Value
 from tests.pag_values import SHAPES, factory_of, paper, random_pag
 
@@ -158,7 +164,7 @@ def shortened(layout: Layout, robot: int, length: float) -> Layout:
         a = (round(x + u[0] * length, 3), round(y + u[1] * length, 3))
         paths[guest] = replace(paths[guest], a=a)
         moved += below[guest]
-    return replace(layout, guidepaths=tuple(paths), certificate=None)
+    return with_visits(replace(layout, guidepaths=tuple(paths)), stations_of(layout))
 
 
 def with_path(layout: Layout, robot: int, **changes: object) -> Layout:
@@ -166,6 +172,58 @@ def with_path(layout: Layout, robot: int, **changes: object) -> Layout:
     paths = list(layout.guidepaths)
     paths[robot] = replace(paths[robot], **changes)  # type: ignore[arg-type]
     return replace(layout, guidepaths=tuple(paths), certificate=None)
+
+
+def with_visits(
+    layout: Layout,
+    stations: Mapping[int, float] = MappingProxyType({}),
+    shifts: Mapping[tuple[int, int], Point3] = MappingProxyType({}),
+) -> Layout:
+    """A layout with some operations at other stations, distances from the B ends of their carriers,
+    and some robots that hold the payload of a tour, by (robot, tour), so much elsewhere than they
+    did [m]."""
+    factory, paths = layout.factory, layout.guidepaths
+    held = [
+        tuple(
+            _shift(layout, robot, tour[-1], shifts.get((robot, n), (0.0, 0.0, 0.0)))
+            for n, tour in enumerate(tours)
+        )
+        for robot, tours in enumerate(factory.tours)
+    ]
+    plain = not any(any(shift) for tours in held for shift in tours)
+    there = {**stations_of(layout), **stations}
+    at = [there[o.index] for o in factory.operations]
+    return replace(
+        layout, visits=visits_of(factory, paths, at, () if plain else held), certificate=None
+    )
+
+
+def without_gone(layout: Layout) -> Layout:
+    """The layout of a crew without the robots that are gone, which have no operations."""
+    stay = layout.factory.present
+    factory = taking_over.without_gone(layout.factory)
+    visits = {(number, stay.index(robot)): v for (number, robot), v in layout.visits.items()}
+    paths = tuple(layout.guidepaths[robot] for robot in stay)
+    hands = tuple(layout.hands[robot] for robot in stay) if layout.hands else ()
+    made = replace(layout, factory=factory, guidepaths=paths, visits=visits, hands=hands)
+    return replace(made, standby=None, certificate=None)
+
+
+def stations_of(layout: Layout) -> dict[int, float]:
+    """Where operations take place, distances from the B ends of their carriers [m]."""
+    paths, factory = layout.guidepaths, layout.factory
+    at = {o.index: paths[o.carrier].length - layout.station(o.index) for o in factory.operations}
+    return {number: round(station, 9) + 0.0 for number, station in at.items()}
+
+
+def _shift(layout: Layout, robot: int, last: int, by: Point3) -> Point3:
+    """How a robot holds what it delivers in an operation, and so much elsewhere."""
+    visit, carrier = layout.visits[last, robot], layout.factory.operations[last].carrier
+    below = layout.visits[last, carrier].elevation if robot else 0.0
+    ahead, _, aside, _ = layout.guidepaths[robot].frame(
+        displaced((0.0, 0.0, 0.0, 0.0), visit.shift)
+    )
+    return ahead + by[0], aside + by[1], below - visit.lift + by[2]
 
 
 def grown(layout: Layout, label: str, by: float) -> Layout:

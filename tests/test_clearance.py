@@ -25,7 +25,9 @@ from tests.layout_values import (
     robots_with_payload,
     row_of_inserts,
     shortened,
+    stations_of,
     with_path,
+    with_visits,
 )
 from tests.pag_values import SHAPES
 
@@ -138,6 +140,8 @@ def test_a_guidepath_shortened_by_30_mm() -> None:
         assert not found.holds, name
         assert max(fault.lacking for fault in found.faults) >= 0.029 - SIDE
     alone = with_path(layout, 2, travel=layout.guidepaths[2].travel - 0.03)
+    broken(alone, "r3 stands 30.0 mm beyond the end of its guidepath")
+    alone = with_visits(alone, stations_of(layout))
     broken(alone, "ends 30.0 mm away from the junction of 'sub1' on r3's guidepath")
 
 
@@ -160,13 +164,12 @@ def test_a_station_moved_onto_its_neighbour() -> None:
     factory = layout.factory
     inserts = [o for o in factory.operations if o.template.name == "insert"]
     later, sooner = inserts[0], inserts[2]
-    stations = list(layout.stations)
-    stations[later.index] = stations[sooner.index]
-    moved = replace(layout, stations=tuple(stations), certificate=None)
+    station = layout.guidepaths[sooner.carrier].length - layout.station(sooner.index)
+    moved = with_visits(layout, {later.index: station})
     broken(moved, "away from the junction", later.label)
     guest = later.robots[1]
     on = layout.guidepaths[later.carrier]
-    both = with_path(moved, guest, a=on.middle(on.length - stations[sooner.index]))
+    both = with_path(moved, guest, a=on.middle(on.length - station))
     neighbour = factory.robots[sooner.robots[1]].name
     broken(both, factory.robots[guest].name, neighbour, "overlap")
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
 from factory.compiler.folding import folded, kind_of
@@ -19,6 +17,7 @@ from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.settings import Settings
 from tests.fold_values import fold_layout, table_of
+from tests.layout_values import with_visits
 
 WELDED_AGAIN = (
     ("x6", "weld", ("x5",)),
@@ -53,10 +52,8 @@ def test_a_robot_that_comes_back_to_a_tool_is_clear_of_its_feeder() -> None:
 def test_one_that_comes_back_under_its_feeder_is_refused() -> None:
     layout = welded_again(Settings(hands=False))
     operations = layout.factory.by_label
-    stations = list(layout.stations)
-    for label in ("x2", "x4", "x5", "x6"):
-        stations[operations[label].index] = 0.0
-    moved = replace(layout, stations=tuple(stations), certificate=None)
+    stations = {operations[label].index: 0.0 for label in ("x2", "x4", "x5", "x6")}
+    moved = with_visits(layout, stations)
     assert not certify(moved).holds
     messages = [fault.message for fault in exclusions(moved).faults]
     assert any("p0 of r1, in x4, and p0 of magazine of r1" in message for message in messages)

@@ -143,7 +143,7 @@ def test_pads_are_off_the_surface_by_the_air_between() -> None:
             assert np.all(first - np.array(hand.places)[:, 2] <= reach + 1e-9)
             pads = [limb for limb in limbs(layout, robot) if limb.name.endswith("pad")]
             assert len(pads) == len(hand.places)
-            up = layout.elevation(robot, layout.factory.robots[robot].operations[0])
+            up = layout.visits[layout.factory.robots[robot].operations[0], robot].elevation
             low = layout.product.low[2] - 0.1 - up
             tops = sorted(limb.high[2] + low for limb in pads)
             assert np.allclose(tops, sorted(z - AIR for _, _, z in hand.places), atol=1e-6)
@@ -163,7 +163,7 @@ def test_those_that_wait_for_a_hand_wait_for_one_that_leaves() -> None:
     waited = {order.past.axis for order in orders if order.past is not None}
     assert waited
     for axis in waited:
-        assert axis < len(layout.guidepaths) + len(layout.lifts)
+        assert axis < len(layout.guidepaths) + len(layout.strokes)
 
 
 def test_hands_of_carriers_depend_on_their_heading_alone() -> None:

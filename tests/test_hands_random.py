@@ -157,6 +157,6 @@ def test_a_tool_comes_from_behind_what_is_held_nearer_to_it(tmp_path: Path) -> N
     (tool,) = (robot for robot in layout.factory.robots if is_tool(layout.factory, robot.index))
     (weld,) = tool.operations
     slot = layout.factory.operations[weld].robots.index(tool.index)
-    assert layout.apart(weld, slot)[0] > 0
-    stands = layout.goal(weld, slot)
+    assert layout.stop_offset(weld, slot)[0] > 0
+    stands = layout.goals(weld)[slot]
     assert layout.guidepaths[tool.index].length - stands >= TOOL_TRAVEL

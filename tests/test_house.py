@@ -24,6 +24,7 @@ from tests.house import (
     twins,
     unexplained,
     upward_imports,
+    variants,
 )
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -40,6 +41,7 @@ LAWS: tuple[Law, ...] = (
     long_modules,
     unexplained,
     clocks,
+    variants,
 )
 FIELDS = "\n".join(f"        self.a{n} = {n}" for n in range(13))
 BREACHES: tuple[tuple[Law, dict[str, str], str], ...] = (
@@ -135,6 +137,11 @@ BREACHES: tuple[tuple[Law, dict[str, str], str], ...] = (
     (unexplained, {"factory/nets/a.py": "x = 1"}, "nets.a: no docstring"),
     (clocks, {"tests/test_a.py": "def f():\n    from time import sleep"}, "tests.test_a reads"),
     (clocks, {"tests/test_a.py": "import time"}, "tests.test_a reads a clock"),
+    (
+        variants,
+        {"factory/nets/a.py": "def f(plan):\n    return plan.is_folded, Relays(parallel=1)"},
+        "nets: names variants 3 times; at most 0",
+    ),
 )
 
 

@@ -24,6 +24,7 @@ from tests.layout_values import (
     paper_layout,
     random_layout,
     row_of_inserts,
+    stations_of,
     table_pag,
 )
 from tests.pag_values import TEMPLATES, catalogue, factory_of, paper
@@ -36,7 +37,8 @@ def test_the_paper_s_example() -> None:
     travels = [round(path.travel * 1000) for path in layout.guidepaths]
     assert travels == [150, 81, 159, 120, 81, 81]
     assert layout.area == pytest.approx(0.332, abs=0.001)
-    stations = {o.label: layout.stations[o.index] for o in layout.factory.operations}
+    at = stations_of(layout)
+    stations = {o.label: at[o.index] for o in layout.factory.operations}
     assert stations["sub1"] == stations["sub3"] == 0.0
     assert stations["sub2"] == pytest.approx(0.08)
     assert {path.reach for path in layout.guidepaths[1:]} == {0.08}
@@ -45,7 +47,7 @@ def test_the_paper_s_example() -> None:
 def test_the_same_input_gives_the_same_layout() -> None:
     anew = random_layout.__wrapped__
     first, second = (anew(30, 4, "any", "mixed") for _ in range(2))
-    assert first.guidepaths == second.guidepaths and first.stations == second.stations
+    assert first.guidepaths == second.guidepaths and first.visits == second.visits
 
 
 @given(drawn_layouts)
@@ -57,7 +59,7 @@ def test_robots_meet_where_their_operation_is(drawn: Drawn) -> None:
             continue
         number = factory.robots[robot].operations[-1]
         path, on = layout.guidepaths[robot], layout.guidepaths[carrier]
-        assert path.a == pytest.approx(on.middle(on.length - layout.stations[number]))
+        assert path.a == pytest.approx(on.middle(layout.station(number)))
         assert path.middle(path.reach) == path.a
         assert abs(path.heading[0] * on.heading[0] + path.heading[1] * on.heading[1]) == 0
     assert len(operation_modes(layout, 2e-4)) == len(factory.operations)
@@ -162,7 +164,7 @@ def test_a_carrier_may_stop_ahead_of_its_tools() -> None:
     factory = factory_of(pag)
     layout = lay_out(factory, product_geometry(pag))
     operation = factory.by_label["y"]
-    ahead = layout.guidepaths[0].middle(layout.goal(operation.index, 0))
+    ahead = layout.guidepaths[0].middle(layout.goals(operation.index)[0])
     station = layout.guidepaths[operation.robots[1]].a
     assert ahead[0] - station[0] == pytest.approx(layout.guidepaths[0].reach)
 
@@ -184,7 +186,7 @@ def test_an_insertion_at_a_feeder_keeps_clear_of_its_boom() -> None:
     ]
     pag = table_pag("x", *rows)  # type: ignore[arg-type]
     layout = lay_out(factory_of(pag), product_geometry(pag))
-    assert layout.stations[layout.factory.by_label["x"].index] >= 0.07
+    assert stations_of(layout)[layout.factory.by_label["x"].index] >= 0.07
     boom = feeder_of(layout, "p").boom
     assert layout.guidepaths[1].a[0] - 0.05 - boom[1] >= 0.02 - 1e-9
 
@@ -192,6 +194,7 @@ def test_an_insertion_at_a_feeder_keeps_clear_of_its_boom() -> None:
 def test_later_guests_of_a_row_follow_one_another() -> None:
     layout = row_of_inserts(7)
     inserts = [o for o in layout.factory.operations if o.template.name == "insert"]
-    stations = [layout.stations[o.index] for o in reversed(inserts)]
+    at = stations_of(layout)
+    stations = [at[o.index] for o in reversed(inserts)]
     assert stations == sorted(stations) and stations[0] > 0
     assert len(set(stations)) >= 3  # at most two, from either side, at one place

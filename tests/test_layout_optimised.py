@@ -35,6 +35,7 @@ from tests.layout_values import (
     paper_layout,
     random_layout,
     row_of_inserts,
+    stations_of,
     table_pag,
 )
 from tests.pag_values import SHAPES, factory_of
@@ -150,7 +151,7 @@ def test_a_row_of_inserts_stands_on_both_sides() -> None:
     layout = row_of_inserts(9)
     headings = {path.heading for path in layout.guidepaths[1:]}
     assert len(headings) == 2
-    assert max(layout.stations) < 8 * 0.08
+    assert max(stations_of(layout).values()) < 8 * 0.08
 
 
 def outline(lane: tuple[float, float], front: float, crown: float = 0.0) -> Outline:

@@ -22,6 +22,7 @@ from factory.record.state import State
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
+from tests.layout_values import with_visits
 from tests.pag_texts import laid_out
 from tests.simulation_values import FENCE, laid_out_with_lifts
 
@@ -99,7 +100,7 @@ def test_what_a_lift_serves_is_made_at_its_height() -> None:
     layout = laid_out_with_lifts(NESTED)
     factory = layout.factory
     robot = {label: factory.by_label[label].carrier for label in ("n", "inside", "bowl", "f2")}
-    up = [layout.elevation(robot.index, robot.operations[0]) for robot in factory.robots]
+    up = [layout.visits[robot.operations[0], robot.index].elevation for robot in factory.robots]
     inside, ball = robot["inside"], factory.by_label["ball"].carrier
     assert up[robot["n"]] == 0.0
     assert up[inside] == factory.strokes[inside] > 0
@@ -135,7 +136,7 @@ def test_it_is_lowered_only_when_all_others_stand() -> None:
     robot = next(iter(factory.strokes))
     last = factory.operations[factory.robots[robot].operations[-1]]
     simulation = Simulation(layout, RunRequest(units=1))
-    goals = np.array([layout.goal(last.index, s) for s in range(len(last.robots))])
+    goals = np.array(layout.goals(last.index)[: len(last.robots)])
     seen = []
 
     def observe(_: State) -> None:
@@ -175,7 +176,7 @@ def test_a_stroke_too_short_fails_the_certificate() -> None:
         else replace(o, approach=replace(o.approach, stroke=o.approach.stroke - MARGIN + 0.005))
         for o in factory.operations
     )
-    lower = replace(layout, factory=replace(factory, operations=operations))
+    lower = with_visits(replace(layout, factory=replace(factory, operations=operations)))
     assert certify(layout).holds
     faults = certify(lower).faults
     assert any("comes 5.0 mm over" in fault.message for fault in faults)

@@ -26,6 +26,7 @@ from factory.simulation.simulation import Simulation
 from factory.simulation.watched import watched
 from factory.study.fidelity.hidden import HiddenPenetrations
 from factory.support.settings import Settings
+from tests.layout_values import with_visits
 
 AT_MOST_MM = 0.1
 
@@ -151,16 +152,16 @@ def test_one_hand_holds_all_labels_of_a_line(name: str, kind: str, lift: float |
     path = layout.guidepaths[robot]
     for tour in factory.tours[robot]:
         (part,) = factory.contents[factory.operations[tour[0]].label]
-        level = layout.level(robot, tour[0])
+        visit = layout.visits[tour[0], robot]
         (x, y), (u, v) = path.carriage(path.length), path.heading
-        middle, shift = path.middle(path.length), layout.shift(robot, tour[0])
+        middle, shift = path.middle(path.length), visit.shift
         solid = product.solids[part]
-        over = 0.1 + level.elevation - product.low[2]
+        over = 0.1 + visit.elevation - product.low[2]
         off = np.array([middle[0] + shift[0], middle[1] + shift[1], over])
         off[:2] -= product.middle[:2]
         low, high = solid.low + off, solid.high + off
         tip = [
-            np.array([x + a * u - b * v, y + a * v + b * u, c + level.up * pad.lifted])
+            np.array([x + a * u - b * v, y + a * v + b * u, c + visit.up * pad.lifted])
             for a, b, c in ends
         ]
         apart = np.maximum(low - np.maximum(*tip), np.minimum(*tip) - high)
@@ -234,11 +235,11 @@ def test_the_carrier_stands_where_each_label_comes() -> None:
     factory, stops = layout.factory, []
     for tour in factory.tours[robot]:
         last = factory.operations[tour[-1]]
-        short, further = layout.apart(last.index, last.robots.index(robot))
+        short, further = layout.stop_offset(last.index, last.robots.index(robot))
         assert short >= 0, "it never comes nearer to its carrier's line than its path ends"
-        stops.append(round(layout.stations[last.index] - further, 6))
+        stops.append(round(layout.station(last.index) + further, 6))
     assert len(set(stops)) == 1, "all are told from one station"
-    assert len({layout.stations[tour[-1]] for tour in factory.tours[robot]}) == 3
+    assert len({layout.station(tour[-1]) for tour in factory.tours[robot]}) == 3
 
 
 def test_the_magazine_shows_each_part_where_the_hand_takes_it() -> None:
@@ -253,7 +254,8 @@ def test_the_magazine_shows_each_part_where_the_hand_takes_it() -> None:
 
 def test_nothing_is_shifted_where_no_robot_has_several_tours() -> None:
     layout = project("shelf", shared=False).layout
-    assert layout.shifts == () and not layout.factory.adjusted
+    assert {visit.shift for visit in layout.visits.values()} == {(0.0, 0.0)}
+    assert not layout.factory.adjusted
     assert project("shelf", hands=0).layout.factory.adjusted == frozenset()
     (robot,) = project("shelf").layout.factory.adjusted
     assert project("shelf").factory.robots[robot].type == "lift"
@@ -288,10 +290,7 @@ def test_a_tower_is_not_over_pads_that_have_yet_to_rise() -> None:
 def moved(layout: Layout, by: tuple[float, float, float]) -> Layout:
     """A layout in which a robot holds the second label of its line elsewhere than it was found."""
     robot, _ = of_line(layout)
-    shifts = [list(tours) for tours in layout.shifts]
-    x, y, z = shifts[robot][1]
-    shifts[robot][1] = x + by[0], y + by[1], z + by[2]
-    return replace(layout, shifts=tuple(map(tuple, shifts)), certificate=None)
+    return with_visits(layout, shifts={(robot, 1): by})
 
 
 @pytest.mark.parametrize("by", [(0.002, 0.0, 0.0), (0.0, 0.0, -0.002)])
@@ -306,15 +305,17 @@ def test_a_label_that_is_held_2_mm_off_fails_the_run(by: tuple[float, float, flo
 def test_a_hand_over_2_mm_off_fails_certificate_and_run(monkeypatch: pytest.MonkeyPatch) -> None:
     layout = project("shelf").layout
     robot, _ = of_line(layout)
-    known: Callable[..., tuple[float, float]] = Layout.apart
+    known: Callable[..., tuple[float, float]] = Layout.stop_offset
+    second = layout.factory.tours[robot][1][-1], robot
 
     def late(self: Layout, operation: int, slot: int) -> tuple[float, float]:
         short, further = known(self, operation, slot)
-        second = self.factory.tours[robot][1]
-        return short + 0.002 * (operation == second[-1]), further
+        return short + 0.002 * (operation == second[0]), further
 
-    monkeypatch.setattr(Layout, "apart", late)
-    changed = replace(layout, shifts=layout.shifts)
+    monkeypatch.setattr(Layout, "stop_offset", late)
+    visit = layout.visits[second]
+    visits = {**layout.visits, second: replace(visit, at=visit.at + 0.002)}
+    changed = replace(layout, visits=visits, certificate=None)
     (fault, *_) = certify(changed).faults
     assert "2.0 mm from its place" in fault.message
     run = run_of(changed)

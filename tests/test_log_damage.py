@@ -22,8 +22,8 @@ from tests.layout_values import paper_layout
 
 OF_A_PROJECT = (
     *("product", "pag", "pag.file", "pag.sha256", "plan", "plan.forms", "plan.turns", "settings"),
-    *("layout.clearance", "layout.guidepaths", "layout.stations", "layout.outfeed"),
-    *("layout.hands", "layout.shifts", "layout.standby", "layout.plain"),
+    *("layout.clearance", "layout.guidepaths", "layout.visits", "layout.outfeed"),
+    *("layout.hands", "layout.standby", "layout.plain"),
 )
 """What a header has of a project and its layout, but for texts that are read later."""
 
@@ -110,7 +110,7 @@ def is_refused(path: Path, words: str = "") -> bool:
         (10**400, ""),
         ("words", "product pag.file pag.sha256"),
         (None, "layout.plain wip"),
-        ([10**6], "layout.stations monitor.radii"),
+        ([10**6], "monitor.radii"),
         ({"a": "abc"}, "versions faults"),
         ({}, "plan plan.forms versions faults monitor.places"),
     ],

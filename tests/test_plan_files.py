@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 import random
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -40,7 +40,7 @@ from tests.layout_values import (
 from tests.test_relay_hands import sawn
 
 EXAMPLES = ROOT / "examples"
-COMPARED = ("factory", "guidepaths", "stations", "hands", "shifts", "given", "floor", "outfeed")
+COMPARED = ("factory", "guidepaths", "visits", "hands", "floor", "outfeed")
 
 BESIDE = """root = sub4;
 sub4 = insert ( sub3, part4 ); sub3 = insert ( part3, sub2 ); sub2 = weld ( sub1 );
@@ -129,7 +129,14 @@ GUIDEPATH = {
     "a": [0.0, 0.0],
     **dict.fromkeys(("travel", "reach", "offset", "arm", "nest"), 0.1),
 }
-LAYOUT = {"clearance": 0.02, "guidepaths": [GUIDEPATH], "stations": [0], "outfeed": [0, 1, 0, 1]}
+VISIT = {"at": 0.06, "lift": 0, "up": 0, "elevation": 0}
+
+LAYOUT = {
+    "clearance": 0.02,
+    "guidepaths": [GUIDEPATH],
+    "visits": [[VISIT]],
+    "outfeed": [0, 1, 0, 1],
+}
 
 LESSONS: list[tuple[str, Any, str]] = [
     ("", [], "the table must be a table, not []"),
@@ -139,8 +146,8 @@ LESSONS: list[tuple[str, Any, str]] = [
     ("clearance", float("nan"), "'clearance' must be a number within ±1e+09, not nan"),
     ("clearance", 10**400, "'clearance' must be a number within ±1e+09, not 1000"),
     ("clearance", 0, "clearance must be above 0, not 0.0"),
-    ("stations", 1.0, "'stations' must be a list, not 1.0"),
-    ("stations", [[]], "'stations[0]' must be a number within ±1e+09, not []"),
+    ("visits", 1.0, "'visits' must be a list, not 1.0"),
+    ("visits", [[[]]], "'visits[0][0]' must be a table, not []"),
     ("outfeed", [1.0], "'outfeed' must be a list of 4, not [1.0]"),
     ("guidepaths", [{}], "'guidepaths[0]' lacks the key 'heading'"),
     ("guidepaths", [{**GUIDEPATH, "a": 0}], "'guidepaths[0].a' must be a list, not 0"),
@@ -154,7 +161,7 @@ LESSONS: list[tuple[str, Any, str]] = [
 
 @pytest.mark.parametrize(("key", "value", "words"), LESSONS)
 def test_a_broken_table_has_its_lesson(key: str, value: Any, words: str) -> None:
-    assert table_of(value_of(LayoutTable, LAYOUT)) == {**LAYOUT, "stations": [0.0]}
+    assert table_of(value_of(LayoutTable, LAYOUT)) == LAYOUT
     with pytest.raises(ValueError) as error:
         value_of(LayoutTable, {**LAYOUT, key: value} if key else value)
     assert words in str(error.value)
@@ -386,3 +393,29 @@ def test_the_meshes_of_a_plan(run: Terminal, tmp_path: Path) -> None:
     assert "other settings, meshes" in run("check", moved / "plan.json").err
     (moved / "a.stl").unlink()
     assert "BadMesh" in run("check", moved / "plan.json").err
+
+
+def _raise(table: list[list[dict[str, Any]]], rows: Sequence[tuple[int, int]]) -> None:
+    for operation, slot in rows:
+        table[operation][slot]["elevation"] += 0.002
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda rows: rows[0].pop(), r"visits\[0\] must be a list of 3, one for each robot"),
+        (lambda rows: rows[0][1].update(at=9.0), "r2 stands .* mm beyond the end of its guidepath"),
+        (lambda rows: rows[0][1].update(lift=1e-3), "1.0 mm from its place in"),
+        (lambda rows: _raise(rows, [(0, 1)]), "the same up, elevation and shift"),
+        (lambda rows: _raise(rows, [(0, 1), (1, 0)]), "2.0 mm from its place in"),
+    ],
+    ids=["robots", "guidepath", "lift", "tour", "height"],
+)
+def test_visits_that_are_refused(change: Callable[[Any], object], words: str) -> None:
+    """A layout is not read whose robots are not on their guidepaths, or bring what they bring
+    elsewhere than where it is joined."""
+    project = written_paper()
+    table = table_of(LayoutTable.of(project.layout))
+    change(table["visits"])
+    with pytest.raises(InputError, match=words):
+        _ = replace(project, laid=value_of(LayoutTable, table, "layout")).layout

@@ -98,7 +98,7 @@ def check(seed: int, folder: Path) -> None:
     assert again.layout.factory == factory and again.layout.certificate == layout.certificate
     anew = replace(again, laid=None).layout
     assert anew.factory == factory
-    assert (anew.guidepaths, anew.stations) == (layout.guidepaths, layout.stations)
+    assert (anew.guidepaths, anew.visits) == (layout.guidepaths, layout.visits)
 
 
 @pytest.mark.parametrize("seed", FEW)

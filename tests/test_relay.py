@@ -113,7 +113,7 @@ def middles(layout: Layout) -> dict[str, tuple[float, float]]:
     found = {}
     for o in layout.factory.operations:
         path = layout.guidepaths[o.carrier]
-        x, y = path.middle(layout.goal(o.index, o.template.carrier - 1))
+        x, y = path.middle(layout.visits[o.index, o.carrier].at)
         found[o.label] = round(x, 6), round(y, 6)
     return found
 

@@ -96,7 +96,7 @@ def test_only_empty_hands_go_ahead_and_only_to_others(drawn: Drawn) -> None:
         assert operation.robots[stage.slot] == stage.robot
         assert operation.before[stage.slot] == NOPART
         assert len(operation.robots) > 1
-        assert stage.goal == layout.goal(operation.index, stage.slot) != stage.start
+        assert stage.goal == layout.goals(operation.index)[stage.slot] != stage.start
 
 
 def test_what_would_meet_another_on_its_way_does_not_go(

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 
 from factory.compiler import taking_over
 from factory.compiler.deputies import chosen_pairs, deputies, rounds_of, standing_by
-from factory.compiler.taking_over import Takeover, nets_after, present, with_moved
+from factory.compiler.taking_over import Takeover, crew_with, nets_after, with_moved
 from factory.layout.clearance import certify
 from factory.layout.layout import Layout
 from factory.layout.request import Ground
@@ -36,6 +36,7 @@ from tests.bench.faults.takeovers import interval_after
 from tests.command_line import ROOT, Terminal
 from tests.fold_values import swapped
 from tests.good_runs import assert_good
+from tests.layout_values import without_gone
 from tests.pag_values import catalogue
 from tests.test_deputies import made, randoms, seeds
 
@@ -100,16 +101,13 @@ def test_the_layout_is_certified_for_either() -> None:
     assert certify(layout).holds and layout.standby is not None
     assert {*layout.payloads} == {o.label for o in layout.factory.making}
     for dead, deputy in deputies_in(layout).items():
-        after = with_moved(layout.factory, {dead: deputy})
-        part = part_of(layout, after, [r for r in range(4) if r != dead])
+        crew = crew_with(layout.factory, {dead: deputy})
+        part = part_of(layout, crew)
         assert part is not None and certify(part).holds
-        assert {*part.magazine(present(after).index(2 if deputy == 3 else 1))} == {
-            "part2",
-            "part3",
-        }
-    assert part_of(laid_out(False), layout.factory, range(4)) is None
-    strange = with_moved(layout.factory, {2: 1})
-    assert part_of(layout, strange, (0, 1, 3)) is None, "no such tour is laid out"
+        assert {*part.magazine(deputy)} == {"part2", "part3"} and not part.magazine(dead)
+        assert part_of(laid_out(False), crew) is None
+    strange = crew_with(layout.factory, {2: 1})
+    assert part_of(layout, strange) is None, "no such tour is laid out"
 
 
 def test_what_cannot_be_laid_out_is_no_deputy() -> None:
@@ -279,7 +277,7 @@ def test_products(name: str) -> None:
     for dead, deputy in deputies_in(layout).items():
         moved = {dead: deputy}
         found = Takeover(layout.factory, with_moved(layout.factory, moved), dead, moved)
-        part = part_of(layout, found.after, present(found.crew))
+        part = part_of(layout, found.crew)
         assert part is not None and certify(part).holds
     assert part is not None
-    assert_good(Simulation(part, RunRequest("mujoco", 2)).run())
+    assert_good(Simulation(without_gone(part), RunRequest("mujoco", 2)).run())

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from factory.commands.run import summarise
-from factory.compiler.taking_over import Takeover
+from factory.compiler.taking_over import Takeover, crew_with
 from factory.control.mode import Limits
 from factory.exporting import Subject, exporters
 from factory.exporting.motion import motion_of
@@ -24,7 +24,7 @@ from factory.layout.exclusions import goes_early
 from factory.layout.feeding import feeder_of, lines_of, outlets_of
 from factory.layout.layout import Layout
 from factory.layout.request import Ground
-from factory.layout.standby import Repertoire, deputies_in, part_of
+from factory.layout.standby import deputies_in, part_of
 from factory.mjcf import names
 from factory.mjcf.masks import feeder_codes
 from factory.pipeline import read
@@ -47,6 +47,7 @@ from factory.timing.timing import Timing
 from tests.bench.faults.takeovers import PAPER as INSERTS
 from tests.bench.faults.takeovers import interval_after
 from tests.command_line import ROOT, Terminal
+from tests.layout_values import with_visits
 
 STEPS = """root = s2; s1 = insert ( base, a ); s2 = insert ( s1, b );
 base = atomic ( box = ( 0.16, 0.1, 0.02 ), pos = ( 0, 0, 0.01 ) );
@@ -104,7 +105,7 @@ def test_parts_of_two_heights(dead: str) -> None:
     """The deputy's lift goes as far as either of the tours asks for, from the beginning."""
     layout = laid_out(STEPS)
     assert layout.factory.strokes == {1: 0.04, 2: 0.02} and deputies_in(layout) == {1: 2, 2: 1}
-    assert {level.up for robot in (1, 2) for level in layout.levels[robot]} == {0.041}
+    assert {v.up for (_, robot), v in layout.visits.items() if robot in (1, 2)} == {0.041}
     run = simulated(STEPS, dead, 5.0)[0].run(max_time=150.0)
     contacts, products, residual = figures(run)
     assert (contacts, products, len(run.exchanges)) == (0, 10, 1) and residual < 0.1
@@ -122,15 +123,15 @@ def test_each_axis_keeps_its_limits(monkeypatch: pytest.MonkeyPatch) -> None:
     simulation, _ = simulated(STEPS, "r2", 5.0, jitter=0.3)
     before = speeds(simulation.layout, simulation.limits)
     simulation.run(max_time=60.0)
-    ((alone, limits),) = seen
-    assert speeds(alone, limits) == {axis: before[axis] for axis in ("r1", "r3", "lift of r3")}
+    ((crew, limits),) = seen
+    assert speeds(crew, limits) == before
     assert len(before) == 5 and before["lift of r2"] != before["lift of r3"]
 
 
 def speeds(layout: Layout, limits: Limits) -> dict[str, float]:
     """How fast each axis can be [m/s], by its robot."""
     robots = [robot.name for robot in layout.factory.robots]
-    axes = [*robots, *(f"lift of {robots[robot]}" for robot in layout.lifts)]
+    axes = [*robots, *(f"lift of {robots[robot]}" for robot in layout.strokes)]
     return dict(zip(axes, np.asarray(limits.speed).tolist(), strict=True))
 
 
@@ -207,21 +208,18 @@ def test_the_model_has_what_deputies_need() -> None:
     plain = physical_model(laid_out(INSERTS, False), 3).xml
     for found in ("feed/part2@r2", "feed/part3@r4", "grip/r2/part2", "grip/r4/part3"):
         assert f'name="{found}"' in xml and f'name="{found}"' not in plain
-    whole = Repertoire.of(layout)
-    assert whole.layout is layout.standby
-    assert {*whole.names.values()} | {"dropoff"} == {*layout.factory.by_label}
-    assert {label for one in bins_of(layout) for label in one.labels} <= {*whole.names.values()}
+    made = {layout.named(o.label) for o in layout.whole.factory.making}
+    assert made | {"dropoff"} == {*layout.factory.by_label}
+    assert {label for one in bins_of(layout) for label in one.labels} <= made
 
 
-def test_a_part_alone_has_its_own_tours() -> None:
-    """What is left when a robot is gone is a layout of its own, with the feeders of the whole."""
+def test_a_crew_has_the_tours_that_are_left() -> None:
+    """What is left when a robot is gone is a part of the same whole, with its feeders."""
     layout = laid_out(INSERTS)
-    after = deputising.with_moved(layout.factory, {1: 3})
-    alone = part_of(layout, after, (0, 2, 3))
-    assert alone is not None and not deputies_in(alone)
-    assert Repertoire.of(alone).layout is alone and len(outlets_of(alone)) == 3
-    assert feeder_of(alone, "part2") == feeder_of(layout, "part2")
-    assert [*alone.hands] == [layout.hand(robot) for robot in (0, 2, 3)]
+    crew = part_of(layout, crew_with(layout.factory, {1: 3}))
+    assert crew is not None and crew.whole is layout.whole
+    assert [*map(crew.magazine, range(4))] == [("part1",), (), (), ("part2", "part3")]
+    assert feeder_of(crew, "part2") == feeder_of(layout, "part2")
 
 
 def test_a_monitor_knows_who_goes_ahead() -> None:
@@ -229,9 +227,9 @@ def test_a_monitor_knows_who_goes_ahead() -> None:
     layout = laid_out(STEPS)
     moved = {1: 2}
     found = Takeover(layout.factory, deputising.with_moved(layout.factory, moved), 1, moved)
-    alone = part_of(layout, found.after, (0, 2))
-    assert alone is not None
-    early = {*goes_early(alone)}
+    crew = part_of(layout, found.crew)
+    assert crew is not None
+    early = {(operation, (0, 2).index(robot)) for operation, robot in goes_early(crew)}
     assert early and early <= subject_of(layout, Settings()).after(found.crew).early
 
 
@@ -240,14 +238,14 @@ def test_a_monitor_knows_who_goes_ahead() -> None:
 
 def test_levels_of_the_first_factory_do_not_fit_the_deputy(monkeypatch: pytest.MonkeyPatch) -> None:
     """Planted: each factory has the levels that its own tours ask for."""
-    layout = replace(laid_out(STEPS), given=None)
     found = standby.part_of
 
-    def ungiven(*args: Any) -> Layout | None:
+    def with_own(*args: Any) -> Layout | None:
         part = found(*args)
-        return part and replace(part, given=None)
+        return part and with_visits(part)
 
-    monkeypatch.setattr(deputising, "part_of", ungiven)
+    monkeypatch.setattr(deputising, "part_of", with_own)
+    layout = replace(with_visits(laid_out(STEPS)), certificate=laid_out(STEPS).certificate)
     simulation = Simulation(layout, RunRequest("mujoco", 10, recovers=True))
     recover(simulation, Campaign((WorldFault("dead", robot="r2", at=5.0),), swap=4.0))
     assert figures(simulation.run(max_time=150.0))[2] > 1.0, "a weld pulls its part into place"
@@ -310,7 +308,7 @@ def test_a_part_that_comes_late_waits_for_its_robot(monkeypatch: pytest.MonkeyPa
     not."""
     layout = read(ROOT / "examples" / "truck.pag").layout
     robot = layout.factory.by_label["roof"].carrier
-    lift = len(layout.guidepaths) + layout.lifts.index(robot)
+    lift = len(layout.guidepaths) + [*layout.strokes].index(robot)
     for is_kept in (True, False):
         if not is_kept:
             monkeypatch.setattr(Feeders, "_obstructed", lambda feeders: [])
@@ -330,8 +328,8 @@ def test_a_part_that_comes_late_waits_for_its_robot(monkeypatch: pytest.MonkeyPa
 def test_what_the_crew_that_stays_cannot_carry_back(monkeypatch: pytest.MonkeyPatch) -> None:
     """Falls where the deputy is as it takes over. Planted: that is all that robots ever bring."""
 
-    def every(alone: Layout) -> frozenset[tuple[int, str]]:
-        robots = range(len(alone.factory.robots))
+    def every(crew: Layout) -> frozenset[tuple[int, str]]:
+        robots = range(len(crew.factory.robots))
         return frozenset((robot, label) for robot in robots for label in ("part2", "part3"))
 
     for binned in (1, 0):

@@ -100,17 +100,11 @@ def crew_with(factory: Factory, moved: Moved) -> Factory:
 
 def without_gone(factory: Factory) -> Factory:
     """The factory without robots that have no operations; those that stay keep their names."""
-    stay = present(factory)
-    number = {robot: n for n, robot in enumerate(stay)}
+    number = {robot: n for n, robot in enumerate(factory.present)}
     robots = [replace(factory.robots[robot], index=n) for robot, n in number.items()]
     every = [[number.get(robot.index, -1) for robot in factory.robots]]
     adjusted = frozenset(number[robot] for robot in factory.adjusted if robot in number)
     return replace(assigned(factory, robots, every), adjusted=adjusted)
-
-
-def present(factory: Factory) -> list[int]:
-    """The robots (index) that have operations."""
-    return [robot.index for robot in factory.robots if robot.operations]
 
 
 def lost(factory: Factory, fired: Sequence[int], robots: Iterable[int]) -> tuple[int, ...]:

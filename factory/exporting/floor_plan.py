@@ -62,8 +62,8 @@ def flat_shapes(layout: Layout) -> Iterator[Flat]:
     for robot in layout.factory.robots:
         yield from _robot(layout, robot.index, "tool" if robot.type == "tool" else "dot")
     for leaf in leaves:
-        goal = layout.goal(leaf.index, leaf.template.carrier - 1)
-        at = layout.guidepaths[leaf.carrier].middle(goal)
+        visit = layout.visits[leaf.index, leaf.carrier]
+        at = layout.guidepaths[leaf.carrier].middle(visit.at)
         yield part_outline(layout, leaf.label, at, "part")
     for at in stations(layout):
         yield Flat("junction", (at,), JUNCTION)
@@ -75,7 +75,7 @@ def stations(layout: Layout) -> dict[Point2, list[str]]:
     for operation in reversed(layout.factory.operations):
         if len(operation.robots) > 1:
             path = layout.guidepaths[operation.carrier]
-            x, y = path.middle(path.length - layout.stations[operation.index])
+            x, y = path.middle(layout.station(operation.index))
             junctions.setdefault((round(x, 6), round(y, 6)), []).append(operation.label)
     return junctions
 

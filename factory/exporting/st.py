@@ -58,7 +58,7 @@ class _Writer:
     @property
     def axes(self) -> int:
         """Number of axes: the carriages, then the lifts."""
-        return len(self.layout.guidepaths) + len(self.layout.lifts)
+        return len(self.layout.guidepaths) + len(self.layout.strokes)
 
     def _identifier(self, prefix: str, text: str) -> str:
         """A new identifier, distinct whatever the case: letters, digits, single underscores."""

@@ -22,7 +22,6 @@ from factory.layout.dimensions import ARMS, CARRIAGES, PAYLOADS
 from factory.layout.guidepath import Box, Point2, hull, moved
 from factory.layout.layout import Layout
 from factory.layout.scrapping import not_carried_back
-from factory.layout.standby import Repertoire
 from factory.layout.sweeps import Pile, piles, regions
 from factory.problem.pag import NOPART
 
@@ -67,8 +66,7 @@ class Bin:
 def bins_of(layout: Layout) -> tuple[Bin, ...]:
     """The bins for which there is room, one a robot at most: for all that it can carry back to B
     or, where there is no room for that, for what is smallest."""
-    whole = Repertoire.of(layout)
-    layout = whole.layout
+    named, layout = layout.named, layout.whole
     found = piles(layout.factory, layout.product)
     taken, added = regions(layout, found), list[Region]()
     corners = np.array([region.box for region in taken])
@@ -86,18 +84,17 @@ def bins_of(layout: Layout) -> tuple[Bin, ...]:
         if held and bin_:
             made.append(bin_)
             added += _stands(bin_)
-    named = (frozenset(whole.names[label] for label in one.labels) for one in made)
-    return tuple(replace(one, labels=labels) for one, labels in zip(made, named, strict=True))
+    return tuple(replace(one, labels=frozenset(map(named, one.labels))) for one in made)
 
 
 def bin_regions(layout: Layout, bins: Iterable[Bin]) -> list[Region]:
     """What bins take of the floor, and what flies into them."""
-    whole = Repertoire.of(layout)
-    found = piles(whole.layout.factory, whole.layout.product)
+    whole = layout.whole
+    found = piles(whole.factory, whole.product)
     result = list[Region]()
     for one in bins:
-        held = _held(whole.layout, one.robot, found, frozenset())
-        flown = [each for each in held if whole.names[each[0]] in one.labels]
+        held = _held(whole, one.robot, found, frozenset())
+        flown = [each for each in held if layout.named(each[0]) in one.labels]
         result += [*_stands(one), *_flights(one, flown)]
     return result
 
@@ -115,10 +112,8 @@ def _held(
         label = operation.after[operation.robots.index(robot)]
         if label == NOPART or (robot, label) in barred:
             continue
-        pile = found[label].raised(layout.elevation(robot, number))
-        x, y = layout.shift(robot, number)
-        at = path.middle(path.length)
-        result[label] = pile.moved((x + at[0], y + at[1]))
+        visit, pile = layout.visits[number, robot], found[label]
+        result[label] = pile.carried(visit, path.middle(path.length))
     return [*result.items()]
 
 

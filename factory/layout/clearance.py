@@ -207,8 +207,8 @@ def _standoffs(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
             if slot == carrier or label == NOPART:
                 continue
             guest = _way(layout, found, operation, slot)
-            start, end = layout.legs[operation.index, guest.robot]
-            room = start - end - layout.standoff(operation, slot)
+            before, visit = layout.ways[operation.index, guest.robot]
+            room = before.at - visit.at - layout.standoff(operation, slot)
             if room < -TOLERANCE:
                 name = layout.factory.robots[guest.robot].name
                 message = (
@@ -227,11 +227,12 @@ def _raised(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
             continue
         guest = operation.robots[operation.lowered]
         low = found[operation.before[operation.lowered]].z[0]
-        low += layout.elevation(guest, operation.index)
+        low += layout.visits[operation.index, guest].elevation
+        pile = layout.visits[operation.index, operation.carrier].elevation
         for robot, label in zip(operation.robots, operation.before, strict=True):
             if robot == guest or label == NOPART:
                 continue
-            over = low - found[label].z[1] - layout.elevation(operation.carrier, operation.index)
+            over = low - found[label].z[1] - pile
             if over < MARGIN - TOLERANCE:
                 name = layout.factory.robots[guest].name
                 message = (
@@ -246,11 +247,9 @@ def _way(layout: Layout, found: Mapping[str, Pile], operation: Operation, slot: 
     """What a robot's payload sweeps in a mode before its gate opens."""
     robot = operation.robots[slot]
     label = operation.before[slot]
-    pile = found[label].raised(layout.elevation(robot, operation.index))
-    pile = pile.moved(layout.shift(robot, operation.index))
-    start, end = layout.legs[operation.index, robot]
-    end += layout.standoff(operation, slot)
-    box = layout.guidepaths[robot].sweep(pile.box, max(start, end), end)
+    before, visit = layout.ways[operation.index, robot]
+    pile, end = found[label].carried(visit), visit.at + layout.standoff(operation, slot)
+    box = layout.guidepaths[robot].sweep(pile.box, max(before.at, end), end)
     return Region(robot, PAYLOADS, PAYLOAD_BODY, box, pile.z, label, operation.index)
 
 

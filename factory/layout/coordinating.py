@@ -134,9 +134,7 @@ def _chain(
     gear = factory.robots[robot].operations
     step = (gear.index(operation.index) + 1) % len(gear)
     then, wait = factory.operations[gear[step]], factory.net.gears[robot].places[2 * step]
-    goals = {
-        axis: layout.goal(then.index, slot) for slot, axis in enumerate(factory.axes[then.index])
-    }
+    goals = dict(zip(factory.axes[then.index], layout.goals(then.index), strict=True))
     beyond = all(past.axis in goals and past.holds(goals[past.axis]) for past in passes)
     build.chain(names, kind, then.end if beyond else then.start, wait)
 
@@ -155,7 +153,7 @@ def _feedings(layout: Layout) -> Iterator[_Feeding]:
                 past: Past | None = Past(last.end, robot, length - HOME)
             else:
                 clear = length - passing(layout, leaf)
-                legs = (2 * n for n in before if layout.legs[n, robot][1] <= clear)
+                legs = (2 * n for n in before if layout.visits[n, robot].at <= clear)
                 past = next((Past(start, robot, clear, -1) for start in legs), None)
             yield _Feeding(factory.operations[before[0]], leaf, not step, past)
 

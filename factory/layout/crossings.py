@@ -32,9 +32,9 @@ Grid = tuple[int, int]
 
 
 def embedding_faults(layout: Layout) -> Iterator[Fault]:
-    """What keeps f from being an embedding: ends off the grid of millimetres, junctions that ~
-    asks for but f does not make, and crossings that it makes but ~ does not ask for. Near
-    linear."""
+    """What keeps f from being an embedding: ends off the grid of millimetres, visits off a
+    guidepath, junctions that ~ asks for but f does not make, and crossings that it makes but ~ does
+    not ask for. Near linear."""
     for robot, carrier in enumerate(carriers(layout.factory)):
         yield from _off_grid(layout, robot)
         yield from _junction(layout, robot, carrier)
@@ -55,6 +55,11 @@ def _off_grid(layout: Layout, robot: int) -> Iterator[Fault]:
     elif not (path.travel > 0 and path.reach > 0):
         message = f"{name}: its guidepath has no length (it receives and delivers at {path.a})"
         yield fault(factory, message, robot)
+    stops = layout.stops(robot) or [0.0]
+    beyond = max(-min(stops), max(stops) - path.length)
+    if beyond > 1e-6:
+        message = f"{name} stands {beyond * 1000:.1f} mm beyond the end of its guidepath"
+        yield fault(factory, message, robot, lacking=beyond)
 
 
 def _junction(layout: Layout, robot: int, carrier: int) -> Iterator[Fault]:
@@ -83,7 +88,7 @@ def _ends_at(layout: Layout, robot: int, operation: Operation) -> Iterator[Fault
         message = f"{name}: its side {t} is not {other}'s heading {on.heading}: it is mirrored"
         yield fault(factory, message, robot, carrier)
     slot = operation.robots.index(robot)
-    wanted = on.middle(on.length - layout.stations[number] + layout.apart(number, slot)[1])
+    wanted = on.middle(layout.station(number) + layout.stop_offset(number, slot)[1])
     off = dist(path.a, wanted)
     if off > 1e-6:
         message = (
@@ -92,8 +97,11 @@ def _ends_at(layout: Layout, robot: int, operation: Operation) -> Iterator[Fault
         )
         yield fault(factory, message, robot, carrier, lacking=off)
         return
-    (x, y), (more, beside) = path.middle(layout.goal(number, slot)), layout.shift(robot, number)
-    off = dist((x + more, y + beside), layout.meeting(operation))
+    visit = layout.visits[number, robot]
+    (x, y), (more, beside) = path.middle(visit.at), visit.shift
+    stand = layout.visits[number, carrier]
+    above = visit.height + visit.lift - stand.height - stand.lift
+    off = dist((x + more, y + beside, above), (*layout.meeting(operation), 0.0))
     if operation.before[slot] != NOPART and off > 1e-6:
         message = (
             f"{name} brings '{operation.before[slot]}' to {off * 1000:.1f} mm from its place in"

@@ -24,6 +24,7 @@ from factory.layout.layout import Layout, carriers
 from factory.layout.shapes import Shape, headings
 from factory.layout.stretching import Stretched
 from factory.layout.sweeps import piles, regions
+from factory.layout.visits import visits_of
 from factory.plant.factory import Factory
 
 
@@ -55,16 +56,17 @@ class LayoutDraft:
             self.product,
             self.clearance.c,
             guidepaths,
-            tuple(self.stretched.stations),
+            visits_of(self.factory, guidepaths, self.stretched.stations, self._shifts()),
             self.payloads,
             _outfeed(guidepaths[0], self.shapes[0], self.clearance),
             tuple(s.hand for s in self.shapes) if any(s.hand for s in self.shapes) else (),
-            self._shifts() if any(s.shifts for s in self.shapes) else (),
         )
 
     def _shifts(self) -> tuple[tuple[Point3, ...], ...]:
-        """For each robot those of its tours."""
+        """For each robot those of its tours; none where no robot has any."""
         tours = self.factory.tours
+        if not any(shape.shifts for shape in self.shapes):
+            return ()
         return tuple(
             tuple(shape.shift(tour[-1]) for tour in tours[robot])
             for robot, shape in enumerate(self.shapes)

@@ -96,7 +96,7 @@ def operation_times(layout: Layout, pace: Pace) -> list[float]:
 
 def _ways(layout: Layout) -> dict[tuple[int, int], float]:
     """How far a robot goes in an operation, by both [m]."""
-    return {leg: abs(end - start) for leg, (start, end) in layout.legs.items()}
+    return {leg: abs(visit.at - before.at) for leg, (before, visit) in layout.ways.items()}
 
 
 def _operation_time(
@@ -119,9 +119,8 @@ def _operation_time(
             rested[slot] = pace.staged(way, standoff, pace.entered(rested[gate]))
     longest = max(rested)
     if lowered >= 0:
-        robot = operation.robots[lowered]
-        level = layout.level(robot, operation.index)
-        stroke = level.up - level.down
+        visit = layout.visits[operation.index, operation.robots[lowered]]
+        stroke = visit.up - visit.lift
         longest = max(longest, pace.entered(rested[lowered]) + pace.rest(stroke))
     for robot in operation.robots:
         lifted = robot in layout.factory.strokes

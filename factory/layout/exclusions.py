@@ -164,8 +164,8 @@ def _cuts(
             and (cut := _cut(layout, own, other)) is not None
         ]
         if ways:
-            legs = layout.legs
-            cuts.append(min(ways, key=lambda past: past.at - legs[past.after // 2, past.axis][1]))
+            visits = layout.visits
+            cuts.append(min(ways, key=lambda past: past.at - visits[past.after // 2, past.axis].at))
     return cuts
 
 
@@ -173,7 +173,7 @@ def _cut(layout: Layout, own: Presence, other: Presence) -> Past | None:
     """The pass by which a robot that goes home is clear of another machine; None where it never
     is, or always."""
     robot, since = own.robot, own.since
-    begin, home = layout.legs[since // 2, robot][1], layout.guidepaths[robot].length
+    begin, home = layout.visits[since // 2, robot].at, layout.guidepaths[robot].length
     heights = [z for _, span in own.sweeps for z in span]
     low = max(heights) if rises_first(layout, robot) else min(heights)
 

@@ -20,7 +20,6 @@ from factory.layout.dimensions import (
 from factory.layout.guidepath import Extent, Feeder, hull
 from factory.layout.hands.hand import BEAM
 from factory.layout.layout import Layout
-from factory.layout.standby import Repertoire
 from factory.plant.factory import Operation
 
 
@@ -44,29 +43,28 @@ class Outlet:
     @property
     def elevation(self) -> float:
         """How far above its place in the product the part is taken [m]."""
-        return self.layout.elevation(self.robot, self.leaf.index)
+        return self.layout.visits[self.leaf.index, self.robot].elevation
 
 
 def outlets_of(layout: Layout) -> tuple[Outlet, ...]:
     """The outlets of a layout's feeders: of its parts, in the order of the factory's labels, and
     then of those that deputies may have to take."""
-    whole, factory = Repertoire.of(layout), layout.factory
+    whole, factory = layout.whole, layout.factory
     found: dict[tuple[str, int], Outlet] = {}
-    for leaf in whole.layout.factory.leaves:
-        label, robot = whole.names[leaf.label], leaf.carrier
+    for leaf in whole.factory.leaves:
+        label, robot = leaf.within(factory.period), leaf.carrier
         own = factory.by_label[label].carrier == robot
         name = label if own else f"{label}@{factory.robots[robot].name}"
-        found.setdefault((label, robot), Outlet(name, label, robot, whole.layout, leaf))
+        found.setdefault((label, robot), Outlet(name, label, robot, whole, leaf))
     return tuple(found.values())
 
 
 def lines_of(layout: Layout) -> tuple[tuple[Outlet, ...], ...]:
     """The outlets of each robot's feeder (by index), in the order of all that it may do."""
     by_leaf = {outlet.leaf.label: outlet for outlet in outlets_of(layout)}
-    whole, robots = Repertoire.of(layout).layout, range(len(layout.factory.robots))
     return tuple(
-        tuple(by_leaf[label] for label in whole.magazine(robot) if label in by_leaf)
-        for robot in robots
+        tuple(by_leaf[label] for label in layout.whole.magazine(robot) if label in by_leaf)
+        for robot in range(len(layout.factory.robots))
     )
 
 
@@ -79,12 +77,12 @@ def feeder_of(layout: Layout, label: str) -> Feeder:
     label, room = operation.label, Clearance(layout.clearance).room
     robot, by_label = operation.carrier, layout.factory.by_label
     path, shown = layout.guidepaths[robot], layout.magazine(robot)
-    middle = path.middle(layout.goal(operation.index, operation.template.carrier - 1))
+    visit = layout.visits[operation.index, robot]
+    middle, elevation = path.middle(visit.at), visit.elevation
     solids = [layout.product.solids[part] for part in shown]
     first, rises = layout.factory.robots[robot].operations[0], layout.strokes.get(robot, 0.0)
-    elevation = layout.elevation(robot, operation.index)
     highest = max(
-        float(solid.high[2]) + (layout.elevation(robot, by_label[part].index) - elevation)
+        float(solid.high[2]) + (layout.visits[by_label[part].index, robot].elevation - elevation)
         for part, solid in zip(shown, solids, strict=True)
     )
     tallest = max(float(solid.high[2] - solid.low[2]) for solid in solids)
@@ -96,7 +94,7 @@ def feeder_of(layout: Layout, label: str) -> Feeder:
     back = -Clearance(layout.clearance).post(path.reach, min(rear, grip[0]) if grip else rear)
     if hand is not None and hand.tall:
         top = max(hand.beam + BEAM, hand.places[0][2] + max(hand.radius, FINGER / 2))
-        top += layout.held_at(robot, first) + rises - elevation
+        top += layout.visits[first, robot].height + rises - elevation
         room = max(room, round(top - highest + layout.clearance, 6))
         if hand.kind == "above":
             across = round((near + far) / 2, 3)
@@ -104,7 +102,7 @@ def feeder_of(layout: Layout, label: str) -> Feeder:
     low = float(over + highest) + room
     high_up = RISE * hypot(inside[1] - inside[0], inside[3] - inside[2])
     stroke = room + high_up + tallest
-    x, y = layout.shift(robot, operation.index)
+    x, y = visit.shift
     ahead, _, aside, _ = path.frame((x, x, y, y))
     return Feeder(
         back - ahead,
@@ -135,9 +133,7 @@ def passing(layout: Layout, leaf: Operation) -> float:
 
 def _with_all(layout: Layout, leaf: Operation) -> tuple[Layout, Operation]:
     """An operation in which a part is taken, in the layout of all that its robot may do."""
-    if layout.standby is None:
-        return layout, leaf
-    whole = layout.standby
+    whole = layout.whole
     return whole, whole.fed[leaf.written, layout.factory.robots[leaf.carrier].name]
 
 

@@ -116,7 +116,7 @@ def _taken(outlet: Outlet) -> tuple[float, ...]:
     if hand is None or hand.kind != "above":
         return inf, inf, -inf, -inf
     half = max(hand.radius, hand.width / 2) + BESIDE_HAND
-    shift = outlet.layout.shift(outlet.robot, outlet.leaf.index)
+    shift = outlet.layout.visits[outlet.leaf.index, outlet.robot].shift
     at = np.array(hand.places[0][:2]) - shift - _solid(outlet).position[:2]
     ends = [at - half, at + half]
     for way in (path.heading, (-path.side[0], -path.side[1])):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
@@ -20,9 +20,9 @@ from factory.layout.dimensions import (
     up,
 )
 from factory.layout.guidepath import Box, Extent, Feeder, Guidepath, Point2, moved
-from factory.layout.hands.hand import Hand, Point3
+from factory.layout.hands.hand import Hand
 from factory.layout.hands.mounted import Mount, grip_of
-from factory.layout.level import LEAST, Level
+from factory.layout.visits import LEAST, Visit, Visits, beyond_station, stop_offset
 from factory.plant.approaches import Overlap
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
@@ -34,37 +34,41 @@ BESIDE = 0.001
 
 @dataclass(frozen=True)
 class Layout(Pictured):
-    """A factory laid out: a guidepath for each robot, and for each operation the arc length at
-    which each of its robots has its goal.
+    """A factory laid out: a guidepath for each robot, and its visit for each of its operations.
 
-    `stations[i]`: distance [m] of operation i from its carrier's B end; `payloads[label]`: the box
-    of a sub-assembly about the product's middle; `outfeed`: the box of the conveyor in the world;
-    `hands`: those of the robots, None for tools, nothing where they are not chosen; `shifts`: for
-    each robot and each of its tours how far the product's middle is, in the robot's frame (u, t)
-    and upwards, from where it is on the first of them [m], nothing for no shifts
-    (docs/decisions/hands.md, Lines);
-    `given`: the levels of robots on their tours, None where they follow from these;
-    `plain`: the layout without relays, None where this is one; `standby`: that of which this is a
-    part, so that deputies can take over, None where none may.
+    `payloads[label]`: the box of a sub-assembly about the product's middle; `outfeed`: the box of
+    the conveyor in the world; `hands`: those of the robots, None for tools, nothing where they are
+    not chosen;
+    `plain`: the layout without relays, None where this is one; `standby`: that of all tours that
+    its robots may do, of which this is a part, None where this is all.
     """
 
     factory: Factory
     product: Product
     clearance: float
     guidepaths: tuple[Guidepath, ...] = field(repr=False)
-    stations: tuple[float, ...] = field(repr=False)
+    visits: Visits = field(repr=False)
     payloads: Mapping[str, Box] = field(repr=False)
     outfeed: Box = (0.0, 0.0, 0.0, 0.0)
     hands: tuple[Hand | None, ...] = field(default=(), repr=False)
-    shifts: tuple[tuple[Point3, ...], ...] = field(default=(), repr=False)
-    given: tuple[tuple[Level, ...], ...] | None = field(default=None, repr=False)
     floor: Box = (0.0, 0.0, 0.0, 0.0)
     certificate: Certificate | None = field(default=None, repr=False, compare=False)
     plain: Layout | None = field(default=None, repr=False, compare=False)
     standby: Layout | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "payloads", MappingProxyType(dict(self.payloads)))
+        for name in ("visits", "payloads"):
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+
+    @property
+    def whole(self) -> Layout:
+        """The layout of all tours that its robots may do, in which they have the same numbers:
+        itself unless deputies may take over."""
+        return self.standby or self
+
+    def named(self, label: str) -> str:
+        """What a label of the whole is called in the factory."""
+        return self.whole.factory.by_label[label].within(self.factory.period)
 
     def __repr__(self) -> str:
         return f"<Layout of {self.factory}: {self.area:.2f} m²>"
@@ -73,45 +77,24 @@ class Layout(Pictured):
         """The hand of a robot; None for a tool, and where hands are not chosen."""
         return self.hands[robot] if self.hands else None
 
-    def shift(self, robot: int, operation: int) -> Point2:
-        """How far the product's middle is from where a robot's guidepath has it, in the world, on
-        the robot's tour that an operation (index) is in."""
-        if not self.shifts:
-            return 0.0, 0.0
-        ahead, aside, _ = self.shifts[robot][self.factory.turns[operation, robot]]
-        (u, v), (s, t) = self.guidepaths[robot].heading, self.guidepaths[robot].side
-        return u * ahead + s * aside, v * ahead + t * aside
-
     def held(self, robot: int, operation: int, label: str) -> Box:
         """The box of a sub-assembly about the middle that a robot's guidepath tells, on the robot's
         tour that an operation (index) is in."""
-        return moved(self.payloads[label], self.shift(robot, operation))
+        return moved(self.payloads[label], self.visits[operation, robot].shift)
 
-    def apart(self, operation: int, slot: int) -> Point2:
-        """Where the robot in a slot of an operation and the carrier of it stand, which hold what
-        they bring in other places than for other operations: how much earlier than at the end of
-        its guidepath the robot delivers, and how much further than where that ends the carrier
-        stands [m]."""
+    def stop_offset(self, operation: int, slot: int) -> Point2:
+        """Offset (along, across) [m] of the robot in a slot of an operation from its nominal stop,
+        and of the carrier from that (`factory.layout.visits`)."""
         chosen = self.factory.operations[operation]
         robot, carrier = chosen.robots[slot], chosen.carrier
-        if not self.shifts or robot == carrier:
-            return 0.0, 0.0
-        (x, y), (a, b) = self.shift(robot, operation), self.shift(carrier, operation)
-        (u, v), (s, t) = self.guidepaths[robot].heading, self.guidepaths[robot].side
-        ahead, aside = (x - a) * u + (y - b) * v, (x - a) * s + (y - b) * t
-        return round(ahead, 6), round(aside, 6)
-
-    def held_at(self, robot: int, operation: int) -> float:
-        """How far above its place in the product a robot holds its payload with its lift down, on
-        the tour that an operation (index) is in [m]."""
-        level = self.level(robot, operation)
-        return level.elevation - level.up
+        shifts = (self.visits[operation, number].shift for number in (robot, carrier))
+        return stop_offset(self.guidepaths[robot], *shifts)
 
     def mount(self, robot: int) -> Mount:
         """Where a robot's hand is mounted."""
         path, (x, y, _) = self.guidepaths[robot], self.product.middle.tolist()
         first = self.factory.robots[robot].operations[0]
-        over = PAYLOAD - float(self.product.low[2]) + self.held_at(robot, first)
+        over = PAYLOAD - float(self.product.low[2]) + self.visits[first, robot].height
         lies = path.heading, path.side, path.reach, path.arm, path.offset
         stroke = self.strokes.get(robot)
         return Mount(*lies, (x, y), over, stroke or 0.0, stroke is not None)
@@ -133,41 +116,39 @@ class Layout(Pictured):
         xlo, xhi, ylo, yhi = self.floor
         return (xhi - xlo) * (yhi - ylo)
 
-    def goal(self, operation: int, slot: int) -> float:
-        """Arc length of the goal of the robot in `slot` of an operation; beyond its robots, height
-        of the goal of a lift (see `Factory.axes`).
+    def goals(self, operation: int) -> tuple[float, ...]:
+        """Where the axes of an operation are at its end: arc lengths of carriages, heights of lifts
+        [m]. They are in the order of `Factory.axes`."""
+        return self._on_axes(operation, 1)
 
-        A non-carrier delivers at A + 2r, or short of that (`apart`); a carrier stands
-        `stations[operation]` from its B end. A lift is up but for the operation it delivers to.
-        """
+    def starts(self, operation: int) -> tuple[float, ...]:
+        """Where the axes of an operation are when it starts: at the visits before it."""
+        return self._on_axes(operation, 0)
+
+    def _on_axes(self, operation: int, end: int) -> tuple[float, ...]:
+        """Where the axes of an operation are at one end of its ways, 0 or 1 [m]."""
+        factory, carriages = self.factory, len(self.factory.robots)
+        visits = (
+            (axis < carriages, self.ways[operation, factory.robot_of(axis)][end])
+            for axis in factory.axes[operation]
+        )
+        return tuple(visit.at if is_carriage else visit.lift for is_carriage, visit in visits)
+
+    def station(self, operation: int) -> float:
+        """Arc length of the station of an operation on its carrier's guidepath [m]."""
         chosen = self.factory.operations[operation]
-        if slot >= len(chosen.robots):
-            robot = self.factory.robot_of(self.factory.axes[operation][slot])
-            level = self.level(robot, operation)
-            return level.down if self.factory.delivers(robot, operation) else level.up
-        path = self.guidepaths[chosen.robots[slot]]
-        point = chosen.template.law.goals[slot]
-        if slot != chosen.template.carrier - 1 or point.end == "A":
-            return point.multiple * path.r + self.apart(operation, slot)[0]
-        exact = {"B": 0.0, "S": 2.0}[point.end]
-        return path.length - self.stations[operation] + (point.multiple - exact) * path.r
+        beyond = beyond_station(chosen) * self.guidepaths[chosen.carrier].r
+        return self.visits[operation, chosen.carrier].at - beyond
 
     def meeting(self, operation: Operation) -> Point2:
         """The product's middle where the carrier of an operation has its goal."""
-        path, (x, y) = (
-            self.guidepaths[operation.carrier],
-            self.shift(operation.carrier, operation.index),
-        )
-        at = path.middle(self.goal(operation.index, operation.template.carrier - 1))
+        visit = self.visits[operation.index, operation.carrier]
+        at, (x, y) = self.guidepaths[operation.carrier].middle(visit.at), visit.shift
         return at[0] + x, at[1] + y
 
     def stops(self, robot: int) -> list[float]:
         """The arc lengths at which a robot has its goals, in the order of its gear."""
-        operations = self.factory.operations
-        return [
-            self.goal(number, operations[number].robots.index(robot))
-            for number in self.factory.robots[robot].operations
-        ]
+        return [self.visits[number, robot].at for number in self.factory.robots[robot].operations]
 
     def ends(self, robot: int) -> tuple[float, float]:
         """The least and the greatest arc length at which a robot ever stands."""
@@ -175,58 +156,26 @@ class Layout(Pictured):
         return min(path.reach, *stops), max(path.length, *stops)
 
     @cached_property
-    def legs(self) -> Mapping[tuple[int, int], tuple[float, float]]:
-        """For each (operation, robot of it): from where to where it goes (arc lengths)."""
-        found: dict[tuple[int, int], tuple[float, float]] = {}
+    def ways(self) -> Mapping[tuple[int, int], tuple[Visit, Visit]]:
+        """For each (operation, robot of it): from which visit to which the robot goes."""
+        found: dict[tuple[int, int], tuple[Visit, Visit]] = {}
         for robot in self.factory.robots:
-            stops = self.stops(robot.index)
+            visits = [self.visits[number, robot.index] for number in robot.operations]
             for step, number in enumerate(robot.operations):
-                found[number, robot.index] = stops[step - 1], stops[step]
+                found[number, robot.index] = visits[step - 1], visits[step]
         return MappingProxyType(found)
 
     @cached_property
-    def lifts(self) -> tuple[int, ...]:
-        """The robots that have a lift, in the order of their axes."""
-        return tuple(self.factory.strokes)
-
-    @cached_property
-    def levels(self) -> Sequence[Sequence[Level]]:
-        """For each robot those of its tours, as `given` if they are."""
-        factory, found = self.factory, list[list[Level]]()
-        if self.given is not None:
-            return self.given
-        for robot, tours in enumerate(factory.tours):
-            ends = [factory.operations[tour[-1]] for tour in tours]
-            below = [0.0] * len(ends)
-            if robot:
-                turns = ((o.carrier, factory.turns[o.index, o.carrier]) for o in ends)
-                below = [found[carrier][turn].elevation for carrier, turn in turns]
-            stroke, downs = factory.strokes.get(robot, 0.0), [0.0] * len(ends)
-            if robot in factory.strokes and len(ends) > 1 and self.shifts:
-                over = [d - z for d, (_, _, z) in zip(below, self.shifts[robot], strict=True)]
-                downs = [round(at - min(over), 6) for at in over]
-                own = (o.approach.stroke if o.approach else 0.0 for o in ends)
-                stroke = max(at + far for at, far in zip(downs, own, strict=True))
-            ups = downs if robot in factory.adjusted else [stroke] * len(ends)
-            levels = zip(downs, ups, below, strict=True)
-            found.append([Level(down, up, d + (up - down)) for down, up, d in levels])
-        return found
-
-    def level(self, robot: int, operation: int) -> Level:
-        """How high a robot holds what it brings, on the tour that an operation (index) is in."""
-        return self.levels[robot][self.factory.turns[operation, robot]]
-
-    @cached_property
     def strokes(self) -> Mapping[int, float]:
-        """How far up the lift of each robot that has one goes (index) [m]."""
-        highest = {r: max((level.up for level in self.levels[r]), default=0.0) for r in self.lifts}
-        return MappingProxyType({robot: max(up, LEAST) for robot, up in highest.items()})
-
-    def elevation(self, robot: int, operation: int) -> float:
-        """How far above its place in the product a robot carries what it brings, on the tour that
-        an operation (index) is in [m]: what its own lift has to lower it, over the height at which
-        the robot that it delivers to carries it."""
-        return self.level(robot, operation).elevation
+        """How far up the lift of each robot that has one goes (index), in the order of their axes
+        [m]."""
+        programs = {robot: self.factory.robots[robot].operations for robot in self.factory.strokes}
+        return MappingProxyType(
+            {
+                robot: max((LEAST, *(self.visits[number, robot].up for number in program)))
+                for robot, program in programs.items()
+            }
+        )
 
     def side(self, operation: Operation) -> int:
         """From which side, +1 or -1, of the axis of its approach the last input of an operation
@@ -255,7 +204,7 @@ class Layout(Pictured):
         where it waits with no part at the beginning of its cycle."""
         if self.factory.begins(robot, operation):
             return self.guidepaths[robot].length
-        return self.legs[operation, robot][0]
+        return self.ways[operation, robot][0].at
 
     @cached_property
     def fed(self) -> Mapping[tuple[str, str], Operation]:
@@ -299,7 +248,7 @@ class Layout(Pictured):
         if hand is None or grip is None or not hand.first:
             return 0.0
         path, on = self.guidepaths[operation.robots[slot]], self.guidepaths[operation.carrier]
-        x, y = self.shift(operation.carrier, operation.index)
+        x, y = self.visits[operation.index, operation.carrier].shift
         over = x * path.heading[0] + y * path.heading[1]
         ahead = path.frame(self.payloads[operation.before[slot]])[1]
         lines = [
@@ -342,9 +291,9 @@ class Layout(Pictured):
 
 
 def carriers(factory: Factory) -> list[int]:
-    """For each robot the carrier it delivers to; -1 for the output robot."""
-    last = [robot.operations[-1] for robot in factory.robots]
-    return [-1 if factory.drops(n) else factory.operations[n].carrier for n in last]
+    """For each robot the carrier it delivers to; -1 for the output robot, and one that is gone."""
+    lasts = [robot.operations[-1] if robot.operations else -1 for robot in factory.robots]
+    return [-1 if n < 0 or factory.drops(n) else factory.operations[n].carrier for n in lasts]
 
 
 __all__ = ["BESIDE", "Box", "Extent", "Feeder", "Guidepath", "Layout", "Point2", "carriers"]

@@ -102,8 +102,7 @@ class Ground:
             return plain.lay_out(whole, product, settings, None if pairs else hands)
 
         found = chosen_pairs(factory, deputies(factory, catalogue or load_catalogue()))
-        whole, robots = laid_out_for(found, lay_out), range(len(factory.robots))
-        known = replace(whole, product=product, standby=whole)
-        layout = part_of(known, factory, robots)
+        whole = laid_out_for(found, lay_out)
+        layout = part_of(replace(whole, product=product, standby=whole), factory)
         assert layout is not None, "its robots have their own tours"
         return layout

@@ -8,11 +8,12 @@ from factory.compiler.assigning import assigned
 from factory.geometry.solids import Product
 from factory.layout.embedding import certified
 from factory.layout.guidepath import Box, Guidepath
-from factory.layout.hands.hand import Hand, Point3
+from factory.layout.hands.hand import Hand
 from factory.layout.layout import Layout
 from factory.layout.repeated import repeated
 from factory.layout.shapes import payload_boxes
 from factory.layout.standby import part_of
+from factory.layout.visits import Visit
 from factory.plant.factory import Factory
 from factory.support.errors import RunError
 
@@ -25,17 +26,17 @@ AXES = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
 
 @dataclass(frozen=True, slots=True)
 class LayoutTable:
-    """What is kept of a layout, by the names that `Layout` has. `standby`: where deputies can take
+    """What is kept of a layout, by the names that `Layout` has; `visits`: for each operation those
+    of its robots. `standby`: where deputies can take
     over, who does the tours of each robot in each turn of the layout of all that robots may do
     (`Layout.standby`), whose values the others are; nothing where none may. `plain`: the layout
     without relays, None where this is one."""
 
     clearance: float
     guidepaths: tuple[Guidepath, ...]
-    stations: tuple[float, ...]
+    visits: tuple[tuple[Visit, ...], ...]
     outfeed: Box
     hands: tuple[Hand | None, ...] = ()
-    shifts: tuple[tuple[Point3, ...], ...] = ()
     standby: tuple[tuple[int, ...], ...] = ()
     plain: LayoutTable | None = None
 
@@ -56,14 +57,17 @@ class LayoutTable:
     @classmethod
     def of(cls, layout: Layout) -> LayoutTable:
         """That of a layout."""
-        whole = layout.standby or layout
+        whole = layout.whole
+        visits = (
+            tuple(whole.visits[o.index, robot] for robot in o.robots)
+            for o in whole.factory.operations
+        )
         return cls(
             whole.clearance,
             whole.guidepaths,
-            whole.stations,
+            tuple(visits),
             whole.outfeed,
             whole.hands,
-            whole.shifts,
             _turns(layout.factory, whole.factory) if layout.standby else (),
             None if layout.plain is None else cls.of(layout.plain),
         )
@@ -78,11 +82,10 @@ class LayoutTable:
             solids := repeated(product, whole),
             self.clearance,
             self.guidepaths,
-            self.stations,
+            self._visits(whole),
             payload_boxes(whole, solids),
             self.outfeed,
             self.hands,
-            self.shifts,
         )
         try:
             laid = certified(laid)
@@ -93,7 +96,7 @@ class LayoutTable:
         if not self.standby:
             return laid
         known = replace(laid, product=repeated(product, factory), standby=laid)
-        made = part_of(known, factory, range(len(factory.robots)))
+        made = part_of(known, factory)
         assert made is not None, "its robots have their own tours"
         return made
 
@@ -113,17 +116,29 @@ class LayoutTable:
         robots = len(factory.robots)
         wanted: tuple[tuple[str, tuple[object, ...], int], ...] = (
             ("guidepaths", self.guidepaths, robots),
-            ("stations", self.stations, len(factory.operations)),
+            ("visits", self.visits, len(factory.operations)),
             ("hands", self.hands, len(self.hands) and robots),
-            ("shifts", self.shifts, len(self.shifts) and robots),
         )
         for name, values, count in wanted:
             if len(values) != count:
                 raise ValueError(f"{name} must be a list of {count}, not of {len(values)}")
-        for number, (row, tours) in enumerate(zip(self.shifts, factory.tours, strict=False)):
-            if len(row) != len(tours):
-                words = f"a list of {len(tours)}, one for each tour, not of {len(row)}"
-                raise ValueError(f"shifts[{number}] must be {words}")
+
+    def _visits(self, factory: Factory) -> dict[tuple[int, int], Visit]:
+        """The visits of a factory. Raises ValueError where they are not, or where a robot holds its
+        payload in several ways on one tour."""
+        found = dict[tuple[int, int], Visit]()
+        for o, row in zip(factory.operations, self.visits, strict=True):
+            if len(row) != len(o.robots):
+                words = f"a list of {len(o.robots)}, one for each robot, not of {len(row)}"
+                raise ValueError(f"visits[{o.index}] must be {words}")
+            found |= {(o.index, robot): visit for robot, visit in zip(o.robots, row, strict=True)}
+        for robot, tours in enumerate(factory.tours):
+            for tour in tours:
+                visits = [found[number, robot] for number in tour]
+                if len({(visit.up, visit.elevation, visit.shift) for visit in visits}) > 1:
+                    words = f"visits of {factory.robots[robot].name} for one payload"
+                    raise ValueError(f"{words} must have the same up, elevation and shift")
+        return found
 
 
 def _turns(factory: Factory, whole: Factory) -> tuple[tuple[int, ...], ...]:

@@ -20,7 +20,7 @@ from factory.problem.pag import NOPART
 def not_carried_back(layout: Layout) -> frozenset[tuple[int, str]]:
     """The robots (index) with the labels that they cannot carry back to B. Near linear."""
     found = piles(layout.factory, layout.product)
-    ways = [way for r in range(len(layout.guidepaths)) for way in _ways_back(layout, r, found)]
+    ways = [way for r in layout.factory.present for way in _ways_back(layout, r, found)]
     here = [region for region in regions(layout, found) if region.layer == PAYLOADS]
     search, back = ClearanceSearch(layout, [*here, *ways]), {id(way) for way in ways}
     barred = set[tuple[int, str]]()
@@ -43,8 +43,8 @@ def _ways_back(layout: Layout, robot: int, found: Mapping[str, Pile]) -> Iterato
         onward = (step + 1) % len(gear)
         then = operations[gear[onward]]
         leaves = then.after[then.robots.index(robot)] == NOPART
-        pile = found[label].raised(layout.elevation(robot, number))
-        pile, at = pile.moved(layout.shift(robot, number)), stops[step if leaves else onward]
+        pile = found[label].carried(layout.visits[number, robot])
+        at = stops[step if leaves else onward]
         yield Region(
             robot, PAYLOADS, PAYLOAD_BODY, path.sweep(pile.box, path.length, at), pile.z, label
         )

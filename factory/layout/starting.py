@@ -15,7 +15,7 @@ def start_positions(layout: Layout, marking: Marking) -> np.ndarray:
     leaves it, unless that is set by then, or its hand is above what it takes; 0 for one that is
     gone."""
     factory, net = layout.factory, layout.factory.net
-    positions, lifts = np.zeros(len(factory.robots) + len(layout.lifts)), factory.lift_axis
+    positions, lifts = np.zeros(len(factory.robots) + len(layout.strokes)), factory.lift_axis
     for robot, gear in zip(factory.robots, net.gears, strict=True):
         if not robot.operations:
             continue
@@ -23,7 +23,6 @@ def start_positions(layout: Layout, marking: Marking) -> np.ndarray:
         positions[robot.index] = layout.home(robot.index, robot.operations[step])
         always = robot.index in factory.adjusted or rises_first(layout, robot.index)
         if robot.index in lifts:
-            level = layout.level(robot.index, robot.operations[step])
-            last = layout.level(robot.index, robot.operations[step - 1])
-            positions[lifts[robot.index]] = level.up if step or always else last.down
+            before, visit = layout.ways[robot.operations[step], robot.index]
+            positions[lifts[robot.index]] = visit.up if step or always else before.lift
     return positions

@@ -83,7 +83,7 @@ class Staying:
 
     def __init__(self, layout: Layout, net: Coordinated, awaited: Mapping[int, float]) -> None:
         self.layout, self.net, self._awaited = layout, net, awaited
-        self._own = [_own(layout, robot) for robot in range(len(layout.guidepaths))]
+        self._own = {robot: _own(layout, robot) for robot in layout.factory.present}
         self.partners = _partners(layout)
 
     def presences(self) -> Iterator[Presence]:
@@ -106,8 +106,9 @@ class Staying:
         """What a robot holds on its tour with an operation, with its axes at 0."""
         layout, product = self.layout, self.layout.product
         parts = layout.factory.contents[label]
-        (x, y), (dx, dy) = layout.guidepaths[robot].middle(0.0), layout.shift(robot, operation)
-        up = PAYLOAD - float(product.low[2]) + layout.held_at(robot, operation)
+        visit = layout.visits[operation, robot]
+        (x, y), (dx, dy) = layout.guidepaths[robot].middle(0.0), visit.shift
+        up = PAYLOAD - float(product.low[2]) + visit.height
         origin = np.array([x + dx, y + dy, up]) - [*product.middle[:2], 0.0]
         boxes = np.concatenate([self._pieces[part] for part in parts]) + origin
         count, solids = len(boxes), layout.product.solids
@@ -136,10 +137,11 @@ class Staying:
         """A robot with its payload at the end of an operation, and on the stretch before that where
         it `comes` to its carrier and has waited for it."""
         layout, robot, label = self.layout, operation.robots[slot], operation.before[slot]
-        end, low = layout.legs[operation.index, robot][1], self.height(robot, operation.index)
-        high, far, bodies = low, end, self._own[robot]
+        visit, bodies = layout.visits[operation.index, robot], self._own[robot]
+        end, low = visit.at, visit.lift
+        high, far = low, end
         if layout.factory.lowers(robot) and layout.factory.delivers(robot, operation.index):
-            high = layout.level(robot, operation.index).up
+            high = visit.up
         pile = operation.before[operation.template.carrier - 1]
         if comes and (slot != operation.lowered or pile != NOPART):
             far += layout.standoff(operation, slot)
@@ -159,19 +161,12 @@ class Staying:
             for part, solid in self.layout.product.solids.items()
         }
 
-    def height(self, robot: int, operation: int) -> float:
-        """How high a robot's lift is after an operation [m]; 0 without one."""
-        if robot not in self.layout.strokes:
-            return 0.0
-        level = self.layout.level(robot, operation)
-        return level.down if self.layout.factory.delivers(robot, operation) else level.up
-
     def _waits(self, robot: int, step: int) -> Iterator[Segment]:
         """Before a step of its gear."""
         layout = self.layout
         before, number, wait = self._steps(robot, step)
-        begin, goal = layout.legs[number, robot][0], self._goal(robot, step)
-        low, high = self.height(robot, before), self.height(robot, number)
+        since, visit = layout.ways[number, robot]
+        begin, goal, low, high = since.at, self._goal(robot, step), since.lift, visit.lift
         carriage, lift = self._chains(2 * before + 1, robot)
         begins = layout.factory.begins(robot, number)
         if begins and rises_first(layout, robot):
@@ -192,8 +187,9 @@ class Staying:
         """In a step of its gear, from wherever it may be by then."""
         layout, factory = self.layout, self.layout.factory
         before, number, _ = self._steps(robot, step)
-        (begin, end), goal = layout.legs[number, robot], self._goal(robot, step)
-        low, high = self.height(robot, before), self.height(robot, number)
+        since, visit = layout.ways[number, robot]
+        begin, end, goal = since.at, visit.at, self._goal(robot, step)
+        low, high = since.lift, visit.lift
         carriage, lift = self._chains(2 * before + 1, robot)
         within, _ = self._chains(2 * number, robot)
         begins = factory.begins(robot, number)
@@ -226,11 +222,11 @@ class Staying:
         """Where a robot goes in the wait before a step of its gear, an arc length [m]."""
         layout, (_, number, _) = self.layout, self._steps(robot, step)
         operation, hand = layout.factory.operations[number], layout.hand(robot)
-        begin, end = layout.legs[number, robot]
+        since, visit = layout.ways[number, robot]
         if robot not in self._awaited or operation.before[operation.robots.index(robot)] != NOPART:
-            return begin
+            return since.at
         tall = hand is not None and hand.tall
-        return self._awaited[robot] if tall or not operation.inputs else end
+        return self._awaited[robot] if tall or not operation.inputs else visit.at
 
     def _comes_last(self, robot: int, operation: int) -> bool:
         """Whether a robot comes home when the part of its feeder is down, which it is where a run

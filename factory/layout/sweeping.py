@@ -8,7 +8,6 @@ import numpy as np
 
 from factory.control.mode import ROUNDING, Array, Index
 from factory.layout.layout import Layout
-from factory.layout.standby import Repertoire
 from factory.layout.sweeps import piles, regions
 
 APART = 0.02
@@ -26,7 +25,7 @@ class SweptFloor:
     @classmethod
     def of(cls, layout: Layout) -> SweptFloor:
         """Those of a layout, with what deputies may do."""
-        layout = Repertoire.of(layout).layout
+        layout = layout.whole
         found = regions(layout, piles(layout.factory, layout.product))
         robots = np.array([region.robot for region in found], np.intp)
         return cls(np.array([region.box for region in found]), robots)

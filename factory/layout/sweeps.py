@@ -47,6 +47,7 @@ from factory.layout.guidepath import Box, Extent, Point2, hull, moved
 from factory.layout.hands.hand import ROOT
 from factory.layout.hands.limbs import cross_of
 from factory.layout.layout import Layout
+from factory.layout.visits import Visit
 from factory.plant.factory import Factory
 from factory.problem.pag import NOPART
 
@@ -62,9 +63,12 @@ class Pile:
         """The same, elsewhere."""
         return Pile(moved(self.box, by), self.z)
 
-    def raised(self, height: float) -> Pile:
-        """The same, so much higher [m]."""
-        return Pile(self.box, (self.z[0] + height, self.z[1] + height))
+    def carried(self, visit: Visit, middle: Point2 = (0.0, 0.0)) -> Pile:
+        """The same as a robot carries it on its tour with a visit, where its guidepath has the
+        product's middle."""
+        (x, y), (low, high) = visit.shift, self.z
+        box = moved(self.box, (x + middle[0], y + middle[1]))
+        return Pile(box, (low + visit.elevation, high + visit.elevation))
 
 
 def piles(factory: Factory, product: Product) -> dict[str, Pile]:
@@ -86,9 +90,10 @@ def piles(factory: Factory, product: Product) -> dict[str, Pile]:
 
 
 def regions(layout: Layout, found: Mapping[str, Pile]) -> list[Region]:
-    """Every region of a layout, robot by robot. Linear in the sum of the gears' lengths."""
+    """Every region of a layout, robot by robot, without those that are gone. Linear in the sum of
+    the gears' lengths."""
     result: list[Region] = []
-    for robot in range(len(layout.guidepaths)):
+    for robot in layout.factory.present:
         result.extend(_bodies(layout, robot))
         result.extend(_payloads(layout, robot, found))
     for leaf in layout.factory.leaves:
@@ -130,8 +135,7 @@ def _payloads(layout: Layout, robot: int, found: Mapping[str, Pile]) -> Iterator
         label = operation.after[operation.robots.index(robot)]
         if label == NOPART:
             continue
-        pile, at = found[label].raised(layout.elevation(robot, number)), stops[step]
-        pile = pile.moved(layout.shift(robot, number))
+        pile, at = found[label].carried(layout.visits[number, robot]), stops[step]
         step = (step + 1) % len(gear)
         onward = operations[gear[step]]
         leaves = onward.after[onward.robots.index(robot)] == NOPART

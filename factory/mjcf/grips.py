@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from factory.geometry.meshes import Array
 from factory.layout.layout import Layout
-from factory.layout.standby import Repertoire
+from factory.layout.visits import Visit
 from factory.mjcf.parts import place_in
 from factory.plant.fused_bodies import FusedBodies, bodies_of
 
@@ -26,27 +26,30 @@ class Grip:
     begins: int
 
     @property
+    def visit(self) -> Visit:
+        """The first visit of the tour."""
+        return self.layout.visits[self.begins, self.robot]
+
+    @property
     def position(self) -> Point3:
         """Where the body's centre of mass is, in the frame of the robot's carriage, or of its head
         [m]."""
         path = self.layout.guidepaths[self.robot]
         at, foot = path.middle(0.0), path.carriage(0.0)
-        more = self.layout.shift(self.robot, self.begins)
-        middle = (at[0] + more[0] - foot[0], at[1] + more[1] - foot[1])
-        height = self.layout.held_at(self.robot, self.begins)
+        (x, y), height = self.visit.shift, self.visit.height
+        middle = (at[0] + x - foot[0], at[1] + y - foot[1])
         return turned(place_in(self.layout.product, self.centre, middle, height), path.heading)
 
 
 def grips_of(layout: Layout, bodies: FusedBodies) -> Iterator[Grip]:
     """All grips of a layout's robots on its bodies, robot by robot, with those of deputies."""
-    whole = Repertoire.of(layout)
-    every, factory = whole.layout, whole.layout.factory
+    every, factory = layout.whole, layout.whole.factory
     if every is not layout:
         bodies = bodies_of(factory, every.product, bool(bodies.wholes))
     for robot in range(len(factory.robots)):
         found = dict[str, str]()
         for label in bodies.handled(factory, robot):
-            found.setdefault(whole.names[label], label)
+            found.setdefault(layout.named(label), label)
         for name, label in found.items():
             begins, *_ = factory.tours[robot][factory.tour_with(robot, label)]
             yield Grip(robot, name, bodies.centre[label], every, begins)

@@ -23,7 +23,6 @@ from factory.layout.bins import Bin
 from factory.layout.feeding import outlets_of
 from factory.layout.hanging import Hanging
 from factory.layout.layout import Layout
-from factory.layout.standby import Repertoire
 from factory.mjcf.bins import add_bins
 from factory.mjcf.elements import fill
 from factory.mjcf.feeders import add_feeders
@@ -201,7 +200,7 @@ def build_model(
     files = add_meshes(section["asset"], product, insets)
     add_scene(world, section["statistic"], layout)
     hoists = _hoists(layout, masses, settings)
-    add_robots(Repertoire.of(layout).layout, catalogue, drives, hoists, section)
+    add_robots(layout.whole, catalogue, drives, hoists, section)
     load = masses[factory.products[0]]
     fast = settings.outfeed_acceleration
     tray = drive_for(TRAY_MASS, load, fast, settings)
@@ -252,9 +251,10 @@ def model_files(model: Model, path: Path) -> dict[Path, bytes]:
 
 def heaviest(layout: Layout, masses: Mapping[str, float]) -> list[float]:
     """The heaviest load that each robot carries [kg], by what labels weigh."""
-    whole = Repertoire.of(layout)
-    weights = {label: masses[name] for label, name in whole.names.items() if name in masses}
-    operations, robots = whole.layout.factory.operations, whole.layout.factory.robots
+    factory = layout.whole.factory
+    names = {o.label: layout.named(o.label) for o in factory.making}
+    weights = {label: masses[name] for label, name in names.items() if name in masses}
+    operations, robots = factory.operations, factory.robots
     return [
         max(
             weights.get(o.after[o.robots.index(robot.index)], 0.0)
@@ -262,6 +262,15 @@ def heaviest(layout: Layout, masses: Mapping[str, float]) -> list[float]:
         )
         for robot in robots
     ]
+
+
+def lifted(layout: Layout, masses: Mapping[str, float]) -> dict[int, float]:
+    """The heaviest load that each robot with a lift delivers [kg], by what labels weigh."""
+    factory = layout.whole.factory
+    return {
+        robot: max(masses[layout.named(label)] for label in factory.deliveries(robot))
+        for robot in factory.strokes
+    }
 
 
 def drive_for(
@@ -284,11 +293,10 @@ def drive_for(
 
 def _hoists(layout: Layout, masses: Mapping[str, float], settings: Settings) -> dict[int, Hoist]:
     """The lifts, for the heaviest load of each: what it delivers."""
-    whole, found = Repertoire.of(layout), {}
-    for robot, stroke in whole.layout.strokes.items():
-        load = max(masses[label] for label in whole.delivered(robot))
+    loads, found = lifted(layout, masses), {}
+    for robot, stroke in layout.whole.strokes.items():
         most = settings.acceleration + GRAVITY
-        drive = drive_for(HOIST_MASS, load, most, settings, HOIST_STIFFNESS)
+        drive = drive_for(HOIST_MASS, loads[robot], most, settings, HOIST_STIFFNESS)
         found[robot] = Hoist(stroke, drive, lift_stops(stroke, layout.clearance))
     return found
 

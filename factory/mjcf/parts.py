@@ -41,7 +41,7 @@ def place_in(
 def presented_at(layout: Layout, label: str) -> tuple[float, float, float]:
     """Where a part's centre of mass is in its feeder."""
     operation, centre = layout.factory.by_label[label], layout.product.solids[label].centre
-    elevation = layout.elevation(operation.carrier, operation.index)
+    elevation = layout.visits[operation.index, operation.carrier].elevation
     return place_in(layout.product, centre, layout.meeting(operation), elevation)
 
 

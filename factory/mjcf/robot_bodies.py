@@ -61,8 +61,9 @@ def _low(layout: Layout, robot: int) -> float:
     ground, found = float(product.low[2]), list[float]()
     for tour, label in zip(factory.tours[robot], factory.deliveries(robot), strict=False):
         low = min(float(product.solids[part].low[2]) for part in factory.contents[label])
-        found.append(low - ground + layout.held_at(robot, tour[0]))
-    return min(found, default=layout.held_at(robot, factory.robots[robot].operations[0]))
+        found.append(low - ground + layout.visits[tour[0], robot].height)
+    first = factory.robots[robot].operations[0]
+    return min(found, default=layout.visits[first, robot].height)
 
 
 def _style(hand: Hand | None, loaded: dict[str, Styles]) -> Styles:

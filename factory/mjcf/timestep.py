@@ -14,7 +14,6 @@ from math import inf, sqrt
 
 from factory.control.profile import World
 from factory.layout.layout import Layout
-from factory.layout.standby import Repertoire
 from factory.mjcf.model import (
     CARRIAGE_MASS,
     GRAVITY,
@@ -25,6 +24,7 @@ from factory.mjcf.model import (
     STIFFNESS,
     drive_for,
     heaviest,
+    lifted,
 )
 from factory.mjcf.outfeed import TRAY_MASS
 from factory.mjcf.stops import OVERLOAD, robot_room, tray_room
@@ -168,9 +168,7 @@ def _axes(settings: Settings, layout: Layout, jitter: float) -> Iterator[DrivenA
         masses[operation.label] = sum(inputs) if inputs else solids[operation.label].mass
     for load in sorted({*heaviest(layout, masses)}):
         yield DrivenAxis.loaded(CARRIAGE_MASS, load, a, gain=1 - jitter, room=room)
-    whole = Repertoire.of(layout)
-    lifted = [[masses[x] for x in whole.delivered(robot)] for robot in factory.strokes]
-    for load in sorted({max(loads) for loads in lifted}):
+    for load in sorted({*lifted(layout, masses).values()}):
         held = 2 * FRICTION + SLACK * (HEAD_MASS + load) * GRAVITY
         push, stiff = a + GRAVITY, HOIST_STIFFNESS
         yield DrivenAxis(HOIST_MASS, load, a, push, stiff, 1 - jitter, held=held, room=room)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import lru_cache
+from math import isclose
 
 import numpy as np
 
@@ -35,8 +36,7 @@ def operation_modes(layout: Layout, eps: float) -> tuple[Mode, ...]:
     operations = layout.factory.operations
     modes = tuple(operation_mode(layout, operation, eps) for operation in operations)
     starts = operation_starts(layout)
-    count = len(layout.guidepaths)
-    count += len(layout.lifts)
+    count = len(layout.guidepaths) + len(layout.strokes)
     limits = Limits(np.ones(count), np.ones(count))
     bundle = Bundle.of(modes, [limits.of(axes) for axes in layout.factory.axes])
     inside = bundle.in_domain(np.concatenate(starts))
@@ -73,14 +73,7 @@ def check_modes(factory: Factory, own: Iterable[Template], product: Product) -> 
 def operation_starts(layout: Layout) -> list[Array]:
     """For each operation where its axes (k,) are when it starts: where the ones before left
     them."""
-    factory = layout.factory
-    left = {leg: start for leg, (start, _) in layout.legs.items()}
-    for axis, lift in enumerate(layout.lifts, start=len(factory.robots)):
-        tours = factory.tours[lift]
-        for before, tour in zip((tours[-1], *tours), tours, strict=False):
-            left[tour[0], axis] = layout.level(lift, before[-1]).down
-            left[tour[-1], axis] = layout.level(lift, tour[-1]).up
-    return [np.array([left[o.index, a] for a in factory.axes[o.index]]) for o in factory.operations]
+    return [np.array(layout.starts(o.index)) for o in layout.factory.operations]
 
 
 def _unprepared(operation: Operation, inside: bool) -> Diagnostic:
@@ -119,16 +112,16 @@ def operation_mode(layout: Layout, operation: Operation, eps: float) -> Mode:
         gate[slot] = next(other for other in others if other != slot)
         standoff[slot] = layout.standoff(operation, slot)
     r = np.array([path.r for path in paths])
+    station = layout.station(operation.index)
     stations = [
-        path.length - layout.stations[operation.index] - path.reach if slot == carrier else np.nan
-        for slot, path in enumerate(paths)
+        station - path.reach if slot == carrier else np.nan for slot, path in enumerate(paths)
     ]
     ends = np.array([layout.ends(robot)[1] for robot in operation.robots])
     template, end = operation.template, np.array([path.length for path in paths])
-    if template.before[carrier] != NOPART or layout.stations[operation.index]:
+    if template.before[carrier] != NOPART or not isclose(station, end[carrier], abs_tol=1e-9):
         template, end[carrier] = _inside(template), ends[carrier]
     setting = Setting(
-        lower=np.array([layout.apart(operation.index, s)[0] for s in range(len(paths))]),
+        lower=np.array([layout.stop_offset(operation.index, s)[0] for s in range(len(paths))]),
         upper=end,
         r=r,
         eps=eps,
@@ -155,7 +148,7 @@ def _with_lifts(mode: Mode, layout: Layout, operation: Operation) -> Mode:
         return mode
     robots = [*map(factory.robot_of, axes)]
     strokes = np.array([layout.strokes[robot] for robot in robots])
-    goals = np.array([layout.goal(operation.index, count + n) for n in range(len(axes))])
+    goals = np.array(layout.goals(operation.index)[count:])
     lowers = np.array([factory.lowers(robot) for robot in robots]) & (goals < strokes)
     own = np.array([operation.robots.index(robot) for robot in robots])
     return replace(
@@ -191,6 +184,6 @@ def robot_limits(
     robot within ± jitter by the seed, and the same for its lift."""
     count = len(layout.guidepaths)
     draw = np.random.default_rng(seed).uniform(1 - jitter, 1 + jitter, size=(2, count))
-    robots = [*range(count), *layout.lifts]
+    robots = [*range(count), *layout.strokes]
     speed = settings.speed * draw[0, robots]
     return Limits(speed, np.full(len(robots), settings.acceleration)), draw[1, robots]

@@ -51,7 +51,8 @@ class GearNet(Pictured):
     def is_tree(self) -> bool:
         """Whether the incidence graph of gears and the places that they share is a tree, if it
         hangs together: that of a gear net is, of any other gear train not."""
-        return sum(len(own) - 1 for own in self.slots if own) == len(self.gears) - 1
+        gears = sum(bool(gear.places) for gear in self.gears)
+        return sum(len(own) - 1 for own in self.slots if own) == gears - 1
 
     def threads_of(self, marked: Marking) -> dict[Slot, int]:
         """f_m of a marking: every slot holds the robot that owns it (Definition 3.3)."""

@@ -147,6 +147,11 @@ class Factory(Pictured):
         return MappingProxyType({operation.label: operation for operation in self.operations})
 
     @cached_property
+    def present(self) -> tuple[int, ...]:
+        """The robots (index) that are not gone: those that have operations."""
+        return tuple(robot.index for robot in self.robots if robot.operations)
+
+    @cached_property
     def leaves(self) -> tuple[Operation, ...]:
         """The operations that make a part out of nothing, in the order of their numbers."""
         return tuple(operation for operation in self.making if not operation.inputs)
@@ -213,9 +218,10 @@ class Factory(Pictured):
             return (*reversed(range(len(self.operations) - 1)), len(self.operations) - 1)
         waits = [len(operation.robots) for operation in self.operations]
         onward: list[list[int]] = [[] for _ in self.operations]
-        for robot in self.robots:
-            waits[robot.operations[0]] -= 1
-            for before, number in pairwise(robot.operations):
+        for robot in self.present:
+            program = self.robots[robot].operations
+            waits[program[0]] -= 1
+            for before, number in pairwise(program):
                 onward[before].append(number)
         came, ordered, ready = count(), list[int](), list[tuple[int, int, int]]()
 

@@ -24,7 +24,7 @@ from factory.support.tables import table_of, value_of
 
 PLAN_NAME, LAYOUT_NAME = "plan.json", "layout.json"
 
-SCHEMA, LAYOUT_SCHEMA = "factory.plan.1", "factory.layout.1"
+SCHEMA, LAYOUT_SCHEMA = "factory.plan.1", "factory.layout.2"
 
 AGAIN = "write it again: `factory build FILE.pag -o DIR`"
 

@@ -85,7 +85,7 @@ class Simulation:
         self.modes = compiled.modes if compiled else operation_modes(layout, settings.eps)
         self.limits, gains = robot_limits(layout, settings, request.seed, request.jitter)
         stages = stages_of(layout, self.modes, settings)
-        drawn = request.seed, request.jitter, request.wip, self.modes, self.limits
+        drawn = request.seed, request.jitter, request.wip, self.modes
         self.timing = Timing(layout, settings, world, *drawn)
         self.delays = self.timing.delays
         self.counts = firings(net, self.start)

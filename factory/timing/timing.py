@@ -45,7 +45,7 @@ AS_IT_IS = Change()
 class Timing:
     """The delays of a layout, by its modes, where each starts, and the robots' limits.
 
-    Speeds are those of `seed` and `jitter`, as in a run, or those `drawn`; `shaped`: the modes,
+    Speeds are those of `seed` and `jitter`, as in a run; `shaped`: the modes,
     where they have been made already. Raises InputError where a mode cannot reach its goal.
     """
 
@@ -56,7 +56,6 @@ class Timing:
     jitter: float = 0.0
     wip: int | None = None
     shaped: Sequence[Mode] = field(default=(), repr=False, compare=False)
-    drawn: Limits | None = field(default=None, repr=False, compare=False)
 
     @property
     def factory(self) -> Factory:
@@ -71,8 +70,6 @@ class Timing:
     @cached_property
     def limits(self) -> Limits:
         """The limits of each axis."""
-        if self.drawn is not None:
-            return self.drawn
         return robot_limits(self.layout, self.settings, self.seed, self.jitter)[0]
 
     @cached_property
@@ -131,20 +128,20 @@ class Timing:
         profile = self._profile(past.axis, change)
         if past.axis != robot:
             return profile.passes(layout.strokes[robot], past.at)
-        begin, factor = layout.legs[number, robot], change.way.get(robot, 1.0)
+        (before, visit), factor = layout.ways[number, robot], change.way.get(robot, 1.0)
         if past.direction < 0:
             mode, slot = self.modes[number], self.factory.operations[number].robots.index(robot)
-            left = max(0.0, past.at - begin[1]) * factor
+            left = max(0.0, past.at - visit.at) * factor
             if mode.gate[slot] >= 0 and left < mode.standoff[slot]:
                 return max(0.0, delays[number] - self.rest - profile.landing(left))
-            way = (begin[0] - begin[1]) * factor
+            way = (before.at - visit.at) * factor
             return profile.passes(way, way - left)
         rises = 0.0
         if rises_first(layout, robot):
             rises = self._profile(self.factory.lift_axis[robot], change).rest(layout.strokes[robot])
-        way = (layout.guidepaths[robot].length - begin[1]) * factor
+        way = (layout.guidepaths[robot].length - visit.at) * factor
         if past.at < layout.guidepaths[robot].length - HOME:
-            return rises + profile.passes(way, min(way, (past.at - begin[1]) * factor))
+            return rises + profile.passes(way, min(way, (past.at - visit.at) * factor))
         return rises + profile.rest(way) + self._adjusted(robot, number)
 
     def _adjusted(self, robot: int, number: int) -> float:
@@ -153,7 +150,7 @@ class Timing:
             return 0.0
         gear = self.factory.robots[robot].operations
         after = gear[(gear.index(number) + 1) % len(gear)]
-        one, other = (self.layout.level(robot, n).up for n in (number, after))
+        one, other = (self.layout.visits[n, robot].up for n in (number, after))
         profile = SpeedProfile(self.settings.speed, self.settings.acceleration)
         return profile.rest(abs(one - other)) + self.settings.settle
 

@@ -73,7 +73,7 @@ def robot_times(layout: Layout, settings: Settings) -> list[float]:
     pace = Pace.of(settings)
     found = gear_times(layout, pace)
     dropoff = layout.factory.dropoff.index
-    way = layout.home(0, dropoff) - layout.goal(dropoff, 0)
+    way = layout.home(0, dropoff) - layout.visits[dropoff, 0].at
     outfeed = pace.rest(way) + pace.lost + away(layout, settings)
     found[0] = max(found[0], outfeed)
     return found

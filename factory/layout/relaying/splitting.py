@@ -16,6 +16,7 @@ from factory.layout.layout import Guidepath, Layout
 from factory.layout.relaying.in_line import InLine, hands_in_line
 from factory.layout.relaying.ways import Way
 from factory.layout.shapes import payload_boxes
+from factory.layout.visits import visits_of
 from factory.plant.approaches import Approach
 from factory.plant.factory import Factory
 from factory.problem.pag import NOPART
@@ -55,17 +56,16 @@ def split(
             paths[piece.robot] = _path(layout.guidepaths[robot], piece, lane)
             starts[piece.robot] = piece.start
     stations = [0.0] * len(factory.operations)
-    for operation in before.operations:
-        made = factory.by_label[operation.label].index
-        station = layout.stations[operation.index]
-        if operation.index != before.dropoff.index:
-            station = round(station - starts[factory.operations[made].carrier], 3)
-        stations[made] = station
+    for operation in before.making:
+        made = factory.by_label[operation.label]
+        station = layout.guidepaths[operation.carrier].length - layout.station(operation.index)
+        stations[made.index] = round(station - starts[made.carrier], 3)
+    guidepaths = tuple(paths[robot.index] for robot in factory.robots)
     return replace(
         layout,
         factory=factory,
-        guidepaths=tuple(paths[robot.index] for robot in factory.robots),
-        stations=tuple(stations),
+        guidepaths=guidepaths,
+        visits=visits_of(factory, guidepaths, stations),
         hands=found.hands,
         payloads=payload_boxes(factory, layout.product),
         certificate=None,

@@ -8,7 +8,7 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
-from factory.compiler.taking_over import present, without_gone
+from factory.compiler.taking_over import without_gone
 from factory.layout.exclusions import goes_early
 from factory.layout.layout import Layout
 from factory.nets.history import firings
@@ -55,7 +55,7 @@ class MonitorSubject:
     def after(self, crew: Factory) -> MonitorSubject:
         """The subject after an exchange of robots: `crew` is the new factory, with the numbers of
         robots of this one."""
-        number = {robot: n for n, robot in enumerate(present(crew))}
+        number = {robot: n for n, robot in enumerate(crew.present)}
         before = zip(crew.operations, self.goals, strict=True)
         goals = tuple(self.others.get((o.index, o.robots), goals) for o, goals in before)
         early = frozenset((o, number[robot]) for o, robot in self.early if robot in number)
@@ -137,8 +137,7 @@ def subject_of(
     is one body unless other `bodies` are given."""
     factory, product = layout.factory, layout.product
     goals = tuple(
-        tuple(layout.goal(o.index, slot) for slot in range(len(o.robots)))
-        for o in factory.operations
+        tuple(layout.visits[o.index, robot].at for robot in o.robots) for o in factory.operations
     )
     radii = tuple(
         eps if isinstance(eps := o.template.law.eps, float) else settings.eps
@@ -154,7 +153,7 @@ def subject_of(
     marking = factory.net.initial_marking if start is None else start
     patience, early = round(PATIENCE * travel, 6), frozenset(goes_early(layout))
     subject = MonitorSubject(factory, goals, radii, places, settings, marking, patience, wip, early)
-    return subject if layout.standby is None else _with_others(subject, layout.standby)
+    return subject if layout.whole is layout else _with_others(subject, layout.whole)
 
 
 def _with_others(subject: MonitorSubject, whole: Layout) -> MonitorSubject:
@@ -164,7 +163,7 @@ def _with_others(subject: MonitorSubject, whole: Layout) -> MonitorSubject:
     every, others = whole.factory.operations, dict[Manned, tuple[float, ...]]()
     for o in every:
         if (key := (number[o.written], o.robots)) not in own:
-            goals = (whole.goal(o.index, slot) for slot in range(len(o.robots)))
+            goals = (whole.visits[o.index, robot].at for robot in o.robots)
             others.setdefault(key, tuple(goals))
     early = {(number[every[o].written], robot) for o, robot in goes_early(whole)}
     return replace(subject, others=others, early=subject.early | early)

@@ -110,5 +110,5 @@ def _ends(simulation: Simulation) -> Iterator[tuple[Operation, Floats]]:
     start, address = world.d.qpos, world.motion.axes.qpos
     for operation in layout.factory.operations:
         qpos, slides = start.copy(), address[[*operation.robots]]
-        qpos[slides] = [layout.goal(operation.index, n) for n in range(slides.size)]
+        qpos[slides] = [layout.visits[operation.index, robot].at for robot in operation.robots]
         yield operation, qpos

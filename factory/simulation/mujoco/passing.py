@@ -36,7 +36,7 @@ class _Lifts:
         """Those of a model."""
         chosen = [(n, o) for n, o in enumerate(outlets) if o.robot in factory.adjusted]
         lifts = [m.joint(names.lift(factory.robots[o.robot].name)).id for _, o in chosen]
-        level = [o.layout.level(o.robot, o.leaf.index).up for _, o in chosen]
+        level = [o.layout.visits[o.leaf.index, o.robot].up for _, o in chosen]
         numbers = np.array([n for n, _ in chosen], np.intp)
         return cls(numbers, m.jnt_qposadr[np.array(lifts, np.intp)], np.array(level))
 

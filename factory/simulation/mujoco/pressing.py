@@ -37,7 +37,7 @@ class Pressing:
         self.shaken: set[int] = set()
         self.touched: set[tuple[int, int]] = set()
         self._holds = {r.name: {held(factory, r.index, at_last=True)} for r in factory.robots}
-        if layout.standby is not None:
+        if layout.whole is not layout:
             for grip in grips_of(layout, model.carried):
                 self._holds[factory.robots[grip.robot].name].add(grip.label)
         for outlet in outlets_of(layout):

@@ -125,11 +125,11 @@ class Strength:
             grip, hand = grips[key], self._hands[key[0]]
             load = np.diag([1.0, 1.0, 1.0, 0.5, 0.5, 0.5])
             at = grip.centre - middle(hand)
-            at[:2] += grip.layout.shift(grip.robot, grip.begins)
+            at[:2] += grip.visit.shift
             tour = grip.layout.factory.turns[grip.begins, grip.robot]
             first = grip.layout.factory.robots[grip.robot].operations[0]
-            at[2] += grip.layout.held_at(grip.robot, grip.begins)
-            at[2] -= grip.layout.held_at(grip.robot, first)
+            at[2] += grip.visit.height
+            at[2] -= grip.layout.visits[first, grip.robot].height
             load[3:, :3] = np.cross(at, np.eye(3)).T
             found[number] = gauge(hand, layout.guidepaths[grip.robot].heading, tour) @ load
         return found

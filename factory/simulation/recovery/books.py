@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from factory.compiler.taking_over import present
 from factory.layout.layout import Layout
 from factory.nets.petri import Marking
 from factory.plant.factory import Factory, Operation
@@ -21,11 +20,6 @@ class Books:
     def factory(self) -> Factory:
         """The factory of now."""
         return self.layout.factory
-
-    @property
-    def present(self) -> list[int]:
-        """The robots (index) that are not gone."""
-        return present(self.factory)
 
     @property
     def marking(self) -> Marking:

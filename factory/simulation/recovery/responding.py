@@ -191,9 +191,8 @@ class Responding:
         before, held, under_way = books.marking, books.held(), supervisor.active.operations
         marking = marking_after(change.layout.factory.net, fired)
         after = Books(change.layout, supervisor)
-        going = {
-            r for r in after.present if books.place_of(r, before) != after.place_of(r, marking)
-        }
+        stay = after.factory.present
+        going = {r for r in stay if books.place_of(r, before) != after.place_of(r, marking)}
         self._plant.clear_out(robot, change.layout)
         self._plant.exchange(robot, change.layout)
         scrap = {*self._plant.undone(after.held(marking), fired, going)}
@@ -223,7 +222,7 @@ class Responding:
         books, supervisor, factory = self._books, self._books.supervisor, self._books.factory
         before, under_way = books.marking, supervisor.active.operations
         fired = undo(factory.net, supervisor.fired, asked, joins_of(factory))
-        marking, robots = marking_after(factory.net, fired), books.present
+        marking, robots = marking_after(factory.net, fired), factory.present
         going = {r for r in robots if books.step_of(r, before) != books.step_of(r, marking)}
         what = self._now, operation.label, reason
         undone = Undone.between(factory.net, what, asked, supervisor.fired, fired)

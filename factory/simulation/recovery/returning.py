@@ -125,7 +125,7 @@ class Returning:
         rise = (lift, float(at[lift]))
         if robot in layout.factory.adjusted:
             return [*goals, rise]
-        up = layout.level(robot, layout.factory.robots[robot].operations[step]).up
+        up = layout.visits[layout.factory.robots[robot].operations[step], robot].up
         return [rise, *goals] if rise[1] == up > 0 else goals
 
     def has_left(self, robot: int, marking: Marking) -> bool:
@@ -158,7 +158,7 @@ def _aside(layout: Layout, leaf: Operation) -> float:
 
 
 def _highest(layout: Layout, robot: int) -> float:
-    return max(layout.level(robot, tour[0]).up for tour in layout.factory.tours[robot])
+    return max(layout.visits[tour[0], robot].up for tour in layout.factory.tours[robot])
 
 
 def _goals(layout: Layout) -> Iterable[Goal]:
@@ -172,7 +172,7 @@ def _goals(layout: Layout) -> Iterable[Goal]:
             if not factory.operations[number].inputs:
                 yield _rounded((robot.index, _aside(layout, factory.operations[number])))
             if robot.index in lifts:
-                yield _rounded((lifts[robot.index], layout.level(robot.index, number).up))
+                yield _rounded((lifts[robot.index], layout.visits[number, robot.index].up))
         if robot.index in lifts:
             yield _rounded((lifts[robot.index], _highest(layout, robot.index)))
 
