@@ -6,7 +6,6 @@ import mujoco
 import numpy as np
 import pytest
 
-import factory.layout.arranging as arranging
 import factory.layout.optimising as optimising
 from factory.compiler.mating.mating import judged
 from factory.geometry.product import product_geometry
@@ -57,7 +56,7 @@ def test_inputs_from_the_wrong_sides_are_seen(monkeypatch: pytest.MonkeyPatch) -
         return {robot: -side for robot, side in admissible(factory, sides).items()}
 
     monkeypatch.setattr(optimising, "admissible", swapped)
-    monkeypatch.setattr(arranging, "admitted", lambda *given: not admitted(*given))
+    monkeypatch.setattr(optimising, "admitted", lambda *given: not admitted(*given))
     simulation = Simulation(laid_out(BALANCED), RunRequest(units=1))
     run = simulation.run()
     assert run.trouble is not None and run.trouble.code == "Stalled"

@@ -2,8 +2,13 @@
 guidepaths, then the floor.
 
 The first feasible layout is the simple construction: sides by a rule of thumb, subtrees as boxes
-(`stretching`). Against it stand a few that are packed by their contours (`arranging`); each further
-one gives more weight to the robots that are the slowest in the best so far.
+(`stretching`). Against it stand a few that are packed by their contours; each further one
+gives more weight to the robots that are the slowest in the best so far.
+
+A factory is packed by dynamic programming over the tree of guidepaths. A robot can lie on the floor
+in four ways (its heading and its side, each of two directions along one axis), and its branch lies
+as it does. Leaves first, each robot is packed once for each way that its carrier may ask for; then
+the sides are read off from the output robot on.
 """
 
 from __future__ import annotations
@@ -12,7 +17,6 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from factory.geometry.solids import Product
-from factory.layout.arranging import arrange, shape_of
 from factory.layout.certificate import Region
 from factory.layout.dimensions import Clearance
 from factory.layout.drafting import LayoutDraft
@@ -20,12 +24,24 @@ from factory.layout.durations import Pace, cycle_of, gear_times
 from factory.layout.guidepath import Box, Point2, hull
 from factory.layout.hands.choosing import Hands
 from factory.layout.layout import Layout, carriers
-from factory.layout.packing import Task, bare
-from factory.layout.shapes import Sides, headings, payload_boxes, symmetric_shapes
-from factory.layout.sides import admissible
-from factory.layout.stretching import stretch
+from factory.layout.outline import Outline
+from factory.layout.packing import Packing, Task, bare
+from factory.layout.shapes import (
+    OUTPUT,
+    Frame,
+    Shape,
+    Sides,
+    headings,
+    held_shape,
+    oriented_shape,
+    payload_boxes,
+    symmetric_shapes,
+    turned,
+)
+from factory.layout.sides import admissible, admitted
+from factory.layout.stretching import Stretched, outgoing, stretch
 from factory.layout.sweeps import piles, regions
-from factory.plant.factory import Factory
+from factory.plant.factory import Factory, Operation
 
 EFFORT = 800
 """Robots times layouts that are looked at, four layouts at most."""
@@ -133,3 +149,63 @@ def _weights(times: Sequence[float]) -> list[float]:
     """How much the time of each robot matters: 1 for the slowest."""
     longest = max(times)
     return [(1 + (time / longest) ** 4) / 2 for time in times]
+
+
+def arrange(
+    task: Task, payloads: Mapping[str, Box], sides: Sides | None = None
+) -> tuple[Stretched, list[Shape]]:
+    """Travels, stations and sides with the shapes that they give; with `sides` these alone are
+    looked at. Linear."""
+    factory, on = task.factory, carriers(task.factory)
+    table: list[dict[Frame, Outline]] = [{} for _ in factory.robots]
+    for robot, frames in reversed(list(enumerate(_frames(on, sides)))):
+        for frame in frames:
+            shape = shape_of(task, payloads, robot, on[robot], frame)
+
+            def outline(guest: int, side: int, frame: Frame = frame) -> Outline:
+                return table[guest][turned(frame, side)]
+
+            def admits(operation: Operation, chosen: Sides, frame: Frame = frame) -> bool:
+                if sides is not None:
+                    return all(sides[robot] == side for robot, side in chosen.items())
+                return admitted(operation, chosen, frame[1])
+
+            table[robot][frame] = Packing(task, robot, shape, outline, admits).packed()
+    return _chosen(task, table)
+
+
+def shape_of(
+    task: Task, payloads: Mapping[str, Box], robot: int, carrier: int, frame: Frame
+) -> Shape:
+    """The shape of a robot that lies in a frame, with its hand if hands are chosen."""
+    lies = robot, carrier, frame, task.clearance, task.wide
+    if task.hands is not None:
+        return held_shape(task.hands, payloads, *lies)
+    return oriented_shape(task.factory, payloads, *lies)
+
+
+def _frames(on: Sequence[int], sides: Sides | None) -> list[tuple[Frame, ...]]:
+    """The frames in which each robot may lie."""
+    found: list[tuple[Frame, ...]] = [(OUTPUT,)]
+    for robot, carrier in list(enumerate(on))[1:]:
+        both = (-1, +1) if sides is None else (sides[robot],)
+        frames = [turned(frame, side) for frame in found[carrier] for side in both]
+        found.append(tuple(dict.fromkeys(frames)))
+    return found
+
+
+def _chosen(task: Task, table: Sequence[Mapping[Frame, Outline]]) -> tuple[Stretched, list[Shape]]:
+    """What was chosen for the frames that the output robot's gives."""
+    robots, operations = len(table), len(task.factory.operations)
+    travel, stations, sides = [0.0] * robots, [0.0] * operations, Sides()
+    frames, outlines = [OUTPUT] * robots, list[Outline]()
+    for robot in range(robots):
+        outlines.append(table[robot][frames[robot]])
+        choice = outlines[-1].choice
+        for number, station in choice.stations.items():
+            stations[number] = station
+        for guest, side in choice.sides.items():
+            sides[guest], travel[guest] = side, choice.travels[guest]
+            frames[guest] = turned(frames[robot], side)
+    travel[0] = outgoing(outlines[0], task.clearance)
+    return Stretched(travel, stations, sides), [outline.shape for outline in outlines]

@@ -1,21 +1,31 @@
 """The outfeed: how long its tray takes, which brings a product into the shed, waits until that is
-shut, and comes back; and the slot in it."""
+shut, and comes back; and the slot in it, into which a round bottom dips."""
 
 from __future__ import annotations
 
 from math import sqrt
 
+import numpy as np
+
 from factory.control.profile import SpeedProfile
+from factory.geometry.meshes import Array
+from factory.geometry.solids import Product
 from factory.layout.dimensions import BEHIND, PLAY, SLOT, Clearance
 from factory.layout.guidepath import Box, Point2
 from factory.layout.hands.limbs import limbs
+from factory.layout.hands.surfaces import Body
 from factory.layout.layout import Layout
-from factory.layout.standing import dip
 from factory.support.settings import Settings
 
 CRUISE = 1.2
 """The tray's way is at least so many times what it takes to reach its speed and to brake: a drive
 whose acceleration is reversed at once gets half as far again off its reference."""
+
+FLAT = 1e-5
+"""What dips no deeper stands flat [m]."""
+
+HalfSpace = tuple[int, float, int]
+"""All that is beyond a bound [m] on an axis, one way (+1, -1) along it."""
 
 
 def tray_profile(layout: Layout, settings: Settings) -> SpeedProfile:
@@ -85,3 +95,35 @@ def slotted(plate: Box, slot: tuple[float, float, float] | None) -> list[tuple[P
     return [
         (((x0 + x1) / 2, (y0 + y1) / 2), ((x1 - x0) / 2, (y1 - y0) / 2)) for x0, x1, y0, y1 in boxes
     ]
+
+
+def dip(product: Product, plates: list[HalfSpace]) -> float:
+    """How much higher a product is where it is over some plates, which are level, than where it is
+    lowest [m]: 0 where it is over none."""
+    bodies = [body for solid in product.solids.values() for body in Body.of(solid)]
+    least, bottom = np.inf, float(product.low[2])
+    for body in sorted(bodies, key=lambda body: float(body.low[2])):
+        if float(body.low[2]) >= least:
+            break
+        least = min(least, *(_lowest(body, *plate) for plate in plates), np.inf)
+    deep = least - bottom
+    return deep if FLAT < deep < np.inf else 0.0
+
+
+def _lowest(body: Body, axis: int, bound: float, way: int) -> float:
+    """How low a body is beyond a bound [m]; inf where it is not there."""
+    beyond = way * (np.array([body.low, body.high])[:, axis] - bound)
+    if beyond.max() <= 0:
+        return np.inf
+    if body.ball:
+        middle, radius = (body.low + body.high) / 2, (body.high - body.low)[2] / 2
+        short = max(0.0, -way * float(middle[axis] - bound))
+        return float(middle[2] - np.sqrt(max(radius**2 - short**2, 0.0)))
+    ends = body.edges
+    far = way * (ends[:, :, axis] - bound)
+    heights: Array = ends[:, :, 2]
+    found = heights[far >= 0].min(initial=np.inf)
+    crossing = far.prod(axis=1) < 0
+    share = far[crossing, 0] / (far[crossing, 0] - far[crossing, 1])
+    at = heights[crossing, 0] + share * (heights[crossing, 1] - heights[crossing, 0])
+    return float(min(found, at.min(initial=np.inf)))
