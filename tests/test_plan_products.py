@@ -83,7 +83,3 @@ def test_wheels_on_slanted_axles_are_named() -> None:
     )
     for labels, way in found.needs:
         assert labels in pairs and np.allclose(np.abs(way), [0.5**0.5, 0, 0.5**0.5], atol=1e-4)
-    allowed = PlanOptions(lay_out=False, allow=tuple(":".join(labels) for labels in pairs))
-    accepted = plan(source, allowed)
-    assert isinstance(accepted, Planned)
-    assert accepted.figures.blocked == 8 and accepted.figures.left_out == 0
