@@ -89,7 +89,7 @@ class Divisions:
 
     @cached_property
     def least(self) -> Array:
-        """A lower bound (s,) on the price of a tree of each subset: relays cost nothing."""
+        """A lower bound (s,) on the price of a tree of each subset: along the best axes."""
         least = np.full(1 << self.subsets.count, np.inf)
         least[1 << np.arange(self.subsets.count)] = 0.0
         for batch in self.batches:

@@ -15,7 +15,7 @@ from factory.geometry.meshes import Array
 from factory.planning.blocking import Blocking
 from factory.planning.divisions import Divisions, Late, TooLate, divisions
 from factory.planning.estimate import Expected
-from factory.planning.exact import RELAY, Best, Tables, TreeTask, tables
+from factory.planning.exact import Best, Tables, TreeTask, tables
 from factory.planning.growing import Site, bettered, divided
 from factory.planning.judging import Judge, Judged
 from factory.planning.stance import ROOT_AXIS, Stance, stances
@@ -49,8 +49,9 @@ DIVISIONS = 1_000_000
 """The most divisions of subsets of units for which there are proofs: 13 units that all touch, and
 block nothing, have 800,000."""
 
-RELAYS = 50 * RELAY
-"""The price of the most relays that a tree of few units is expected to have."""
+ABOVE = 50.0
+"""Trees are first sought at prices up to so much above the lower bound: less than an operation with
+any blocking costs."""
 
 UnitPrices = Callable[[Stance], Array]
 """The price (2, n) of each unit in a stance if its own inputs come along x or y of the floor."""
@@ -186,7 +187,7 @@ def _cheap_first(every: Divisions) -> Iterator[Divisions]:
     """The divisions at little more than the lower bound on the price, which are few, and all of
     them, in case the bound is wide of the mark."""
     if every.least[-1] < inf:
-        yield every.within(float(every.least[-1]) + RELAYS)
+        yield every.within(float(every.least[-1]) + ABOVE)
     yield every
 
 
