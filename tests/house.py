@@ -71,7 +71,7 @@ VARIANT_ROOMS = ("compiler", "layout/relaying", "problem/plan")
 """Where variants are made. All others know the factory that was made."""
 
 VARIANT_MARKS = {
-    **{"study": 121, "commands": 47, "lang": 28, "simulation": 28, "layout": 23, "planning": 23},
+    **{"study": 121, "commands": 47, "lang": 28, "simulation": 28, "layout": 23, "planning": 19},
     **{"pipeline": 18, "record": 14, "show": 13, "stages": 11, "exporting": 7, "support": 5},
     **{"foreign_nets": 4, "plant": 2, "rendering": 2},
 }

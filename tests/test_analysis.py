@@ -35,6 +35,7 @@ from factory.study.analysis.slack import circuits, slacks
 from factory.study.analysis.timed import timed_net
 from factory.study.analysis.what_if import least_wip
 from factory.support.settings import Settings
+from factory.timing.prediction import duration
 from factory.timing.timed import timed
 from tests.command_line import PAPER, ROOT, Terminal
 from tests.layout_values import paper_layout, random_layout
@@ -187,6 +188,13 @@ def test_a_second_robot_takes_turns_with_the_first() -> None:
     assert net.pace == pytest.approx(max(gears["r3"] / 2, others))
     dates = token_game(net.net, list(net.seconds), 60)[timing.factory.dropoff.end]
     assert (dates[-1] - dates[29]) / 30 == pytest.approx(net.pace)
+
+
+def test_the_first_unit_waits_for_no_cycle_and_each_other_one_for_one() -> None:
+    timing = Timing(paper_layout(), Settings(), "ideal")
+    first = duration(timing, 100.0, 1)
+    assert first == duration(timing, 0.0, 5) < sum(timing.delays)
+    assert duration(timing, 100.0, 5) == pytest.approx(first + 400.0)
 
 
 def test_a_part_is_taken_by_one_copy_at_a_time() -> None:
