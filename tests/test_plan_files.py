@@ -94,7 +94,7 @@ def test_a_layout_is_read_as_it_was_written(drawn: Drawn) -> None:
 
 VARIANTS: dict[str, Callable[[Path], Project]] = {
     "written": lambda folder: read(PAPER),
-    "bare": lambda folder: read(EXAMPLES / "lamp.pag", (), Settings(hands=0)),
+    "bare": lambda folder: read(EXAMPLES / "lamp.pag", (), Settings(hands=False)),
     "lines": lambda folder: with_text(ON_ONE, folder).with_lines([["part2", "part3"]]),
     "forms": lambda folder: read(PAPER).with_plan(Plan({"sub3": 0, "sub1": 1})),
     "branches": lambda folder: with_text(BESIDE, folder).with_branches([("sub2", 3)]),

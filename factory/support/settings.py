@@ -92,8 +92,10 @@ class Settings:
     hands: int = 1
 
     def __post_init__(self) -> None:
+        for name in SWITCHES:
+            if getattr(self, name) in (False, True):
+                object.__setattr__(self, name, int(getattr(self, name)))
         values = {name: getattr(self, name) for name in RANGES}
-        values |= {name: int(values[name]) for name in SWITCHES if values[name] in (True, False)}
         found = [wrong_type(n, v) for n, v in values.items() if (n, v) != ("substeps", None)]
         if faults := [fault for fault in found if fault]:
             raise InputError(faults)
