@@ -122,7 +122,7 @@ def test_all_that_is_drawn_is_solid() -> None:
 
 
 def test_a_seed_lists_its_worst_penetrations_and_the_command_tells_them(run: Terminal) -> None:
-    words = (PAPER, "--seeds", 1, "--units", 1, "--jobs", 1, "--no-convergence")
+    words = (PAPER, "--seeds", 1, "--units", 1, "--jobs", 1)
     done, key = run("fidelity", *words, "--json"), "hidden_penetration_max_mm"
     (seed,) = done.json["seeds"]
     listed = seed["hidden_penetrations"]
@@ -134,7 +134,7 @@ def test_a_seed_lists_its_worst_penetrations_and_the_command_tells_them(run: Ter
 
 
 def test_a_magazine_of_a_line_is_solid(run: Terminal) -> None:
-    words = (PAPER, "--robots", 3, "--seeds", 1, "--units", 2, "--jobs", 1, "--no-convergence")
+    words = (PAPER, "--robots", 3, "--seeds", 1, "--units", 2, "--jobs", 1)
     done = run("fidelity", *words, "--json")
     assert done.status == 0, done.err
     assert done.json["figures"]["hidden_penetration_max_mm"]["worst"] < 0.1

@@ -68,4 +68,4 @@ def test_which_rooms_import_it() -> None:
         for module in house.modules.values()
         if any(house.modules[other].room == "foreign_nets" for other in house.imports(module))
     }
-    assert {"foreign_nets", "commands"} <= rooms <= OFF_THE_ROAD
+    assert {"foreign_nets", "exporting"} <= rooms <= OFF_THE_ROAD

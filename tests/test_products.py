@@ -67,7 +67,7 @@ def test_large_products_are_made(run: Terminal, name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "robots"), [(SMALL[0], 7), (SMALL[1], 17)])
 def test_magazines_of_lines_are_solid(run: Terminal, name: str, robots: int) -> None:
-    words = ("--robots", robots, "--effort", 40, "--seeds", 1, "--units", 2, "--no-convergence")
+    words = ("--robots", robots, "--effort", 40, "--seeds", 1, "--units", 2)
     done = run("fidelity", product(name), *words, "--jobs", 1, "--json")
     assert done.json["figures"]["hidden_penetration_max_mm"]["worst"] < 0.1
 

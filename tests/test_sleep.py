@@ -17,9 +17,9 @@ from tests.simulation_values import FINE, layout_of, ready
 
 
 def crept(fast: bool, seconds: float = 1.5) -> float:
-    """How far the first robot under way gets behind its reference [m] at 0.5 mm/s, which the engine
+    """How far the first robot under way gets behind its reference [m] at 1 mm/s, which the engine
     takes for rest."""
-    simulation = ready("paper", settings=replace(FINE, speed=0.0005), fast=fast)
+    simulation = ready("paper", settings=replace(FINE, speed=0.001), fast=fast)
     world, behind = simulation.physical, 0.0
     while world.time < seconds:
         simulation.supervisor.step()
@@ -67,7 +67,7 @@ def test_what_waits_sleeps(name: str, stage: int) -> None:
 
 def test_a_robot_that_may_sleep_on_its_way_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Planted fault: an active robot may sleep; it does, before its next setpoint."""
-    settings = replace(FINE, speed=0.0005)
+    settings = replace(FINE, speed=0.001)
     simulation = ready("paper", settings=settings)
     monkeypatch.setattr(Sleep, "stay_awake", lambda self, axes: None)
     world = simulation.physical

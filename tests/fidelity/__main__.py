@@ -11,6 +11,7 @@ REPORT = Report(
     " (`python -m tests.fidelity NAME` for one section) from what is kept in docs/fidelity/.",
     (
         "seeds",
+        "paces",
         "approaches",
         "convergence",
         "disturbances",
