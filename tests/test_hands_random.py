@@ -160,3 +160,11 @@ def test_a_tool_comes_from_behind_what_is_held_nearer_to_it(tmp_path: Path) -> N
     assert layout.stop_offset(weld, slot)[0] > 0
     stands = layout.goals(weld)[slot]
     assert layout.guidepaths[tool.index].length - stands >= TOOL_TRAVEL
+
+
+@pytest.mark.slow
+def test_a_tool_may_be_farther_than_its_goal_when_an_operation_begins(tmp_path: Path) -> None:
+    """On its way home from the one before, for which it stopped later: factories with it that the
+    search looks at were refused as NotPrepared, and with them the product."""
+    project = project_of(random_product(2611330026), tmp_path)
+    succeeds(allocated(project, Aim(LEAST, effort=12)), 2611330026, 2, 0.3)

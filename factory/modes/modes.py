@@ -88,12 +88,12 @@ def _unprepared(operation: Operation, inside: bool) -> Diagnostic:
 
 
 def operation_mode(layout: Layout, operation: Operation, eps: float) -> Mode:
-    """The mode of one operation. The way of a robot that is not the carrier ends at its goal: what
-    is left of its guidepath is taken by the others. A carrier stands where its station is: beyond
-    its B end, if it has several tours and its parts are held elsewhere on this one. A robot that
-    brings something to a carrier that brings something too keeps its distance until the carrier
-    stands: they would meet diagonally. So does one that is to lower what it brings: it does so when
-    all others stand."""
+    """The mode of one operation. The way of a robot that is not the carrier ends at its goal, or
+    where it stood before if that is further: what is left of its guidepath is taken by the others.
+    A carrier stands where its station is: beyond its B end, if it has several tours and its parts
+    are held elsewhere on this one. A robot that brings something to a carrier that brings something
+    too keeps its distance until the carrier stands: they would meet diagonally. So does one that is
+    to lower what it brings: it does so when all others stand."""
     paths = [layout.guidepaths[robot] for robot in operation.robots]
     carrier = operation.template.carrier - 1
     gate, standoff = np.full(len(paths), -1), np.zeros(len(paths))
@@ -135,7 +135,8 @@ def operation_mode(layout: Layout, operation: Operation, eps: float) -> Mode:
     mode = replace(mode, upper=np.maximum(mode.upper, ends))
     if operation.inputs and not layout.factory.drops(operation.index):
         guests = np.arange(len(paths)) != carrier
-        mode = replace(mode, lower=np.where(guests, mode.goals, mode.lower))
+        furthest = np.minimum(mode.goals, layout.starts(operation.index)[: len(paths)])
+        mode = replace(mode, lower=np.where(guests, furthest, mode.lower))
     return _with_lifts(mode, layout, operation)
 
 
