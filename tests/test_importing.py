@@ -662,12 +662,12 @@ def test_nesting_has_no_end(bring: Importer) -> None:
 
 def test_sub_models_nest_without_end(bring: Importer) -> None:
     model = "".join(
-        f"0 FILE {i}.ldr\n1 4 0 -1 0 {PLAIN} {i + 1}.ldr\n1 4 9 0 0 {PLAIN} tile.dat\n"
+        f"0 FILE {i}.ldr\n1 4 0 -20 0 {PLAIN} {i + 1}.ldr\n1 4 9 0 0 {PLAIN} tile.dat\n"
         for i in range(2000)
     )
     text = f"{model}0 FILE 2000.ldr\n1 4 0 0 0 {PLAIN} tile.dat\n{TILE}"
     assert len(bring.product("m.mpd", text).pag) == 4001
-    parts = "".join(f"0 FILE {i}.dat\n1 4 0 -1 0 {PLAIN} {i + 1}.dat\n" for i in range(2000))
+    parts = "".join(f"0 FILE {i}.dat\n1 4 0 -20 0 {PLAIN} {i + 1}.dat\n" for i in range(2000))
     text = f"1 4 0 0 0 {PLAIN} 0.dat\n{parts}0 FILE 2000.dat\n1 4 0 0 0 {PLAIN} tile.dat\n{TILE}"
     assert len(bring.product("m.mpd", text).pag) == 1
 
