@@ -88,6 +88,11 @@ class Project:
         same = {"matings", "compiled", "approached"} if plan.forms == self.plan.forms else set()
         return self._changed({"product", *same}, plan=plan)
 
+    def with_settings(self, settings: Settings) -> Project:
+        """The same factory under other settings."""
+        known = {"product", "matings", "compiled", "approached", "planned"}
+        return self._changed(known, settings=settings)
+
     def with_ground(self, ground: Ground) -> Project:
         """The same factory on another ground."""
         known = {"product", "matings", "compiled", "approached", "planned", "plain", "_hands"}

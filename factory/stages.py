@@ -51,7 +51,7 @@ def project_of(
     from factory.support.files import is_plan
 
     if isinstance(product, Project):
-        return product if settings is None else replace(product, settings=settings)
+        return product if settings is None else product.with_settings(settings)
     if isinstance(product, PAG):
         return Project(product, all_templates(templates), settings=settings or Settings())
     if isinstance(product, Factory | Layout):
@@ -73,6 +73,11 @@ def path_of(path: object) -> Path:
     raise usage_error(
         message, "a product is a path, or a PAG, a factory or a layout of this package"
     )
+
+
+def named(product: object) -> Path | None:
+    """The file of a product that is given by its path; None for any other."""
+    return Path(product) if isinstance(product, str | PathLike) else None
 
 
 def maybe(path: AnyPath | None) -> Path | None:
@@ -163,18 +168,21 @@ def lay_out(
 
     `clearance` and `floor` (width, depth) in [m]. `relay`: several robots share guidepaths that
     set the pace, to reach a `cycle` time [s] or the least there can be; the layout's factory has
-    more robots then. `deputies`: robots can take over for others where there is room. Raises
-    InputError for a mesh that cannot be read, RunError where the factory does not fit the floor.
+    more robots then. `deputies`: robots can take over for others where there is room. With none of
+    these the layout is that of the product's plan.json, or the layout itself. Raises InputError for
+    a mesh that cannot be read, RunError where the factory does not fit the floor.
     """
     from factory.layout.request import Ground
     from factory.simulation.options import check_together
 
     check_together({"--relay": relay, "--deputies": deputies})
-    ground = Ground(floor, relay, cycle if relay else None, deputies)
-    settings = settings or Settings()
+    project = project_of(product, settings)
     if clearance is not None:
-        settings = replace(settings, clearance=clearance)
-    return project_of(product, settings).with_ground(ground).layout
+        project = project.with_settings(replace(project.settings, clearance=clearance))
+    ground = Ground(floor, relay, cycle if relay else None, deputies)
+    if ground != Ground() or settings is not None:
+        project = project.with_ground(ground if ground != Ground() else project.ground)
+    return project.layout
 
 
 def run(
@@ -273,7 +281,7 @@ def export(
     from factory.support.files import write_all
 
     chosen = exporter(form, of)
-    file = Path(product) if isinstance(product, str | PathLike) else None
+    file = named(product)
     source: Source | None = None if file is None else read_source(file)
     if file is None or source is None:
         source = project = project_of(product, settings)

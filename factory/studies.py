@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
-from factory.stages import AnyPath, Stage, maybe, path_of, project_of
+from factory.stages import AnyPath, Stage, maybe, named, path_of, project_of
 from factory.support.settings import Settings
 
 if TYPE_CHECKING:
@@ -28,7 +27,7 @@ def _logged(product: Stage) -> Path | None:
     """The path of the log of a run; None where a product is given."""
     from factory.record.log import is_log
 
-    path = Path(product) if isinstance(product, str | PathLike) else None
+    path = named(product)
     return path if path is not None and is_log(path) else None
 
 
@@ -185,8 +184,9 @@ def sweep(
     axes = read_axes([f"{key}={','.join(map(str, values))}" for key, values in vary.items()])
     project = project_of(product, settings)
     recipe = recipe_of(project, axes, {**shared, "world": world}, max_time, fuse)
-    swept(recipe, axes, Path(database), jobs or cores(), retry)
-    return summarise(Path(database))
+    kept = path_of(database)
+    swept(recipe, axes, kept, jobs or cores(), retry)
+    return summarise(kept)
 
 
 class PlannedAssembly(NamedTuple):
@@ -252,5 +252,5 @@ def plan(
     found = planned_for(placed, replace(search, templates=operations))
     if isinstance(found, CannotAssemble):
         raise InputError(refusal(found))
-    files = write_planned(placed, found, Path(output), file, passing, operations)
+    files = write_planned(placed, found, path_of(output), file, passing, operations)
     return PlannedAssembly(read(files[0], templates).pag, found, files)

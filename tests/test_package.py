@@ -9,6 +9,7 @@ import os
 import shutil
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -172,6 +173,18 @@ def test_a_plan_is_a_product_and_what_interlocks_is_refused(tmp_path: Path) -> N
         factory.plan(tmp_path / "puzzle.pag", tmp_path / "none", replan=True)
     assert [diagnostic.code for diagnostic in caught.value.diagnostics] == ["CannotAssemble"]
     assert not (tmp_path / "none").exists()
+
+
+def test_a_layout_keeps_the_settings_and_the_ground_of_its_plan(tmp_path: Path) -> None:
+    """What a call does not choose is that of the plan.json, or of the layout."""
+    factory.build(PAPER, tmp_path, settings=factory.Settings(hands=False))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        layout = factory.lay_out(tmp_path / "plan.json")
+    assert not layout.hands and factory.lay_out(layout) is layout
+    wider = factory.lay_out(layout, clearance=0.03)
+    assert wider.clearance == 0.03 and not wider.hands
+    assert factory.lay_out(layout, settings=factory.Settings()).hands
 
 
 def test_settings_replace_those_of_a_project() -> None:

@@ -135,7 +135,7 @@ def _proved(sought: Sought) -> Iterator[Judged]:
     table = subsets(sought.graphs)
 
     def late() -> bool:
-        return sought.budget.late_by() > PROVING
+        return sought.budget.time_used > PROVING
 
     for apart in (False, True):
         ranks = _ranks(sought, table, apart, late)
@@ -198,7 +198,7 @@ def _grown(sought: Sought) -> Iterator[Judged]:
     def late_after(share: float) -> Late:
         def late() -> bool:
             sought.budget.spend()
-            return sought.budget.gone > share
+            return sought.budget.used > share
 
         return late
 
@@ -217,7 +217,7 @@ def _grown(sought: Sought) -> Iterator[Judged]:
     least = min(judged.price for judged in first)
     best = min(first, key=lambda j: (j.price > least, j.seconds))
     yield best
-    factors, begin = BOUNDS[sought.aim], sought.budget.gone
+    factors, begin = BOUNDS[sought.aim], sought.budget.used
     for number, factor in enumerate(factors):
         bound = factor * best.seconds
         late = late_after(begin + (GROWING - begin) * (number + 1) / len(factors))

@@ -33,11 +33,12 @@ class Allowance:
         return max(0.0, self.seconds - self.elapsed)
 
     @property
-    def gone(self) -> float:
+    def used(self) -> float:
         """The share of the candidates or of the time that is used up, whichever is greater."""
-        return max(self.spent / self.effort, self.late_by())
+        return max(self.spent / self.effort, self.time_used)
 
-    def late_by(self) -> float:
+    @property
+    def time_used(self) -> float:
         """The share of the time that is used up; infinite once the search is stopped."""
         elapsed = self.elapsed
         return elapsed if elapsed == inf else elapsed / self.seconds

@@ -147,10 +147,12 @@ class Feeders:
         self._sliders.settle()
         if self.back.numbers:
             self._take_back()
-        free = [number for number in self._vacant() if not self._is_busy(number)]
+        vacant = np.array(self._vacant(), np.intp)
+        clear = vacant[self._passing.clear()[vacant]] if len(vacant) else vacant
+        free = [number for number in clear.tolist() if not self._is_busy(number)]
         if free:
-            late, clear = self._obstructed(), self._passing.clear()
-            free = [number for number in free if clear[number] and number not in late]
+            late = self._obstructed()
+            free = [number for number in free if number not in late]
         if not free:
             return False
         loaded = self._load(free)
