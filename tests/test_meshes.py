@@ -176,6 +176,15 @@ def cracked() -> trimesh.Trimesh:
     return trimesh.Trimesh(corners, np.arange(len(corners)).reshape(-1, 3), process=False)
 
 
+def divided_twice() -> trimesh.Trimesh:
+    """The rims of a cylinder: 100 segments in its wall, 64 in its ends, four corners in common."""
+    wall, ends = (trimesh.creation.cylinder(0.05, 0.1, sections=sections) for sections in (100, 64))
+    level = np.abs(wall.face_normals[:, 2]) > 0.5
+    wall.update_faces(~level)
+    ends.update_faces(np.abs(ends.face_normals[:, 2]) > 0.5)
+    return trimesh.util.concatenate([wall, ends])
+
+
 def two_sided() -> trimesh.Trimesh:
     mesh = cube()
     faces = np.concatenate([mesh.faces, mesh.faces[:, ::-1]])
@@ -193,6 +202,7 @@ MENDED: tuple[tuple[Callable[[], trimesh.Trimesh], str, float], ...] = (
     (with_a_sliver, "had slivers or small holes", EDGE**3),
     (cracked, "had cracks", TUBE),
     (two_sided, "had duplicate triangles", EDGE**3),
+    (divided_twice, "had slivers or small holes", 0.1 * 50 * np.sin(np.pi / 50) * 0.05**2),
 )
 
 

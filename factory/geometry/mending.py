@@ -3,8 +3,10 @@ outwards."""
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
+import networkx as nx
 import numpy as np
 
 from factory.geometry.mesh_file import areas_of
@@ -17,9 +19,9 @@ if TYPE_CHECKING:
 GAP = 1e-5
 """In an open mesh, vertices closer than about this share of the longest edge are merged."""
 
-HOLES, SLIVERS = 0.05, 0.001
-"""Holes with three or four corners are filled if that adds no more than the first share of the
-surface, others if it adds no more than the second: the rim of a large hole says little about its
+FEW, HOLES, SLIVERS = 4, 0.05, 0.001
+"""Holes with few corners are filled if that adds no more than the second number's share of the
+surface, others if it adds no more than the third: the rim of a large hole says little about its
 interior."""
 
 HOLLOW = 1e-6
@@ -72,19 +74,42 @@ def _drop_twins(mesh: trimesh.Trimesh) -> None:
 
 
 def _fill(mesh: trimesh.Trimesh) -> None:
-    """Close small holes. They are found in a mesh of the same triangles with random vertices,
-    because trimesh adds no flat triangles, and flat ones close a side that has one vertex more than
-    its neighbour."""
-    from trimesh import repair
-
+    """Close small holes, and cracks along edges that two faces divide into different segments."""
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
-    for use_fan, most in ((False, HOLES), (True, SLIVERS)):
-        anywhere = _body(np.random.default_rng(0).random(vertices.shape), faces)
-        repair.fill_holes(anywhere, use_fan=use_fan)
-        filled = _body(vertices, np.asarray(anywhere.faces))
-        if len(filled.faces) > len(faces) and filled.area <= (1 + most) * mesh.area:
-            mesh.faces = filled.faces
-            return
+    filled = [(len(rim), _zipped(vertices, rim)) for rim in _rims(faces)]
+    for few, share in ((True, HOLES), (False, SLIVERS)):
+        added = [triangles for corners, triangles in filled if (corners <= FEW) == few]
+        if added and areas_of(vertices, np.concatenate(added)).sum() <= share * mesh.area:
+            mesh.faces = np.concatenate([mesh.faces, *added])
+
+
+def _rims(faces: Indices) -> list[list[int]]:
+    """The holes of a mesh: the shortest cycles of its open edges, each edge in one, in the
+    orientation of the triangles that close them."""
+    edges = np.concatenate([faces[:, [1, 0]], faces[:, [2, 1]], faces[:, [0, 2]]])
+    _, first, count = np.unique(
+        np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    border = nx.Graph(edges[first[count == 1]].tolist())
+    rims: list[list[int]] = []
+    for start, end in edges[first[count == 1]].tolist():
+        if border.has_edge(start, end):
+            border.remove_edge(start, end)
+            if nx.has_path(border, end, start):
+                rims.append(nx.shortest_path(border, end, start))
+                border.remove_edges_from(pairwise(rims[-1]))
+    return rims
+
+
+def _zipped(vertices: Array, rim: list[int]) -> Indices:
+    """The triangles (m, 3) that close a hole. Each cuts off the corner whose neighbours are nearest
+    to each other, so that a crack is closed from its ends."""
+    corners, triangles = list(rim), []
+    while len(corners) > 2:
+        before, after = np.roll(corners, 1), np.roll(corners, -1)
+        cut = int(np.linalg.norm(vertices[before] - vertices[after], axis=1).argmin())
+        triangles.append((before[cut], corners.pop(cut), after[cut]))
+    return np.array(triangles)
 
 
 def _wind(mesh: trimesh.Trimesh) -> None:

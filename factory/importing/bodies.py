@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from factory.geometry.glb_reader import Colour
+from factory.geometry.mending import mended
 from factory.geometry.mesh_file import MeshFile, areas_of
-from factory.geometry.meshes import Array, is_closed, volume_of
+from factory.geometry.meshes import Array, Indices, is_closed, volume_of
 from factory.geometry.pieces import MOST_PIECES, components, submeshes
 from factory.geometry.touching import bodies as shells
 from factory.lang.source import quoted
@@ -130,8 +131,8 @@ def most_of(areas: Array, colours: Sequence[Colour]) -> Colour:
 
 def solids_of(body: FileBody) -> tuple[FileBody, ...]:
     """The solids of a body, separated where they touch, each with its cavities and in its
-    predominant colour; the body itself if it is one solid, or is not closed."""
-    vertices, faces = body.mesh.merged()
+    predominant colour; the body itself if it is one solid, or cannot be closed."""
+    vertices, faces, _ = mended(*body.mesh.merged())
     if not is_closed(faces):
         return (body,)
     number = shells(vertices, faces)
@@ -146,19 +147,27 @@ def solids_of(body: FileBody) -> tuple[FileBody, ...]:
         around = (boxes[outer, 0] <= boxes[n, 0]) & (boxes[outer, 1] >= boxes[n, 1])
         near = outer[around.all(axis=1)]
         of[n] = min(near if len(near) else outer, key=volume.__getitem__)
-    areas, paint = areas_of(vertices, faces), np.repeat(-1, len(faces))
+    return _divided(body, vertices, faces, np.unique(of[number], return_inverse=True)[1])
+
+
+def _divided(
+    body: FileBody, vertices: Array, faces: Indices, number: Indices
+) -> tuple[FileBody, ...]:
+    """The bodies of the triangles with equal numbers, 0, 1, ..., each in its predominant colour.
+    `faces` are those of the body, and perhaps others that close it."""
+    areas, paint = areas_of(vertices, faces), np.full(len(faces), -1)
     sizes = [len(triangles) for _, triangles in body.mesh.bodies]
-    if body.colours and sum(sizes) == len(faces):
-        paint = np.repeat(np.arange(len(sizes)), sizes)
-    solids = []
-    for index, solid in enumerate(outer.tolist(), 1):
-        chosen = of[number] == solid
-        used, corners = np.unique(faces[chosen], return_inverse=True)
-        shades = [body.colour if n < 0 else body.colours[n] for n in paint[chosen].tolist()]
-        mesh = MeshFile(((vertices[used], corners.reshape(-1, 3)),))
-        name = body.name and f"{body.name}-{index}"
-        solids.append(FileBody(name, mesh, most_of(areas[chosen], shades)))
-    return tuple(solids)
+    if body.colours and sum(sizes) <= len(faces):
+        paint[: sum(sizes)] = np.repeat(np.arange(len(sizes)), sizes)
+    colours = (*body.colours, body.colour)
+    return tuple(
+        FileBody(
+            body.name and f"{body.name}-{n + 1}",
+            MeshFile((mesh,)),
+            most_of(areas[number == n], [colours[shade] for shade in paint[number == n].tolist()]),
+        )
+        for n, mesh in enumerate(submeshes(vertices, faces, number))
+    )
 
 
 def _box(points: Array) -> Array:
@@ -169,9 +178,4 @@ def apart(body: FileBody) -> tuple[FileBody, ...]:
     """The connected components of a body; the body itself if it is connected."""
     vertices, faces = body.mesh.merged()
     number = components(len(vertices), faces)
-    if number.max() == 0:
-        return (body,)
-    return tuple(
-        FileBody(f"{body.name}-{index}", MeshFile((mesh,)), body.colour)
-        for index, mesh in enumerate(submeshes(vertices, faces, number), 1)
-    )
+    return _divided(body, vertices, faces, number) if number.max() > 0 else (body,)

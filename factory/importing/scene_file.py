@@ -158,8 +158,9 @@ def read_step(content: bytes) -> list[GlbBody]:
 
 
 def _stated(linear: Colour) -> Colour:
-    """A colour as STEP states it, in sRGB; glTF has linear values (IEC 61966-2-1)."""
+    """A colour as STEP states it, in sRGB; glTF has linear values (IEC 61966-2-1). What is
+    fully transparent is opaque here: SolveSpace writes opacity in place of transparency."""
     if linear is None:
         return None
     light = [12.92 * x if x <= 0.0031308 else 1.055 * x ** (1 / 2.4) - 0.055 for x in linear[:3]]
-    return (*(round(x, 3) for x in light), linear[3])
+    return (*(round(x, 3) for x in light), linear[3] or 1.0)
