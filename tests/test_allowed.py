@@ -96,6 +96,8 @@ def test_a_run_says_that_ways_were_blocked_unless_they_are_allowed(
     assert checked.status == 0 and (words in checked.err) == said
     passes = "a pair of parts passes through each other on the way by up to 35.00 mm"
     assert (passes in checked.out) == (not said)
+    counted = "1 blocked" if said else "1 allowed to pass through each other, 0 blocked"
+    assert f" lowered, {counted}" in checked.out
     done = run("run", file, "--no-hands", *options, "--log", log)
     watched = run("monitor", log)
     last = "the run succeeded\nparts passed through each other in 1 operation (Blocked)"

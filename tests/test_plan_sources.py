@@ -95,7 +95,7 @@ def test_a_folder_of_meshes_is_read_whatever_their_format(tmp_path: Path, suffix
     assert [p.kind for p in source.parts].count("leg-1") == 4
     assert len(source.files) == 2  # a mesh a kind
     assert "5 parts of 2 kinds (4 like leg-1)" in source.notes
-    assert any("taken as mm" in note and "0.6 m long" in note for note in source.notes)
+    assert any("taken as mm" in note and "the product is 0.6 x " in note for note in source.notes)
     for part in source.parts:
         low, high = part.vertices.min(axis=0), part.vertices.max(axis=0)
         assert np.allclose((*low, *high), TABLE[part.label], atol=1e-7)

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from factory.nets.coordinated import CoordinatedNet
     from factory.nets.verdict import Witness
     from factory.pipeline import Project
+    from factory.problem.pag import AllowedOverlap
     from factory.study.checking import Checked
 
 SHOWN = 24
@@ -94,7 +95,7 @@ def check(
         found = {"certificate": {"file": str(against), **proved}} if proved else {}
         emit({**checked.as_json(), **found})
     else:
-        _describe(checked, out.verbose)
+        _describe(checked, out.verbose, project.pag.allowed if project else ())
         if proved:
             say(f"{against} is a certificate of this net: {_claims(proved)}")
     return 0 if checked.verdict.holds else 1
@@ -136,7 +137,7 @@ def _pictures(checked: Checked, folder: Path) -> dict[Path, bytes]:
     return found
 
 
-def _describe(checked: Checked, verbose: bool) -> None:
+def _describe(checked: Checked, verbose: bool, allowed: Sequence[AllowedOverlap]) -> None:
     """Print the gears, the counts and the verdict."""
     document = checked.as_json()
     gears = document["gears"]
@@ -175,7 +176,7 @@ def _describe(checked: Checked, verbose: bool) -> None:
         more = ", ..." if len(checked.pool) > POOLED else ""
         say(f"copies of each part inside at once: {listed}{more}")
     if checked.matings is not None:
-        _describe_approaches(checked.matings)
+        _describe_approaches(checked.matings, allowed)
     if "deputies" in document:
         _describe_deputies(document["deputies"])
 
@@ -206,13 +207,16 @@ def _has_places(project: Project) -> bool:
     return is_shaped(project.pag) or bool(project.plan.turns)
 
 
-def _describe_approaches(matings: Matings) -> None:
-    """Print how many operations can be approached, and how."""
+def _describe_approaches(matings: Matings, allowed: Sequence[AllowedOverlap]) -> None:
+    """Print how many operations can be approached, and how; those whose parts are allowed to pass
+    through each other are not blocked."""
     strict, no_deeper, left_out = (matings.count(level) for level in (3, 2, 1))
-    lowered, blocked = len(matings.of_kind("lower")), len(matings.of_kind("blocked"))
+    lowered, blocked = len(matings.of_kind("lower")), len(matings.faults(allowed))
+    passing = len(matings.of_kind("blocked")) - blocked
     say(
         f"approach: {left_out} of {len(matings.all)} operations clear but for overlaps"
-        f" when finished, {no_deeper} never deeper, {strict} strictly; {lowered} lowered,"
+        f" when finished, {no_deeper} never deeper, {strict} strictly; {lowered} lowered"
+        f"{f', {passing} allowed to pass through each other' if passing else ''},"
         f" {blocked} blocked{' (--clashes DIR draws each)' if blocked else ''}"
     )
 

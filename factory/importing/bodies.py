@@ -93,9 +93,10 @@ def unit_of(bodies: Bodies, asked: str | None) -> tuple[float, str]:
     guessed (metres, or millimetres if metres would make the product too long). Raises InputError
     (Unit) if several units are plausible."""
     low, high = (np.array(ends) for ends in zip(*map(box_of, bodies.bodies), strict=True))
-    length = float((high.max(axis=0) - low.min(axis=0)).max())
+    extents = high.max(axis=0) - low.min(axis=0)
+    length = float(extents.max())
     if asked:
-        return UNITS[asked], f"lengths are in {asked}, as given by --unit: {_long(length, asked)}"
+        return UNITS[asked], f"lengths are in {asked}, as given by --unit: {_sizes(extents, asked)}"
     if bodies.unit and (bodies.sure or length * UNITS[bodies.unit] <= LIKELY):
         return UNITS[bodies.unit], f"lengths are in {bodies.unit}: {bodies.by}"
     why = (
@@ -114,11 +115,12 @@ def unit_of(bodies: Bodies, asked: str | None) -> tuple[float, str]:
         )
         raise InputError(Diagnostic("Unit", message, None, "give it with --unit m, cm, mm or in"))
     unit = "m" if length <= DOUBTFUL[0] else "mm"
-    return UNITS[unit], f"lengths are taken as {unit}: {why}; {_long(length, unit)} (--unit)"
+    return UNITS[unit], f"lengths are taken as {unit}: {why}; {_sizes(extents, unit)} (--unit)"
 
 
-def _long(length: float, unit: str) -> str:
-    return f"the product is {length * UNITS[unit]:.4g} m long"
+def _sizes(extents: Array, unit: str) -> str:
+    sizes = " x ".join(f"{extent * UNITS[unit]:.4g}" for extent in extents)
+    return f"the product is {sizes} m"
 
 
 def most_of(areas: Array, colours: Sequence[Colour]) -> Colour:
