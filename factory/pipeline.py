@@ -103,6 +103,7 @@ class Project:
         InputError (BadLine)."""
         from factory.compiler.folding import fold, lines_of_labels
 
+        self.pag.check_alone("[lines]")
         factory = self.planned
         made = fold(factory, lines_of_labels(factory, lines), self.catalogue)
         return self.with_plan(made.plan)
@@ -137,6 +138,18 @@ class Project:
 
         return product_geometry(self.pag)
 
+    @cached_property
+    def each(self) -> tuple[Project, ...]:
+        """A project for each product of a mix, alone; itself for one product."""
+        if self.pag.mix is None:
+            return (self,)
+        alone = [
+            self.with_plan(self._single).with_pag(self.pag.product(x)) for x in self.pag.products
+        ]
+        for project in alone:
+            project.__dict__["product"] = self.product
+        return tuple(alone)
+
     @property
     def has_geometry(self) -> bool:
         """Whether its solids have been computed."""
@@ -153,6 +166,10 @@ class Project:
         """What was found of how its inputs come together; None for a product of default boxes."""
         if not is_shaped(self.pag):
             return None
+        if self.pag.mix is not None:
+            from factory.compiler.mating.findings import together
+
+            return together(filter(None, (one.matings for one in self.each)))
         from factory.compiler.mating.mating import matings
 
         return matings(expand(self.pag, self.templates, self._single), self.product)
@@ -160,9 +177,12 @@ class Project:
     @property
     def overlaps(self) -> DrawnOverlaps:
         """Which parts overlap in the finished product; none of default boxes."""
-        from factory.geometry.overlapping import DrawnOverlaps, overlaps_of
+        from factory.geometry.overlapping import DrawnOverlaps, overlaps_of, within
 
-        return overlaps_of(self.product) if is_shaped(self.pag) else DrawnOverlaps()
+        if not is_shaped(self.pag):
+            return DrawnOverlaps()
+        found = overlaps_of(self.product)
+        return within(found, *self.pag.insides) if self.pag.mix else found
 
     @property
     def warnings(self) -> tuple[Diagnostic, ...]:
@@ -199,7 +219,7 @@ class Project:
     @cached_property
     def plain(self) -> Factory:
         """The factory of the plan, without relays. Raises InputError where there is none."""
-        factory, plan = self.planned, self.plan
+        factory, plan = self.planned, self.planned.plan
         if not (self.settings.hands and plan.turns) or plan.lifts is not None:
             return factory
         from factory.layout.hands.adjusting import lifts_for
@@ -212,7 +232,14 @@ class Project:
     @cached_property
     def planned(self) -> Factory:
         """The same, but for lifts of robots with several tours."""
-        return self._shared(self.plan) if self.plan.turns else self.compiled
+        if self.plan.turns:
+            return self._shared(self.plan)
+        if self.pag.mix is None:
+            return self.compiled
+        from factory.compiler.mixing import even, mixed
+
+        sequence = self.pag.mix.sequence or even(self.pag.mix)
+        return self._shared(self.plan.then(mixed(self.approached, sequence, self.catalogue)))
 
     def _shared(self, plan: Plan) -> Factory:
         from factory.compiler.assigning import shared
@@ -222,8 +249,11 @@ class Project:
     @cached_property
     def approached(self) -> Factory:
         """`compiled`, with how inputs come together where that is free: in default boxes."""
+        from factory.compiler.assigning import beside
         from factory.compiler.mating.mating import judged
 
+        if self.pag.mix is not None:
+            return beside(self.pag, [one.approached for one in self.each])
         return judged(self.compiled, self.product)
 
     @property
@@ -235,6 +265,10 @@ class Project:
     def compiled(self) -> Factory:
         """The factory of the plan, with a robot for each tour and without relays. Raises InputError
         where there is no such factory."""
+        if self.pag.mix is not None:
+            from factory.compiler.assigning import beside
+
+            return beside(self.pag, [one.compiled for one in self.each])
         factory = compile_pag(
             self.pag, self.templates, self.catalogue, self.approaches, self._single
         )

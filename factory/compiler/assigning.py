@@ -14,14 +14,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import accumulate
 
 from factory.nets.gears import Gear, GearNet
 from factory.nets.petri import PetriNet, Place, Transition
 from factory.nets.threaded import Redistribution, ThreadedNet
-from factory.plant.approaches import Overlap
-from factory.plant.factory import Factory, Operation, Robot, in_turn
-from factory.problem.pag import NOPART
-from factory.problem.plan import Plan
+from factory.plant.factory import Factory, Operation, Robot
+from factory.problem.pag import NOPART, PAG
+from factory.problem.plan import NOBODY, Plan, in_turn, out_of_turn
 from factory.problem.robot_types import LIFT, Catalogue
 from factory.support.errors import Diagnostic, InputError
 
@@ -94,15 +94,51 @@ def _wait_name(robot: Robot, label: str, onward: Operation, several: bool) -> st
     return f"{robot.name}:{label}"
 
 
+def beside(pag: PAG, factories: Sequence[Factory]) -> Factory:
+    """The factory of a mix whose products are made by factories that share no robot: in a period
+    each makes one unit."""
+    parts = [(unit, o) for unit, one in enumerate(factories) for o in one.making]
+    parts += [(unit, one.dropoff) for unit, one in enumerate(factories)]
+    number = {(unit, o.index): n for n, (unit, o) in enumerate(parts)}
+    firsts = [0, *accumulate(len(one.robots) for one in factories)]
+    operations = tuple(
+        for_unit(o, n, unit, range(firsts[unit], firsts[unit + 1]))
+        for n, (unit, o) in enumerate(parts)
+    )
+    robots = tuple(
+        replace(
+            robot,
+            index=firsts[unit] + robot.index,
+            name=f"r{firsts[unit] + robot.index + 1}",
+            operations=tuple(number[unit, i] for i in robot.operations),
+        )
+        for unit, one in enumerate(factories)
+        for robot in one.robots
+    )
+    return replace(
+        factories[0],
+        pag=pag,
+        robots=robots,
+        operations=operations,
+        net=gear_net(robots, operations),
+        parents=tuple(number.get((u, factories[u].parents[o.index]), -1) for u, o in parts),
+        period=len(factories),
+    )
+
+
 def assigned(base: Factory, robots: Sequence[Robot], turns: Sequence[Sequence[int]]) -> Factory:
     """The factory with these `robots` and new programs: in turn t robot `turns[t][r]` (index) does
-    the tours of robot r of `base`. Near-linear."""
-    period, when = len(turns), base.postorder
+    the tours of robot r of `base`, NOBODY those of a product that is not made in this turn.
+    Near-linear."""
+    when, outputs = base.postorder, [dropoff.carrier for dropoff in base.dropoffs]
+    made = ((t, u) for t, does in enumerate(turns) for u, r in enumerate(outputs) if does[r] >= 0)
+    unit = {one: n for n, one in enumerate(made)}
     makes, drops = range(len(base.making)), range(len(base.making), len(base.operations))
-    every = ((o, turn) for part in (makes, drops) for turn in range(period) for o in part)
-    number = {unit: n for n, unit in enumerate(every)}
+    every = ((o, turn) for part in (makes, drops) for turn in range(len(turns)) for o in part)
+    each = ((i, turn) for i, turn in every if (turn, base.operations[i].turn) in unit)
+    number = {one: n for n, one in enumerate(each)}
     operations = tuple(
-        _for_unit(o := base.operations[i], n, turn * base.period + o.turn, turns[turn])
+        for_unit(o := base.operations[i], n, unit[turn, o.turn], turns[turn])
         for (i, turn), n in number.items()
     )
     programs: list[list[int]] = [[] for _ in robots]
@@ -112,7 +148,7 @@ def assigned(base: Factory, robots: Sequence[Robot], turns: Sequence[Sequence[in
         for tour in tours_of
     )
     for turn, does in enumerate(turns):
-        for _, robot, tour in tours:
+        for _, robot, tour in (one for one in tours if does[one[1]] >= 0):
             programs[does[robot]] += [number[o, turn] for o in tour]
     crew = tuple(
         replace(robot, operations=tuple(program))
@@ -126,7 +162,7 @@ def assigned(base: Factory, robots: Sequence[Robot], turns: Sequence[Sequence[in
         net=gear_net(crew, operations),
         parents=tuple(parents),
         plan=base.plan.then(turns),
-        period=base.period * period,
+        period=len(unit),
     )
 
 
@@ -138,15 +174,22 @@ def shared(base: Factory, plan: Plan, catalogue: Catalogue) -> Factory:
     tours = range(len(base.robots))
     if any(len(turn) != len(tours) for turn in plan.turns):
         raise _bad(f"each turn must name a robot for each of {len(tours)} tours")
+    if any(max(turn) == NOBODY for turn in plan.turns):
+        raise _bad("a turn makes no product")
     every = range(1 + max(map(max, plan.turns)))
     for turn in plan.turns:
         for o in base.operations:
-            if len({turn[robot] for robot in o.robots}) < len(o.robots):
+            does, output = [turn[robot] for robot in o.robots], base.dropoffs[o.turn].carrier
+            if (min(does) == NOBODY or turn[output] == NOBODY) and {*does, turn[output]} != {
+                NOBODY
+            }:
+                raise _bad(f"nobody does some of the tours of '{base.products[o.turn]}' in a turn")
+            if len({*does}) < len(does) and NOBODY not in does:
                 raise _bad(f"a robot cannot take two parts in '{o.label}'")
     types, first = dict[int, str](), dict[int, Robot]()
     for tour in tours:
         base_robot = base.robots[tour]
-        for robot in dict.fromkeys(turn[tour] for turn in plan.turns):
+        for robot in dict.fromkeys(turn[tour] for turn in plan.turns if turn[tour] != NOBODY):
             first.setdefault(robot, base_robot)
             kind = types.setdefault(robot, base_robot.type)
             types[robot] = catalogue.meet(kind, base_robot.type) or kind
@@ -166,7 +209,7 @@ def _bad(words: str) -> InputError:
     return InputError(Diagnostic("BadPlan", f"the plan is not of this product: {words}"))
 
 
-def _for_unit(o: Operation, index: int, unit: int, does: Sequence[int]) -> Operation:
+def for_unit(o: Operation, index: int, unit: int, does: Sequence[int]) -> Operation:
     """A copy of an operation for a unit of a period; `does`: the robot that does the tours of each
     robot."""
     robots = tuple(does[robot] for robot in o.robots)
@@ -174,18 +217,10 @@ def _for_unit(o: Operation, index: int, unit: int, does: Sequence[int]) -> Opera
         return replace(o, index=index, robots=robots)
 
     def named(label: str) -> str:
-        return label if label == NOPART else in_turn(label.removesuffix(in_turn("", o.turn)), unit)
-
-    def overlapping(overlap: Overlap) -> Overlap:
-        one, other = overlap.parts
-        return replace(overlap, parts=(named(one), named(other)))
+        return label if label == NOPART else in_turn(out_of_turn(label, o.turn), unit)
 
     before, after = (tuple(map(named, labels)) for labels in (o.before, o.after))
-    approach = o.approach and replace(
-        o.approach,
-        lowered=o.approach.lowered and named(o.approach.lowered),
-        overlaps=tuple(tuple(map(overlapping, side)) for side in o.approach.overlaps),
-    )
+    approach = o.approach and o.approach.renamed(named)
     return replace(
         o,
         index=index,

@@ -12,7 +12,7 @@ from dataclasses import replace
 from functools import cache
 from types import MappingProxyType
 
-from factory.compiler.assigning import gear_net
+from factory.compiler.assigning import beside, gear_net
 from factory.compiler.domains import check_prepared
 from factory.compiler.expanding import Node, expand
 from factory.plant.approaches import Approach
@@ -35,7 +35,7 @@ def compile_pag(
     plan: Plan = AS_WRITTEN,
 ) -> Factory:
     """The factory that makes the product `pag` with the forms and hand-overs of a plan, and a robot
-    for each tour.
+    for each tour. The products of a mix are compiled apart: each makes a unit in a period.
 
     `approaches`: how the inputs of operations (by label, see `expand`) can come together; where one
     is to be lowered, a lift brings it.
@@ -44,6 +44,11 @@ def compile_pag(
     numbered as in the specification of the net: the output robot is r1; an operation numbers all
     its new robots at once, the input with fewest operation instances first, tools last.
     """
+    if pag.mix is not None:
+        products = map(pag.product, pag.products)
+        return beside(
+            pag, [compile_pag(x, templates, catalogue, approaches, plan) for x in products]
+        )
     return compile_nodes(pag, expand(pag, templates, plan), templates, catalogue, approaches, plan)
 
 

@@ -42,9 +42,9 @@ def in_parallel(factory: Factory, branches: Branches) -> Factory:
         above = lines[delivery(factory, robot.index).carrier] if lines else 1
         lines.append(above * times.get(robot.index, 1))
     period = lcm(*lines)
-    if period > MOST_BRANCHES:
+    if (units := period * factory.period) > MOST_BRANCHES:
         names = ", ".join(f"{label} = {k}" for label, k in branches)
-        message = f"{names} would make {period} units in one period; {MOST_BRANCHES} are the most"
+        message = f"{names} would make {units} units in one period; {MOST_BRANCHES} are the most"
         raise InputError(_fault(message, None, "take numbers with a small common multiple"))
     return _unrolled(factory, lines, period) if period > 1 else factory
 
@@ -74,7 +74,7 @@ def _brings(factory: Factory, label: str) -> int:
 def _faults(factory: Factory, branches: Branches) -> Iterator[Diagnostic]:
     """What forbids that these branches are there several times."""
     times: dict[int, tuple[str, int]] = {}
-    taken = [o.label for o in factory.operations if "@" in o.label]
+    taken = [o.label for o in factory.operations if "@" in o.written]
     for label, k in branches:
         robot = _brings(factory, label)
         if robot < 0:

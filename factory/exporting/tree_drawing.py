@@ -58,14 +58,17 @@ def draw_tree(pag: PAG) -> str:
 
 def _places(pag: PAG) -> dict[str, Point]:
     """Middle of each label's box: a row for each part; an assembly lies between its inputs, to the
-    right of them."""
+    right of them. In a mix, one that would lie on another lies further to the right."""
     found: dict[str, Point] = {}
     row = 0
     for node in pag.postorder():
         inputs = [found[label] for label in node.inputs]
         if inputs:
             x = max(x for x, _ in inputs) + COLUMN
-            found[node.label] = x, (inputs[0][1] + inputs[-1][1]) / 2
+            y = (inputs[0][1] + inputs[-1][1]) / 2
+            while pag.mix and any(x == u and abs(y - v) < ROW for u, v in found.values()):
+                x += COLUMN
+            found[node.label] = x, y
         else:
             found[node.label] = EDGE + BOX / 2, EDGE + ROW * (row + 0.5)
             row += 1

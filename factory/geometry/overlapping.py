@@ -103,11 +103,15 @@ def everywhere(product: Product) -> tuple[AllowedOverlap, ...]:
     return (AllowedOverlap(EVERYWHERE),) if needed else ()
 
 
-def within(overlaps: DrawnOverlaps, parts: Collection[str]) -> DrawnOverlaps:
-    """The overlaps between some parts."""
+def within(overlaps: DrawnOverlaps, *products: Collection[str]) -> DrawnOverlaps:
+    """The overlaps between parts of one product, given by the parts of each."""
     return DrawnOverlaps(
-        tuple(pair for pair in overlaps.pairs if pair.one in parts and pair.other in parts),
-        tuple(part for part in overlaps.open if part in parts),
+        tuple(
+            pair
+            for pair in overlaps.pairs
+            if any(pair.one in parts and pair.other in parts for parts in products)
+        ),
+        tuple(part for part in overlaps.open if any(part in parts for parts in products)),
     )
 
 

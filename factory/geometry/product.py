@@ -8,9 +8,10 @@ with a warning that names it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import count
 from pathlib import Path
 from types import MappingProxyType
 
@@ -82,9 +83,10 @@ def product_geometry(pag: PAG, files: Mapping[str, bytes] = MappingProxyType({})
     shaped = {n.label: reader.solid(n, i) for i, n in enumerate(leaves) if _has_shape(n)}
     solids = {label: solid for label, solid in shaped.items() if solid is not None}
     lift = max((float(solid.high[2]) for solid in solids.values()), default=0.0)
-    cells = _lattice(len(plain))
+    cells = _cells(pag, {node.label for node in plain})
+    lattice = _lattice(1 + max(cells.values(), default=-1))
     for number, node in enumerate(plain):
-        solids[node.label] = _box_in_lattice(node, number, cells, lift)
+        solids[node.label] = _box_in_lattice(node, number, cells[node.label], lattice, lift)
     faults = [beyond(node, solids[node.label]) for node in leaves if node.label in solids]
     if reader.errors or any(faults):
         raise InputError([*reader.errors, *(fault for fault in faults if fault)])
@@ -98,19 +100,33 @@ def _has_shape(node: Assembly) -> bool:
     return any(p.name in SHAPES for p in node.parameters)
 
 
-def _lattice(count: int) -> tuple[int, float]:
-    """Cells along an edge, and the edge of a cell [m], for `count` parts."""
+def _cells(pag: PAG, plain: Collection[str]) -> dict[str, int]:
+    """The cell of each part without a shape, by its label: in each product they are side by side,
+    in the order of its tree, as far as they are in no other product before."""
+    cells: dict[str, int] = {}
+    for product in pag.products:
+        parts = [n.label for n in pag.product(product).postorder() if n.label in plain]
+        taken = {cells[label] for label in parts if label in cells}
+        free = (cell for cell in count() if cell not in taken)
+        cells |= {label: next(free) for label in parts if label not in cells}
+    return cells
+
+
+def _lattice(number: int) -> tuple[int, float]:
+    """Cells along an edge, and the edge of a cell [m], for a number of parts."""
     edge = 1
-    while edge**3 < count:
+    while edge**3 < number:
         edge += 1
     return edge, min(CELL, LATTICE / edge)
 
 
-def _box_in_lattice(node: Assembly, number: int, cells: tuple[int, float], lift: float) -> Solid:
-    """A box in the cell `number` of a path that winds through the lattice, so that neighbours in
-    number are neighbours in space."""
-    edge, cell = cells
-    layer, rest = divmod(number, edge * edge)
+def _box_in_lattice(
+    node: Assembly, number: int, index: int, lattice: tuple[int, float], lift: float
+) -> Solid:
+    """A box in the cell `index` of a path that winds through the lattice, so that neighbours on the
+    path are neighbours in space; `number` chooses its colour."""
+    edge, cell = lattice
+    layer, rest = divmod(index, edge * edge)
     row, column = divmod(rest, edge)
     if layer % 2:
         row = edge - 1 - row

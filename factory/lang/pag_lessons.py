@@ -26,6 +26,12 @@ FALSE_PLACE = Lesson(
     "behind",
     "",
 )
+FALSE_MIX = Lesson(
+    "unexpected {found} in the mix of products",
+    "write how many of each: mix = 3 truck, 1 van; or the order: mix = truck, truck, van;",
+    "found",
+    "",
+)
 FALSE_ROOT = Lesson("unexpected {found} after the root", "write: root = label;", "found", "")
 
 LESSONS = (

@@ -17,6 +17,7 @@ from itertools import chain, product, repeat
 
 from lark import Token
 
+from factory.lang.mixes import mix_of
 from factory.lang.operations import AssemblyReader, signature
 from factory.lang.pag_syntax import read_statements
 from factory.lang.source import STDIN, Findings, quoted, read_text, source_of
@@ -77,11 +78,12 @@ def read_pag(
     unit = unit_of(statements, findings)
     reader = AssemblyReader(findings, signatures, folder, unit)
     nodes = tuple(map(reader.read, written_out(statements, findings)))
+    mix = mix_of(statements, findings)
     TreeCheck(statements, nodes, findings).run()
     allowed = allowances_of(statements, nodes, unit, findings)
     findings.raise_if_any()
     count = next((int(token.lstrip("0") or 0) for token in statements.counts), None)
-    return PAG(str(statements.roots[0]), nodes, count, folder or ".", file, allowed)
+    return PAG(str(statements.roots[0]), nodes, count, folder or ".", file, allowed, mix)
 
 
 def unit_of(statements: Statements, findings: Findings) -> str:

@@ -14,7 +14,14 @@ from typing import Any
 
 from lark import Lark, Token, Transformer, UnexpectedInput, v_args
 
-from factory.lang.pag_lessons import FALLBACK, FALSE_PLACE, FALSE_ROOT, FALSE_UNIT, LESSONS
+from factory.lang.pag_lessons import (
+    FALLBACK,
+    FALSE_MIX,
+    FALSE_PLACE,
+    FALSE_ROOT,
+    FALSE_UNIT,
+    LESSONS,
+)
 from factory.lang.recovery import (
     UNLAWFUL,
     Lesson,
@@ -26,10 +33,12 @@ from factory.lang.recovery import (
 )
 from factory.lang.source import Findings, quoted
 from factory.lang.statements import (
+    Amount,
     CopiedLabel,
     Definition,
     Equation,
     Keyword,
+    MixStatement,
     Permission,
     PlaceList,
     Statements,
@@ -65,6 +74,12 @@ class _Builder(Transformer[Token, Any]):
 
     def permission(self, word: Token, *words: Token) -> Permission:
         return Permission(word, words)
+
+    def mix(self, word: Token, *amounts: Amount) -> MixStatement:
+        return MixStatement(word, amounts)
+
+    def amount(self, *words: Token) -> Amount:
+        return Amount(words)
 
     def places(self, word: Token, *vectors: Vector) -> PlaceList:
         return PlaceList(word, vectors)
@@ -125,6 +140,9 @@ def _sort_in(statement: Any, made: Statements, findings: Findings) -> None:
         return
     if isinstance(statement, Permission):
         made.permissions.append(statement)
+        return
+    if isinstance(statement, MixStatement):
+        made.mixes.append(statement)
         return
     first, second = statement
     if isinstance(statement, Equation) and first == "root":
@@ -200,7 +218,9 @@ def _parse_piece(piece: list[Token], findings: Findings) -> Any | None:
 
 def _report_stuck(stuck: Stuck, piece: list[Token], findings: Findings) -> None:
     lesson = _lessons().get((stuck.state, stuck.token.type), FALLBACK)
-    if piece[0] == "root" and stuck.index >= 3 and piece[1].type == "EQUAL":
+    if piece[0].type == "MIX":
+        lesson = FALSE_MIX
+    elif piece[0] == "root" and stuck.index >= 3 and piece[1].type == "EQUAL":
         lesson = FALSE_ROOT
     elif piece[0] == "unit" and stuck.index >= 2 and all(t.type != "LPAR" for t in piece):
         lesson = FALSE_UNIT
@@ -257,7 +277,7 @@ def _starts(tokens: Sequence[Token], index: int, depth: int) -> bool:
     if kinds[1:2] == ["COPIES"]:
         del kinds[1]
     kinds = kinds[:4]
-    if kinds[:1] == ["ALLOW"] and depth <= 0:
+    if kinds[:1] in (["ALLOW"], ["MIX"]) and depth <= 0:
         return True
     if kinds[:1] != ["WORD"]:
         return False

@@ -74,6 +74,19 @@ class WordPair(NamedTuple):
     second: Token
 
 
+class Amount(NamedTuple):
+    """`3 truck` or `truck` of a mix: its words."""
+
+    words: Sequence[Token]
+
+
+class MixStatement(NamedTuple):
+    """`mix = 3 truck, 1 van`, `mix = truck, truck, van`."""
+
+    word: Token
+    amounts: Sequence[Amount]
+
+
 class Permission(NamedTuple):
     """`allow ( peg, frame, 0.0005 )`, `allow ( 0.0005 )`."""
 
@@ -88,11 +101,17 @@ class Statements:
 
     definitions: list[Definition] = field(default_factory=list)
     permissions: list[Permission] = field(default_factory=list)
+    mixes: list[MixStatement] = field(default_factory=list)
     units: list[Token] = field(default_factory=list)
     roots: list[Token] = field(default_factory=list)
     counts: list[Token] = field(default_factory=list)
     broken: set[str] = field(default_factory=set)
     nameless: bool = False
+
+    @property
+    def mixed(self) -> bool:
+        """Whether the text has a mix of products, well formed or not."""
+        return bool(self.mixes) or "mix" in self.broken
 
 
 def labels_of(label: Token | CopiedLabel) -> list[Token]:

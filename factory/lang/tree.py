@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from factory.lang.mixes import check_mix
 from factory.lang.source import Findings, quoted, where
 from factory.lang.statements import Statements
 from factory.lang.words import LABEL_HINT, is_label, is_number
@@ -68,10 +69,10 @@ class TreeCheck:
                     continue
                 if label not in self.defined:
                     self._use_undefined(label, node.input_positions[index])
-                elif label in self.users:
+                elif label in self.users and not self.statements.mixed:
                     self._report_second_use(label, node.input_positions[index])
                 else:
-                    self.users[label] = (node, index)
+                    self.users.setdefault(label, (node, index))
 
     def _use_undefined(self, label: str, position: Position) -> None:
         if label in RESERVED:
@@ -91,13 +92,23 @@ class TreeCheck:
 
     def _check_roots(self) -> None:
         roots, at = self.statements.roots, self.findings.source.at
+        if self.statements.mixed:
+            check_mix(roots, self.defined, self.findings)
+            for root in roots:
+                if root not in self.defined:
+                    self._use_undefined(str(root), at(root))
+            return
         for root in roots[1:]:
             message = f"the root is given twice, first {where(at(roots[0]), at(root))}"
             hint = "a factory makes one product: remove one of the two"
             self.findings.add("Root", message, root, hint)
         if roots and roots[0] not in self.defined:
             self._use_undefined(str(roots[0]), at(roots[0]))
-        if not roots and "root" not in self.statements.broken and "root" not in self.defined:
+        if (
+            not roots
+            and self.statements.broken.isdisjoint(("root", "mix"))
+            and "root" not in self.defined
+        ):
             self._report_missing_root()
 
     def _report_missing_root(self) -> None:
@@ -147,12 +158,12 @@ class TreeCheck:
         roots = self.statements.roots
         if not roots or roots[0] not in self.defined.keys() | self.statements.broken:
             return
-        root = str(roots[0])
+        root, product = str(roots[0]), "a" if self.statements.mixed else "the"
         hint = f"use it in the making of {quoted(root)}, or remove it"
         for label in free:
             if label not in doubtful:
-                message = f"{quoted(label)} is not part of the product: nothing uses it"
-                if root in self.users:
+                message = f"{quoted(label)} is not part of {product} product: nothing uses it"
+                if root in self.users and not self.statements.mixed:
                     hint = f"{quoted(root)} goes into another: did you mean root = {label};"
                 self.findings.add("UnreachableLabel", message, _place(self.defined[label]), hint)
 

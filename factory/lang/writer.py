@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from factory.problem.pag import PAG, AllowedOverlap, Assembly, Value
+from factory.problem.pag import PAG, AllowedOverlap, Assembly, Mix, Value
 from factory.problem.template import LOST, Failure, Law, Template
 
 
@@ -10,8 +10,15 @@ def write_pag(pag: PAG) -> str:
     """The canonical text of a PAG: one statement a line, numbers at full precision."""
     count = [] if pag.count is None else [f"{pag.count} parts;"]
     allowed = map(write_allowance, pag.allowed)
-    lines = [*count, f"root = {pag.root};", *allowed, *map(write_assembly, pag.nodes)]
+    products = f"root = {pag.root};" if pag.mix is None else write_mix(pag.mix)
+    lines = [*count, products, *allowed, *map(write_assembly, pag.nodes)]
     return "\n".join(lines) + "\n"
+
+
+def write_mix(mix: Mix) -> str:
+    """One statement: `mix = 3 truck, 1 van;` or, in order, `mix = truck, van, truck;`."""
+    counts = (f"{count} {label}" for label, count in mix.counts)
+    return f"mix = {', '.join(mix.sequence or counts)};"
 
 
 def write_allowance(allowed: AllowedOverlap) -> str:

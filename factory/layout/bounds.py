@@ -97,8 +97,8 @@ class _Bound:
         """The least way to where a robot delivers, by the operation in which it does; 0 for a
         tool."""
         if robot == 0:
-            product = self._box(self.factory.products[0], 0)
-            way = product.high - product.low + 1.5 * self.c
+            boxes = [self._box(product, 0) for product in self.factory.products]
+            way = max(box.high for box in boxes) - min(box.low for box in boxes) + 1.5 * self.c
             return {dropoff.index: way for dropoff in self.factory.dropoffs}
         axis, legs = self.axis[robot], dict[int, float]()
         for tour in self.factory.tours[robot]:

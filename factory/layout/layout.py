@@ -19,7 +19,7 @@ from factory.layout.dimensions import (
     WALL,
     up,
 )
-from factory.layout.guidepath import Box, Extent, Feeder, Guidepath, Point2, moved
+from factory.layout.guidepath import Box, Extent, Feeder, Guidepath, Point2, hull, moved
 from factory.layout.hands.hand import Hand
 from factory.layout.hands.mounted import Mount, grip_of
 from factory.layout.visits import LEAST, Visit, Visits, beyond_station, stop_offset
@@ -257,6 +257,11 @@ class Layout(Pictured):
         ]
         return round(max(0.0, ahead + over - min(lines) + self.clearance), 6)
 
+    @cached_property
+    def outgoing(self) -> Box:
+        """The box of the finished product, of all products of a mix."""
+        return hull([self.payloads[product] for product in self.factory.products])
+
     @property
     def outfeed_way(self) -> float:
         """How far the outfeed takes a product until it is out of sight [m]."""
@@ -265,14 +270,14 @@ class Layout(Pictured):
     @property
     def hand_ahead(self) -> float:
         """How far the hand of the output robot reaches ahead of the product [m]."""
-        grip, ahead = self.grip(0), self.payloads[self.factory.products[0]][1]
+        grip, ahead = self.grip(0), self.outgoing[1]
         return 0.0 if grip is None else up(max(0.0, grip[1] - ahead))
 
     @property
     def shed(self) -> Box:
         """The shed that the outfeed takes products into, in the world: its shutter is a clearance
         ahead of a product that is dropped off, and of the hand that does so."""
-        xlo, xhi, ylo, yhi = self.payloads[self.factory.products[0]]
+        xlo, xhi, ylo, yhi = self.outgoing
         x, y = self.guidepaths[0].a
         start = x + xhi + self.hand_ahead + self.clearance
         return start, start + WALL + BEHIND + xhi - xlo + SIDE, y + ylo - SIDE, y + yhi + SIDE
@@ -286,7 +291,7 @@ class Layout(Pictured):
     @cached_property
     def product_length(self) -> float:
         """Length of the finished product along the output robot's heading [m]."""
-        xlo, xhi, _, _ = self.payloads[self.factory.products[0]]
+        xlo, xhi, _, _ = self.outgoing
         return xhi - xlo
 
 

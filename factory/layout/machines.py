@@ -103,7 +103,7 @@ def _tray(layout: Layout, coordinated: Coordinated, robots: Staying) -> Iterator
     """The tray, at home, and on its way with a product and back."""
     slot, (x, y) = slot_of(layout), layout.guidepaths[0].a
     low, high = PAYLOAD - BELT_GAP - TRAY, PAYLOAD - BELT_GAP + dip_of(layout, slot)
-    plates = slotted(layout.payloads[layout.factory.products[0]], slot)
+    plates = slotted(layout.outgoing, slot)
     boxes = np.array(
         [
             [[x + a - dx, y + b - dy, low + 1e-4], [x + a + dx, y + b + dy, high - 1e-4]]

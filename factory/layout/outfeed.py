@@ -73,7 +73,7 @@ def dip_of(layout: Layout, slot: tuple[float, float, float] | None) -> float:
     """How far the product dips into the tray's slot [m]."""
     if slot is None:
         return 0.0
-    (_, xhi, ylo, yhi), (end, low, high) = layout.payloads[layout.factory.products[0]], slot
+    (_, xhi, ylo, yhi), (end, low, high) = layout.outgoing, slot
     x, y = layout.product.middle[:2].tolist()
     beside = (1, y + low, -1, low - ylo), (1, y + high, 1, yhi - high), (0, x + end, 1, xhi - end)
     plates = [(axis, at, way) for axis, at, way, room in beside if room > SLOT]

@@ -77,6 +77,7 @@ class Ground:
         if self.relays:
             from factory.layout.relaying import relayed
 
+            factory.pag.check_alone("--relay")
             if self.relay and factory.folded:
                 raise InputError(SEVERAL_TOURS)
             layout = relayed(layout, settings, self.cycle, self.floor, hands)
@@ -95,6 +96,7 @@ class Ground:
         from factory.layout.standby import laid_out_for, part_of
         from factory.problem.robot_types import load_catalogue
 
+        factory.pag.check_alone("--deputies")
         plain = replace(self, deputies=False)
 
         def lay_out(pairs: tuple[Pair, ...]) -> Layout:

@@ -201,7 +201,7 @@ def build_model(
     add_scene(world, section["statistic"], layout)
     hoists = _hoists(layout, masses, settings)
     add_robots(layout.whole, catalogue, drives, hoists, section)
-    load = masses[factory.products[0]]
+    load = max(masses[product] for product in factory.products)
     fast = settings.outfeed_acceleration
     tray = drive_for(TRAY_MASS, load, fast, settings)
     shutter = drive_for(

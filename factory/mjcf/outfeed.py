@@ -58,7 +58,7 @@ def _add_tray(world: Element, actuator: Element, layout: Layout, drive: Drive) -
     """It touches the product that it holds by design, so it is masked as what it holds. It is as
     much higher as a round bottom dips into its slot."""
     x, y = layout.guidepaths[0].a
-    xlo, xhi, ylo, yhi = layout.payloads[layout.factory.products[0]]
+    xlo, xhi, ylo, yhi = layout.outgoing
     body = add(world, "body", name=names.OUTFEED_TRAY, pos=(x, y, 0), sleep="allowed")
     slide = names.OUTFEED_SLIDE
     joint = add(body, "joint", name=slide, type="slide", axis="1 0 0", frictionloss=0.2)
@@ -143,7 +143,7 @@ def _add_table(world: Element, layout: Layout) -> None:
         shown.append((f"upright{side}", upright, (UPRIGHT, WALL / 2, stroke / 2)))
     for name, pos, size in shown:
         add_station(body, f"outfeed/{name}", pos=pos, size=size, material="housing")
-    leg, front = min(LEG, *half), layout.payloads[layout.factory.products[0]][1]
+    leg, front = min(LEG, *half), layout.outgoing[1]
     for side in (-1, 1):
         foot = a[0] + front + 2 * leg - x, side * (half[1] - leg), (BELT - thick) / 2
         size = leg, leg, (BELT - thick) / 2

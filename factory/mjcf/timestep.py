@@ -173,7 +173,7 @@ def _axes(settings: Settings, layout: Layout, jitter: float) -> Iterator[DrivenA
         push, stiff = a + GRAVITY, HOIST_STIFFNESS
         yield DrivenAxis(HOIST_MASS, load, a, push, stiff, 1 - jitter, held=held, room=room)
     fast = settings.outfeed_acceleration
-    product = masses[factory.products[0]]
+    product = max(masses[label] for label in factory.products)
     yield DrivenAxis.loaded(TRAY_MASS, product, fast, gain=1.0, jump=CRUISES, room=far)
     shut = settings.shutter_limits[1]
     yield DrivenAxis(HOIST_MASS, 0.0, shut, shut + GRAVITY, HOIST_STIFFNESS, gain=1.0)

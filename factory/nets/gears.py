@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from heapq import heappop, heappush
+from itertools import count, pairwise
 
 from factory.nets.petri import Marking
 from factory.nets.threaded import Slot, ThreadedNet
@@ -57,3 +60,32 @@ class GearNet(Pictured):
     def threads_of(self, marked: Marking) -> dict[Slot, int]:
         """f_m of a marking: every slot holds the robot that owns it (Definition 3.3)."""
         return {(p, i): robot for p in sorted(marked) for i, robot in enumerate(self.slots[p])}
+
+
+def ascending(programs: Iterable[Sequence[int]], turns: Sequence[int]) -> tuple[int, ...]:
+    """The operations, numbered from 0, in an order in which every program of operations ascends,
+    those of earlier `turns` first. Raises ValueError where there is none: then the gears of these
+    programs are not live."""
+    waits, onward = [0] * len(turns), [list[int]() for _ in turns]
+    for program in programs:
+        for before, number in pairwise(program):
+            onward[before].append(number)
+            waits[number] += 1
+    came, ordered, ready = count(), list[int](), list[tuple[int, int, int]]()
+
+    def free(number: int) -> None:
+        heappush(ready, (turns[number], next(came), number))
+
+    for number, left in enumerate(waits):
+        if not left:
+            free(number)
+    while ready:
+        *_, number = heappop(ready)
+        ordered.append(number)
+        for after in onward[number]:
+            waits[after] -= 1
+            if not waits[after]:
+                free(after)
+    if len(ordered) < len(turns):
+        raise ValueError("the robots' programs wait for each other: the net is not live")
+    return tuple(ordered)

@@ -3,8 +3,8 @@ geometry of a product, used by Compile (robot types), the layout (sides) and the
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from factory.problem.pag import ROUNDING, AllowedOverlap, most_allowed
@@ -69,6 +69,15 @@ class Approach:
     stroke: float = 0.0
     overlaps: tuple[tuple[Overlap, ...], ...] = ((), ())
     clashes: tuple[Clash, ...] = ()
+
+    def renamed(self, name: Callable[[str], str]) -> Approach:
+        """The same approach of inputs and parts that have other labels."""
+        overlaps = (
+            tuple(replace(o, parts=(name(o.parts[0]), name(o.parts[1]))) for o in side)
+            for side in self.overlaps
+        )
+        lowered = self.lowered and name(self.lowered)
+        return replace(self, lowered=lowered, overlaps=tuple(overlaps))
 
     def fault(
         self,

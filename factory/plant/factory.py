@@ -6,26 +6,19 @@ number: operation i has start 2i, end 2i + 1 and operation place i.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from heapq import heappop, heappush
-from itertools import count, pairwise
 from types import MappingProxyType
 
-from factory.nets.gears import GearNet
+from factory.nets.gears import GearNet, ascending
 from factory.plant.approaches import Approach
 from factory.problem.pag import NOPART, PAG
-from factory.problem.plan import Plan
+from factory.problem.plan import Plan, in_turn, out_of_turn
 from factory.problem.template import Template, variable_number
 from factory.support.errors import Position
 from factory.support.showing import Pictured
-
-
-def in_turn(label: str, turn: int) -> str:
-    """What a label is called for a unit of a period, counted from 0: `x` for the first, `x@2` for
-    the next."""
-    return f"{label}@{turn + 1}" if turn else label
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +45,7 @@ class Operation:
     @property
     def written(self) -> str:
         """The label without its turn: as the PAG has it, or one pile of such a label."""
-        return self.label.removesuffix(in_turn("", self.turn))
+        return out_of_turn(self.label, self.turn)
 
     def within(self, period: int) -> str:
         """The label in a factory whose period has so many units, where this one's has several times
@@ -122,10 +115,9 @@ class Factory(Pictured):
 
     ~ is the union of the templates' identifications over `operations`. `parents[i]` is the
     operation that takes the result of operation i (dropoff has none, -1). `plan`: the variant that
-    it is. `adjusted`: robots with a
-    lift that is set for each of their tours, to where the one hand holds what they bring. `period`:
-    how many units are made in one cycle of the net, with operations of their own; the last so many
-    operations are their dropoffs, in that order.
+    it is. `adjusted`: robots with a lift that is set for each of their tours, to where the one hand
+    holds what they bring. `period`: how many units are made in one cycle of the net, with
+    operations of their own; the last so many operations are their dropoffs, in that order.
     """
 
     pag: PAG
@@ -180,6 +172,21 @@ class Factory(Pictured):
         """The label of the finished product, for each unit of a period."""
         return tuple(dropoff.inputs[0] for dropoff in self.dropoffs)
 
+    def result(self, operation: Operation) -> str:
+        """What an operation makes; what it drops off."""
+        return operation.inputs[0] if self.drops(operation.index) else operation.label
+
+    @property
+    def sequence(self) -> tuple[str, ...]:
+        """The product of each unit of a period, as the PAG has it."""
+        return tuple(out_of_turn(label, turn) for turn, label in enumerate(self.products))
+
+    def made(self, begin: int, end: int) -> Mapping[str, int]:
+        """How many of each product the units from `begin` to `end` are."""
+        sequence = self.sequence
+        counts = Counter(sequence[unit % self.period] for unit in range(begin, end))
+        return {product: counts[product] for product in self.pag.products}
+
     def unit(self, operation: Operation, count: int) -> int:
         """For which unit an operation is that has been started, or ended, so often before."""
         return count * self.period + operation.turn
@@ -216,31 +223,8 @@ class Factory(Pictured):
         is none: then the net is not live."""
         if not self.folded:
             return (*reversed(range(len(self.operations) - 1)), len(self.operations) - 1)
-        waits = [len(operation.robots) for operation in self.operations]
-        onward: list[list[int]] = [[] for _ in self.operations]
-        for robot in self.present:
-            program = self.robots[robot].operations
-            waits[program[0]] -= 1
-            for before, number in pairwise(program):
-                onward[before].append(number)
-        came, ordered, ready = count(), list[int](), list[tuple[int, int, int]]()
-
-        def free(number: int) -> None:
-            heappush(ready, (self.operations[number].turn, next(came), number))
-
-        for number, left in enumerate(waits):
-            if not left:
-                free(number)
-        while ready:
-            *_, number = heappop(ready)
-            ordered.append(number)
-            for after in onward[number]:
-                waits[after] -= 1
-                if not waits[after]:
-                    free(after)
-        if len(ordered) < len(self.operations):
-            raise ValueError("the robots' programs wait for each other: the net is not live")
-        return tuple(ordered)
+        turns = [operation.turn for operation in self.operations]
+        return ascending([self.robots[robot].operations for robot in self.present], turns)
 
     @cached_property
     def postorder(self) -> tuple[int, ...]:
@@ -260,8 +244,7 @@ class Factory(Pictured):
     @cached_property
     def strokes(self) -> Mapping[int, float]:
         """How far [m] each robot (index) with a lift lowers what it delivers, robot by robot: one
-        with several tours the farthest that one of them asks for, one that is adjusted not at
-        all."""
+        with several tours the farthest that one of them asks for, one that is adjusted 0."""
         found: dict[int, float] = dict.fromkeys(self.adjusted, 0.0)
         for o in self.operations:
             if o.approach is not None and o.lowered >= 0:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
 
-from factory.support.errors import Position
+from factory.support.errors import Diagnostic, InputError, Position
 from factory.support.showing import Pictured
 
 NOPART = "nopart"
-RESERVED = frozenset({NOPART, "root", "parts", "dropoff"})
+RESERVED = frozenset({NOPART, "root", "mix", "parts", "dropoff"})
 
 Value = float | str | tuple[float, ...]
 
@@ -73,10 +73,20 @@ def most_allowed(allowed: Iterable[AllowedOverlap], one: str, other: str) -> flo
     return max((a.depth for a in allowed if a.covers(one, other)), default=0.0)
 
 
+@dataclass(frozen=True, slots=True)
+class Mix:
+    """Several products of one floor: the `counts` of each that are made in a period, and their
+    `sequence` in it, empty where it is to be chosen."""
+
+    counts: tuple[tuple[str, int], ...]
+    sequence: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True)
 class PAG(Pictured):
     """A product assembly graph: one tree over its labels, in the order of the text, which
-    `factory.lang.read_pag` checks. `count` is the number in `N parts`, None without it; `folder` is
+    `factory.lang.read_pag` checks; with a `mix`, a tree for each product, which share labels, and
+    `root` is the first product. `count` is the number in `N parts`, None without it; `folder` is
     where mesh paths start; `allowed`: overlaps that are meant."""
 
     root: str
@@ -85,6 +95,7 @@ class PAG(Pictured):
     folder: str = field(default=".", compare=False)
     file: str = field(default="<text>", compare=False)
     allowed: tuple[AllowedOverlap, ...] = ()
+    mix: Mix | None = None
 
     def __repr__(self) -> str:
         parts = sum(1 for _ in self.parts())
@@ -101,18 +112,43 @@ class PAG(Pictured):
     def __len__(self) -> int:
         return len(self.nodes)
 
+    @property
+    def products(self) -> tuple[str, ...]:
+        """The labels of the products, one unless there is a mix."""
+        return (self.root,) if self.mix is None else tuple(label for label, _ in self.mix.counts)
+
     def parts(self) -> Iterator[Assembly]:
         """The leaves, in the order of the text."""
         return (node for node in self.nodes if not node.inputs)
 
     def postorder(self) -> Iterator[Assembly]:
-        """Every node after its inputs, inputs in argument order, root last; without recursion."""
-        stack: list[tuple[str, bool]] = [(self.root, False)]
+        """Every node after its inputs, inputs in argument order, each product after its nodes that
+        no earlier product has; without recursion."""
+        seen: set[str] = set()
+        stack = [(label, False) for label in reversed(self.products)]
         while stack:
             label, expanded = stack.pop()
             node = self.by_label[label]
-            if expanded or not node.inputs:
+            if expanded:
                 yield node
-            else:
+            elif label not in seen:
+                seen.add(label)
                 stack.append((label, True))
                 stack.extend((child, False) for child in reversed(node.inputs))
+
+    @cached_property
+    def insides(self) -> tuple[frozenset[str], ...]:
+        """The labels of the parts of each product."""
+        each = (self.product(label).parts() for label in self.products)
+        return tuple(frozenset(part.label for part in parts) for parts in each)
+
+    def check_alone(self, option: str) -> None:
+        """Raises InputError (BadMix) for a mix: an option is for one product."""
+        if self.mix is not None:
+            message = f"{option} is for one product, and there is a mix of {len(self.products)}"
+            raise InputError(Diagnostic("BadMix", message, self[self.root].position))
+
+    def product(self, label: str) -> PAG:
+        """The PAG of one product of a mix."""
+        alone = PAG(label, self.nodes, None, self.folder, self.file, self.allowed)
+        return replace(alone, nodes=tuple(alone.postorder()))

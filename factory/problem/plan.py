@@ -15,7 +15,20 @@ MOST_RELAYS, MOST_ROBOTS = 99, 10**6
 
 Turns = Sequence[Sequence[int]]
 """For each unit of a period, and each robot of the factory that has one robot for each tour, the
-robot (index) that does its tour."""
+robot (index) that does its tour. NOBODY does the tours of products that are not made in it."""
+
+NOBODY = -1
+
+
+def in_turn(label: str, turn: int) -> str:
+    """What a label is called for a unit of a period, counted from 0: `x` for the first, `x@2` for
+    the next."""
+    return f"{label}@{turn + 1}" if turn else label
+
+
+def out_of_turn(label: str, turn: int) -> str:
+    """What a label of a unit of a period is called for the first unit: as the PAG has it."""
+    return label.removesuffix(in_turn("", turn))
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +51,7 @@ class Plan:
         for name, values, least, most in (
             ("forms", self.forms.values(), THIRD, 1),
             ("relays", self.relays.values(), 1, MOST_RELAYS),
-            ("turns", chain.from_iterable(self.turns), 0, MOST_ROBOTS),
+            ("turns", chain.from_iterable(self.turns), NOBODY, MOST_ROBOTS),
             ("lifts", self.lifts or (), 0, MOST_ROBOTS),
         ):
             if wrong := [value for value in values if not least <= value <= most]:
@@ -49,7 +62,11 @@ class Plan:
         """The plan in which other robots do what the robots of this one do: in turn t robot
         `turns[t][r]` (index) what robot r does. Its lifts are to be found again."""
         first: Turns = self.turns or [range(len(turns[0]))]
-        every = tuple(tuple(turn[robot] for robot in unit) for turn in turns for unit in first)
+        every = tuple(
+            tuple(turn[robot] if robot != NOBODY else NOBODY for robot in unit)
+            for turn in turns
+            for unit in first
+        )
         alone = len(every) == 1 and every[0] == tuple(range(len(every[0])))
         return replace(self, turns=() if alone else every, lifts=None)
 

@@ -19,9 +19,11 @@ def figures(record: Run, verbose: bool = False) -> Iterator[str]:
     contact."""
     cycle = f"{record.cycle_time_s:.3f} s" if record.cycle_time_s is not None else "not yet steady"
     of_all = " with all robots" if record.exchanges else ""
+    each = [f"{count} {product}" for product, count in record.by_product.items()]
     yield (
         f"{record.products} of {record.units} products in {record.sim_time_s:.2f} s "
         f"({record.realtime_factor:.1f} times real time, {record.world})"
+        + (f": {', '.join(each)}" if len(each) > 1 else "")
     )
     yield (
         f"cycle time {cycle}, predicted {record.predicted_cycle_time_s:.3f} s{of_all}; "

@@ -43,18 +43,18 @@ def modelled(layout: Layout, request: RunRequest, under_way: Mapping[str, int]) 
 
 def _overlaps(layout: Layout) -> tuple[Diagnostic, ...]:
     """What overlaps in a product, or passes through each other on the way to its place in it, and
-    is not allowed. Units are alike: one is looked at."""
+    is not allowed. Units of one product are alike: one of each product is looked at."""
     factory = layout.factory
     if not is_shaped(factory.pag):
         return ()
-    parts = {*factory.contents[factory.products[0]]}
-    allowed = factory.pag.allowed
+    allowed, sequence = factory.pag.allowed, factory.sequence
+    firsts = {sequence.index(product) for product in sequence}
     blocked = (
         o.approach.fault(o.label, o.inputs[-1], o.position, allowed)
         for o in factory.operations
-        if o.approach is not None and not o.turn
+        if o.approach is not None and o.turn in firsts
     )
-    found = within(overlaps_of(layout.product), parts).faults(allowed)
+    found = within(overlaps_of(layout.product), *factory.pag.insides).faults(allowed)
     return (*found, *(fault for fault in blocked if fault is not None))
 
 

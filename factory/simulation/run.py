@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -68,8 +68,9 @@ class Run:
     """The record of a run: figures and events. `replays`: an independent replay of the events is a
     run of the net; `trouble` is None for a run that reached its end; `monitor` is what a monitor
     reports that watched it, if one did. `lenient`: what is wrong with the bodies does not count;
-    `period`: how many units come in a cycle of the net; `failures`: what went wrong, in a run that
-    goes on when something does; `exchanges`: the nets that it went on in; `log`: its log."""
+    `period`: how many units come in a cycle of the net; `by_product`: how many units of each
+    product were made; `failures`: what went wrong, in a run that goes on when something does;
+    `exchanges`: the nets that it went on in; `log`: its log."""
 
     world: str
     units: int
@@ -92,6 +93,7 @@ class Run:
     monitor: Report | None = None
     lenient: bool = False
     period: int = 1
+    by_product: Mapping[str, int] = field(default_factory=dict)
     failures: Failures | None = None
     exchanges: tuple[Exchange, ...] = ()
     log: Path | None = field(default=None, repr=False, compare=False)
@@ -185,6 +187,7 @@ class Run:
             "world": self.world,
             "units": self.units,
             "products": self.products,
+            "units_by_product": dict(self.by_product),
             "cut_off": cut and cut.as_json(),
             "robots": self.robots,
             "seed": self.seed,

@@ -300,6 +300,7 @@ class Simulation:
             request.jitter,
             trouble,
             period=factory.period,
+            by_product=factory.made(self.before, world.delivered()),
             exchanges=exchanges,
         )
 

@@ -34,7 +34,7 @@ class Checked:
     shape; `product`: None if every part is a default box; `no_grips`: what no hand can hold, None
     if hands are not chosen; `factory` and the `least` number of robots for its product, None for a
     net from PNML; the `deputies` of each robot, and the `coordinated` net with hands, magazines and
-    the tray, None if not requested."""
+    the tray, None if not requested; the number of robots for each product of a mix `alone`."""
 
     name: str
     net: GearNet | MarkedNet
@@ -49,6 +49,7 @@ class Checked:
     least: Least | None = None
     deputies: tuple[tuple[int, ...], ...] | None = None
     coordinated: CoordinatedNet | None = None
+    alone: tuple[int, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """The keys of `check --json`."""
@@ -96,15 +97,33 @@ class Checked:
 
     def _allocation(self) -> dict[str, Any]:
         """The robots that serve several labels, the least number of robots, and a live order."""
-        if self.factory is None or self.least is None:
+        if self.factory is None:
             return {}
         factory = self.factory
         lines = [(robot.name, factory.deliveries(robot.index)) for robot in factory.robots]
         return {
-            "least_robots": self.least.total,
+            **({"least_robots": self.least.total} if self.least else self._mix(factory)),
             "lines": [{"robot": n, "labels": list(x)} for n, x in lines if len(x) > 1],
             "order": [factory.operations[number].label for number in factory.order],
             **self._deputies(factory),
+        }
+
+    def _mix(self, factory: Factory) -> dict[str, Any]:
+        """The products of a mix with the robots that each needs alone, their sequence in a period,
+        and the labels that are common to all."""
+        pag = factory.pag
+        counts = dict(pag.mix.counts if pag.mix else ())
+        alone = zip(pag.products, self.alone, strict=True)
+        inside = ({node.label for node in pag.product(x).nodes} for x in pag.products)
+        common = set.intersection(*inside)
+        return {
+            "products": [
+                {"label": label, "count": counts[label], "robots_alone": robots}
+                for label, robots in alone
+            ],
+            "period": factory.period,
+            "sequence": list(factory.sequence),
+            "common": [label for label in pag.by_label if label in common],
         }
 
     def _deputies(self, factory: Factory) -> dict[str, Any]:
@@ -148,9 +167,10 @@ def check_project(
         project.warnings,
         project.no_grips if project.settings.hands else None,
         factory,
-        least_robots(project.pag, project.templates),
+        None if project.pag.mix else least_robots(project.pag, project.templates),
         _deputies(project, factory) if deputies else None,
         _coordinated(project) if laid_out else None,
+        tuple(len(one.compiled.robots) for one in project.each),
     )
 
 

@@ -33,7 +33,7 @@ LONGEST = 1e9
 DWELL = 86_400.0
 """Upper bound on the dwell of an operation [s]: a day."""
 
-MOST_BRANCHES = 60
+MOST_UNITS = MOST_BRANCHES = 60
 """Maximum number of parallel branches, and of units of a period."""
 
 LEAST: Literal["least"] = "least"

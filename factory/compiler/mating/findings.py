@@ -7,7 +7,7 @@ at the third, pairs that overlap in the finished product are *left out*. All of 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
@@ -81,6 +81,15 @@ class Mating:
                 for clash in self.clashes
             ],
         }
+
+
+def together(several: Iterable[Matings]) -> Matings:
+    """The judgements of all products of a mix, each operation of several only once."""
+    every = [*several]
+    made = {mating.label: mating for one in reversed(every) for mating in one.all}
+    order = dict.fromkeys(mating.label for one in every for mating in one.all)
+    parts = {label: parts for one in every for label, parts in one.parts.items()}
+    return Matings(tuple(made[label] for label in order), parts)
 
 
 @dataclass(frozen=True)

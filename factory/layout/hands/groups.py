@@ -106,11 +106,33 @@ class Groups:
         keys = self.waits[0], self.first[0], one != other, self.used(tip)[0]
         return tuple(map(float, keys))
 
+    def spots(self) -> list[frozenset[Point3]]:
+        """The places of each group, to 0.01 mm [m]."""
+        at = [(x, y, z) for x, y, z in (self.places.at.round(5) + 0.0).tolist()]
+        return [frozenset((at[one], at[other])) for one, other in self.chosen.tolist()]
+
     def points(self) -> tuple[Point3, ...]:
         """The places of the first group [m]."""
         at = self.places.at[sorted({*self.chosen[0].tolist()})]
         found = sorted((x, y, z) for x, y, z in at.round(6).tolist())
         return tuple(found)
+
+
+def in_one_place(options: Sequence[Groups]) -> list[Groups]:
+    """For each label the one group in the place that is the least bad for all labels together, the
+    strongest if several are; nothing where they have no place in common."""
+    numbers = [dict(zip(one.spots(), range(len(one)), strict=True)) for one in options]
+    common = [spot for spot in numbers[0] if all(spot in number for number in numbers)]
+    if not common:
+        return [one.among(np.zeros(len(one), bool)) for one in options]
+    each = [np.array([number[spot] for spot in common]) for number in numbers]
+    pairs = [(one, at) for one, at in zip(options, each, strict=True)]
+    costs = np.minimum(
+        *(np.max([o.cost(tip)[at] for o, at in pairs], axis=0) for tip in ("suction", "pin"))
+    )
+    shares = np.max([o.share[at] for o, at in pairs], axis=0)
+    best = np.lexsort((shares, costs))[:1]
+    return [one.among(at[best]) for one, at in pairs]
 
 
 def bad(share: Array, pinned: Array) -> Array:

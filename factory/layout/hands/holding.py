@@ -76,7 +76,8 @@ class Holding:
                 known = self.places(label, kind, axis, way)
                 found = resized(self.surfaces, parts, (axis, way), loads, known, radius)
             else:
-                found = places(self.surfaces, self.product, parts, kind, (axis, way), loads)
+                mix = self.factory.pag.mix is not None
+                found = places(self.surfaces, self.product, parts, kind, (axis, way), loads, mix)
             self._places[key] = found
         return self._places[key]
 
@@ -103,9 +104,7 @@ class Holding:
 
     def top(self, operation: Operation) -> float:
         """How high the result of an operation is [m]."""
-        parts = self.factory.contents.get(
-            operation.label, self.factory.contents[self.factory.products[0]]
-        )
+        parts = self.factory.contents[self.factory.result(operation)]
         return float(max(self.product.solids[part].high[2] for part in parts))
 
 

@@ -70,8 +70,8 @@ class _Search:
 
     def found(self, bare: bool = False) -> NoGrip:
         """What is told of it; nothing of misses if that is to be `bare`."""
-        factory, last = self.holding.factory, self.holding.last(self.robot).label
-        made = factory.contents.get(last, factory.contents[factory.products[0]])
+        factory, last = self.holding.factory, self.holding.last(self.robot)
+        made = factory.contents[factory.result(last)]
         return NoGrip(
             self.label,
             factory.robots[self.robot].name,

@@ -3,8 +3,9 @@ one hand serves.
 
 It is of one kind, with tips of one size. What differs from label to label is where on it the tip
 is: the robot holds each label in such a place about itself that its tip is there
-(docs/decisions/hands.md, Lines). Of a robot that brings one label each place has a tip of its own
-size, and under a payload there may be two.
+(docs/decisions/hands.md, Lines). The outfeed takes all products in one place, so the output
+robot's tip is in the same place on all of them. Of a robot that brings one label each place has a
+tip of its own size, and under a payload there may be two.
 """
 
 from __future__ import annotations
@@ -18,7 +19,16 @@ from factory.control.mode import Truth
 from factory.geometry.meshes import Array
 from factory.layout.dimensions import FINGER
 from factory.layout.hands.apart import BESIDE
-from factory.layout.hands.groups import LONG, PINNED, WAIT, Groups, bad, in_line, least
+from factory.layout.hands.groups import (
+    LONG,
+    PINNED,
+    WAIT,
+    Groups,
+    bad,
+    in_line,
+    in_one_place,
+    least,
+)
 from factory.layout.hands.hand import Hand, Kind
 from factory.layout.hands.holding import held
 from factory.layout.hands.in_the_way import InTheWay
@@ -106,6 +116,8 @@ class OneHand:
         best, lowest = tuple[Hand, ...](), np.inf
         for radius in [0.0] if alone else self._radii(kind, tours, frames):
             options = [self._groups(kind, tour, frames, radius) for tour in tours]
+            if not alone and self.in_the_way.holding.on[tours[0]] < 0:
+                options = in_one_place(options)
             if not all(map(len, options)):
                 continue
             cost, by, chosen = _level(options, *frames[0], lifted)

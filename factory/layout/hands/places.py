@@ -61,6 +61,9 @@ PARTLY = 0.6
 UP = np.array([0.0, 0.0, 1.0])
 """From a tip below to its payload."""
 
+RASTER, WIDE = 0.01, 9
+"""Between lines on which all products of a mix are held [m], and how many of them over a body."""
+
 SAME = 1e-9
 """Radii that differ by no more are one [m]."""
 
@@ -131,9 +134,11 @@ def places(
     kind: Kind,
     side: tuple[int, int],
     loads: Loads,
+    on_raster: bool = False,
 ) -> Places:
     """Places on the side of a sub-assembly that faces a direction, an axis and a way (+1, -1) along
-    it, where nothing of it is further out; `loads`: what is held there."""
+    it, where nothing of it is further out; `loads`: what is held there; `on_raster`: with places
+    on lines that other sub-assemblies have too."""
     axis, way = side
     _, centre = centre_of(product, parts)
     across = [a for a in range(3) if a != axis]
@@ -142,6 +147,8 @@ def places(
     points = _tried(low, high, centre, side)
     if kind == "below":
         points = np.concatenate([points, _lines(low, high, centre)])
+    if on_raster:
+        points = np.concatenate([points, _raster(low, high, product.middle, across)])
     small = float((high.max(axis=0) - low.min(axis=0))[across].min()) <= SMALL
     radii, smaller = (*RADII, *[FINE] * small), (*SMALLER, *[len(RADII)] * small)
     points = _rounded(points, float((high - low)[:, across].min()), product.middle)
@@ -224,6 +231,22 @@ def _tried(low: Array, high: Array, centre: Array, side: tuple[int, int]) -> Arr
     found[0] = centre
     found[1:, across] = np.concatenate([grid.reshape(-1, 2), np.clip(centre[across], begin, end)])
     return found
+
+
+def _raster(low: Array, high: Array, middle: Array, across: Sequence[int]) -> Array:
+    """Points (n, 3) over each body, of boxes from `low` to `high` (b, 3), on lines at multiples of
+    RASTER from the product's middle: the WIDE nearest to the middle of the body."""
+    found = [np.zeros((0, 3))]
+    for least, most in zip(low - middle, high - middle, strict=True):
+        for line, along in (across, across[::-1]):
+            at = RASTER * np.arange(np.ceil(least[line] / RASTER), most[line] / RASTER)
+            order = np.argsort(np.abs(at - (least[line] + most[line]) / 2), kind="stable")
+            at, share = at[order][:WIDE], (np.arange(3) + 0.5) / 3
+            points = np.zeros((3 * len(at), 3))
+            points[:, line] = np.repeat(at, 3)
+            points[:, along] = np.tile(least[along] + share * (most[along] - least[along]), len(at))
+            found.append(points + middle)
+    return np.concatenate(found)
 
 
 def _lines(low: Array, high: Array, centre: Array) -> Array:

@@ -101,5 +101,5 @@ def _beyond(layout: Layout, robot: int) -> float:
     beside = path.frame(layout.payloads[delivered])[0]
     if operation.index != factory.dropoff.index:
         return beside
-    front = path.frame(layout.payloads[factory.products[0]])[1]
+    front = path.frame(layout.outgoing)[1]
     return beside - c + min(0.0, front + path.arm, front + path.reach - CARRIAGE / 2)

@@ -54,7 +54,7 @@ def _of_robot(factory: Factory, labels: dict[str, int], robot: int) -> Link:
 
 
 def _of_operation(factory: Factory, labels: dict[str, int], operation: Operation) -> Link:
-    made = about(labels, operation.label) or factory.pag.root
+    made = about(labels, factory.result(operation)) or factory.pag.root
     return {
         "robots": sorted(set(operation.robots)),
         "labels": [labels[made]],

@@ -171,15 +171,17 @@ def utilisation(recording: Recording, run: MeasuredPace, plan: Predicted | None)
 
 
 def assembly_tree(pag: PAG, labels: dict[str, int]) -> str:
-    """The assembly tree as nested lists, the product first; each label has room for its picture."""
+    """The assembly tree as nested lists, the product first, or that of each product of a mix; each
+    label has room for its picture."""
     made: dict[str, str] = {}
+    take = made.pop if pag.mix is None else made.__getitem__
     for node in pag.postorder():
-        inside = "".join(made.pop(label) for label in node.inputs)
+        inside = "".join(map(take, node.inputs))
         below = f"<ul>{inside}</ul>" if inside else ""
         made[node.label] = (
             f"<li>{_node(node.label, node.operation, labels, bool(inside))}{below}</li>"
         )
-    return f'<ul class="tree">{made[pag.root]}</ul>'
+    return f'<ul class="tree">{"".join(made[label] for label in pag.products)}</ul>'
 
 
 def _node(label: str, operation: str, labels: dict[str, int], whole: bool) -> str:

@@ -13,7 +13,7 @@ from factory.mjcf.weld_frames import residuals
 from factory.record.figures import PhysicsFigures
 from factory.simulation.mujoco.onsets import Onsets
 from factory.simulation.mujoco.pressing import Pressing
-from factory.simulation.mujoco.product_error import Misfit, ProductError
+from factory.simulation.mujoco.product_error import Misfit, product_errors
 from factory.simulation.mujoco.soundness import Soundness
 from factory.simulation.mujoco.strength import StrengthUse
 from factory.simulation.mujoco.welds import Welds
@@ -34,7 +34,7 @@ class Inspection:
     ) -> None:
         self._m, self._d, self._model, self.soundness = m, d, model, soundness
         self._masks = soundness.masks
-        self._product = ProductError(model)
+        self._products = product_errors(model)
         self.pressing = Pressing(m, model, self._masks)
         self.onsets = Onsets(lambda geom: str(m.geom(geom).name))
         self.joining: dict[int, int] = {}
@@ -94,10 +94,11 @@ class Inspection:
         force = float(np.linalg.norm(wrench[:3]))
         self.force[label] = max(self.force.get(label, 0.0), force)
 
-    def measure(self, bodies: np.ndarray, misfit: Misfit) -> None:
-        """Keep the error of a finished product, and how far off its parts were when they became one
-        body."""
-        found = self._product.measure(self._d, bodies).worse(misfit)
+    def measure(self, unit: int, bodies: np.ndarray, misfit: Misfit) -> None:
+        """Keep the error of the finished product of a unit, and how far off its parts were when
+        they became one body."""
+        product = self._products[unit % len(self._products)]
+        found = product.measure(self._d, bodies).worse(misfit)
         self.error = found.worse(self.error or Misfit())
 
     def figures(self, welds: Welds, strength: StrengthUse | None = None) -> PhysicsFigures:

@@ -38,7 +38,7 @@ class Outfeed:
         self.axes = np.array([axes.tray, axes.tray + 1])
         self._d, self._drives, self._settings = d, drives, model.settings
         self._address = axes.qpos[self.axes], axes.dof[self.axes]
-        self._product = model.masses[model.factory.products[0]]
+        self._product = max(model.masses[product] for product in model.factory.products)
         self._far = model.layout.outfeed_way, -model.layout.shutter_stroke
         drives.load(self.axes, np.zeros(2), WEIGHT)
         tray = tray_profile(model.layout, model.settings)

@@ -30,9 +30,9 @@ class ProductError:
     """The vertices of a product: which body each is of, and where it belongs, in the frame of its
     own body and in that of the first."""
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Model, product: str) -> None:
         solids, bodies = model.layout.product.solids, model.carried
-        found = bodies.carried[model.factory.products[0]]
+        found = bodies.carried[product]
         corners = [
             np.concatenate([solids[part].corners for part in bodies.parts(body)]) for body in found
         ]
@@ -53,3 +53,12 @@ class ProductError:
         worst = int(off.argmax())
         label = self._labels[int(self._owner[worst])]
         return Misfit(float(off[worst]), float(angles(turn[0].T @ turn).max()), label)
+
+
+def product_errors(model: Model) -> tuple[ProductError, ...]:
+    """The error of the product of each unit of a period: units of one product share it."""
+    factory, errors = model.factory, dict[str, ProductError]()
+    for written, product in zip(factory.sequence, factory.products, strict=True):
+        if written not in errors:
+            errors[written] = ProductError(model, product)
+    return tuple(errors[written] for written in factory.sequence)

@@ -136,7 +136,7 @@ class MujocoWorld:
         for operation, unit in ended:
             self.inspection.joining.pop(operation.index, None)
             if self.model.factory.drops(operation.index):
-                self.inspection.measure(*self.parts.finished(unit))
+                self.inspection.measure(unit, *self.parts.finished(unit))
                 self.motion.send_tray(True)
         robots = [robot for operation, _ in ended for robot in operation.robots]
         labels = [label for operation, _ in ended for label in operation.after]
@@ -221,7 +221,7 @@ class MujocoWorld:
             if unit is None:
                 outfeed.busy = False
                 return
-            self.inspection.measure(*self.parts.finished(unit))
+            self.inspection.measure(unit, *self.parts.finished(unit))
             self.dropoffs.append(self.time)
             self.parts.recycle()
             self.motion.send_tray(False)

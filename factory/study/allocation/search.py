@@ -54,6 +54,7 @@ def allocated(
     robots are needed, or none of the factories found has as few."""
     if not aim.asks:
         return project
+    project.pag.check_alone("a search for few robots (--robots, --cycle)")
     if isinstance(aim.robots, int):
         least = least_robots(project.pag, project.templates)
         if aim.robots < least.total:

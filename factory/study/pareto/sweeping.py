@@ -101,6 +101,7 @@ class FrontSweep:
         self.changes = Allowance(factories, effort.seconds)
         self.budget = Allowance(factories, effort.seconds)
         bare = replace(project.ground, relay=False, cycle=None)
+        project.pag.check_alone("a Pareto front")
         self.estimator = Estimator(project.with_plan(Plan()).with_ground(bare), effort.branches)
         self.written: FrontPoint | None = None
         self.points: list[FrontPoint] = []

@@ -1,0 +1,276 @@
+"""Mixes: several products on one floor, a period of units with trees of their own (Theorem 9)."""
+
+from __future__ import annotations
+
+import json
+import random
+from collections import Counter
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from factory.compiler.mixing import even
+from factory.exporting.certificate.check import check_certificate
+from factory.exporting.certificate.writer import certificate
+from factory.geometry.product import product_geometry
+from factory.lang.pag_reader import read_pag
+from factory.lang.writer import write_pag
+from factory.nets.marked import marked
+from factory.nets.verify import verify
+from factory.pipeline import Project, all_templates, read
+from factory.problem.pag import PAG, Mix
+from factory.problem.plan import NOBODY, Plan
+from factory.support.errors import InputError
+from factory.timing.cycle_time import cycle_time
+from tests.command_line import Terminal
+from tests.fold_values import pairs_of_tours, simulated_cycle, swapped
+from tests.mix_values import LITTLE, Tree, family_of, mixed_factory, random_family
+from tests.pag_values import TEMPLATES
+from tests.state_space import explored
+
+
+def little(mix: str = "mix = 2 a, 1 b") -> PAG:
+    return read_pag(LITTLE.replace("mix = 2 a, 1 b", mix), TEMPLATES, "little.pag")
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    """The little family in a file."""
+    path = tmp_path / "little.pag"
+    path.write_text(LITTLE)
+    return path
+
+
+# The language
+
+
+def test_a_mix_counts_its_products_or_orders_them() -> None:
+    assert little().mix == Mix((("a", 2), ("b", 1)))
+    assert little("mix = b, a, a").mix == Mix((("b", 1), ("a", 2)), ("b", "a", "a"))
+    for pag in (little(), little("mix = b, a, a")):
+        assert read_pag(write_pag(pag), TEMPLATES, "little.pag") == pag
+
+
+def test_one_product_is_no_mix() -> None:
+    text = "; a = mate ( x, y ); x = atomic(); y = atomic()"
+    assert read_pag("mix = 3 a" + text, TEMPLATES) == read_pag("root = a" + text, TEMPLATES)
+
+
+@pytest.mark.parametrize(
+    ("mix", "message"),
+    [
+        ("mix = 2 a, b", "'b' is not counted, and others are"),
+        ("mix = 2 a, 1 b, 1 a", "'a' is counted twice"),
+        ("mix = 0 a, 1 b", "'0' is no number of units from 1 to 60"),
+        ("mix = 61 a, 1 b", "'61' is no number of units from 1 to 60"),
+        ("mix = 40 a, 40 b", "a period of 80 units; 60 are the most"),
+        ("mix = 1 a, 1 b; root = b", "there are a root and a mix, at column 1"),
+        ("mix = 1 a, 1 b; mix = a, b", "the mix is given twice, first at column 1"),
+        ("mix = a, b, base", "the product 'base' is part of the product 'a'"),
+    ],
+)
+def test_wrong_mixes_are_refused_in_words(mix: str, message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        little(mix)
+    found = [(d.code, d.message) for d in caught.value.diagnostics]
+    assert ("BadMix", message) in found
+    assert {code for code, _ in found} == {"BadMix"}
+
+
+def test_a_product_uses_a_label_once() -> None:
+    with pytest.raises(InputError) as caught:
+        read_pag(
+            "mix = t, v; t = mate(x, y, x); v = mate(x, y); x = atomic(); y = atomic()", TEMPLATES
+        )
+    (fault,) = caught.value.diagnostics
+    assert fault.code == "PagNotTree"
+    assert fault.message == "'x' is used twice in 't', first at column 22"
+
+
+def test_a_word_that_is_no_mix_is_one_error() -> None:
+    """What follows from a mix that cannot be read is not reported."""
+    for mix in ("mix = ", "mix = 3 4 a", "mix = mate ( a, b )"):
+        with pytest.raises(InputError) as caught:
+            little(mix)
+        assert [d.code for d in caught.value.diagnostics] == ["Syntax"]
+
+
+# The net
+
+
+@cache
+def family(seed: int) -> PAG | None:
+    return random_family(seed)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_random_families_are_certified_and_explored(seed: int) -> None:
+    """Theorem 9: live, safe and reversible, by the proof, by the other program, and by looking at
+    every marking; any other order of a line's tours is dead. The output robot's own order may be
+    another where no other robot serves both products."""
+    pag = family(seed)
+    if pag is None:
+        return
+    factory = mixed_factory(pag)
+    verdict = verify(factory.net)
+    assert verdict.holds and verdict.gear_train
+    assert pag.mix is not None and factory.sequence == pag.mix.sequence
+    assert check_certificate(json.loads(json.dumps(certificate(factory.net, verdict)))) == []
+    if len(factory.operations) < 18:
+        truth = explored(marked(factory.net), 60_000)
+        assert truth is None or truth.behaviour == (True, True, True)
+    for robot, one, other in pairs_of_tours(factory):
+        found = verify(swapped(factory, robot, one, other))
+        assert not (found.live and robot), "another order of a line's tours is live"
+        assert found.live or found.faults
+
+
+def test_products_share_robots() -> None:
+    """The common part has one robot, and what begins with it comes on the same two lines."""
+    factory = mixed_factory(little("mix = a, b, a"))
+    assert [factory.deliveries(r.index) for r in factory.robots[1:]] == [
+        ("y", "y@3"),
+        ("base", "base@2", "base@3"),
+        ("x", "z@2", "x@3"),
+    ]
+
+
+def test_products_that_begin_otherwise_are_refused() -> None:
+    """One begins with two parts, the other with a sub-assembly and a part."""
+    part = [Tree(f"p{n}") for n in range(6)]
+    inner = Tree("s", "mate", (part[0], part[1]))
+    trees = Tree("a", "mate", (inner, part[2])), Tree("b", "mate", (part[3], part[4]))
+    with pytest.raises(InputError) as caught:
+        mixed_factory(family_of(trees, ("a", "b")))
+    assert caught.value.diagnostics[0].code == "BadLine"
+
+
+@pytest.mark.parametrize("seed", range(0, 40, 4))
+def test_the_cycle_time_is_that_of_the_token_game(seed: int) -> None:
+    pag = family(seed)
+    if pag is None:
+        return
+    factory, rng = mixed_factory(pag), random.Random(seed)
+    seconds = [rng.uniform(0.3, 2.0) for _ in factory.operations]
+    places = len(factory.net.threaded.places)
+    game = simulated_cycle(factory.net, [*seconds, *[0.0] * (places - len(seconds))])
+    assert game / factory.period == pytest.approx(cycle_time(factory, seconds).seconds)
+
+
+def test_the_even_sequence_is_even() -> None:
+    """After any number of units each product is less than a unit from its share."""
+    for counts in ((3, 1), (5, 3, 2), (1, 1), (7, 2), (30, 29, 1)):
+        mix = Mix(tuple((f"p{n}", count) for n, count in enumerate(counts)))
+        made, total = Counter[str](), sum(counts)
+        for unit, product in enumerate(even(mix), 1):
+            made[product] += 1
+            for label, count in mix.counts:
+                assert abs(made[label] - unit * count / total) < 1 + 1e-9
+        assert made == dict(mix.counts)
+
+
+def test_a_plan_makes_a_product_wholly_or_not_at_all() -> None:
+    project = Project(little(), all_templates())
+    turns = [list(turn) for turn in project.planned.plan.turns]
+    assert project.with_plan(Plan(turns=tuple(map(tuple, turns)))).planned == project.planned
+    unit = next(turn for turn in turns if NOBODY in turn)
+    unit[next(n for n, robot in enumerate(unit) if robot != NOBODY)] = NOBODY
+    with pytest.raises(InputError, match="nobody does some of the tours"):
+        _ = project.with_plan(Plan(turns=tuple(map(tuple, turns)))).planned
+    with pytest.raises(InputError, match="a turn makes no product"):
+        _ = project.with_plan(Plan(turns=((NOBODY,) * len(unit),))).planned
+
+
+# Geometry
+
+
+def test_default_boxes_are_side_by_side_in_each_product() -> None:
+    """Boxes of two products may be in one place, those of one never are."""
+    pag = little()
+    solids = product_geometry(pag).solids
+    for parts in pag.insides:
+        assert len({tuple(solids[part].position) for part in parts}) == len(parts)
+    assert tuple(solids["x"].position) == tuple(solids["z"].position)
+
+
+SHAPED = """mix = a, b;
+a = mate ( base, x ); b = mate ( base, z );
+base = atomic ( box = ( 0.2, 0.1, 0.02 ), pos = ( 0, 0, 0.01 ) );
+x = atomic ( box = ( 0.22, 0.08, 0.05 ), pos = ( 0, 0, 0.045 ) );
+z = atomic ( box = ( 0.16, 0.12, 0.03 ), pos = ( 0.02, 0, 0.035 ) );"""
+"""Two products of which the first is longer and taller, and the second wider."""
+
+
+@pytest.fixture
+def shaped(tmp_path: Path) -> Path:
+    path = tmp_path / "shaped.pag"
+    path.write_text(SHAPED)
+    return path
+
+
+def test_the_outfeed_takes_all_products_in_one_place(shaped: Path, run: Terminal) -> None:
+    """The output robot holds all products by one place, the outfeed is for the box of all, and what
+    overlaps are parts of one product only: x and z do, were they in one."""
+    project = read(shaped)
+    layout = project.layout
+    assert {layout.visits[o.index, 0].shift for o in layout.factory.dropoffs} == {(0.0, 0.0)}
+    a, b = (layout.payloads[product] for product in layout.factory.products)
+    assert layout.outgoing == (min(a[0], b[0]), max(a[1], b[1]), min(a[2], b[2]), max(a[3], b[3]))
+    assert layout.outgoing not in (a, b)
+    assert not project.overlaps.pairs
+    found = run("run", shaped, "--units", 4, "--json").json
+    assert found["units_by_product"] == {"a": 2, "b": 2}
+    assert (found["unintended_contacts"], found["verdict"]["succeeded"]) == (0, True)
+
+
+# From end to end
+
+
+@pytest.mark.parametrize("world", ["ideal", "mujoco"])
+def test_a_mix_runs(file: Path, run: Terminal, world: str) -> None:
+    done = run("run", file, "--units", 7, "--world", world, "--jitter", 0.3, "--json")
+    assert done.status == 0
+    found = done.json
+    assert found["units_by_product"] == {"a": 5, "b": 2}
+    assert found["cycle_time_s"] == pytest.approx(found["predicted_cycle_time_s"], rel=0.03)
+    if world == "mujoco":
+        assert found["unintended_contacts"] == 0
+        assert found["product_error_max_mm"] < 0.1
+    drops = [e["transition"] for e in found["events"] if e["transition"].startswith("dropoff")]
+    assert drops[1::2] == ["dropoff_e", "dropoff@2_e", "dropoff@3_e"] * 2 + ["dropoff_e"]
+
+
+def test_check_says_what_is_shared(file: Path, run: Terminal) -> None:
+    found = run("check", file, "--json").json
+    assert found["products"] == [
+        {"label": "a", "count": 2, "robots_alone": 4},
+        {"label": "b", "count": 1, "robots_alone": 3},
+    ]
+    assert (found["robots"], found["period"], found["common"]) == (4, 3, ["base"])
+    assert Counter(found["sequence"]) == {"a": 2, "b": 1}
+    assert found["lines"][3] == {"robot": "r4", "labels": ["x", "z@2", "x@3"]}
+
+
+def test_a_log_a_plan_and_a_report_of_a_mix(file: Path, run: Terminal, tmp_path: Path) -> None:
+    assert run("run", file, "--units", 3, "--log", tmp_path / "log").status == 0
+    assert run("monitor", tmp_path / "log").status == 0
+    assert run("report", tmp_path / "log", "-o", tmp_path / "r.html", "-q").status == 0
+    assert run("build", file, "-o", tmp_path / "made", "-q").status == 0
+    done = run("check", tmp_path / "made" / "plan.json", "--json")
+    assert done.json["sequence"] == run("check", file, "--json").json["sequence"]
+
+
+@pytest.mark.parametrize(
+    "options", [("--robots", "least"), ("--cycle", "1"), ("--relay",), ("--deputies",)]
+)
+def test_options_for_one_product_are_refused(
+    file: Path, run: Terminal, options: tuple[str, ...]
+) -> None:
+    done = run("run", file, "--world", "ideal", *options, "--json")
+    assert (done.status, done.codes) == (2, ["BadMix"])
+
+
+def test_branches_of_a_mix_may_be_parallel(file: Path, run: Terminal) -> None:
+    done = run("run", file, "--units", 8, "--parallel", "y=2", "--json")
+    assert (done.status, done.json["robots"]) == (0, 5)
