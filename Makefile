@@ -36,13 +36,13 @@ test-all: setup oracles
 	$(PY) -m pytest -q -n 2 --dist worksteal $(ARGS)
 
 bench: setup
-	$(PY) -m tests.bench $(ARGS)
+	$(PY) -m benches.speed $(ARGS)
 
 fidelity: setup
-	$(PY) -m tests.fidelity $(ARGS)
+	$(PY) -m benches.fidelity $(ARGS)
 
 faults: setup
-	$(PY) -m tests.bench.faults $(ARGS)
+	$(PY) -m benches.faults $(ARGS)
 
 docs:
 	@tools/setup docs
@@ -54,8 +54,8 @@ gallery: setup
 
 lint:
 	@tools/setup dev
-	$(PY) -m ruff check factory tests docs tools/gallery
-	$(PY) -m ruff format --check factory tests docs tools/gallery
+	$(PY) -m ruff check factory tests benches docs tools/gallery
+	$(PY) -m ruff format --check factory tests benches docs tools/gallery
 	$(PY) -m mypy
 
 golden: setup

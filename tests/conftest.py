@@ -19,7 +19,7 @@ from tests.once import ANEW, Stages, stages_once
 TESTS = Path(__file__).parent
 ROOT = TESTS.parent
 
-collect_ignore_glob = ["bench/rivals/*", "oracles/*"]
+collect_ignore_glob = ["oracles/*"]
 """Scripts for environments of their own."""
 
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in what a shell starts with `&`

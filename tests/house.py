@@ -104,8 +104,8 @@ class Module:
 
 
 CLOCK = re.compile(r"^ *(?:from|import) (?:[^()\n]*, )?time\b", re.M)
-CLOCKED = ("waiting", "reporting")
-"""Modules of the tests that read a clock: one waits for processes, one times benches."""
+CLOCKED = ("waiting",)
+"""Modules of the tests that read a clock: it waits for processes."""
 
 
 class House:

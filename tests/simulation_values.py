@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 import factory
+from benches.speed.factories import balanced
+from benches.speed.factories import laid_out as floor_of
 from factory.compiler.compiler import compile_pag
 from factory.compiler.expanding import expand
 from factory.compiler.mating.mating import matings
@@ -24,8 +26,6 @@ from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
-from tests.bench.factories import balanced
-from tests.bench.factories import laid_out as floor_of
 from tests.command_line import ROOT
 from tests.examples import without_hands
 

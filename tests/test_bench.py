@@ -10,14 +10,14 @@ from pathlib import Path
 
 import pytest
 
+from benches import reporting
+from benches.faults.__main__ import REPORT as FAULTS
+from benches.fidelity.__main__ import REPORT as FIDELITY
+from benches.reporting import Report
+from benches.speed import floors, large, processes, production, replaying
+from benches.speed.__main__ import REPORT
+from benches.speed.factories import laid_out, produce, robots_at_least
 from factory.simulation.simulation import Simulation
-from tests import reporting
-from tests.bench import floors, large, processes, production, replaying
-from tests.bench.__main__ import REPORT
-from tests.bench.factories import laid_out, produce, robots_at_least
-from tests.bench.faults.__main__ import REPORT as FAULTS
-from tests.fidelity.__main__ import REPORT as FIDELITY
-from tests.reporting import Report
 
 KEPT = [(report, file) for report in (REPORT, FAULTS) for file in report.folder.glob("*.json")]
 

@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from benches.fidelity.products import layout
 from factory.mjcf import binary, loading
 from factory.mjcf.binary import beside, kept, key_of, packed, seal_of, sealed
 from factory.mjcf.model import Model
 from factory.simulation.modelling import physical_model
 from tests.command_line import PAPER, Terminal, files_in
-from tests.fidelity.products import layout
 
 KEY = "k"
 CONTENT = bytes(range(256)) * 4

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benches.fidelity import attraction, disturbances
+from benches.fidelity.products import PAPER, layout
 from factory.simulation.disturbance import (
     Delay,
     Dragged,
@@ -21,8 +23,6 @@ from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from factory.support.errors import InputError
 from factory.support.settings import MOST
-from tests.fidelity import attraction, disturbances
-from tests.fidelity.products import PAPER, layout
 from tests.simulation_values import FINE, read_by, stepping
 
 

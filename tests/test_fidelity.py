@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import factory
+from benches.fidelity.convergence import soften
 from factory.layout.layout import Layout
 from factory.record.state import Event
 from factory.simulation.request import RunRequest
@@ -20,7 +21,6 @@ from factory.study.fidelity.measuring import Measurement
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
 from tests.command_line import PAPER, ROOT, Terminal
-from tests.fidelity.convergence import soften
 
 
 @cache

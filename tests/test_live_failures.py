@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from benches.faults.takeovers import PAPER as INSERTS
 from factory.nets.replay import replay
 from factory.nets.undone import Undone
 from factory.plant.material import joins_of
@@ -32,7 +33,6 @@ from factory.simulation.run import entries_of
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
 from tests import failing_runs
-from tests.bench.faults.takeovers import PAPER as INSERTS
 from tests.command_line import started
 from tests.layout_values import paper_layout
 from tests.live_sessions import Running, a_session

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benches.fidelity import long_runs
+from benches.fidelity.__main__ import REPORT
+from benches.fidelity.products import PAPER, layout
 from factory.record.state import State
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
-from tests.fidelity import long_runs
-from tests.fidelity.__main__ import REPORT
-from tests.fidelity.products import PAPER, layout
 
 
 @pytest.fixture

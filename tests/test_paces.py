@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.fidelity import paces
+from benches.fidelity import paces
 
 
 def test_the_pace_of_the_papers_example_is_that_of_its_net() -> None:

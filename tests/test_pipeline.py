@@ -11,13 +11,13 @@ import click
 import pytest
 from click.testing import CliRunner
 
+from benches.speed.factories import cube
 from factory.commands.options import MOTION, OUTPUT, SOURCE
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.layout.request import Ground
 from factory.pipeline import read
 from factory.support.errors import InputError
 from factory.support.settings import Settings
-from tests.bench.factories import cube
 from tests.command_line import PAPER, ROOT
 
 

@@ -16,6 +16,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benches.speed.factories import cube
 from factory.layout import request
 from factory.layout.layout import Layout
 from factory.layout.request import Ground
@@ -30,7 +31,6 @@ from factory.study.analysis import Timing, analyse
 from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import Settings
 from factory.support.tables import table_of, value_of
-from tests.bench.factories import cube
 from tests.command_line import PAPER, ROOT, Terminal
 from tests.layout_values import (
     Drawn,

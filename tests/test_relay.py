@@ -15,6 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benches.speed.factories import cube, laid_out
 from factory.compiler.compiler import compile_pag
 from factory.compiler.expanding import expand, nodes_of
 from factory.lang import read_pag, write_pag
@@ -40,7 +41,6 @@ from factory.simulation.simulation import Simulation
 from factory.support.resources import templates_folder
 from factory.support.settings import Settings
 from factory.timing.pool import part_pool
-from tests.bench.factories import cube, laid_out
 from tests.command_line import Terminal
 from tests.layout_values import (
     Drawn,

@@ -13,6 +13,7 @@ from tempfile import TemporaryDirectory
 
 import pytest
 
+from benches.speed.factories import cube
 from factory.layout.certificate import ARM_BODY
 from factory.layout.clearance import certify
 from factory.layout.dimensions import ARM_WIDTH, Clearance
@@ -32,7 +33,6 @@ from factory.plant.factory import Operation
 from factory.problem.robot_types import load_catalogue
 from factory.support.settings import Settings
 from factory.timing.prediction import pace
-from tests.bench.factories import cube
 from tests.command_line import ROOT, Terminal
 from tests.test_hands import AT_MOST_MM, GRIP_MM, looked_at
 from tests.test_relay import templates_of

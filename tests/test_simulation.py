@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import factory
+from benches.speed.factories import laid_out as floor_of
 from factory.layout.layout import Layout
 from factory.nets.history import firings, legal_marking
 from factory.nets.replay import replay
@@ -20,7 +21,6 @@ from factory.simulation.request import RunRequest
 from factory.simulation.run import busy_times
 from factory.simulation.simulation import Simulation
 from factory.support.settings import Settings
-from tests.bench.factories import laid_out as floor_of
 from tests.good_runs import assert_good, random_marking
 from tests.pag_texts import LONE, OVERLAP, PAPER, PRODUCTS, laid_out
 from tests.simulation_values import ready

@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from benches.fidelity.products import layout
 from factory.mjcf import names
 from factory.mjcf.loading import load
 from factory.mjcf.model import Model, model_files
@@ -25,7 +26,6 @@ from factory.simulation.modelling import physical_model
 from factory.support.files import write_all
 from factory.support.settings import Settings
 from tests.command_line import ROOT
-from tests.fidelity.products import layout
 from tests.oracles.driving import ahead, start
 
 PAGE = ROOT / "docs" / "guide" / "driving.md"

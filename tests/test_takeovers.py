@@ -12,6 +12,8 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 
+from benches.faults.takeovers import PAPER as INSERTS
+from benches.faults.takeovers import interval_after
 from factory.compiler import taking_over
 from factory.compiler.deputies import chosen_pairs, deputies, rounds_of, standing_by
 from factory.compiler.taking_over import Takeover, crew_with, nets_after, with_moved
@@ -31,8 +33,6 @@ from factory.simulation.request import RunRequest
 from factory.simulation.run import Run, entries_of
 from factory.simulation.simulation import Simulation
 from factory.support.errors import Diagnostic, RunError
-from tests.bench.faults.takeovers import PAPER as INSERTS
-from tests.bench.faults.takeovers import interval_after
 from tests.command_line import ROOT, Terminal
 from tests.fold_values import swapped
 from tests.good_runs import assert_good

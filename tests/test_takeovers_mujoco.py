@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from benches.faults.takeovers import PAPER as INSERTS
+from benches.faults.takeovers import interval_after
 from factory.commands.run import summarise
 from factory.compiler.taking_over import Takeover, crew_with
 from factory.control.mode import Limits
@@ -44,8 +46,6 @@ from factory.support.engine import mujoco
 from factory.support.settings import Settings
 from factory.timing.timed import timed
 from factory.timing.timing import Timing
-from tests.bench.faults.takeovers import PAPER as INSERTS
-from tests.bench.faults.takeovers import interval_after
 from tests.command_line import ROOT, Terminal
 from tests.layout_values import with_visits
 

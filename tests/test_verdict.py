@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import factory
+from benches.speed.factories import balanced
 from factory.layout.layout import Layout
 from factory.layout.request import Ground
 from factory.mjcf import loading, names
@@ -31,7 +32,6 @@ from factory.simulation.simulation import Simulation
 from factory.simulation.watched import watched
 from factory.support.errors import Diagnostic
 from factory.support.settings import Settings
-from tests.bench.factories import balanced
 from tests.command_line import PAPER, ROOT, Terminal
 from tests.examples import with_hands
 from tests.good_runs import random_marking

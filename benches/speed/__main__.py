@@ -1,0 +1,52 @@
+"""`python -m benches.speed [--quick] [NAME ...]`: measure all sections, or some, and write
+docs/benchmarks.md."""
+
+from __future__ import annotations
+
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+from benches.reporting import DOCS, Report
+from benches.speed.processes import ROOT
+
+REPORT = Report(
+    "benches.speed",
+    "# Benchmarks\n\nWritten by `make bench` (`python -m benches.speed NAME` for one section) from"
+    " what is kept in docs/benchmarks/.",
+    (
+        "production",
+        "floors",
+        "profile_300",
+        "movers",
+        "relays",
+        "few_robots",
+        "states",
+        "proving",
+        "sweeping",
+        "rendering",
+        "products",
+        "large",
+    ),
+    DOCS / "benchmarks.md",
+    ("mujoco", "numpy", "scipy", "lark", "shapely"),
+)
+
+
+def main() -> None:
+    """Measure, and write the report after each section."""
+    parser = REPORT.parser(__doc__)
+    parser.add_argument("-o", "--output", type=Path, default=REPORT.path, help="the report")
+    given = parser.parse_args()
+    report = replace(REPORT, path=given.output)
+    names = report.chosen(parser, given)
+    if names:
+        subprocess.run([ROOT / "tools" / "rivals"], check=False)
+    for name in names:
+        print(f"{name} ", end="", flush=True)
+        report.measure(name, given.quick)
+        report.write()
+
+
+if __name__ == "__main__":
+    main()
