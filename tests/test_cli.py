@@ -12,17 +12,15 @@ from typing import Any
 
 import click
 import pytest
-import trimesh
 
 from factory.commands import cli
 from factory.exporting.certificate.check import check_certificate
 from factory.record.log import read_log
 from factory.support.extras import EXTRAS
-from tests.command_line import PAPER, ROOT, Terminal, files_in, spawn
+from tests.command_line import PAPER, ROOT, Terminal, files_in
 
 NUMBER = (int, float)
 MAYBE = (int, float, type(None))
-FLAG = (bool,)
 
 CHECK: dict[str, Any] = {
     "product": str,
@@ -71,38 +69,6 @@ def assert_keys(document: dict[str, Any], expected: dict[str, Any]) -> None:
 
 
 # --- the documents --------------------------------------------------------------------------------
-
-
-def test_check_of_the_papers_example(run: Terminal) -> None:
-    document = run("check", PAPER, "--json").json
-    assert_keys(document, CHECK)
-    assert document["product"] == "sub3"
-    assert [document[k] for k in ("labels", "robots", "places", "transitions", "tokens")] == [
-        *(6, 6, 19, 14, 6)
-    ]
-    assert document["largest_mode"] == 3
-    assert document["part_pool"] == {"part1": 3, "part2": 3, "part3": 2}
-    assert document["witness"] == []
-    r3 = document["gears"][2]
-    assert (r3["robot"], r3["type"]) == ("r3", "dot")
-    assert [f"{p['mode']} {p['label']}" for p in r3["places"]] == [
-        *("wait nopart", "mate sub1", "hold sub1", "weld sub2", "wait sub2", "mate sub3")
-    ]
-    assert all(set(p) >= {"name", "mode", "label"} for g in document["gears"] for p in g["places"])
-
-
-def test_labels_are_those_the_user_wrote(run: Terminal, tmp_path: Path) -> None:
-    file = tmp_path / "k.pag"
-    file.write_text(
-        "5 parts; root = s; s = mate(a, b, c, d);" + "".join(f"{x} = atomic();" for x in "abcd")
-    )
-    document = run("check", file, "--json").json
-    assert document["labels"] == 5
-    operations, roles = 7, 4 + 3 + 2 + 2
-    robots = 1 + roles - operations
-    assert document["robots"] == robots
-    assert document["transitions"] == 2 * operations + 2
-    assert document["places"] == 2 * operations + robots + 1
 
 
 def test_build_of_the_papers_example(run: Terminal, tmp_path: Path) -> None:
@@ -269,40 +235,6 @@ def test_a_pag_may_come_in(tmp_path: Path) -> None:
     assert status == 2 and err.startswith("<stdin>:1:8: UndefinedLabel")
 
 
-@pytest.mark.parametrize("command", ["run", "view", "programs", "build"])
-def test_what_is_no_pag_says_what_it_is(run: Terminal, tmp_path: Path, command: str) -> None:
-    for name, words in (
-        ("x.pnml", "`factory check"),
-        ("x.mpd", "`factory import"),
-        ("x.step", "`factory plan"),
-        ("x.stl", "atomic ( mesh = "),
-    ):
-        (tmp_path / name).write_text("<pnml/>")
-        done = run(command, tmp_path / name)
-        assert done.status == 2
-        assert "not the PAG of a product" in done.err and words in done.err
-
-
-@pytest.mark.parametrize(
-    ("line", "hint"),
-    [
-        ("lamp.pag", "the command comes first: factory run lamp.pag"),
-        ("simulate lamp.pag", "did you mean 'factory run'?"),
-        ("help", "did you mean 'factory --help'?"),
-        ("run lamp", "did you mean 'lamp.pag'?"),
-        ("export lamp.pag", "There are: csv, dot, "),
-        ("render lamp.pag", "-o: OUT.mp4, or OUT.png for a still."),
-    ],
-)
-def test_first_lines_have_a_way_out(
-    run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, line: str, hint: str
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "lamp.pag").write_text("root = a; a = atomic()")
-    done = run(*line.split())
-    assert done.status == 2 and hint in done.err
-
-
 def test_help_is_in_sections(run: Terminal) -> None:
     out = run("run", "--help").out
     titles = re.findall(r"^(\w[\w ]+):$", out, re.M)
@@ -353,50 +285,6 @@ def test_more_is_said_of_what_was_written(run: Terminal, tmp_path: Path) -> None
 
 # --- diagnostics ----------------------------------------------------------------------------------
 
-BROKEN = """root = s;
-s = mate(a, b);
-a = atomic ( mass = -1, box = (1, 2) );
-b = atomik ();
-"""
-
-
-@pytest.fixture
-def broken(tmp_path: Path) -> Path:
-    file = tmp_path / "broken.pag"
-    file.write_text(BROKEN)
-    return file
-
-
-@pytest.mark.parametrize("columns", ["20", "80", "1000"])
-def test_diagnostics_are_lines_that_are_never_wrapped(broken: Path, columns: str) -> None:
-    done = spawn("check", broken, COLUMNS=columns)
-    assert done.status == 2
-    assert done.out == ""
-    lines = done.err.splitlines()
-    heads = [line for line in lines if re.match(r"\S.*:\d+:\d+: \w+ \S", line)]
-    assert [re.sub(r"^.*?(\d+:\d+: \w+).*", r"\1", head) for head in heads] == [
-        *("3:21: BadValue", "3:31: BadValue", "4:5: UnknownOperation")
-    ]
-    for head in heads:
-        at = lines.index(head)
-        line, column = (int(n) for n in head.removeprefix(f"{broken}:").split(":")[:2])
-        assert lines[at + 1].strip() == BROKEN.splitlines()[line - 1].strip()
-        caret = lines[at + 2].index("^")
-        assert lines[at + 1][caret] == BROKEN.splitlines()[line - 1][column - 1]
-        assert lines[at + 3].strip()
-    assert "did you mean 'atomic'?" in done.err
-
-
-def test_errors_are_a_document_too(run: Terminal, broken: Path) -> None:
-    done = run("check", broken, "--json")
-    assert done.status == 2
-    assert done.codes == ["BadValue", "BadValue", "UnknownOperation"]
-    for error in done.json["errors"]:
-        assert error["file"] == str(broken)
-        assert error["message"]
-        assert isinstance(error["line"], int)
-        assert isinstance(error["col"], int)
-
 
 def test_unprintable_signs_cannot_break_a_line(run: Terminal, tmp_path: Path) -> None:
     file = tmp_path / "new\nline.pag"
@@ -406,120 +294,7 @@ def test_unprintable_signs_cannot_break_a_line(run: Terminal, tmp_path: Path) ->
     assert "new line.pag:1:" in err.splitlines()[0]
 
 
-def test_check_warns_as_build_does(run: Terminal, tmp_path: Path) -> None:
-    file = tmp_path / "big.pag"
-    file.write_text("root = p; p = atomic ( box = (9, 1, 1) );")
-    built, done = (run(word, file) for word in ("build", "check"))
-    assert built.status == done.status == 0 and done.err == built.err
-    assert re.match(rf"{re.escape(str(file))}:\d+:\d+: Size warning: ", done.err)
-    assert run("check", file, "-q").err == run("build", file, "-q").err == ""
-    found = run("check", file, "--json").json["warnings"]
-    assert found == run("build", file, "--json").json["warnings"]
-    assert [warning["code"] for warning in found] == ["Size"]
-    assert run("check", PAPER, "--json").json["warnings"] == []
-
-
-@pytest.mark.parametrize(
-    "geometry",
-    [
-        "mass = @1e300",
-        "mass = @5e12, density = 1",
-        "density = @1e300",
-        "pos = @(1e9, 0, 0)",
-        "sphere = 1, pos = @(1e300, 0, 0)",
-        "sphere = @9e3, pos = (2e3, 0, 0)",
-        "sphere = 1, mass = @1e308",
-        "sphere = 1, density = @1e300",
-        "sphere = @900",
-        'mesh = "box.stl", scale = @1e300',
-        'mesh = "box.stl", scale = @900',
-        'mesh = "box.stl", pos = @(9.9995e3, 0, 0)',
-        'mesh = "box.stl", pos = @(2e4, 0, 0), scale = 2',
-    ],
-)
-def test_check_finds_values_that_lead_too_far(run: Terminal, tmp_path: Path, geometry: str) -> None:
-    """Where they are written, marked here by @."""
-    file = tmp_path / "far.pag"
-    trimesh.creation.box((20, 20, 20)).export(tmp_path / "box.stl")
-    line = f"root = a; a = atomic ( {geometry} )"
-    file.write_text(line.replace("@", ""))
-    for command in ("check", "build"):
-        done = run(command, file, "--json")
-        assert (done.status, done.codes) == (2, ["BadValue"])
-        assert done.json["errors"][0]["col"] == line.index("@") + 1
-
-
-@pytest.mark.parametrize(
-    ("words", "hint"),
-    [
-        ([], "--help"),
-        (["--json", "check", PAPER], "--help"),
-        (["chek", PAPER], "did you mean 'check'?"),
-        (["run", PAPER, "--unitz", "2"], "did you mean '--units'?"),
-        (["run"], "factory run --help"),
-        (["run", PAPER, "--units"], "--help"),
-        (["check", PAPER, PAPER], "--help"),
-        (["export", PAPER, "--format", "pnlm"], "did you mean 'pnml'?"),
-        (["programs", PAPER, "--robot", "r77"], "robots: r1, r2"),
-        (["check", PAPER.parent / "papers.pag"], "did you mean"),
-        (["run", PAPER, "--world", "real"], "--help"),
-        (["build", PAPER, "--templates", "nowhere"], "directory"),
-    ],
-)
-def test_usage_errors(run: Terminal, words: list[object], hint: str) -> None:
-    done = run(*words)
-    assert done.status == 2
-    assert hint in done.err
-    document = done if "--json" in words else run(*words, "--json")
-    assert document.status == 2
-    assert len(document.codes) == 1
-    assert "--json" in words or done.out == ""
-
-
 # --- proofs ---------------------------------------------------------------------------------------
-
-
-def test_certificates_check(run: Terminal, tmp_path: Path) -> None:
-    file = tmp_path / "proof.json"
-    assert run("check", PAPER, "--certificate", file).status == 0
-    proof = json.loads(file.read_text("utf-8"))
-    assert check_certificate(proof) == []
-    assert run("check", PAPER, "--certificate", file, "--wip", 1, "--json").json["part_pool"] == {
-        **dict.fromkeys(("part1", "part2", "part3"), 1)
-    }
-
-
-@pytest.mark.parametrize("ending", ["pnml", "xml"])
-def test_a_net_that_fails_has_a_witness(run: Terminal, tmp_path: Path, ending: str) -> None:
-    file = tmp_path / f"net.{ending}"
-    text = run("export", PAPER, "--format", "pnml").out
-    file.write_text(text)
-    good = run("check", file, "--json")
-    assert good.status == 0
-    assert good.json["live"] is True
-    bad = re.sub(r"<initialMarking>\s*<text>1</text>\s*</initialMarking>", "", text)
-    assert bad != text
-    file.write_text(bad)
-    done = run("check", file, "--json")
-    assert done.status == 1
-    assert_keys(done.json, {k: v for k, v in CHECK.items() if v is not bool})
-    assert done.json["live"] is False
-    assert done.json["witness"]
-    assert all(w["property"] and w["reason"] for w in done.json["witness"])
-    assert "NO" in run("check", file).out
-
-
-def test_what_a_net_has_not_is_refused(run: Terminal, out: Path) -> None:
-    net = out / "net.pnml"
-    net.write_text(run("export", PAPER, "--format", "pnml").out)
-    words = ["--wip", 2, "--relay", "--cycle", 3, "--clashes", out / "no", "--templates", out]
-    refused = run("check", net, "--certificate", out / "proof.json", *words, "--json")
-    assert refused.codes == ["Usage"] * 5
-    for word in words[::2]:
-        if isinstance(word, str):
-            assert f"{word} applies to a PAG; '{net}' is a net in PNML" in refused.out
-    assert files_in(out).keys() == {"net.pnml"}
-    assert run("check", net, "--certificate", out / "proof.json", "-v").status == 0
 
 
 def test_what_a_log_has_not_is_refused(
@@ -542,17 +317,6 @@ def test_what_a_log_has_not_is_refused(
     shown = ["--size", "640x360", "--fps", 5, "--camera", "top", "--with", "net", "--title", "A"]
     assert run(*picture, *shown, "--at", 1, "--quiet").status == 0
     assert "--poster applies to a film; this is a still" in run(*picture, "--poster", "b.png").err
-
-
-def test_options_of_a_film_are_refused_without_one(run: Terminal, out: Path) -> None:
-    """Each by its name; those that are set beforehand are not."""
-    given = ("--camera", "top", "--size", "640x480", "--poster", out / "a.png")
-    refused = run("run", PAPER, *given, "--json")
-    messages = [error["message"] for error in refused.json["errors"]]
-    assert refused.status == 2 and {*refused.codes} == {"Usage"}
-    assert messages == [
-        f"{x} applies to a film, and there is none" for x in ("--size", "--camera", "--poster")
-    ]
 
 
 # --- templates ----------------------------------------------------------------------------------
@@ -579,17 +343,3 @@ def test_folders_of_templates_are_searched_in_order(run: Terminal, tmp_path: Pat
     assert run("check", file).status == 2
     for command in (["check"], ["build"], ["programs"], ["export", "--format", "dot"]):
         assert run(command[0], file, *command[1:], *words).status == 0
-
-
-def test_a_witness_reads_as_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from factory.commands import run_command
-
-    net = tmp_path / "net.pnml"
-    assert run_command(["export", str(PAPER), "--format", "pnml", "-o", str(net)]) == 0
-    text = net.read_text("utf-8")
-    start, end = text.index("<initialMarking>"), text.index("</initialMarking>")
-    net.write_text(text[:start] + text[end + len("</initialMarking>") :], "utf-8")
-    assert run_command(["check", str(net)]) == 1
-    said = capsys.readouterr().out
-    assert "not legal: the gear of r1 carries no token" in said
-    assert "paper.pag:3" in said and "Witness(" not in said

@@ -81,32 +81,6 @@ def test_operations_of_ones_own_are_compiled(run: Terminal, own: Path) -> None:
         assert run(command, own / "p.pag", "--templates", own, *options).status == 0
 
 
-@pytest.mark.parametrize(
-    ("right", "wrong", "code"),
-    [
-        ("navigation", "navigatoin", "BadTemplate"),
-        ("navigation", "hold", "NotPrepared"),
-        ("navigation", "wait", "NotPrepared"),
-        ("within eps", "within 1e9", "NotPrepared"),
-        ("within eps", "within 0.02", "NotPrepared"),
-        ("A1 = A2 = B3", "A1 = B1 = A2 = B3", "NotPrepared"),
-        ("A1 = A2 = B3", "A1 = A2, B3 = B1", "NotPrepared"),
-    ],
-)
-def test_operations_without_a_mode_are_refused_when_compiled(
-    run: Terminal, own: Path, right: str, wrong: str, code: str
-) -> None:
-    assert right in OWN
-    (own / "op.op").write_text(OWN.replace(right, wrong))
-    (own / "y").mkdir()
-    for command, *options in commands(own / "y"):
-        done = run(command, own / "p.pag", "--templates", own, *options, "--json")
-        assert done.status == 2 and done.codes == [code], command
-        (error,) = done.json["errors"]
-        assert (Path(error["file"]).name, error["line"]) == ("op.op", 6)
-    assert files_in(own / "y") == {}
-
-
 def garbage() -> dict[str, bytes]:
     """Files that nobody would write."""
     draw = random.Random(7)
@@ -206,31 +180,6 @@ def test_odd_numbers_for_run(run: Terminal, out: Path, option: str) -> None:
         (out / "run.log").unlink(missing_ok=True)
 
 
-@pytest.mark.parametrize("value", ["0x0", "-1x2", "4", "4x", "x", "4x3x2", "nanx1", "infx2", "4,3"])
-def test_odd_pairs(run: Terminal, out: Path, value: str) -> None:
-    for words in (["build", PAPER, "--floor"], ["run", PAPER, "--size"]):
-        done = run(*words, value, "--json")
-        assert (done.status, done.codes) == (2, ["BadValue"])
-
-
-@pytest.mark.parametrize("size", ["1x1", "321x181", "100000x100000", "320x181"])
-def test_sizes_that_no_film_has(run: Terminal, out: Path, size: str) -> None:
-    for words in (["run", PAPER, "--video"], ["render", PAPER, "-o"]):
-        assert run(*words, out / "film.mp4", "--size", size, "--json").status == 2
-    assert files_in(out) == {}
-
-
-@pytest.mark.parametrize(
-    "words",
-    [["--camera", "nowhere"], ["--world", "ideal"], ["--fps", "0"], ["--fps", "1000"]],
-    ids=" ".join,
-)
-def test_films_that_cannot_be_taken(run: Terminal, out: Path, words: list[str]) -> None:
-    done = run("run", PAPER, "--video", out / "f.mp4", "--log", out / "l", *words, "--json")
-    assert done.status == 2
-    assert files_in(out) == {}
-
-
 # --- outputs --------------------------------------------------------------------------------------
 
 OUTPUTS = [
@@ -268,12 +217,6 @@ def test_the_input_is_never_overwritten(run: Terminal, out: Path, words: list[st
     command, *options = words
     assert run(command, file, *options, out / ".." / "out" / "p.pag", "--json").status == 2
     assert files_in(out) == {"p.pag": PAPER.read_bytes()}
-
-
-def test_one_file_cannot_be_two(run: Terminal, out: Path) -> None:
-    name = out / "both.mp4"
-    assert run("run", PAPER, "--log", name, "--video", name, "--json").codes == ["BadFile"]
-    assert files_in(out) == {}
 
 
 def test_a_folder_that_may_not_be_written(run: Terminal, out: Path) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from factory.support.explanations import codes, explain
-from tests.command_line import Done, Terminal, files_in
+from tests.command_line import Terminal, files_in
 from tests.house import this_house
 
 CODE = re.compile(r"[A-Z][A-Za-z]+")
@@ -138,28 +138,3 @@ def test_those_without_an_example_have_none(tmp_path: Path) -> None:
     assert set(codes()) >= NOT_PROVOKED
     assert not any(example(code, tmp_path) for code in NOT_PROVOKED)
     assert files_in(tmp_path) == {}
-
-
-def test_the_option_prints_it(run: Terminal) -> None:
-    done = run("--explain", "usedtwice")
-    assert done.status == 0
-    assert done.out.startswith("UsedTwice: two parts are in the same place\n\n")
-    assert "$ factory import model.mpd" in done.out
-    document = run("--explain", "Root", "--json").json
-    assert (document["code"], document["title"][:9]) == ("Root", "it is not")
-
-
-@pytest.mark.parametrize(
-    ("code", "hint"),
-    [
-        ("Rooot", "did you mean 'Root'?"),
-        ("label", "there are DuplicateLabel, LabelReuse, ReservedLabel, UndefinedLabel"),
-        ("qqqq", "valid codes: Assets, BadFailure, BadFault"),
-        ("", "valid codes: Assets"),
-    ],
-)
-def test_an_unknown_code_lists_near_ones(run: Terminal, code: str, hint: str) -> None:
-    done: Done = run("--explain", code)
-    assert done.status == 2
-    assert f"Usage there is no code '{code}'" in done.err
-    assert hint in done.err

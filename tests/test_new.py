@@ -157,50 +157,6 @@ def test_faults_of_the_environment_name_the_variable(
         assert f"BadValue in the environment {name}: " in done.err
 
 
-@pytest.mark.parametrize(
-    ("text", "where", "message", "hint"),
-    [
-        ("units = 1\nunit = 3", "2:1", "unknown key 'unit'", "did you mean 'units'?"),
-        ("units = 'three'", "1:1", "units must be a whole number", "for example units = 1"),
-        ("units = true", "1:1", "units must be a whole number", "units = 1"),
-        ("seed = 1\nworld = 3", "2:1", "world must be a text in quotes", 'world = "mujoco"'),
-        ("templates = 'mine'", "1:1", "templates must be a list of texts", 'templates = ["mine"]'),
-        ("templates = [3]", "1:1", "templates must be a list of texts", "mine"),
-        ("world = 'moon'", "1:1", "world: 'moon' is not one of", ""),
-        ("units = 0", "1:1", "units: 0 is not in the range", ""),
-        ("jitter = 7", "1:1", "jitter: 7", ""),
-        ("jitter = nan", "1:1", "jitter: ", ""),
-        ("speed = 1\nsped = 2", "2:1", "UnknownParameter", "did you mean 'speed'?"),
-        ("[motion]\nspeed = 1", "1:2", "UnknownParameter", "keys"),
-        ("clearance = 'much'", "1:1", "BadValue", "clearance = 0.02"),
-        ("  timestep = -1", "1:3", "BadValue", "timestep = 0.002"),
-        ("substeps = 2.5", "1:1", "BadValue", "substeps = 5"),
-        ("speed = true", "1:1", "BadValue", "speed = 0.5"),
-        ("speed = nan", "1:1", "BadValue", "speed = 0.5"),
-        ("speed = 9" + "9" * 500, "1:1", "BadValue", "speed = 0.5"),
-        ("force = 1\nspeed = = 2", "2:9", "Syntax", "toml.io"),
-        ("speed = [", "1:", "Syntax", "toml.io"),
-    ],
-)
-def test_faults_of_the_file_are_shown_in_place(
-    run: Terminal, pag: Path, text: str, where: str, message: str, hint: str
-) -> None:
-    settings = pag.with_name("factory.toml")
-    settings.write_text(text)
-    done = run("run", pag)
-    assert done.status == 2
-    assert f"{settings}:{where}" in done.err
-    assert message in done.err
-    assert hint in done.err
-
-
-def test_all_faults_of_the_file_at_once(run: Terminal, pag: Path) -> None:
-    pag.with_name("factory.toml").write_text("sped = 1\nforce = -1\nclearance = ''")
-    assert run("build", pag, "--json").codes == ["UnknownParameter", "BadValue", "BadValue"]
-    pag.with_name("factory.toml").write_bytes(b"\xff\xfe")
-    assert run("build", pag, "--json").codes == ["Syntax"]
-
-
 def test_each_command_takes_what_it_has_an_option_for(
     run: Terminal, pag: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -240,51 +240,6 @@ def test_all_errors_of_all_files_come_at_once(tmp_path: Path) -> None:
     assert all(d.hint for d in caught.value.diagnostics)
 
 
-def test_two_files_of_a_folder_must_not_define_one_template(tmp_path: Path) -> None:
-    put(tmp_path, "a.op", MATE)
-    put(tmp_path, "b.op", MATE)
-    with pytest.raises(InputError, match=r"b.op:1:1: BadTemplate .* first at .*a.op:1:1"):
-        load_templates([tmp_path, SHIPPED])
-
-
-@pytest.mark.parametrize(
-    ("further", "hint"),
-    [("inser", "did you mean 'insert'"), ("weld", "as insert does"), ("mate", "as insert does")],
-)
-def test_further_inputs_need_a_template_that_takes_them(
-    tmp_path: Path, further: str, hint: str
-) -> None:
-    put(tmp_path, "a.op", MATE.replace("further = insert", f"further = {further}"))
-    with pytest.raises(InputError) as caught:
-        load_templates([tmp_path, SHIPPED])
-    (found,) = caught.value.diagnostics
-    assert found.code == "BadTemplate"
-    assert str(found.position).endswith("a.op:7:13")
-    assert hint in found.hint
-
-
-@pytest.mark.parametrize(
-    ("instead", "more", "hint"),
-    [
-        ("inser", "", "did you mean 'insert'"),
-        ("weld", "", "as insert does"),
-        ("mate", "", "as insert does"),
-        ("insert", "parameters = ( dwell = 1 );", "the same parameters"),
-    ],
-)
-def test_one_robot_fewer_needs_a_template_that_does_the_same(
-    tmp_path: Path, instead: str, more: str, hint: str
-) -> None:
-    text = MATE.replace("further = insert;", f"instead = {instead}; {more}")
-    put(tmp_path, "a.op", text)
-    with pytest.raises(InputError) as caught:
-        load_templates([tmp_path, SHIPPED])
-    (found,) = caught.value.diagnostics
-    assert found.code == "BadTemplate"
-    assert str(found.position).endswith("a.op:7:13")
-    assert hint in found.hint
-
-
 # What is refused
 
 
@@ -296,45 +251,6 @@ def test_broken_files(path: Path, golden: Callable[[str, str], None]) -> None:
         assert diagnostic.position is not None
         assert diagnostic.hint
     golden(f"broken/{path.name}.txt", f"{caught.value}\n")
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "wanted"),
-    [
-        ("j = 3", "j = 0", ["BadTemplate"]),
-        ("j = 3", "j = 99999999999999", ["BadTemplate"]),
-        ("j = 3", "j = 2", ["GearNotClosed", "GearNotClosed"]),
-        ("B3 }", "B33333333333333333 }", ["BadTemplate"]),
-        ("B3 }", "B0 }", ["BadTemplate"]),
-        ("B3 }", "B3 + 1e999r }", ["Syntax"]),
-        ("LAB1", "LAB0", ["BadTemplate"]),
-        ("LAB3", "LAB2", ["LabelReuse"]),
-        ("within eps", "within 0", ["BadTemplate"]),
-        ("within eps", "within epsilon", ["BadTemplate"]),
-        ("within eps", "within eps for 1e999", ["BadTemplate"]),
-        ("mate =", "nopart =", ["ReservedLabel"]),
-        ("mate =", "a+b =", ["Syntax"]),
-        ("<a; b>", "<b; a>", ["Syntax", "Syntax"]),
-        ("where", "", ["Syntax"]),
-        ("further = insert", "failure = { residual > 1e999 : scrap }", ["BadFailure"]),
-        ("further = insert", "failure = { jammed : again 9999999999 }", ["BadFailure"]),
-        ("further = insert", "failure = { jammed : again 1.5 }", ["BadFailure"]),
-        ("further = insert", "failure = { jammed : stop 2 }", ["BadFailure"]),
-        ("further = insert", "failure = { jammed : }", ["Syntax"]),
-        ("further = insert", "failure = { jammed : stop, }", ["Syntax"]),
-        ("on W to", "on V to", ["Syntax"]),
-        ("dot, dot, dot", "dot, , dot", ["Syntax"]),
-        ("further = insert", "further = < insert >", ["Syntax"]),
-    ],
-)
-def test_one_mistake_gives_one_error(old: str, new: str, wanted: list[str]) -> None:
-    assert old in MATE
-    assert codes(MATE.replace(old, new)) == wanted
-
-
-def test_a_carrier_that_brings_one_input_has_no_robot_to_spare() -> None:
-    text = (SHIPPED / "insert.op").read_text()
-    assert codes(f"{text} instead = insert;") == ["BadTemplate"]
 
 
 def test_dropoff_alone_may_leave_nothing() -> None:
