@@ -155,29 +155,6 @@ def test_no_binary_lies_beside_a_device_or_upon_the_mjcf(tmp_path: Path) -> None
     assert beside(tmp_path / "m.mjb") == tmp_path / "m.mjb.mjb"
 
 
-@pytest.mark.parametrize(
-    ("name", "fuse"),
-    [
-        ("gearbox", True),
-        ("truck", False),
-        pytest.param("gearbox", False, marks=pytest.mark.slow),
-        pytest.param("truck", True, marks=pytest.mark.slow),
-    ],
-)
-def test_a_model_read_in_pieces_is_the_same_to_the_last_byte(name, fuse, monkeypatch) -> None:
-    model = physical_model(layout(name), 2, fuse=fuse)
-    whole = packed(loading.load(model))
-    pieces = []
-    attach = mujoco.MjSpec.attach
-    monkeypatch.setattr(
-        mujoco.MjSpec, "attach", lambda *a, **k: pieces.append(a) or attach(*a, **k)
-    )
-    monkeypatch.setattr(loading, "MANY", 0)
-    monkeypatch.setattr(loading, "PIECE", 100)
-    assert packed(loading.load(model)) == whole
-    assert len(pieces) > 3
-
-
 def test_the_reading_of_pieces_warns_of_nothing(capfd, recwarn, monkeypatch) -> None:
     monkeypatch.setattr(loading, "MANY", 0)
     loading.load(physical_model(layout("gearbox"), 2))

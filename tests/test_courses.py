@@ -12,7 +12,6 @@ import pytest
 from factory.control.governor import follow
 from factory.control.mode import ROUNDING
 from factory.control.navigation import Bundle
-from factory.simulation import bundles
 from factory.simulation.disturbance.interventions import Interventions
 from factory.simulation.mujoco import courses, motion
 from factory.simulation.mujoco.courses import Course, Follower, planned
@@ -22,7 +21,7 @@ from factory.simulation.mujoco.motion import Motion
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from factory.support.settings import MOST, Settings
-from tests.simulation_values import FINE, read_by, ready, states, stepping
+from tests.simulation_values import FINE, read_by, ready, stepping
 
 
 def kept(simulation: Simulation) -> dict[Any, Course]:
@@ -30,23 +29,6 @@ def kept(simulation: Simulation) -> dict[Any, Course]:
     stepping_ = simulation.physical.motion.stepping
     assert isinstance(stepping_, Strides)
     return stepping_._courses  # type: ignore[return-value]
-
-
-@pytest.mark.parametrize(
-    ("name", "given"), [("paper", {}), ("20", {"settings": replace(FINE, stage=1)}), ("lamp", {})]
-)
-def test_a_course_is_the_same_when_it_is_kept(
-    name: str, given: dict[str, Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    remembers, forgets = ready(name, **given), ready(name, **given)
-    expected = states(remembers, remembers.supervisor.step, 800)
-    monkeypatch.setattr(strides, "ROOM", 0)
-    kept(forgets)
-    forgets.physical.motion.stepping._room = 0  # type: ignore[attr-defined]
-    for state in expected:
-        assert states(forgets, forgets.supervisor.step, 1) == [state]
-        assert len(kept(forgets)) <= 1
-    assert len(kept(remembers)) > 1
 
 
 def test_steady_production_repeats_itself() -> None:
@@ -69,16 +51,6 @@ def test_there_is_room_for_so_many_numbers(monkeypatch: pytest.MonkeyPatch) -> N
         again = cache.course(number % 7, lambda: pytest.fail("it was forgotten"))
         assert again is course
         assert 1 <= len(cache._courses) <= 42 // 16
-
-
-def test_bundles_are_forgotten_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    usual, forgetful = ready("20"), ready("20")
-    expected = states(usual, usual.supervisor.step, 400)
-    monkeypatch.setattr(bundles, "KEPT", 3)
-    for state in expected:
-        assert states(forgetful, forgetful.supervisor.step, 1) == [state]
-        assert len(forgetful.supervisor.bundles._kept) <= 3
-    assert len(usual.supervisor.bundles._kept) > 3
 
 
 # --- what drives read -----------------------------------------------------------------------------

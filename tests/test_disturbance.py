@@ -31,17 +31,6 @@ def simulated(*wanted, **options) -> Simulation:
     return disturb(Simulation(layout(PAPER), RunRequest(units=1, **given)), *wanted)
 
 
-def final(simulation: Simulation) -> np.ndarray:
-    return np.concatenate([simulation.physical.d.qpos, simulation.physical.d.qvel])
-
-
-def test_without_disturbances_a_run_is_the_same_to_the_bit() -> None:
-    plain, other = simulated(), disturb(simulated(), *())
-    one, two = plain.run(), other.run()
-    assert one.events == two.events and one.physics == two.physics
-    assert (final(plain) == final(other)).all()
-
-
 @pytest.mark.parametrize(
     "nothing",
     [Mass(1.0), Gain(1.0), Slowed("r3", 1.0), Push("r1/carriage", (0, 0, 0), 0.0, 9.0), Noise(0.0)],

@@ -6,18 +6,14 @@ import json
 from functools import cache, partial
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import factory
 from benches.fidelity.convergence import soften
 from factory.layout.layout import Layout
 from factory.record.state import Event
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
 from factory.study.fidelity import QUANTITIES, SeedRecord, measure, measure_seed
 from factory.study.fidelity.comparing import Alter, Case, durations
-from factory.study.fidelity.measuring import Measurement
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
 from tests.command_line import PAPER, ROOT, Terminal
@@ -46,17 +42,6 @@ def figure(record: SeedRecord, key: str) -> float:
     value = record.figures[key]
     assert value is not None
     return value
-
-
-@pytest.mark.parametrize("name", ["paper", "meshes", "kary"])
-def test_measuring_does_not_change_the_run_by_a_bit(name: str) -> None:
-    one = Simulation(layout(name), RunRequest(units=2, seed=3, jitter=0.3))
-    other = Simulation(layout(name), RunRequest(units=2, seed=3, jitter=0.3))
-    first, second = one.run(), Measurement(other).run()
-    assert first.events == second.events
-    assert first.physics == second.physics
-    for data in ("qpos", "qvel", "act", "qacc_warmstart"):
-        assert np.array_equal(getattr(one.world.d, data), getattr(other.world.d, data))
 
 
 @pytest.mark.parametrize("settings", [FINE, Settings()])

@@ -209,16 +209,6 @@ def test_without_hands_there_is_nothing_to_measure() -> None:
     assert figures.grip_strength_robot is None and figures.grip_strength_label is None
 
 
-def test_measuring_is_the_same_in_any_run() -> None:
-    """To the last bit: with what makes runs faster and without, observed and not."""
-    runs = [
-        ready("stool", fast=fast, shown=False).run([lambda *_: None] if seen else [])
-        for fast, seen in ((True, False), (True, True), (False, False))
-    ]
-    assert runs[0].physics is not None and runs[0].physics.grip_strength_share_max is not None
-    assert all((run.physics, run.events) == (runs[0].physics, runs[0].events) for run in runs)
-
-
 def test_a_distributed_run_is_measured_too() -> None:
     run = watched(ready("paper", distributed=True))
     assert run.succeeded and run.physics is not None

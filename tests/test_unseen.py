@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import pytest
@@ -15,19 +14,6 @@ from factory.simulation.modelling import physical_model
 from factory.simulation.simulation import Simulation
 from tests.command_line import PAPER, Terminal
 from tests.simulation_values import gone_wild, layout_of, ready, states
-
-
-@pytest.mark.parametrize(
-    ("name", "given"),
-    [("paper", {}), ("gearbox", {}), ("20", {"fuse": True}), ("fence", {"distributed": True})],
-)
-def test_an_unseen_run_is_the_same_to_the_last_bit(name: str, given: dict[str, Any]) -> None:
-    seen, unseen = (ready(name, shown=shown, **given) for shown in (True, False))
-    assert unseen.physical.m.ngeom < seen.physical.m.ngeom
-    assert unseen.physical.m.nbody <= seen.physical.m.nbody
-    expected = states(seen, seen.supervisor.step, 500)
-    assert states(unseen, unseen.supervisor.step, 500) == expected
-    assert unseen.physical.figures() == seen.physical.figures()
 
 
 @pytest.mark.parametrize("seed", range(3))

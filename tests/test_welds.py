@@ -3,21 +3,18 @@ nothing else differs from writing it one after the other."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pytest
 
 from factory.mjcf.masks import ALL, NOBODY
-from factory.plant.factory import Operation
 from factory.simulation.mujoco.contacts import LAST
-from factory.simulation.mujoco.parts import Parts
 from factory.simulation.mujoco.sleep import AWAKE, FRESH
 from factory.simulation.mujoco.world import MujocoWorld
 from tests.good_runs import random_marking
 from tests.pag_texts import laid_out
-from tests.simulation_values import FENCE, layout_of, ready, states
+from tests.simulation_values import FENCE, layout_of, ready
 
 
 def under_way(name: str = "paper", **given: Any) -> MujocoWorld:
@@ -129,28 +126,6 @@ def test_what_a_weld_lets_go_is_woken() -> None:
     parts.welds.loose([weld])
     parts.welds.write()
     assert np.signbit(d.qvel[first : first + 6]).any()
-
-
-@pytest.mark.parametrize(
-    ("name", "given"), [("paper", {}), ("fence", {}), ("20", {}), ("20", {"fuse": True})]
-)
-def test_one_after_the_other_is_the_same(
-    name: str, given: dict[str, Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """To the last bit: what ends in one tick is handed over at once, or by one write each."""
-    at_once, singly = (ready(name, units=4, **given) for _ in range(2))
-    expected = states(at_once, at_once.supervisor.step, 700)
-    hand_over = Parts.hand_over
-
-    def one_by_one(self: Parts, ended: Sequence[tuple[Operation, int]]) -> None:
-        for each in ended:
-            hand_over(self, [each])
-
-    monkeypatch.setattr(Parts, "hand_over", one_by_one)
-    assert states(singly, singly.supervisor.step, 700) == expected
-    one, other = at_once.physical.parts.welds, singly.physical.parts.welds
-    assert one.taken.count == other.taken.count > 0
-    assert one.taken.gap == other.taken.gap > 0.0
 
 
 # --- gaps -----------------------------------------------------------------------------------------
