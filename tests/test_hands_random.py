@@ -120,6 +120,10 @@ def test_random_products_whose_hands_met(seed: int, tmp_path: Path) -> None:
     succeeds(project_of(random_product(seed), tmp_path), seed, 2, 0.3 * (seed == 3287))
 
 
+def test_a_ball_comes_down_past_the_pad_that_holds_it_over_its_middle(tmp_path: Path) -> None:
+    succeeds(project_of(random_blocks(2611320180), tmp_path), 2611320180, 2, 0.3)
+
+
 DAY = int(os.environ.get("TEST_DAY", "261126"))
 """Year, month and day whose seeds are drawn; `make test` says today's."""
 

@@ -18,8 +18,9 @@ from factory.layout.hands.hand import Hand, Kind
 from factory.layout.hands.holding import Holding, held
 from factory.layout.hands.places import SMALL, Places
 from factory.layout.hands.reach import back, halves, reach, under_beam
-from factory.layout.hands.surfaces import Way, hit, retreat, swept
+from factory.layout.hands.surfaces import TOUCH, Way, hit, retreat, swept
 from factory.layout.hands.tips import STRONG
+from factory.layout.presence import ACROSS
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
 
@@ -278,7 +279,9 @@ class InTheWay:
             for side in (t, back(t)):
                 yield (*swept(low, high, u, side), own)
         elif kind == "behind":
-            # the part comes down along the pad
+            # the part comes down along the pad, its widest place too, and no nearer than may be
+            axis, ahead = (0, u[0]) if u[0] else (1, u[1])
+            (high if ahead > 0 else low)[:, axis] += ahead * (ACROSS + TOUCH)
             low[:, 2] -= 10.0
             yield low, high, own
         else:
