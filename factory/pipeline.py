@@ -236,10 +236,10 @@ class Project:
             return self._shared(self.plan)
         if self.pag.mix is None:
             return self.compiled
-        from factory.compiler.mixing import even, mixed
+        from factory.layout.sequencing import sequenced
 
-        sequence = self.pag.mix.sequence or even(self.pag.mix)
-        return self._shared(self.plan.then(mixed(self.approached, sequence, self.catalogue)))
+        given = self.pag.mix, self.product, self.catalogue, self.settings
+        return self._shared(sequenced(self.approached, *given).plan)
 
     def _shared(self, plan: Plan) -> Factory:
         from factory.compiler.assigning import shared

@@ -10,7 +10,7 @@ from itertools import count
 
 from factory.compiler.assigning import shared
 from factory.compiler.compiler import compile_pag
-from factory.compiler.mixing import mixed
+from factory.compiler.mixing import lines_of_mix, turns_of
 from factory.lang.pag_reader import read_pag
 from factory.plant.factory import Factory
 from factory.problem.pag import PAG
@@ -90,5 +90,5 @@ def mixed_factory(pag: PAG, sequence: Sequence[str] = ()) -> Factory:
     """The factory of a mix, without geometry; in another sequence than written if one is given."""
     assert pag.mix is not None
     forest = compile_pag(pag, TEMPLATES, catalogue())
-    turns = mixed(forest, sequence or pag.mix.sequence, catalogue())
+    turns = turns_of(forest, lines_of_mix(forest, catalogue()), sequence or pag.mix.sequence)
     return shared(forest, forest.plan.then(turns), catalogue())

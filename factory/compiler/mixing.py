@@ -14,6 +14,7 @@ the pile first (`assigning`). Any other order of the tours of a line is dead.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import permutations
 from typing import NamedTuple
 
 from factory.compiler.folding import begun_by, delivery, kind_of, sides_of
@@ -22,6 +23,9 @@ from factory.problem.pag import NOPART, Mix
 from factory.problem.plan import NOBODY, Turns
 from factory.problem.robot_types import Catalogue
 from factory.support.errors import Diagnostic, InputError
+
+NECKLACES = 8
+"""All orders are tried of a period of so many units."""
 
 
 class _Key(NamedTuple):
@@ -33,11 +37,9 @@ class _Key(NamedTuple):
     kind: object
 
 
-def mixed(forest: Factory, sequence: Sequence[str], catalogue: Catalogue) -> Turns:
+def turns_of(forest: Factory, on: Sequence[int], sequence: Sequence[str]) -> Turns:
     """The turns of a sequence of products: for each unit and each robot of the forest the line
-    (index) that does its tours. Raises InputError (BadLine) where what begins the tours of the
-    output robot does not come in one way in all products."""
-    on = lines_of_mix(forest, catalogue)
+    (index) that does its tours, NOBODY for another product. `on`: the line of each robot."""
     unit = {product: number for number, product in enumerate(forest.sequence)}
     makes = _product_of(forest)
     return [
@@ -57,9 +59,30 @@ def even(mix: Mix) -> tuple[str, ...]:
     return tuple(sequence)
 
 
+def orders(mix: Mix) -> Iterator[tuple[str, ...]]:
+    """The sequences of a mix that are not the same but for where a period begins: that as written
+    alone, or the even one and, of at most NECKLACES units, all others."""
+    if mix.sequence:
+        yield mix.sequence
+        return
+    yield even(mix)
+    first, tried = mix.counts[0][0], {_necklace(even(mix))}
+    left = [label for label, count in mix.counts for _ in range(count)][1:]
+    for rest in permutations(left) if len(left) < NECKLACES else ():
+        if (necklace := _necklace((first, *rest))) not in tried:
+            tried.add(necklace)
+            yield first, *rest
+
+
+def _necklace(sequence: tuple[str, ...]) -> tuple[str, ...]:
+    """The first in alphabetical order of the rotations of a sequence."""
+    return min(sequence[n:] + sequence[:n] for n in range(len(sequence)))
+
+
 def lines_of_mix(forest: Factory, catalogue: Catalogue) -> list[int]:
     """The line of each robot of the forest, numbered in the order of the robots. Raises InputError
-    (BadLine)."""
+    (BadLine) where what begins the tours of the output robot does not come in one way in all
+    products."""
     apart: set[int] = set()
     while True:
         on = _lines(forest, apart, catalogue)

@@ -39,6 +39,14 @@ def cycle_time_bound(factory: Factory, product: Product, clearance: float, pace:
     return max(bound.gear(robot.index) for robot in factory.robots) / factory.period
 
 
+def least_times(factory: Factory, product: Product, clearance: float, pace: Pace) -> list[float]:
+    """The least time of each operation in a layout with this clearance [m], with the way back of
+    its robots [s]."""
+    bound = _Bound(factory, product, clearance - TOLERANCE, pace)
+    moving = zip(factory.operations, bound.moving, strict=True)
+    return [o.dwell + pace.lost + time for o, time in moving]
+
+
 @dataclass(frozen=True, slots=True)
 class _Interval:
     """What something takes of one axis of the product [m]."""

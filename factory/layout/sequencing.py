@@ -1,0 +1,62 @@
+"""The sequence of the products of a mix: the one with the shortest cycle time, by estimate.
+
+Every sequence is live (`compiler.mixing`), and their cycle times differ: robots that one product
+needs long wait for others that another product needs long. They are compared before there is a
+layout, with the least time of each operation in any layout (`bounds`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import islice
+
+from factory.compiler.assigning import shared
+from factory.compiler.mixing import lines_of_mix, orders, turns_of
+from factory.geometry.solids import Product
+from factory.layout.bounds import least_times
+from factory.layout.durations import Pace
+from factory.layout.repeated import repeated
+from factory.nets.ways import train_ratio
+from factory.plant.factory import Factory
+from factory.problem.pag import Mix
+from factory.problem.plan import Plan
+from factory.problem.robot_types import Catalogue
+from factory.support.settings import Settings
+
+MOST, SAME = 100, 1e-6
+"""The most sequences that are compared; ratios that differ by less are equal."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sequenced:
+    """The plan of a mix with the best sequence, and how many sequences were compared."""
+
+    plan: Plan
+    tried: int
+
+
+def sequenced(
+    forest: Factory, mix: Mix, product: Product, catalogue: Catalogue, settings: Settings
+) -> Sequenced:
+    """The plan of a mix whose products are made by a forest of factories. Where the estimates of
+    sequences are equal, the even one is taken. Raises InputError (BadLine)."""
+    on, times = lines_of_mix(forest, catalogue), dict[tuple[str, str], float]()
+    plans, seconds = list[Plan](), list[float]()
+    sequences = [*islice(orders(mix), MOST)]
+    for sequence in sequences:
+        plans.append(forest.plan.then(turns_of(forest, on, sequence)))
+        if len(sequences) == 1:
+            break
+        factory = shared(forest, plans[-1], catalogue)
+        made = factory.sequence
+        if not times:
+            solids, pace = repeated(product, factory), Pace.of(settings)
+            least = least_times(factory, solids, settings.clearance, pace)
+            for o, time in zip(factory.operations, least, strict=True):
+                times.setdefault((made[o.turn], o.written), time)
+        each = [times[made[o.turn], o.written] for o in factory.operations]
+        idle = [0.0] * (len(factory.net.threaded.places) - len(each))
+        seconds.append(train_ratio(factory.net, [*each, *idle], {})[0].seconds)
+    best = min(seconds, default=0.0) + SAME
+    first = next((n for n, ratio in enumerate(seconds) if ratio <= best), 0)
+    return Sequenced(plans[first], len(plans))
