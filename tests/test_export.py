@@ -46,6 +46,7 @@ from tests.command_line import PAPER, ROOT, Terminal, files_in
 from tests.export_values import LAMP, MESHES, kept_log, made, project, subject
 from tests.net_values import PHILOSOPHERS, net_from, planted, random_marked_net
 from tests.pag_values import factories
+from tests.structured_text import Plc
 
 TEXTS = ("pnml", "dot", "svg", "dxf", "st")
 
@@ -312,23 +313,14 @@ def test_trees_are_drawn(made_factory: Factory) -> None:
 # programs
 
 
-def test_identifiers_are_legal_and_differ() -> None:
-    found = project(PAPER)
-    text = made("st")
-    labels = re.findall(r"LABEL : \((.*)\);", text)[0].split(", ")
-    assert labels[0] == "NOPART"
-    assert len({name.upper() for name in labels}) == len(labels) == len(found.pag) + 1
-    assert all(re.fullmatch("[A-Za-z](_?[A-Za-z0-9])*", name) for name in labels)
-
-
-def test_odd_labels_have_identifiers(tmp_path: Path) -> None:
-    file = tmp_path / "odd.pag"
+def test_odd_labels_and_names_are_no_obstacle(tmp_path: Path) -> None:
+    file = tmp_path / "odd *) name.pag"
     file.write_text(
         "root = A.b; A.b = mate ( a_b, a-B, ä ); a_b = atomic(); a-B = atomic(); ä = atomic()"
     )
-    labels = re.findall(r"LABEL : \((.*)\);", made("st", file))[0].split(", ")
-    assert len({name.upper() for name in labels}) == len(labels) == 6
-    assert all(re.fullmatch("[A-Za-z](_?[A-Za-z0-9])*", name) for name in labels)
+    text = made("st", file)
+    assert text.isascii()
+    assert Plc(text).compiled.program == "FACTORY"
 
 
 def test_a_dwell_is_a_timer() -> None:

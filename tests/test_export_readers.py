@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +15,14 @@ import pytest
 from factory.exporting import exporters
 from factory.exporting.bodies import parts_of
 from factory.geometry.solids import rotation
-from factory.layout.layout import Layout
 from factory.mjcf.loading import load
 from factory.mjcf.names import COMPASS
 from factory.nets.marked import MarkedNet, marked
-from factory.nets.replay import replay
 from factory.record.log import read_log
 from factory.record.log.model import model_of
 from factory.simulation.modelling import physical_model
+from factory.simulation.request import RunRequest
+from factory.simulation.simulation import Simulation
 from tests.command_line import PAPER, ROOT
 from tests.export_values import (
     LAMP,
@@ -37,7 +37,8 @@ from tests.export_values import (
     table,
 )
 from tests.export_values import write as written
-from tests.structured_text import Controller
+from tests.good_runs import assert_good
+from tests.structured_text import Plc
 
 DOCUMENT = ROOT / "docs" / "exports.md"
 
@@ -167,85 +168,128 @@ def dxf_by_trimesh(folder: Path) -> None:
 # programs
 
 
+SMALL = "root = s; s = weld ( a-1, dwell = 0.5 ); a-1 = atomic ()"
+
+
+def small(folder: Path) -> Path:
+    path = folder / "p.pag"
+    path.write_text(SMALL)
+    return path
+
+
 @reads("st", "blark", "GPL-2.0, a process of its own")
 def st_by_blark(folder: Path) -> None:
-    """it parses: the types, a function block for each robot, the program. That is syntax alone (of
-    TwinCAT's dialect), not types, nor what the programs do"""
-    path = folder / "p.pag"
-    path.write_text("root = s; s = weld ( a-1, dwell = 0.5 ); a-1 = atomic ()")
-    found = ask("blark_st", written(made("st", path), folder / "p.st"))
-    assert [kind for kind, _ in found] == [
-        *["DataTypeDeclaration"] * 3,
-        *["FunctionBlock"] * 2,
-        "Program",
-    ]
-    assert [name for kind, name in found if kind == "FunctionBlock"] == ["ROBOT_r1", "ROBOT_r2"]
+    """it parses, but for the configuration, which TwinCAT's dialect has not: the types, the
+    function, a function block for each robot, the program"""
+    for file in (small(folder), PAPER, LAMP):
+        text, _, configuration = made("st", file).partition("CONFIGURATION")
+        assert configuration
+        kinds = Counter(kind for kind, _ in ask("blark_st", written(text, folder / "p.st")))
+        robots = len(project(file).factory.robots)
+        assert kinds == {
+            **{"DataTypeDeclaration": 8, "Function": 1, "FunctionBlock": robots, "Program": 1}
+        }
 
 
-@reads("st", "an executor of the tests", "ours")
-def st_by_an_executor(folder: Path) -> None:
-    """run with drives that go straight to their set-points, blocks scanned in random order: what
-    fires refines the net, and products are made"""
-    for file in (PAPER, LAMP, MESHES):
-        layout = project(file).layout
-        fired = _execute(made("st", file), layout, units=3)
-        names = [layout.factory.net.threaded.transitions[n].name for n in fired]
-        assert names.count("dropoff_e") >= 3
-        assert replay(layout.factory.net, names).refines
+@reads("st", "tree-sitter-iec61131-3-st", "MIT, a process of its own")
+def st_by_tree_sitter(folder: Path) -> None:
+    """it parses by a grammar of the standard, without an error: the types, the function, a function
+    block for each robot, the program and its configuration"""
+    for file in (small(folder), PAPER, LAMP):
+        kinds = ask("tree_sitter_st", written(made("st", file), folder / "p.st"))
+        robots = len(project(file).factory.robots)
+        assert Counter(kinds) == {
+            "type_declaration": 8,
+            "function_declaration": 1,
+            "function_block_declaration": robots,
+            "program_declaration": 1,
+            "configuration_declaration": 1,
+        }
 
 
-def _execute(text: str, layout: Layout, units: int, scans: int = 20_000) -> list[int]:
-    """The transitions that fire, by number: X_s when the first robot enters X, X_e when its carrier
-    ends it."""
-    controller, factory = Controller(text), layout.factory
-    rng = np.random.default_rng(0)
-    for axis, path in enumerate(layout.guidepaths):
-        controller.axes[axis].Position = controller.axes[axis].Target = path.length
-    fired: list[int] = []
-    entered: Counter[int] = Counter()
-    dropped = 0
-    for _ in range(scans):
-        controller.clock[0] += 0.05
-        for axis in controller.axes:
-            step = min(max(axis.Target - axis.Position, -0.03), 0.03)
-            axis.Position, axis.Speed = axis.Position + step, step / 0.05
-        for robot in rng.permutation(len(factory.robots)).tolist():
-            gear = factory.robots[robot].operations
-            memory, cell = controller.memories[robot], controller.cells[robot]
-            before, done = memory.State, cell.Finished
-            controller.scan(robot)
-            number = gear[before // 3]
-            enters = before % 3 == 0 and memory.State % 3 == 1
-            if enters and memory.Unit == entered[number]:
-                entered[number] += 1
-                fired.append(2 * number)
-            if cell.Finished > done and factory.operations[number].carrier == robot:
-                fired.append(2 * number + 1)
-                dropped += number == factory.dropoff.index
-        if dropped == units:
-            return fired
-    raise AssertionError(f"{dropped} products only; {[m.State for m in controller.memories]}")
+@reads("st", "an interpreter of the tests", "ours")
+def st_by_an_interpreter(folder: Path) -> None:
+    """executed as it stands, in lock step with the plant: the robots do what they do under the
+    supervisor, product by product, and the bodies agree"""
+    for file in (small(folder), LAMP, MESHES):
+        plc, layout = Plc(made("st", file)), project(file).layout
+        simulation = Simulation(layout, RunRequest(units=3))
+        supervisor = simulation.drive(plc, plc.interval)
+        run = simulation.run()
+        assert (run.products, supervisor.refusals) == (3, [])
+        assert_good(run)
 
 
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        (r"(\(\* wait [^\n]*\n +IF )[^\n]* THEN", r"\1Ready THEN"),
-        (r"Finished := Cells\[3\]\.Finished \+ 1", "Finished := Cells[3].Finished + 2"),
-        ("Carries := L_sub1", "Carries := L_part1"),
-    ],
-    ids=["no conditions", "miscounted", "wrong label"],
-)
-def test_faults_planted_in_the_programs_show(old: str, new: str) -> None:
-    text, count = re.subn(old, new, made("st"))
-    assert count
-    layout = project(PAPER).layout
-    names = [t.name for t in layout.factory.net.threaded.transitions]
-    try:
-        fired = _execute(text, layout, 3, scans=2_000)
-    except AssertionError:
-        return
-    assert not replay(layout.factory.net, [names[n] for n in fired]).refines
+CHILDREN = {
+    "project": "fileHeader contentHeader types instances",
+    "contentHeader": "Comment coordinateInfo",
+    "coordinateInfo": "fbd ld sfc",
+    "fbd|ld|sfc": "scaling",
+    "types": "dataTypes pous",
+    "dataTypes": "(dataType )+",
+    "dataType": "baseType (documentation )?",
+    "baseType": "(array|struct|derived|BOOL|UINT|LREAL) ",
+    "array": "dimension baseType",
+    "struct|inputVars|outputVars|inOutVars|localVars": "(variable )+",
+    "variable": "type (documentation )?",
+    "type|returnType": "(derived|BOOL|INT|UINT|UDINT|LREAL) ",
+    "documentation|ST": "p",
+    "pous": "(pou )+",
+    "pou": "interface body",
+    "interface": "(returnType )?((inputVars|outputVars|inOutVars|localVars) )*",
+    "body": "ST",
+    "instances": "configurations",
+    "configurations": "configuration",
+    "configuration": "resource",
+    "resource": "task",
+    "task": "pouInstance",
+}
+"""The elements of PLCopen's schema (TC6 2.01) that are used, each with its children in order."""
+
+ATTRIBUTES = {
+    "fileHeader": "companyName productName productVersion creationDateTime",
+    "contentHeader|dataType|variable|derived|configuration|resource": "name",
+    "pou": "name pouType",
+    "dimension": "lower upper",
+    "scaling": "x y",
+    "task": "name interval priority",
+    "pouInstance": "name typeName",
+}
+"""The attributes of the same."""
+
+
+def _of(table: Mapping[str, str], tag: str) -> str:
+    return next((row for tags, row in table.items() if tag in tags.split("|")), "")
+
+
+@reads("plcopen", "lxml", "BSD-3-Clause")
+def plcopen_by_lxml(folder: Path) -> None:
+    """elements and attributes in the order of PLCopen's schema (TC6 2.01), of which the part that
+    is used is a table of the test; bodies and variables are those of the Structured Text"""
+    from lxml import etree
+
+    for file in (small(folder), PAPER, LAMP):
+        root = etree.fromstring(made("plcopen", file).encode())
+        for element in root.iter():
+            name = etree.QName(element)
+            inside = "".join(f"{etree.QName(child).localname} " for child in element)
+            wanted = _of(CHILDREN, name.localname)
+            assert re.fullmatch(
+                wanted if wanted.endswith(("*", "+", "?", " ")) else f"{wanted} ?", inside
+            ), name
+            assert " ".join(element.attrib) == _of(ATTRIBUTES, name.localname), name
+            paragraph = name.localname == "p"
+            assert name.namespace.endswith("xhtml" if paragraph else "tc6_0201"), name
+        text = made("st", file)
+        for unit in root.iterfind(".//{*}pou"):
+            body = unit.findtext(".//{*}ST/{*}p")
+            assert f"\n{body}\nEND_" in text
+            for variable in unit.iterfind(".//{*}variable"):
+                (kind,) = variable.find("{*}type")
+                named = kind.get("name") or etree.QName(kind).localname
+                assert f"    {variable.get('name')} : {named};" in text
+        (task,) = root.iterfind(".//{*}task")
+        assert f"INTERVAL := {task.get('interval')}, PRIORITY := {task.get('priority')}" in text
 
 
 # products

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from factory.control.mode import Array
+from factory.control.mode import ROUNDING, Array
 from factory.control.navigation import Bundle
+from factory.control.profile import landing_speed
 
 
 def govern(
@@ -31,3 +32,16 @@ def follow(bundle: Bundle, x: Array, v: Array, dt: float) -> tuple[Array, Array,
     way to braking by a·dt a tick.
     """
     return govern(x, v, bundle.field(x + v * (dt / 2), dt), bundle.acceleration, dt)
+
+
+def towards(
+    goals: Array, x: Array, v: Array, limits: tuple[Array, Array], tick: float
+) -> tuple[Array, Array, Array]:
+    """A tick [s] of n axes that go to their goals [m] as fast as their limits, speeds [m/s] and
+    accelerations [m/s²], allow, and rest there: positions, speeds and accelerations."""
+    most, acceleration = limits
+    left = goals - (x + v * (tick / 2))
+    wanted = np.minimum(landing_speed(np.abs(left), acceleration, tick), most)
+    x1, v1, a = govern(x, v, np.copysign(wanted, left), acceleration, tick)
+    there = (np.abs(x1 - goals) < ROUNDING) & (np.abs(v1) < ROUNDING)
+    return np.where(there, goals, x1), np.where(there, 0.0, v1), a

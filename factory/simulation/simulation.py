@@ -21,11 +21,14 @@ from factory.plant.material import joins_of
 from factory.record.figures import PhysicsFigures
 from factory.record.state import Observer, State
 from factory.simulation.distributed import DistributedSupervisor
+from factory.simulation.driven import DrivenSupervisor
 from factory.simulation.ideal import IdealWorld
+from factory.simulation.interlock import PlantInterlock
 from factory.simulation.modelling import modelled
 from factory.simulation.ordering import Ordering
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run, busy_times, entries_of
+from factory.simulation.signals import Controller
 from factory.simulation.supervisor import Supervisor
 from factory.simulation.world import World
 from factory.support.errors import Diagnostic, InputError, RunError
@@ -64,13 +67,13 @@ class Compiled:
 class Simulation:
     """One run, ready to go: `run()` does it; `model` is what the engine is given (mujoco only).
 
-    Raises InputError where the engine refuses the model, or a mode starts outside its domain. A
-    run that stalls or takes too long is a Run with its trouble; `require` makes that an error.
-    `compiled`: what it shares with earlier runs, made by `compiled` for the same layout and a
-    request that differs in seed and jitter alone. `counts`: how often each transition has fired
-    where it starts; `before`: products that had left by then. `asked`: the request as it was
-    given; in `request` the timestep is a number, and `wip` is one where the pool of parts is too
-    large. `timing`: how long everything takes.
+    Raises InputError where the engine refuses the model, or a mode starts outside its domain. A run
+    that stalls or takes too long has its trouble, which `require` makes an error. `compiled`: what
+    it shares with earlier runs, made by `compiled` for the same layout and a request that differs
+    in seed and jitter alone. `counts`: how often each transition has fired where it starts;
+    `before`: products that had left by then. `asked`: the request as it was given; in `request` the
+    timestep is a number, and `wip` is one where the pool of parts is too large. `timing`: how long
+    everything takes.
     """
 
     def __init__(
@@ -91,10 +94,9 @@ class Simulation:
         self.counts = firings(net, self.start)
         self.model: Model | None = None
         self.world: World
+        at = start_positions(layout, self.start)
         if world == "ideal":
-            self.world = IdealWorld(
-                layout, request, start_positions(layout, self.start), self.counts
-            )
+            self.world = IdealWorld(layout, request, at, self.counts)
         else:
             from factory.simulation.mujoco.world import MujocoWorld
 
@@ -103,11 +105,11 @@ class Simulation:
             )
             self.request = request = replace(request, wip=self.model.wip)
             loaded = compiled.loaded if compiled else None
-            at = start_positions(layout, self.start)
             self.world = MujocoWorld(self.model, request, at, gains, self.counts, loaded)
         self.world.hooks.state = self.state
         self.before = self.world.delivered()
-        self.supervisor = (self._distributed if request.distributed else self._central)(stages)
+        made = (self._distributed if request.distributed else self._central)(stages)
+        self.supervisor: Supervisor | DistributedSupervisor | DrivenSupervisor = made
         self.supervisor.ordering = Ordering(self.timing.coordinated.orders)
         if self.start != net.initial_marking:
             self.supervisor.ordering.keep_passes()
@@ -167,6 +169,13 @@ class Simulation:
             stages,
         )
 
+    def drive(self, controller: Controller, scan: float) -> DrivenSupervisor:
+        """From the beginning on a controller drives the plant, asked every `scan` [s]."""
+        ordering, settings = self.supervisor.ordering, self.request.settings
+        interlock = PlantInterlock(self.layout.factory, self.modes, self.world, ordering)
+        self.supervisor = DrivenSupervisor(interlock, self.limits, settings, controller, scan)
+        return self.supervisor
+
     @property
     def physical(self) -> MujocoWorld:
         """The world, where it is MuJoCo's; asked for in the ideal one, an AssertionError."""
@@ -217,9 +226,8 @@ class Simulation:
         """Tick until `units` products have been dropped off, the run stalls, `max_time` [s] passes
         or a robot drops what it holds. Observers are called after every tick; `glances` are, but
         where there are no observers several ticks may go by between them, and up to the time
-        `since` [s] observers are called no more often. Where the engine gives up
-        it begins anew by itself, at time 0: nobody is shown that, and the run has lasted until
-        then."""
+        `since` [s] observers are called no more often. Where the engine gives up it begins anew by
+        itself, at time 0: nobody is shown that, and the run has lasted until then."""
         supervisor, world, goal = self.supervisor, self.world, self.before + self.request.units
         begin, watched, trouble = perf_counter(), -world.hooks.ended_time, None
         while trouble is None and (world.dropped or world.delivered() < goal):
@@ -270,7 +278,6 @@ class Simulation:
     def _record(self, wall: float, time: float, trouble: Diagnostic | None) -> Run:
         supervisor, world, factory = self.supervisor, self.world, self.layout.factory
         request, physics, figures = self.request, world.physics_time, self.figures()
-        predicted = self.cycle
         entries = entries_of(supervisor.events)
         exchanges = tuple(world.hooks.account.exchanges) if world.hooks.account else ()
         nets = [exchange.net for exchange in exchanges]
@@ -284,8 +291,8 @@ class Simulation:
             wall,
             physics,
             wall - physics,
-            predicted.seconds,
-            predicted.bottleneck,
+            self.cycle.seconds,
+            self.cycle.bottleneck,
             verdict.refines,
             tuple(supervisor.events),
             tuple(world.dropoffs),
@@ -310,11 +317,8 @@ class Simulation:
         factory, supervisor = self.supervisor.factory, self.supervisor
         numbers = supervisor.active.operations or tuple(o.index for o in supervisor.awaited())
         places = [factory.operations[n] for n in numbers[:3]]
-        robots = ", ".join(
-            f"{factory.robots[r].name} in {o.template.name}({o.label})"
-            for o in places
-            for r in o.robots
-        )
+        pairs = ((factory.robots[r].name, o) for o in places for r in o.robots)
+        robots = ", ".join(f"{name} in {o.template.name}({o.label})" for name, o in pairs)
         message = f"{what}; {robots or 'no robot can start'}"
         return Diagnostic(code, message, places[0].position if places else None, hint)
 

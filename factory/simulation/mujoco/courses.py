@@ -11,10 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.control.governor import follow, govern
+from factory.control.governor import follow
 from factory.control.mode import REST, ROUNDING, Array, Index
 from factory.control.navigation import Bundle
-from factory.control.profile import landing_speed
 from factory.nets.coordinated import Past
 from factory.simulation.mujoco.drives import Drives
 
@@ -79,19 +78,6 @@ def along(bundle: Bundle, tick: float, timestep: float) -> Callable[[Array, Arra
         return x1, v1, a, bool(bundle.near_goal(x1, AHEAD, slow))
 
     return go
-
-
-def towards(
-    goals: Array, x: Array, v: Array, limits: tuple[Array, Array], tick: float
-) -> tuple[Array, Array, Array]:
-    """A tick [s] of n axes that go to their goals [m] as fast as their limits, speeds [m/s] and
-    accelerations [m/s²], allow, and rest there: positions, speeds and accelerations."""
-    most, acceleration = limits
-    left = goals - (x + v * (tick / 2))
-    wanted = np.minimum(landing_speed(np.abs(left), acceleration, tick), most)
-    x1, v1, a = govern(x, v, np.copysign(wanted, left), acceleration, tick)
-    there = (np.abs(x1 - goals) < ROUNDING) & (np.abs(v1) < ROUNDING)
-    return np.where(there, goals, x1), np.where(there, 0.0, v1), a
 
 
 class Follower:

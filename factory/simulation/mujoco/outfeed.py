@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from factory.control.governor import towards
 from factory.control.mode import Array
 from factory.layout.dimensions import BEHIND, PLAY
 from factory.layout.outfeed import tray_profile
 from factory.mjcf.model import GRAVITY, Model
 from factory.mjcf.outfeed import SHUTTER_MASS
 from factory.simulation.mujoco.axes import Axes
-from factory.simulation.mujoco.courses import AHEAD, Course, Follower, Move, planned, towards
+from factory.simulation.mujoco.courses import AHEAD, Course, Follower, Move, planned
 from factory.simulation.mujoco.drives import Drives
 from factory.support.engine import mujoco
 

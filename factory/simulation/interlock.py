@@ -1,0 +1,217 @@
+"""The interlock of a plant that a controller drives: it carries out commands that the marking, the
+order places and the reach of grips allow, and refuses all others, by name.
+
+It trusts the controller in nothing, and knows nothing of how it decides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from factory.control.mode import Mode
+from factory.nets.threaded import Threads
+from factory.plant.factory import Factory, Operation
+from factory.problem.pag import NOPART
+from factory.record.state import Event
+from factory.simulation.ordering import Ordering
+from factory.simulation.signals import Commands, GripStates, Refusal
+from factory.simulation.world import World
+
+REACH = 1e-3
+"""Greatest distance of an axis from where parts change hands at which a grip takes a part [m]."""
+
+
+class PlantInterlock:
+    """What a plant does of what it is commanded, in a `world`. It fires X_s when the carrier of X
+    takes it up as its job, and X_e when it gives it up. `fired`: how often each transition has
+    fired; `held_back`: robots that stand, since what they were told last is refused; `refusals`:
+    all that was."""
+
+    def __init__(
+        self,
+        factory: Factory,
+        modes: Sequence[Mode],
+        world: World,
+        ordering: Ordering,
+    ) -> None:
+        self.factory, self.world, self.ordering = factory, world, ordering
+        self._goals = [mode.goals for mode in modes]
+        net, starts = factory.net, [operation.start for operation in factory.operations]
+        self.threads = Threads(net.threaded, net.threads_of(net.initial_marking), starts)
+        self.fired = [0] * len(net.threaded.transitions)
+        self.events: list[Event] = []
+        self.refusals: list[Refusal] = []
+        robots = len(factory.robots)
+        self.grips, self.held_back = GripStates(robots), set[int]()
+        self.commands = Commands(world.sense()[0].copy(), (False,) * robots, (0,) * robots)
+
+    @property
+    def marked(self) -> bytearray:
+        """1 for each place that is marked, 0 for the others."""
+        return self.threads.marked
+
+    def held(self, robot: int) -> bool:
+        """The sensor of a robot's grip."""
+        return self.grips.held(robot, self.commands.grip[robot])
+
+    def ready(self, operation: Operation) -> bool:
+        """Whether a robot that waits at a station may take the part, or drop the product off."""
+        if operation.start not in self.threads.possible:
+            return False
+        unit = self.factory.unit(operation, self.fired[operation.start])
+        return self.world.prepared(operation, unit)
+
+    def carry_out(self, now: Commands) -> None:
+        """Compare commands with the last ones: jobs that are given up, then grips, then jobs that
+        are taken up, by carriers first."""
+        before, self.commands = self.commands, now
+        robots = self.factory.present
+        jobs = [robot for robot in robots if now.job[robot] != before.job[robot]]
+        grips = [robot for robot in robots if now.grip[robot] != before.grip[robot]]
+        self.held_back.difference_update(jobs, grips)
+        for robot in jobs:
+            if 1 <= before.job[robot] <= len(self.factory.operations):
+                self._leave(robot, self.factory.operations[before.job[robot] - 1])
+        for robot in grips:
+            (self._close if now.grip[robot] else self._open)(robot)
+        for robot in sorted(jobs, key=self._follows):
+            if now.job[robot]:
+                self._enter(robot, now.job[robot])
+
+    # jobs
+
+    def _follows(self, robot: int) -> bool:
+        """Whether a robot is not the carrier of its job: carriers begin."""
+        job = self.commands.job[robot]
+        return not any(o.index == job - 1 and o.carrier == robot for o in self.factory.operations)
+
+    def _enter(self, robot: int, job: int) -> None:
+        """A robot takes up a job; if it is the carrier, the operation starts."""
+        name = self.factory.robots[robot].name
+        if not 1 <= job <= len(self.factory.operations):
+            self._refuse(robot, f"{name} takes up job {job}: there is no such operation")
+            return
+        operation = self.factory.operations[job - 1]
+        if robot not in operation.robots:
+            self._refuse(robot, f"{name} has no part in {_name(operation)}")
+        elif robot in self.grips.closed:
+            what = f"{name} takes up {_name(operation)} before its grip has opened"
+            self._refuse(robot, what)
+        elif robot != operation.carrier:
+            if not self.marked[operation.place]:
+                what = f"{name} takes up {_name(operation)} before its carrier does"
+                self._refuse(robot, what)
+        elif why := self._obstacle(operation):
+            self._refuse(robot, f"{name} takes up {_name(operation)}, but {why}")
+        else:
+            self._fire(operation, operation.start)
+
+    def _obstacle(self, operation: Operation) -> str:
+        """Why an operation cannot start, "" where it can."""
+        if operation.start not in self.threads.possible:
+            places = self.factory.net.threaded.net.preset[operation.start]
+            absent = [
+                self.factory.robots[robot].name
+                for robot in operation.robots
+                if not any(
+                    self.marked[p] for p in places if p in self.factory.net.gears[robot].places
+                )
+            ]
+            return f"{', '.join(absent)} is not there with what it brings"
+        if not self.ready(operation) and (
+            not operation.inputs or self.factory.drops(operation.index)
+        ):
+            return "its feeder shows no part" if not operation.inputs else "the outfeed is not free"
+        self.ordering.ask_anew()
+        sense = self.world.sense
+        if self.ordering.hold_up(operation.start, self.fired.__getitem__, lambda: sense()[0]):
+            return "another machine is still in its way"
+        return ""
+
+    def _leave(self, robot: int, operation: Operation) -> None:
+        """A robot gives up a job; if it is the carrier, the operation ends and parts change
+        hands."""
+        name = self.factory.robots[robot].name
+        if robot in self.grips.closed:
+            what = f"{name} leaves {_name(operation)} before its grip has opened"
+            self._refuse(robot, what)
+        if robot != operation.carrier or not self.marked[operation.place]:
+            return
+        after = operation.after[operation.robots.index(robot)]
+        held = self.held(robot)
+        if held != (after != NOPART):
+            state = "is closed" if held else "is open"
+            self._refuse(robot, f"{name} ends {_name(operation)}, but its grip {state}")
+        elif far := self._far(operation):
+            self._refuse(robot, f"{name} ends {_name(operation)}, but {far}")
+        else:
+            self._fire(operation, operation.end)
+            self.grips.hand_over(operation)
+
+    def _fire(self, operation: Operation, transition: int) -> None:
+        job = operation, self.factory.unit(operation, self.fired[transition])
+        self.threads.fire((transition,))
+        self.fired[transition] += 1
+        name = self.factory.net.threaded.transitions[transition].name
+        self.events.append(Event(self.world.time, name))
+        is_start = transition == operation.start
+        self.world.apply([job] if is_start else [], [] if is_start else [job])
+
+    # grips
+
+    def _close(self, robot: int) -> None:
+        """A grip closes: it takes what its robot's operation gives it, if that is within reach."""
+        name, operation = self.factory.robots[robot].name, self._under_way(robot)
+        if operation is None or operation.carrier != robot:
+            if self.grips.label[robot] == NOPART:
+                self._refuse(robot, f"{name} closes its grip where nothing is given to it")
+        elif far := self._far(operation):
+            self._refuse(robot, f"{name} closes its grip in {_name(operation)}, but {far}")
+        else:
+            self.grips.taken.add(robot)
+
+    def _open(self, robot: int) -> None:
+        """A grip opens: it lets go of what has been taken from it, or drops it off."""
+        label, operation = self.grips.label[robot], self._under_way(robot)
+        self.grips.closed.discard(robot)
+        self.grips.taken.discard(robot)
+        if label == NOPART:
+            return
+        drops = operation is not None and self.factory.drops(operation.index)
+        far = self._far(operation) if drops and operation is not None else "nobody has taken it"
+        if far:
+            name = self.factory.robots[robot].name
+            self._refuse(robot, f"{name} opens its grip: {label} would fall, since {far}")
+        else:
+            self.grips.freed.add(robot)
+
+    def _under_way(self, robot: int) -> Operation | None:
+        """The operation that a robot has as its job, if that has started."""
+        job = self.commands.job[robot]
+        if not 1 <= job <= len(self.factory.operations):
+            return None
+        operation = self.factory.operations[job - 1]
+        taking_part = robot in operation.robots and self.marked[operation.place]
+        return operation if taking_part else None
+
+    def _far(self, operation: Operation) -> str:
+        """Which axis is further than a grip reaches from where parts change hands, "" for none."""
+        axes = self.factory.axes[operation.index]
+        away = np.abs(self.world.sense()[0][list(axes)] - self._goals[operation.index])
+        worst = int(away.argmax())
+        if away[worst] <= REACH:
+            return ""
+        robot = self.factory.robots[self.factory.robot_of(axes[worst])].name
+        far, reach = 1000 * float(away[worst]), 1000 * REACH
+        return f"{robot} is {far:.1f} mm from where it has to be, and a grip reaches {reach:g} mm"
+
+    def _refuse(self, robot: int, message: str) -> None:
+        """Keep a command back: the robot stands until its job or its grip changes."""
+        self.refusals.append(Refusal(self.world.time, robot, message))
+        self.held_back.add(robot)
+
+
+def _name(operation: Operation) -> str:
+    return " ".join(dict.fromkeys((operation.template.name, operation.label)))
