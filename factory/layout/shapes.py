@@ -137,9 +137,15 @@ def oriented_shape(
 def _fronts(factory: Factory, robot: int, boxes: Mapping[int, Extent]) -> dict[int, Point3]:
     """By operation how far ahead a robot that brings several parts, one by one, and has no hand
     holds them: their front ends are in one place, so that it goes no further for one than it has
-    to; nothing for others."""
+    to; nothing for others, nor for the output robot of a mix: the outfeed is in one place."""
     tours = factory.tours[robot]
-    if len(tours) == 1 or any(len(tour) != 2 for tour in tours) or is_tool(factory, robot):
+    output = robot == 0 and factory.pag.mix is not None
+    if (
+        output
+        or len(tours) == 1
+        or any(len(tour) != 2 for tour in tours)
+        or is_tool(factory, robot)
+    ):
         return {}
     front = max(boxes[tour[0]][1] for tour in tours)
     ahead = {tour: round(front - boxes[tour[0]][1], 6) for tour in tours}

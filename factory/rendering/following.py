@@ -7,6 +7,7 @@ joined for good become one body.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 
 import numpy as np
@@ -102,7 +103,8 @@ class Followed:
     """The product furthest on its way or, with a `part`, that which a copy of this part is in from
     its feeder to the dropoff, one copy after the other.
 
-    A product is known by one of its parts, by itself that which the most robots carry.
+    A product is known by one of its parts, by itself that which the most robots carry; each unit of
+    a period by one of its own.
     """
 
     def __init__(self, m: mujoco.MjModel, subject: MonitorSubject, part: str = "") -> None:
@@ -114,14 +116,16 @@ class Followed:
             for robot in factory.robots
         }
         handled = [label for parts in carried.values() for label in parts]
-        self.label = part or max(dict.fromkeys(handled), key=handled.count)
+        most, unlike = Counter(handled), dict.fromkeys(handled)
+        inside = [{part}] if part else [{*contents[product]} for product in factory.products]
+        known = {max((x for x in unlike if x in parts), key=most.__getitem__) for parts in inside}
         parts = {robot: len(labels) for robot, labels in carried.items()}
         self.rank = {e: _rank(name, parts) for e, name in enumerate(self.kinds)}
         bodies = {m.body(b).name: b for b in range(m.nbody)}
         self.labels = {
             b: names.label_of(name) for name, b in bodies.items() if names.kind(name) == "part"
         }
-        self.copies = [b for b, label in self.labels.items() if self.label in contents[label]]
+        self.copies = [b for b, label in self.labels.items() if known & {*contents[label]}]
         self.box = self._box(m, {b for b, label in self.labels.items() if label in handled})
         self.last: tuple[int, Array] | None = None
 
