@@ -119,6 +119,7 @@ def test_a_replay_that_leaves_something_out_is_noticed(monkeypatch: pytest.Monke
         floors.work(4, None, units=1)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not large.BRICKS.is_dir(), reason="the LDraw products are not here")
 def test_the_import_of_a_large_product_is_measured() -> None:
     (row,) = large.measure(quick=True)["rows"]

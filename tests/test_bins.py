@@ -42,7 +42,7 @@ def flights(added: list[Region]) -> set[int]:
     return {id(region) for region in added if region.kind != BIN_BODY}
 
 
-@pytest.mark.parametrize("name", ["paper", "truck", "chest", "balanced"])
+@pytest.mark.parametrize("name", ["paper", "chest"])
 def test_bins_are_clear_of_everything(name: str) -> None:
     layout = layout_of(name)
     bins = bins_of(layout)

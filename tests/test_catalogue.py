@@ -17,16 +17,13 @@ from factory.pipeline import all_templates
 from factory.problem.robot_types import load_catalogue
 from factory.problem.template import Template
 from tests.command_line import ROOT, Terminal, files_in
-from tests.examples import with_hands, without_hands
+from tests.examples import with_hands
 from tests.export_values import kept_log
 from tests.good_runs import assert_good
 
 TEMPLATES = sorted((ROOT / "templates").glob("*.op"))
 ROBOTS = list(tomllib.loads((ROOT / "mjcf" / "catalogue.toml").read_text("utf-8")))
 EXAMPLES = sorted((ROOT / "examples").glob("*.pag"))
-
-SMALL = 40
-"""Most labels of an example that is run here."""
 
 
 # --- templates ------------------------------------------------------------------------------------
@@ -146,12 +143,3 @@ def test_examples_check(run: Terminal, file: Path) -> None:
     assert "products" in document or steps == n + robots
     assert document["tokens"] == robots
     assert document["clashes"] == []
-
-
-@pytest.mark.parametrize("file", EXAMPLES, ids=lambda p: p.stem)
-def test_examples_run(file: Path) -> None:
-    if (labels := len(factory.load_pag(file))) > SMALL:
-        pytest.skip(f"{labels} labels: too large for here")
-    run = factory.run(without_hands(file.stem), units=1)
-    assert run.products == 1
-    assert_good(run)

@@ -130,9 +130,9 @@ def test_what_runs_is_what_was_proved(distributed: bool) -> None:
     without the orders some do not."""
     layout = with_hands("truck")
     orders = coordinated(layout).orders
-    assert late(layout, RunRequest(units=4, jitter=0.3, distributed=distributed), True) == []
+    assert late(layout, RunRequest(units=2, jitter=0.3, distributed=distributed), True) == []
     assert {order.start for order in orders} > set()
-    assert late(layout, RunRequest(units=4, jitter=0.3, distributed=distributed), False)
+    assert late(layout, RunRequest(units=2, jitter=0.3, distributed=distributed), False)
 
 
 def late(layout: Layout, request: RunRequest, kept: bool) -> list[str]:

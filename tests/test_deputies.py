@@ -31,7 +31,7 @@ from factory.plant.material import joins_of
 from factory.problem.pag import NOPART
 from factory.problem.robot_types import Catalogue, load_catalogue
 from factory.support.errors import InputError, RunError
-from tests.command_line import PAPER, ROOT, Terminal
+from tests.command_line import ROOT, Terminal
 from tests.fold_values import (
     inserted,
     lines_of_one_side,
@@ -47,7 +47,6 @@ from tests.test_undo import check_reached, fired_by, held
 
 seeds = st.integers(0, 10**6)
 randoms = st.randoms(use_true_random=False)
-CHEST = ROOT / "examples" / "chest.pag"
 
 SLOW = (
     ("sub4", "insert", ("part4", "sub3")),
@@ -383,26 +382,6 @@ def test_a_wrong_order_is_refused_with_its_circuit() -> None:
 
 
 # --- the command ----------------------------------------------------------------------------------
-
-
-def test_check_lists_them(run: Terminal) -> None:
-    done = run("check", CHEST, "--json")
-    assert done.status == 0
-    found = done.json["deputies"]
-    assert [*found] == [gear["robot"] for gear in done.json["gears"]]
-    assert {robot: row for robot, row in found.items() if row} == {
-        "r13": ["r14", "r15"],
-        "r14": ["r13", "r15"],
-        "r15": ["r13", "r14"],
-    }
-
-
-def test_check_says_it_in_a_line(run: Terminal) -> None:
-    """Only where it is asked for more."""
-    told = run("check", PAPER, "-v").out
-    words = "spares are needed for r1, r2, r3, r4, r5, r6"
-    assert told.endswith(f"deputies: another robot could take over for 0 of 6; {words}\n")
-    assert "deputies" not in run("check", PAPER).out
 
 
 def test_check_of_lines_and_branches(run: Terminal, tmp_path: Path) -> None:

@@ -220,6 +220,7 @@ def test_the_search_finds_the_last_point_that_holds() -> None:
         assert len(asked) == len(set(asked)) <= 11
 
 
+@pytest.mark.slow
 def test_the_quick_campaign_of_disturbances() -> None:
     results = disturbances.measure(quick=True)
     assert all(r["survived"] for r in results["products"][PAPER]["required"])

@@ -71,7 +71,7 @@ def test_with_short_timesteps_drives_are_as_stiff_as_ever() -> None:
     assert (short.kp, short.kv) == (usual.kp, usual.kv)
 
 
-@pytest.mark.parametrize("name", ["paper", "20", "fence", "gearbox"])
+@pytest.mark.parametrize("name", ["paper", "fence"])
 @pytest.mark.parametrize("timestep", [0.008, 0.02])
 def test_long_timesteps_do(name: str, timestep: float) -> None:
     """Gaps stay below 0.3 mm and welds hold, with robots and drives that differ. At 20 ms drives

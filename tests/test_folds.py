@@ -107,7 +107,9 @@ def folds_are_live(seeds: range, size: int) -> tuple[int, int]:
     return shared, small
 
 
-@pytest.mark.parametrize("block", range(10))
+@pytest.mark.parametrize(
+    "block", [*range(3), *(pytest.param(n, marks=pytest.mark.slow) for n in range(3, 10))]
+)
 def test_a_thousand_random_folds_are_live_safe_and_reversible(block: int) -> None:
     shared, small = folds_are_live(range(100 * block, 100 * block + 100), 30)
     assert shared > 30 and small > 10
@@ -151,8 +153,8 @@ def assert_token_free(net: GearNet, names: tuple[str, ...]) -> None:
 
 
 def test_every_swapped_pair_of_tours_is_refused_with_its_circuit() -> None:
-    pairs, tools, small = swapped_tours_are_refused(range(150), 20)
-    assert pairs > 500 and tools > 40 and small > 50
+    pairs, tools, small = swapped_tours_are_refused(range(60), 8)
+    assert pairs > 100 and tools > 10 and small > 5
 
 
 @pytest.mark.slow
@@ -436,7 +438,7 @@ def test_a_dead_train_has_no_cycle_time() -> None:
         cycle_time(_dead(), {})
 
 
-@pytest.mark.parametrize("seed", [2, 5, 6, 9, 19, 33, 37, 51, 53, 56])
+@pytest.mark.parametrize("seed", [2, 5, 19, 56])
 def test_the_ideal_world_has_the_predicted_cycle_time(seed: int) -> None:
     """Within the tick that each operation of the critical circuit may wait for; and prediction,
     analysis and layout are one."""

@@ -230,14 +230,6 @@ def test_few_robots_do_it_in_the_time_that_is_predicted(run: Terminal) -> None:
     assert least["live"]
 
 
-def test_a_cycle_time_takes_as_few_robots_as_found(run: Terminal) -> None:
-    counts = [
-        run("check", EXAMPLES / "paper.pag", "--cycle", cycle, "--json").json["robots"]
-        for cycle in ("4", "2.8", "2.6")
-    ]
-    assert counts == [3, 5, 6]
-
-
 def test_from_python() -> None:
     pag = factory.load_pag(EXAMPLES / "paper.pag")
     assert [len(factory.compile(pag, robots=n).robots) for n in (3, 4, 5, 6, None)] == [

@@ -427,38 +427,6 @@ def test_the_option_and_the_table_say_the_same(run: Terminal, file: Path) -> Non
     assert run("check", file, "--no-hands", "--parallel", "sub2=1", "--json").json == one
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--parallel", "sub2"], "not a label with a number"),
-        (["--parallel", "sub2=0"], "0 is not in the range"),
-        (["--parallel", "sub2=2", "--relay"], "--relay does not go with robots that have several"),
-        (["--parallel", "part3=2"], "'part3' is made by the output robot"),
-    ],
-)
-def test_what_the_option_refuses(run: Terminal, file: Path, words: list[str], message: str) -> None:
-    done = run("build", file, *words)
-    assert done.status == 2 and message in done.err
-
-
-def test_what_the_table_refuses(run: Terminal, file: Path) -> None:
-    file.with_name("factory.toml").write_text("[parallel]\nsub2 = true\n")
-    done = run("check", file)
-    assert done.status == 2 and "must be a table of labels with whole numbers" in done.err
-
-
-def test_a_log_is_of_its_branches(run: Terminal, file: Path, tmp_path: Path) -> None:
-    """The monitor, the report and the exports read it without the option."""
-    log, options = tmp_path / "run.log", ("--no-hands", "--parallel", "sub2=2", "-q")
-    assert run("run", file, *options, "--units", "3", "--log", log).status == 0
-    assert run("monitor", log).status == 0
-    assert run("report", log, "-o", tmp_path / "report.html").status == 0
-    assert run("export", log, "--format", "csv", "-o", tmp_path / "log.csv").status == 0
-    net = tmp_path / "net.pnml"
-    assert run("export", file, *options[1:], "--format", "pnml", "-o", net).status == 0
-    assert run("check", net).status == 0
-
-
 def test_a_unit_waits_for_none_that_comes_after_it() -> None:
     """Units are made one after the other in the order by which machines are kept apart: the last
     unit that is asked for does not wait for a part of a unit that nobody asks for."""

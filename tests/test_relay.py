@@ -3,10 +3,7 @@ as before, everything goes where it went, and the pace no longer depends on the 
 
 from __future__ import annotations
 
-import json
 import random
-import sqlite3
-from contextlib import closing
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -35,13 +32,11 @@ from factory.problem.plan import Plan
 from factory.problem.robot_types import load_catalogue
 from factory.problem.template import Template
 from factory.record.monitor import beside
-from factory.show.report import recording_of
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.resources import templates_folder
 from factory.support.settings import Settings
 from factory.timing.pool import part_pool
-from tests.command_line import Terminal
 from tests.layout_values import (
     Drawn,
     drawn_layouts,
@@ -55,16 +50,10 @@ EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 SETTINGS = Settings(hands=0)
 """Hands cannot relay cubes, which are heavy and narrow: relays with hands are tested for slabs, in
 `test_relay_hands`."""
-BARE = ("--no-hands",)
-"""The same in words."""
 
 PACE = Pace.of(SETTINGS)
 
 seeds = st.integers(0, 10_000)
-
-
-SMALL = cube(8, side=0.15)
-"""The smallest cube whose cycle relays shorten: from 2.06 s to 1.37 s, by two robots."""
 
 
 @cache
@@ -261,57 +250,3 @@ def test_what_is_lowered_can_be_relayed() -> None:
     after = cut(layout, chosen or found, {k: way.most for k, way in (chosen or found).items()})
     assert certify(after).holds
     assert list(after.factory.strokes.values()) == list(plain.factory.strokes.values())
-
-
-def test_by_the_command_line(run: Terminal, tmp_path: Path) -> None:
-    file, log = tmp_path / "cube.pag", tmp_path / "run.log"
-    file.write_text(SMALL)
-    plain = json.loads(run("check", file, *BARE, "--json").out)
-    found = json.loads(run("check", file, *BARE, "--relay", "--json").out)
-    assert found["live"] and found["reversible"] and found["robots"] > plain["robots"]
-    assert "relay" not in json.dumps(plain)
-    built = json.loads(run("build", file, *BARE, "--relay", "--json").out)
-    assert built["robots"] == found["robots"]
-    relays = built["layout"]["relays"]
-    assert relays["robots_added"] == found["robots"] - plain["robots"]
-    assert relays["without"]["predicted_cycle_time_s"] > 2
-    assert built["layout"]["predicted_cycle_time_s"] < 1.5
-    assert run("run", file, *BARE, "--cycle", "1.5", "--log", log, "-q").status == 0
-    assert run("monitor", log).status == 0
-    told = recording_of(log)
-    assert told.layout and told.layout.plain, told.missing
-    assert [r.name for r in told.layout.factory.robots] == told.log.header["robots"]
-    assert run("report", log, "-o", tmp_path / "told.html", "--json").json["predicted"]
-    assert "relay" in run("programs", file, *BARE, "--relay").out
-
-
-def test_a_net_has_no_guidepaths(run: Terminal, tmp_path: Path) -> None:
-    file = tmp_path / "net.pnml"
-    file.write_text("<pnml/>")
-    said = run("check", file, "--relay")
-    assert said.status == 2
-    assert f"--relay applies to a PAG; '{file}' is a net in PNML" in said.err
-
-
-def test_sweeps_and_exports_with_relays_are_those_of_a_run(run: Terminal, out: Path) -> None:
-    file = out / "cube.pag"
-    file.write_text(SMALL)
-    words = (*BARE, "--relay", "--world", "ideal")
-    database = out / "r.db"
-    swept = run("sweep", file, "--vary", "speed=0.3,0.6", *words, "-o", database, "--json")
-    assert (swept.status, swept.json["done"]) == (0, 2)
-    with closing(sqlite3.connect(database)) as opened:
-        rows = opened.execute("SELECT speed, robots, cycle_time_s FROM runs ORDER BY speed")
-        kept = {speed: (robots, seconds) for speed, robots, seconds in rows}
-    for speed, row in kept.items():
-        done = run("run", file, *words, "--units", 4, "--speed", speed, "--json").json
-        assert row == (done["robots"], done["cycle_time_s"])
-        assert done["robots"] > run("check", file, *BARE, "--json").json["robots"]
-    dot = run("export", file, *BARE, "--relay", "--format", "dot").out
-    assert "relay" in run("export", file, *BARE, "--cycle", "1.5", "--format", "dot").out
-    plan = run("build", file, *words[:2], "--speed", 0.3, "-o", out / "all", "--json").json
-    assert "relay" in dot and "relay" not in run("export", file, *BARE, "--format", "dot").out
-    assert plan["robots"] == kept[0.3][0]
-    for more in ((), ("--no-fuse",)):
-        other = run("sweep", file, "--vary", "speed=0.3", *more, "-o", database, "--json")
-        assert other.status == 2 and "other" in other.json["errors"][0]["message"]

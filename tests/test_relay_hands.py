@@ -4,8 +4,6 @@ own side of the line, and nothing meets anything on any way."""
 from __future__ import annotations
 
 import random
-import sqlite3
-from contextlib import closing
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -204,21 +202,6 @@ def test_what_hands_cannot_relay_is_not_cut() -> None:
     assert not hand_overs(found)
     bare = relayed(replace(layout, hands=()), Settings(hands=0))
     assert hand_overs(bare)
-
-
-def test_sweeps_and_exports_are_those_of_a_run(run: Terminal, out: Path) -> None:
-    file, words = out / "slab.pag", ("--relay", "--world", "ideal")
-    file.write_text(sawn(4))
-    swept = run("sweep", file, "--vary", "seed=1", *words, "-o", out / "r.db", "--json")
-    assert (swept.status, swept.json["done"]) == (0, 1)
-    with closing(sqlite3.connect(out / "r.db")) as opened:
-        (row,) = opened.execute("SELECT robots, cycle_time_s FROM runs")
-    done = run("run", file, *words, "--units", 4, "--seed", 1, "--json").json
-    assert row == (done["robots"], done["cycle_time_s"])
-    assert done["robots"] == len(with_relays(4).factory.robots)
-    for command in (("export", "--format", "dot"), ("programs",)):
-        assert "relay" in run(command[0], file, "--relay", *command[1:]).out
-        assert "relay" not in run(command[0], file, *command[1:]).out
 
 
 def test_by_the_command_line(run: Terminal, tmp_path: Path) -> None:

@@ -11,10 +11,8 @@ import pytest
 import factory
 from benches.speed.factories import laid_out as floor_of
 from factory.layout.layout import Layout
-from factory.nets.history import firings, legal_marking
 from factory.nets.replay import replay
 from factory.pipeline import all_templates
-from factory.plant.programs import program_of, write_program
 from factory.record.state import Event, State
 from factory.simulation.distributed import DistributedSupervisor
 from factory.simulation.request import RunRequest
@@ -22,7 +20,7 @@ from factory.simulation.run import busy_times
 from factory.simulation.simulation import Simulation
 from factory.support.settings import Settings
 from tests.good_runs import assert_good, random_marking
-from tests.pag_texts import LONE, OVERLAP, PAPER, PRODUCTS, laid_out
+from tests.pag_texts import LONE, PAPER, PRODUCTS, laid_out
 from tests.simulation_values import ready
 
 
@@ -38,7 +36,7 @@ def test_every_shape_of_product_is_made_in_mujoco(name: str) -> None:
     assert_good(run)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("world", ["mujoco", "ideal"])
 def test_the_papers_example_under_jitter(paper: Layout, world: str, seed: int) -> None:
     run = factory.run(paper, world=world, units=3, jitter=0.3, seed=seed)
@@ -48,31 +46,17 @@ def test_the_papers_example_under_jitter(paper: Layout, world: str, seed: int) -
         assert_good(run)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(4))
 def test_distributed_runs_refine_the_net(paper: Layout, seed: int) -> None:
     run = factory.run(paper, units=3, jitter=0.3, seed=seed, distributed=True)
     assert run.products == 3
     assert_good(run)
 
 
-@pytest.mark.parametrize("name", ["unary", "kary", "chain"])
-def test_distributed_runs_of_other_shapes(name: str) -> None:
-    for seed in range(3):
-        run = factory.run(laid_out(PRODUCTS[name]), units=2, seed=seed, distributed=True)
-        assert run.products == 2
-        assert_good(run)
-
-
 def test_a_hundred_units_of_the_papers_example(paper: Layout) -> None:
     run = factory.run(paper, units=100)
     assert run.products == 100
     assert_good(run)
-    assert run.cycle_time_s == pytest.approx(run.predicted_cycle_time_s, rel=0.02)
-
-
-@pytest.mark.parametrize("name", ["paper", "unary", "kary", "chain"])
-def test_the_ideal_world_has_the_predicted_cycle_time(name: str) -> None:
-    run = factory.run(laid_out(PRODUCTS[name]), world="ideal", units=12)
     assert run.cycle_time_s == pytest.approx(run.predicted_cycle_time_s, rel=0.02)
 
 
@@ -86,12 +70,6 @@ def test_a_run_can_start_from_any_legal_marking(paper: Layout, world: str, seed:
     assert run.refines_net
     if world == "mujoco":
         assert_good(run)
-
-
-def test_a_marking_is_given_by_names(paper: Layout) -> None:
-    start = legal_marking(paper.factory.net, "sub1, r1:sub3")
-    assert firings(paper.factory.net, start)[paper.factory.by_label["sub3"].end] == 1
-    assert_good(factory.run(paper, units=1, start=start))
 
 
 def test_wip_bounds_what_is_inside(paper: Layout) -> None:
@@ -316,22 +294,6 @@ def test_robots_stop_where_their_operation_ends(paper: Layout) -> None:
     assert np.all(motion.robots.v[: motion.axes.tray] == 0.0)
 
 
-def test_a_payload_larger_than_the_layout_knew_is_a_contact() -> None:
-    """Planted fault: the parts are wider than those the clearance was certified for."""
-    text = OVERLAP.replace("mate(u, v)", "mate(u, v, w, x)") + (
-        "; w = atomic(box = (0.05, 0.05, 0.06), pos = (0, -0.1, 0));"
-        "x = atomic(box = (0.05, 0.05, 0.06), pos = (0.1, -0.1, 0))"
-    )
-    layout = laid_out(text)
-    assert_good(factory.run(layout, units=2))
-    wide = laid_out(text.replace("box = (0.05, 0.05", "box = (0.12, 0.12"))
-    solids = {**layout.product.solids, **{k: wide.product.solids[k] for k in ("w", "x")}}
-    broken = replace(layout, product=replace(layout.product, solids=solids))
-    run = Simulation(broken, RunRequest(units=3)).run(max_time=60)
-    assert run.physics is not None
-    assert run.physics.unintended_contacts > 0
-
-
 def test_a_shifted_weld_shows_in_the_gap(paper: Layout) -> None:
     """Planted fault: one nominal frame is 2 mm off."""
     simulation = Simulation(paper, RunRequest(units=1))
@@ -346,14 +308,6 @@ def test_each_robot_has_its_own_speed(paper: Layout) -> None:
     limits = Simulation(paper, RunRequest(world="ideal", jitter=0.3, seed=1)).limits
     assert len(set(limits.speed)) == len(limits.speed)
     assert np.all((limits.speed >= 0.35) & (limits.speed <= 0.65))
-
-
-def test_programs_read_as_in_the_paper(paper: Layout) -> None:
-    text = write_program(program_of(paper.factory, 2))
-    assert "  If state_3 = sub1\n    Run ẋ_3 = hold Until state_4 = nopart" in text
-    assert "Run ẋ_3 = π_3 ∘ mate(x_5, x_6, x_3) Until state_3 = sub1" in text
-    assert "Run ẋ_3 = π_1 ∘ mate(x_3, x_2, x_1) Until state_3 = nopart" in text
-    assert "Run ẋ_3 = wait Until state_1 = nopart ∧ state_2 = part3" in text
 
 
 def test_templates_of_the_user_run_without_a_change_of_code(tmp_path) -> None:

@@ -4,8 +4,6 @@ and nothing comes near what it should not."""
 from __future__ import annotations
 
 import random
-import sqlite3
-from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -45,7 +43,7 @@ from factory.support.settings import Settings
 from factory.timing.cycle_time import cycle_time
 from factory.timing.timed import timed
 from factory.timing.timing import Change
-from tests.command_line import PAPER, ROOT, Terminal
+from tests.command_line import PAPER, ROOT
 from tests.examples import without_hands
 from tests.layout_values import (
     STYLES,
@@ -89,6 +87,7 @@ def test_what_goes_ahead_in_the_papers_example(paper: Layout) -> None:
 
 
 @given(drawn_layouts)
+@settings(max_examples=12)
 def test_only_empty_hands_go_ahead_and_only_to_others(drawn: Drawn) -> None:
     layout = random_layout(*drawn)
     for stage in stages(layout, operation_modes(layout, STAGED.eps)):
@@ -178,7 +177,7 @@ def test_tokens_may_be_ready_later() -> None:
 
 
 @given(drawn_layouts)
-@settings(max_examples=25)
+@settings(max_examples=8)
 def test_the_layout_is_made_for_that_pace(drawn: Drawn) -> None:
     layout = random_layout(*drawn)
     net = timed_net(Timing(layout, STAGED, "ideal"))
@@ -237,7 +236,7 @@ def test_changes_of_a_robot_change_its_ways(seed: int, shape: str) -> None:
 
 @pytest.mark.parametrize("distributed", [False, True])
 @given(st.integers(2, 12), seeds, shapes, styles)
-@settings(max_examples=6)
+@settings(max_examples=4)
 def test_it_runs_at_that_pace(
     distributed: bool, size: int, seed: int, shape: str, style: str
 ) -> None:
@@ -288,16 +287,6 @@ def test_it_pays_in_mujoco(file: Path, units: int, distributed: bool) -> None:
     assert cycles[1] < 0.96 * cycles[0]
     if not distributed:
         assert cycles[1] == pytest.approx(found[STAGED].predicted_cycle_time_s, rel=0.01)
-
-
-def test_it_does_not_change_a_run_without_it(paper: Layout) -> None:
-    made = Simulation(paper, RunRequest("mujoco", units=2))
-    record = made.run()
-    assert [e.transition for e in record.events[:6]] == [
-        e.transition
-        for e in Simulation(paper, RunRequest("mujoco", units=2, settings=STILL)).run().events[:6]
-    ]
-    assert made.supervisor.active.ahead == () and made.timing.ways() == {}
 
 
 # --- robots on their way --------------------------------------------------------------------------
@@ -427,60 +416,6 @@ def test_the_monitor_blames_what_goes_ahead_though_it_should_wait(
     watcher = beside(made)
     made.run([watcher.observe])
     assert any(violation.code == "Order" for violation in watcher.report().violations)
-
-
-# --- the command line -----------------------------------------------------------------------------
-
-
-def test_run_and_its_log(run: Terminal, tmp_path: Path) -> None:
-    log = tmp_path / "run.npz"
-    still = run("run", PAPER, "--units", 6, "--json").json
-    done = run("run", PAPER, "--units", 6, "--stage", "--monitor", "--log", log, "--json").json
-    assert done["cycle_time_s"] < 0.96 * still["cycle_time_s"]
-    assert done["predicted_cycle_time_s"] < 0.96 * still["predicted_cycle_time_s"]
-    assert done["refines_net"]
-    assert run("monitor", log, "--json").json["refines_net"]
-
-
-def test_analyze_against_a_run(run: Terminal, tmp_path: Path) -> None:
-    words = ["--stage", "--units", 5, "--run", "--timestep", 0.002, "--json"]
-    found = run("analyze", CHEST, *words).json
-    critical = found["circuits"][0]
-    assert critical["pace_s"] == found["cycle_time_s"]
-    assert all(operation["slack_s"] < 10 for operation in found["operations"])
-    measured = found["measured"]
-    assert measured["cycle_time_s"]["error"] == pytest.approx(0, abs=0.01)
-    assert measured["last_product_s"]["error"] == pytest.approx(0, abs=0.002)
-    slow = [d for d in measured["durations"] if d["measured"] > 0.1]
-    assert len(slow) > 20
-    for duration in slow:
-        assert duration["predicted"] == pytest.approx(duration["measured"], rel=0.05)
-
-
-def test_sweeps_vary_it(run: Terminal, tmp_path: Path) -> None:
-    out = tmp_path / "sweep.db"
-    done = run("sweep", PAPER, "--vary", "stage=0,1", "--world", "ideal", "-o", out, "--json")
-    assert done.status == 0
-    with closing(sqlite3.connect(out)) as base:
-        rows = base.execute("select stage, cycle_time_s from runs order by stage").fetchall()
-    assert [stage for stage, _ in rows] == [0, 1]
-    assert rows[1][1] < 0.95 * rows[0][1]
-
-
-def test_it_is_0_or_1(run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "p.pag").write_text(PAPER.read_text())
-    (tmp_path / "factory.toml").write_text("stage = 2\n")
-    done = run("run", tmp_path / "p.pag")
-    assert done.status == 2 and "stage = 2 is not between 0 and 1" in done.err
-    (tmp_path / "factory.toml").write_text("stage = 1\n")
-    staged = run("run", tmp_path / "p.pag", "--world", "ideal", "--units", 6, "--json").json
-    still = ["run", tmp_path / "p.pag", "--world", "ideal", "--units", 6, "--no-stage", "--json"]
-    assert staged["cycle_time_s"] < run(*still).json["cycle_time_s"]
-    monkeypatch.setenv("FACTORY_STAGE", "0")
-    assert np.isclose(
-        run(*[a for a in still if a != "--no-stage"]).json["cycle_time_s"],
-        run(*still).json["cycle_time_s"],
-    )
 
 
 @pytest.mark.slow

@@ -85,8 +85,7 @@ def figures(run: Run) -> tuple[int, int, float]:
 # --- runs -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("fuse", [False, True])
-@pytest.mark.parametrize(("dead", "deputy"), [("r2", "r4"), ("r4", "r2")])
+@pytest.mark.parametrize(("dead", "deputy", "fuse"), [("r2", "r4", False), ("r4", "r2", True)])
 def test_all_units_are_made(dead: str, deputy: str, fuse: bool) -> None:
     """At the pace that is predicted for N', and nothing touches."""
     simulation, _ = simulated(INSERTS, dead, 7.0, fuse=fuse)

@@ -208,8 +208,18 @@ def test_it_is_the_longest_that_is_good(
 # --- what was predicted is so ---------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["paper", "truck", "gearbox", "chest"])
-@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("name", "seed"),
+    [
+        ("paper", 0),
+        ("gearbox", 0),
+        *(
+            pytest.param(name, seed, marks=pytest.mark.slow)
+            for name in ("truck", "chest")
+            for seed in (0, 1)
+        ),
+    ],
+)
 def test_products_keep_half_their_limits(name: str, seed: int) -> None:
     simulation = Simulation(layout(name), RunRequest(units=2, seed=seed, jitter=0.3))
     found = measured(simulation)
@@ -219,7 +229,7 @@ def test_products_keep_half_their_limits(name: str, seed: int) -> None:
     assert max(found.values()) < error < 1e3 * ALLOWED
 
 
-SEEDS = range(12, 24)
+SEEDS = range(12, 18)
 ALL = [SEEDS, pytest.param(range(24), marks=pytest.mark.slow)]
 
 
@@ -309,23 +319,6 @@ def test_what_is_no_timestep_is_told(
         Settings().with_options({"speed": 1e9, "timestep": AUTO})
     with pytest.raises(ValueError, match="auto"):
         _ = Settings().step
-
-
-def test_build_writes_it(run: Terminal, tmp_path: Path) -> None:
-    done = run("build", PAPER, "--mjcf", tmp_path / "a.xml", "--json").json
-    assert done["timestep_s"] == 0.01
-    assert 'timestep="0.01"' in (tmp_path / "a.xml").read_text()
-    run("build", PAPER, "--mjcf", tmp_path / "b.xml", "--timestep", "0.002")
-    assert 'timestep="0.002"' in (tmp_path / "b.xml").read_text()
-
-
-def test_a_sweep_may_vary_it(run: Terminal, tmp_path: Path) -> None:
-    words = ["--vary", "timestep=0.002,auto", "--vary", "seed=0:2", "--units", 2]
-    done = run("sweep", PAPER, *words, "-o", tmp_path / "r.db", "--json").json
-    assert (done["done"], done["failed"]) == (4, 0)
-    told = run("sweep", tmp_path / "r.db", "--summary").out
-    assert "timestep 0.002: 2 runs" in told
-    assert "timestep auto: 2 runs" in told
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -30,7 +30,7 @@ def anywhere(m: mujoco.MjModel, seed: int) -> mujoco.MjData:
     return d
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(1))
 def test_frames_follow_from_the_slides_alone(model: mujoco.MjModel, seed: int) -> None:
     frames, d = WeldFrames.of(model, anywhere(model, 9)), anywhere(model, seed)
     welds = np.arange(model.neq)
