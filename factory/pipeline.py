@@ -26,6 +26,7 @@ from factory.problem.robot_types import Catalogue, load_catalogue
 from factory.problem.shapes import is_plain, is_shaped
 from factory.problem.template import Template
 from factory.support.errors import Diagnostic, InputError
+from factory.support.extensions import extension_folders
 from factory.support.resources import templates_folder
 from factory.support.settings import Settings
 
@@ -317,14 +318,16 @@ def _is_shipped(template: Template) -> bool:
 
 
 def all_templates(folders: Sequence[str | PathLike[str]] = ()) -> Mapping[str, Template]:
-    """The templates of the user's folders and the shipped ones. Raises InputError."""
+    """The templates of the user's folders, of entry points and the shipped ones. Raises
+    InputError."""
     for folder in folders:
         if not Path(folder).is_dir():
             message = f"the templates folder '{folder}' is no directory"
             raise InputError(
                 Diagnostic("BadTemplate", message, None, "--templates takes a directory")
             )
-    return load_templates([*map(Path, folders), templates_folder()])
+    every = *map(Path, folders), *extension_folders("templates"), templates_folder()
+    return load_templates(every)
 
 
 def read(

@@ -266,11 +266,12 @@ def export(
     of: str = "",
     *,
     settings: Settings | None = None,
+    exporters: Sequence[AnyPath] = (),
 ) -> Made:
     """A factory, or the log or the net (PNML) in a file, in a format for other tools: a text, bytes
     or the contents of several files by name; written to `output` where that is given. `of`: what is
-    exported where a format offers a choice. `factory export --help` lists the formats. Raises
-    InputError.
+    exported where a format offers a choice. `factory export --help` lists the formats; `exporters`:
+    folders with further ones. Raises InputError.
 
     >>> import factory
     >>> factory.export("examples/paper.pag", "dot").splitlines()[0]
@@ -280,7 +281,7 @@ def export(
     from factory.exporting.writing import exporter, read_source
     from factory.support.files import write_all
 
-    chosen = exporter(form, of)
+    chosen = exporter(form, of, [*map(path_of, exporters)])
     file = named(product)
     source: Source | None = None if file is None else read_source(file)
     if file is None or source is None:

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.command_line import PAPER, ROOT
+from tests.plug_in import FILES, write_package
 
 pytestmark = pytest.mark.slow
 
@@ -44,23 +45,46 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return next(folder.glob("*.whl"))
 
 
-def test_the_wheel_runs_by_itself(wheel: Path, tmp_path: Path) -> None:
-    """In a new environment that borrows the dependencies of this one, but not the package."""
-    call(sys.executable, "-m", "venv", tmp_path / "venv", cwd=tmp_path)
-    python = tmp_path / "venv" / "bin" / "python"
-    call(python, "-m", "pip", "install", "--quiet", "--no-deps", wheel, cwd=tmp_path)
-    site = Path(
-        call(python, "-c", "import site; print(site.getsitepackages()[0])", cwd=tmp_path).strip()
-    )
+@pytest.fixture(scope="module")
+def python(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Python of a new environment that borrows the dependencies of this one, but not the
+    package."""
+    folder = tmp_path_factory.mktemp("environment")
+    call(sys.executable, "-m", "venv", folder / "venv", cwd=folder)
+    python = folder / "venv" / "bin" / "python"
+    call(python, "-m", "pip", "install", "--quiet", "--no-deps", wheel, cwd=folder)
+    words = python, "-c", "import site; print(site.getsitepackages()[0])"
+    site = Path(call(*words, cwd=folder).strip())
     (site / "zz_dependencies.pth").write_text(sysconfig.get_paths()["purelib"])
+    return python
+
+
+def test_the_wheel_runs_by_itself(python: Path, tmp_path: Path) -> None:
     (tmp_path / "p.pag").write_bytes(PAPER.read_bytes())
-    factory = tmp_path / "venv" / "bin" / "factory"
+    factory = python.parent / "factory"
     where = call(python, "-c", "import factory; print(factory.__file__)", cwd=tmp_path)
-    assert Path(where.strip()).is_relative_to(tmp_path)
+    assert Path(where.strip()).is_relative_to(python.parents[1])
     assert json.loads(call(factory, "check", "p.pag", "--json", cwd=tmp_path))["live"]
     call(factory, "build", "p.pag", "-o", "out", cwd=tmp_path)
     assert (tmp_path / "out" / "p.xml").is_file()
     run = json.loads(call(factory, "run", "p.pag", "--json", cwd=tmp_path))
     assert run["refines_net"] and run["products"] == 1
+    shown = json.loads(call(factory, "templates", "--json", cwd=tmp_path))
+    assert len(shown["templates"]) == len(list((ROOT / "templates").glob("*.op")))
+
+
+def test_an_installed_package_extends_it(python: Path, tmp_path: Path) -> None:
+    """Its operation, control law, robot type and exporter are found by their entry points; they are
+    gone when it is."""
+    write_package(tmp_path / "source", installed=False)
+    (tmp_path / "p.pag").write_text(FILES["p.pag"])
+    call(python, "-m", "pip", "install", "--quiet", "--no-deps", tmp_path / "source", cwd=tmp_path)
+    factory = python.parent / "factory"
+    run = json.loads(call(factory, "run", "p.pag", "--json", cwd=tmp_path))
+    assert run["refines_net"] and run["products"] == 1
+    assert call(factory, "export", "p.pag", "--format", "count", cwd=tmp_path).strip() == "2"
+    shown = json.loads(call(factory, "templates", "--json", cwd=tmp_path))
+    assert shown["robots"][-1]["name"] == "dabber"
+    call(python, "-m", "pip", "uninstall", "--quiet", "--yes", "gluing", cwd=tmp_path)
     shown = json.loads(call(factory, "templates", "--json", cwd=tmp_path))
     assert len(shown["templates"]) == len(list((ROOT / "templates").glob("*.op")))

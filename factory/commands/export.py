@@ -57,6 +57,13 @@ class _Format(click.ParamType[str]):
 @click.command(cls=_Listing)
 @SOURCE
 @click.option("--format", "form", type=_Format(), required=True, help="A format listed below.")
+@click.option(
+    "--exporters",
+    "exporting",
+    multiple=True,
+    type=PATH,
+    help="Folder of additional exporters, *.py (repeatable).",
+)
 @click.option("-o", "--output", type=PATH, help="Output file (default: stdout, for text formats).")
 @click.option("--of", default="", help="What to export, where a format offers a choice.")
 @FLOOR
@@ -64,7 +71,12 @@ class _Format(click.ParamType[str]):
 @MOTION
 @OUTPUT
 def export(
-    options: ProjectOptions, out: OutputOptions, form: str, output: Path | None, of: str
+    options: ProjectOptions,
+    out: OutputOptions,
+    form: str,
+    exporting: tuple[Path, ...],
+    output: Path | None,
+    of: str,
 ) -> int:
     """Write FILE.pag, a net in FILE.pnml or a LOG of a run for other tools."""
     from factory.exporting.writing import check_taken, exporter, read_source, takes_folder
@@ -73,7 +85,7 @@ def export(
     from factory.record.log import Log
     from factory.support.files import write_all
 
-    chosen = exporter(form, of)
+    chosen = exporter(form, of, exporting)
     if output is None and chosen.binary:
         message = f"{chosen.format} is binary and is not written to a terminal"
         raise usage_error(message, f"give -o OUT.{chosen.ending or chosen.format}")

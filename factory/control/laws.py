@@ -1,14 +1,17 @@
 """The table of control laws, by the name a template gives its F.
 
 A law is a function from a template and the guidepaths of one operation's robots to a `Mode`. To add
-one: write the function, and a line in `LAWS`.
+one: write the function, and a line in `LAWS`, or name it by an entry point of `factory.laws` in a
+package of your own.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations
+from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
@@ -16,6 +19,7 @@ import numpy as np
 from factory.control.mode import Array, Index, Mode, lock, lock_index
 from factory.problem.template import Point, Template
 from factory.support.errors import Diagnostic, InputError, did_you_mean
+from factory.support.extensions import bad_extension, blaming, extensions, position_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,14 +100,27 @@ LAWS: Mapping[str, Law] = MappingProxyType({"navigation": navigation, "hold": ho
 
 
 def law_of(template: Template) -> Law:
-    """The control law that a template's F names. Raises InputError (BadTemplate) for one that is
-    not in the table."""
+    """The control law that a template's F names: a shipped one, or that of an entry point. Raises
+    InputError (BadTemplate) where there is none."""
     name = template.law.name
-    if name not in LAWS:
-        hint = did_you_mean(name, sorted(LAWS), "control laws")
+    if name in LAWS:
+        return LAWS[name]
+    laws = extensions("laws")
+    if name not in laws:
+        hint = did_you_mean(name, sorted({*LAWS, *laws}), "control laws")
         message = f"{template.name}: unknown control law '{name}'"
         raise InputError(Diagnostic("BadTemplate", message, template.law_position, hint))
-    return LAWS[name]
+    return partial(_of_user, name, laws[name])
+
+
+def _of_user(name: str, law: Law, template: Template, setting: Setting) -> Mode:
+    """What a user's law gives. Raises InputError (BadExtension) where that is no mode."""
+    at = position_of(law)
+    with blaming(f"the control law {name}", Path(at.file) if at else None):
+        mode = law(template, setting)
+    if not isinstance(mode, Mode):
+        raise bad_extension(f"the control law {name} gave {type(mode).__name__}, not a Mode", at)
+    return mode
 
 
 def _meetings(

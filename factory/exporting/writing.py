@@ -2,30 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from factory.exporting import Exporter, Made, exporters
+from factory.exporting import TAKEN, Exporter, Made, exporters
 from factory.exporting.subject import Source, Subject
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet
 from factory.pipeline import Project
 from factory.record.log import Log, is_log, read_log
 from factory.support.errors import did_you_mean, usage_error
+from factory.support.extensions import bad_extension, blaming, position_of
 from factory.support.files import is_net
 
-TAKEN = {
-    "net": ("a PAG", "a net in PNML"),
-    "pag": ("a PAG",),
-    "log": ("a log",),
-    "factory": ("a PAG", "a log"),
-}
-"""The kinds of source that an exporter can take."""
 
-
-def exporter(form: str, of: str = "") -> Exporter:
-    """The exporter of a format, with a choice `of` what it exports. Raises InputError (Usage)."""
-    known = exporters()
+def exporter(form: str, of: str = "", folders: Sequence[Path] = ()) -> Exporter:
+    """The exporter of a format, with a choice `of` what it exports; `folders`: of the user's
+    exporters. Raises InputError (Usage, BadExtension)."""
+    known = exporters(folders)
     if form not in known:
         raise usage_error(f"unknown format '{form}'", did_you_mean(form, list(known), "formats"))
     if of and not known[form].of:
@@ -73,10 +67,24 @@ def export(
     write, none without an output. Raises InputError."""
     check_taken(chosen, file, source)
     whole = takes_folder(chosen, output)
-    made = chosen.export(Subject(file, source, of, output.name if output else "", whole))
+    made = _made(chosen, Subject(file, source, of, output.name if output else "", whole))
     if output is None:
         return made, {}
     if not isinstance(made, Mapping):
         return made, {output: made.encode() if isinstance(made, str) else made}
     folder = output if whole else output.parent
     return made, {folder / name if name else output: content for name, content in made.items()}
+
+
+def _made(chosen: Exporter, subject: Subject) -> Made:
+    """What an exporter makes. Raises InputError, BadExtension for a mistake of the user."""
+    if chosen.file is None:
+        return chosen.export(subject)
+    with blaming(f"the exporter {chosen.format}", chosen.file):
+        made = chosen.export(subject)
+    kinds = bytes | Mapping if chosen.binary else str | Mapping
+    if not isinstance(made, kinds):
+        wanted = f"{'bytes' if chosen.binary else 'a text'} or files by their names"
+        message = f"the exporter {chosen.format} gave {type(made).__name__}, not {wanted}"
+        raise bad_extension(message, position_of(chosen.export))
+    return made

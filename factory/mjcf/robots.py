@@ -98,9 +98,9 @@ def load_robot_model(robot: RobotType) -> RobotModel:
     except (OSError, ElementTree.ParseError, IndexError, ValueError) as error:
         message = f"the file of robot type '{robot.name}' is unusable: {error or 'it has no body'}"
         hint = "it needs one body with a joint `slide` and an actuator `drive`, like dot.xml"
-        raise InputError(
-            Diagnostic("BadTemplate", message, Position(str(path), 1, 1), hint)
-        ) from error
+        line, column = getattr(error, "position", (1, 0))
+        at = Position(str(path), line, column + 1)
+        raise InputError(Diagnostic("BadTemplate", message, at, hint)) from error
     defaults = Element("default", {"class": robot.name})
     for child in root.findall("default/*"):
         defaults.append(_prefixed(child, robot.name, names=False))

@@ -1,15 +1,19 @@
-"""Robot types (paper, section 4.2): each is an MJCF file and an entry in `mjcf/catalogue.toml`."""
+"""Robot types (paper, section 4.2): each is an MJCF file and an entry in `mjcf/catalogue.toml`, or
+in that of a package that an entry point of `factory.robots` names."""
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
+from factory.support.extensions import extension_folders
 from factory.support.resources import mjcf_folder
+from factory.support.user_defaults import read_toml
+
+HINT = "see the shipped mjcf/catalogue.toml"
 
 LIFT = "lift"
 """The type of a robot that can lower what it brings, or set its hand to different heights."""
@@ -57,15 +61,27 @@ class Catalogue:
 
 
 def load_catalogue(folder: Path | None = None) -> Catalogue:
-    """The catalogue of a folder, the shipped one by default.
+    """The catalogue of a folder; by default the shipped one, with those of entry points.
 
-    Raises InputError where the file is not readable TOML, or a type extends one that is not there,
-    or itself.
+    Raises InputError where a file is not readable TOML, or a type extends one that is not there,
+    or itself, or is there already.
     """
-    path = (folder or mjcf_folder()) / "catalogue.toml"
+    folders = [mjcf_folder(), *extension_folders("robots")] if folder is None else [folder]
+    types: dict[str, RobotType] = {}
+    for path in (each / "catalogue.toml" for each in folders):
+        more = _types(path)
+        if twice := sorted(more.keys() & types.keys()):
+            raise InputError(_trouble(path, f"there is a robot type '{twice[0]}' already"))
+        types |= more
+        for robot in more.values():
+            _check_ancestry(path, robot, types)
+    return Catalogue(types)
+
+
+def _types(path: Path) -> dict[str, RobotType]:
+    _, table = read_toml(path, HINT)
     try:
-        table = tomllib.loads(path.read_text("utf-8"))
-        types = {
+        return {
             name: RobotType(
                 name,
                 path.parent / str(entry["mjcf"]),
@@ -75,11 +91,8 @@ def load_catalogue(folder: Path | None = None) -> Catalogue:
             )
             for name, entry in table.items()
         }
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (KeyError, TypeError, AttributeError) as error:
         raise InputError(_trouble(path, f"the robot catalogue is unusable: {error}")) from error
-    for robot in types.values():
-        _check_ancestry(path, robot, types)
-    return Catalogue(types)
 
 
 def _check_ancestry(path: Path, robot: RobotType, types: Mapping[str, RobotType]) -> None:
@@ -96,7 +109,5 @@ def _check_ancestry(path: Path, robot: RobotType, types: Mapping[str, RobotType]
         seen.add(current.name)
 
 
-def _trouble(
-    path: Path, message: str, hint: str = "see the shipped mjcf/catalogue.toml"
-) -> Diagnostic:
+def _trouble(path: Path, message: str, hint: str = HINT) -> Diagnostic:
     return Diagnostic("BadTemplate", message, Position(str(path), 1, 1), hint)

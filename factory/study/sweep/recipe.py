@@ -19,6 +19,7 @@ from factory.layout.saved import LayoutTable
 from factory.nets.verify import proved
 from factory.pipeline import Project
 from factory.plant.factory import Factory
+from factory.problem.robot_types import load_catalogue
 from factory.simulation.options import check_ideal
 from factory.study.sweep.grid import DEFAULTS, SETTINGS, Axis, Point, Value
 from factory.support.errors import usage_error
@@ -110,7 +111,9 @@ def digest(factory: Factory, product: Product) -> str:
     for label in sorted(product.solids):
         for piece in _bytes(product.solids[label]):
             made.update(piece)
-    for path in sorted(mjcf_folder().rglob("*")):
+    shipped = sorted(mjcf_folder().rglob("*"))
+    types = {robot.mjcf for robot in load_catalogue().types.values()}
+    for path in (*shipped, *sorted(types - {*shipped})):
         if path.is_file():
             made.update(path.name.encode() + path.read_bytes())
     return made.hexdigest()
