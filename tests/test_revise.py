@@ -15,7 +15,6 @@ from factory.plant.matching import label_digests, matching, shifted
 from factory.problem.pag import PAG, Parameter
 from tests.revisions import edited, kept_share, shuffled
 
-
 EXAMPLES = Path(__file__).parent.parent / "examples"
 
 
