@@ -180,13 +180,24 @@ def _product_of(forest: Factory) -> Mapping[int, int]:
 
 def _fault(forest: Factory, robot: int) -> Diagnostic:
     """Why the output robot cannot begin the tours of two products."""
-    first = forest.operations[forest.robots[robot].operations[0]]
-    other = forest.operations[forest.robots[forest.dropoff.carrier].operations[0]]
+    here, there = robot, forest.dropoff.carrier
+    first, other = (forest.operations[forest.robots[r].operations[0]] for r in (here, there))
     message = (
         f"'{first.written}' and '{other.written}' begin products on one robot, and their inputs"
-        " cannot come on the same two lines"
+        f" cannot come on the same two lines: {_ways_in(forest, here)}; {_ways_in(forest, there)}"
     )
     hint = (
-        "let both products begin alike: with two parts, or two sub-assemblies, from the same sides"
+        "let both products begin alike: with two parts, or two sub-assemblies, that come in the"
+        " same way from the same sides"
     )
     return Diagnostic("BadLine", message, first.position, hint)
+
+
+def _ways_in(forest: Factory, robot: int) -> str:
+    """How the inputs come with which a tour begins, in words."""
+    first = forest.operations[forest.robots[robot].operations[0]]
+    return " and ".join(
+        f"{forest.by_label[label].written} {'is lowered' if slot == first.lowered else 'slides'}"
+        for slot, label in enumerate(first.before)
+        if label != NOPART
+    )
