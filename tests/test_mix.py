@@ -140,6 +140,14 @@ def test_products_share_robots() -> None:
     ]
 
 
+def test_common_inputs_come_on_one_line_in_whatever_order() -> None:
+    """`b` names the common part second, and it comes on the line of the common part."""
+    text = LITTLE.replace("b = mate ( base, z )", "b = mate ( z, base )")
+    factory = mixed_factory(read_pag(text.replace("2 a, 1 b", "a, b"), TEMPLATES))
+    lines = {frozenset(factory.deliveries(robot.index)) for robot in factory.robots[1:]}
+    assert lines == {frozenset({"y"}), frozenset({"base", "base@2"}), frozenset({"x", "z@2"})}
+
+
 def test_products_that_begin_otherwise_are_refused() -> None:
     """One begins with two parts, the other with a sub-assembly and a part."""
     part = [Tree(f"p{n}") for n in range(6)]

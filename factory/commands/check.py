@@ -154,8 +154,9 @@ def _describe(checked: Checked, verbose: bool, allowed: Sequence[AllowedOverlap]
         table("", ("robot", "type", "gear"), rows)
     if len(shown) < len(gears):
         say(f"... and {len(gears) - len(shown)} more robots (-v shows all)")
+    made = checked.factory.pag.title if checked.factory else checked.name
     say(
-        f"{checked.name}: {document['robots']} robots, {document['places']} places,"
+        f"{made}: {document['robots']} robots, {document['places']} places,"
         f" {document['transitions']} transitions, {document['tokens']} tokens,"
         f" largest mode {document['largest_mode']}"
     )

@@ -179,12 +179,11 @@ def shared(base: Factory, plan: Plan, catalogue: Catalogue) -> Factory:
     every = range(1 + max(map(max, plan.turns)))
     for turn in plan.turns:
         for o in base.operations:
-            does, output = [turn[robot] for robot in o.robots], base.dropoffs[o.turn].carrier
-            if (min(does) == NOBODY or turn[output] == NOBODY) and {*does, turn[output]} != {
-                NOBODY
-            }:
+            does = {turn[robot] for robot in o.robots}
+            made = does | {turn[base.dropoffs[o.turn].carrier]}
+            if NOBODY in made and len(made) > 1:
                 raise _bad(f"nobody does some of the tours of '{base.products[o.turn]}' in a turn")
-            if len({*does}) < len(does) and NOBODY not in does:
+            if NOBODY not in does and len(does) < len(o.robots):
                 raise _bad(f"a robot cannot take two parts in '{o.label}'")
     types, first = dict[int, str](), dict[int, Robot]()
     for tour in tours:

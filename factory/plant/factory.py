@@ -131,7 +131,7 @@ class Factory(Pictured):
 
     def __repr__(self) -> str:
         counts = f"{len(self.robots)} robots, {len(self.operations)} operations"
-        return f"<Factory of {self.pag.root}: {counts}>"
+        return f"<Factory of {self.pag.title}: {counts}>"
 
     @cached_property
     def by_label(self) -> Mapping[str, Operation]:

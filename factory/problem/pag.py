@@ -99,7 +99,7 @@ class PAG(Pictured):
 
     def __repr__(self) -> str:
         parts = sum(1 for _ in self.parts())
-        return f"<PAG {self.root}: {parts} parts, {len(self) - parts} operations, {self.file}>"
+        return f"<PAG {self.title}: {parts} parts, {len(self) - parts} operations, {self.file}>"
 
     @cached_property
     def by_label(self) -> Mapping[str, Assembly]:
@@ -116,6 +116,12 @@ class PAG(Pictured):
     def products(self) -> tuple[str, ...]:
         """The labels of the products, one unless there is a mix."""
         return (self.root,) if self.mix is None else tuple(label for label, _ in self.mix.counts)
+
+    @property
+    def title(self) -> str:
+        """The product in words: "truck", or "3 truck, 1 van" of a mix."""
+        counts = self.mix.counts if self.mix else ()
+        return ", ".join(f"{count} {label}" for label, count in counts) or self.root
 
     def parts(self) -> Iterator[Assembly]:
         """The leaves, in the order of the text."""

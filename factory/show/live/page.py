@@ -39,7 +39,7 @@ def page(session: Session, command: str = "factory view FILE.pag") -> bytes:
     """The page, for as long as the session lasts; it says what `command` begins another."""
     stage, pack = stage_of(session.simulation), Pack()
     factory = stage.factory
-    labels, name = labels_of(factory), factory.pag.root
+    labels, name = labels_of(factory), factory.pag.title
     document = {
         **data(factory),
         "name": name,

@@ -34,7 +34,7 @@ def summary(analysis: Analysis) -> Iterator[str]:
     does = "sets" if len(analysis.bottlenecks) == 1 else "set"
     hourly = f", {3600 / net.pace:.0f} products an hour" if net.pace else ""
     yield (
-        f"{timing.factory.pag.root}, {timing.world}: cycle time {net.pace:.3f} s{hourly}; "
+        f"{timing.factory.pag.title}, {timing.world}: cycle time {net.pace:.3f} s{hourly}; "
         f"{listed(list(analysis.bottlenecks))} {does} the pace"
     )
     yield f"  {critical_words(analysis)}"
