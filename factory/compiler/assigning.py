@@ -180,8 +180,8 @@ def shared(base: Factory, plan: Plan, catalogue: Catalogue) -> Factory:
     for turn in plan.turns:
         for o in base.operations:
             does = {turn[robot] for robot in o.robots}
-            made = does | {turn[base.dropoffs[o.turn].carrier]}
-            if NOBODY in made and len(made) > 1:
+            together = does | {turn[base.dropoffs[o.turn].carrier]}
+            if NOBODY in together and len(together) > 1:
                 raise _bad(f"nobody does some of the tours of '{base.products[o.turn]}' in a turn")
             if NOBODY not in does and len(does) < len(o.robots):
                 raise _bad(f"a robot cannot take two parts in '{o.label}'")
