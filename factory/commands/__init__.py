@@ -23,6 +23,7 @@ from factory.commands.monitor import monitor
 from factory.commands.new import new
 from factory.commands.pareto import pareto
 from factory.commands.plan import plan
+from factory.commands.plant import plant
 from factory.commands.programs import programs
 from factory.commands.render import render
 from factory.commands.report import report
@@ -220,6 +221,7 @@ MEANT = {
         "run": "simulate sim start play execute go",
         "build": "compile make layout mjcf",
         "check": "verify prove validate lint test",
+        "plant": "opcua plc",
         "view": "show gui visualize visualise open watch live",
         "render": "film video draw picture movie",
         "new": "init create start-project template",
@@ -274,7 +276,10 @@ def cli(ctx: click.Context, version: bool, explain: str | None, as_json: bool) -
         raise click.UsageError("--json comes after the command", ctx)
 
 
-ON_A_FILE = check, build, run, render, view, fidelity, analyze, pareto, report, programs, export
+ON_A_FILE = (
+    *(check, build, run, plant, render, view, fidelity),
+    *(analyze, pareto, report, programs, export),
+)
 """The commands on a FILE whose options have defaults in its `factory.toml`."""
 
 for _command in (

@@ -101,8 +101,8 @@ class DrivenSupervisor:
         robots that are held back stand where they are."""
         commands = self._controller.scan(self.sensed())
         self.interlock.carry_out(commands)
-        drives, back = self.drives, self.interlock.held_back
+        drives, back, stops = self.drives, self.interlock.held_back, self.drives.stops
         for axis, target in enumerate(commands.target.tolist()):
-            stands = self.factory.robot_of(axis) in back
-            drives.target[axis] = drives.x[axis] if stands else target
+            stands = commands.stop or self.factory.robot_of(axis) in back
+            drives.target[axis] = stops[axis] if stands else target
         drives.go(self.interlock.world)

@@ -64,8 +64,8 @@ class PlantInterlock:
         return self.world.prepared(operation, unit)
 
     def carry_out(self, now: Commands) -> None:
-        """Compare commands with the last ones: jobs that are given up, then grips, then jobs that
-        are taken up, by carriers first."""
+        """Compare commands with the last ones: jobs that are given up, grips that open, jobs that
+        are taken up, by carriers first, and grips that close. A controller may scan more often."""
         before, self.commands = self.commands, now
         robots = self.factory.present
         jobs = [robot for robot in robots if now.job[robot] != before.job[robot]]
@@ -75,10 +75,14 @@ class PlantInterlock:
             if 1 <= before.job[robot] <= len(self.factory.operations):
                 self._leave(robot, self.factory.operations[before.job[robot] - 1])
         for robot in grips:
-            (self._close if now.grip[robot] else self._open)(robot)
+            if not now.grip[robot]:
+                self._open(robot)
         for robot in sorted(jobs, key=self._follows):
             if now.job[robot]:
                 self._enter(robot, now.job[robot])
+        for robot in grips:
+            if now.grip[robot]:
+                self._close(robot)
 
     # jobs
 

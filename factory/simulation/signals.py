@@ -33,11 +33,12 @@ class Sensed:
 class Commands:
     """What a controller writes: where each axis is to go and stay [m]; of each robot whether its
     grip is to be closed, and its job, the number of the operation that it is in, from 1, 0 for
-    none."""
+    none; whether to `stop`, so that all axes stand."""
 
     target: Array
     grip: tuple[bool, ...]
     job: tuple[int, ...]
+    stop: bool = False
 
 
 class Controller(Protocol):
@@ -64,6 +65,11 @@ class AxisDrives:
         self.x, self.v, self.target = np.array(x), np.zeros(len(x)), np.array(x)
         self.limits, self._period = limits, period
         self._moved = np.zeros(len(x), bool)
+
+    @property
+    def stops(self) -> Array:
+        """Where axes come to stand that begin to brake now [m]."""
+        return self.x + self.v * np.abs(self.v) / (2 * self.limits.acceleration)
 
     def go(self, world: World) -> None:
         """The next period [s] of all axes that have a way to go."""

@@ -50,13 +50,18 @@ def is_loopback(host: str) -> bool:
         return host == "localhost"
 
 
-def check_server(host: str, exposed: bool) -> Any:
-    """The module that serves sockets. Raises InputError (BadValue) for a host other than loopback
-    unless it is exposed, MissingError without the package `websockets`."""
+def check_host(host: str, exposed: bool) -> None:
+    """Raises InputError (BadValue) for a host other than loopback unless it is exposed."""
     if not is_loopback(host) and not exposed:
         message = f"'{host}' can be reached from other machines, which could control this factory"
         hint = "add --expose to allow this, or use `ssh -L` and the host 127.0.0.1"
         raise InputError(Diagnostic("BadValue", message, None, hint))
+
+
+def check_server(host: str, exposed: bool) -> Any:
+    """The module that serves sockets. Raises what `check_host` does, MissingError without the
+    package `websockets`."""
+    check_host(host, exposed)
     return optional("websockets.sync.server", "websockets", "a page in the browser", "live")
 
 
