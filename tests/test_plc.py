@@ -4,9 +4,12 @@ fire what the supervisor fires; what is planted in them is found, by name."""
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
+import numpy as np
 import pytest
 from lark.exceptions import LarkError
 
@@ -15,6 +18,7 @@ from factory.exporting.iec.structured_text import write
 from factory.simulation.driven import DrivenSupervisor
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
+from factory.simulation.signals import Commands, Sensed
 from factory.simulation.simulation import Simulation
 from factory.simulation.watched import watched
 from factory.support.errors import InputError
@@ -30,11 +34,14 @@ def text(name: str, scan: int = 10) -> str:
     return write(cell(with_hands(name), Settings(), name, scan))
 
 
-def driven(name: str, program: str, **asked: Any) -> tuple[Run, DrivenSupervisor]:
+def driven(
+    name: str, program: str, monitor: bool = True, **asked: Any
+) -> tuple[Run, DrivenSupervisor]:
     """A run of the plant that a program drives, and what supervised it."""
     simulation, plc = Simulation(with_hands(name), RunRequest(**asked)), Plc(program)
     supervisor = simulation.drive(plc, plc.interval)
-    return watched(simulation, every_tick=True), supervisor
+    run = watched(simulation, every_tick=True) if monitor else simulation.run()
+    return run, supervisor
 
 
 def by_robot(name: str, run: Run) -> dict[str, list[str]]:
@@ -46,15 +53,15 @@ def by_robot(name: str, run: Run) -> dict[str, list[str]]:
     for robot in factory.robots:
         own = {transitions[2 * o + end].name for o in robot.operations for end in (0, 1)}
         steps = [event.transition for event in run.lasting if event.transition in own]
-        done[robot.name] = steps[: run.units * len(own)]
+        done[robot.name] = steps[: run.units // factory.period * len(own)]
     return done
 
 
-def agree(name: str, scan: int = 10, **asked: Any) -> None:
+def agree(name: str, scan: int = 10, monitor: bool = True, **asked: Any) -> None:
     """The run under the PLC fires what the one under the supervisor does, up to the order of what
     robots do that have nothing to do with each other; and its bodies agree."""
     reference = Simulation(with_hands(name), RunRequest(**asked)).run()
-    run, supervisor = driven(name, text(name, scan), **asked)
+    run, supervisor = driven(name, text(name, scan), monitor, **asked)
     assert (run.trouble, run.products, supervisor.refusals) == (None, asked["units"], [])
     assert run.succeeded, run.verdict
     assert by_robot(name, run) == by_robot(name, reference)
@@ -71,12 +78,15 @@ def test_a_plc_fires_what_the_supervisor_fires(name: str, world: str) -> None:
     agree(name, units=3, world=world, jitter=0.3, seed=1)
 
 
+def test_a_plc_makes_two_products_by_turns() -> None:
+    agree("family", units=4, jitter=0.3)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("scan", [4, 20])
 @pytest.mark.parametrize("name", PRODUCTS)
 def test_twenty_products_at_two_scan_times(name: str, scan: int) -> None:
-    for jitter in (0.0, 0.3):
-        agree(name, scan, units=20, jitter=jitter)
+    agree(name, scan, monitor=False, units=20, jitter=0.3)
 
 
 FAULTS = {
@@ -84,13 +94,13 @@ FAULTS = {
         "paper",
         r"Cells\[3\]\.Finished = Unit \* 3 \+ 2\s+AND Cells\[3\]\.Carries = 3 \(\* sub2 \*\)",
         "Cells[2].Finished = Unit * 2 + 1",
-        "r1 takes up mate sub3, but r3 is not there with what it brings",
+        "r1 takes up mate sub3, but r3 is not there with what is brought",
     ),
     "no wait at all": (
         "paper",
         r"IF Cells\[5\]\.Finished = Unit \* 2 \+ 1\s+AND[^T]*THEN",
         "IF TRUE THEN",
-        "r3 takes up mate sub1, but r5, r6 is not there with what it brings",
+        "r3 takes up mate sub1, but r5 and r6 are not there with what is brought",
     ),
     "a miscounted cell": (
         "paper",
@@ -204,3 +214,78 @@ def test_the_scan_time_is_that_of_the_task(given: str, scan: int) -> None:
 def test_other_scan_times_are_refused(given: str) -> None:
     with pytest.raises(InputError, match="is no scan time"):
         scan_time(given)
+
+
+class Meddler:
+    """A controller that changes what a PLC commands, up to a time [s]."""
+
+    def __init__(
+        self, plc: Plc, change: Callable[[Sensed, Commands], Commands], until: float
+    ) -> None:
+        self._plc, self._change, self._until = plc, change, until
+
+    def scan(self, sensed: Sensed) -> Commands:
+        commands = self._plc.scan(sensed)
+        return self._change(sensed, commands) if sensed.time < self._until else commands
+
+
+def with_job(robot: int, job: int) -> Callable[[Sensed, Commands], Commands]:
+    def change(_: Sensed, now: Commands) -> Commands:
+        jobs = tuple(job if r == robot else kept for r, kept in enumerate(now.job))
+        return replace(now, job=jobs)
+
+    return change
+
+
+def with_grip(robot: int, closed: bool) -> Callable[[Sensed, Commands], Commands]:
+    def change(_: Sensed, now: Commands) -> Commands:
+        grips = tuple(closed if r == robot else kept for r, kept in enumerate(now.grip))
+        return replace(now, grip=grips)
+
+    return change
+
+
+MEDDLED: dict[str, tuple[Callable[[Sensed, Commands], Commands], str]] = {
+    "a job that is not there": (with_job(0, 99), "r1 takes up job 99: there is no such operation"),
+    "a job of others": (with_job(0, 4), "r1 has no part in mate sub1"),
+    "a job too early": (with_job(3, 3), "r4 takes up weld sub2 before its carrier does"),
+    "a job whose parts are not there": (
+        with_job(0, 1),
+        "r1 takes up mate sub3, but r3 and r2 are not there with what is brought",
+    ),
+    "an outfeed without a product": (
+        with_job(0, 7),
+        "r1 takes up dropoff, but r1 is not there with what is brought",
+    ),
+    "a grip on nothing": (with_grip(3, True), "r4 closes its grip where nothing is given to it"),
+}
+
+
+@pytest.mark.parametrize("case", MEDDLED)
+def test_what_is_refused_can_be_withdrawn(case: str) -> None:
+    """The robot stands as long as it is told what may not be; then the run goes on."""
+    change, message = MEDDLED[case]
+    simulation = Simulation(with_hands("paper"), RunRequest(units=2))
+    plc = Plc(text("paper"))
+    supervisor = simulation.drive(Meddler(plc, change, 0.2), plc.interval)
+    run = simulation.run()
+    assert message in {refusal.message for refusal in supervisor.refusals}
+    assert (run.trouble, run.products) == (None, 2)
+    assert run.succeeded, run.verdict
+
+
+def test_a_plant_that_is_told_to_stop_stands() -> None:
+    """Axes brake within their limits; then the run goes on."""
+    simulation, seen = Simulation(with_hands("paper"), RunRequest(units=2)), list[Any]()
+    plc = Plc(text("paper"))
+
+    def stop(sensed: Sensed, now: Commands) -> Commands:
+        seen.append((sensed.time, sensed.position))
+        return replace(now, stop=2.0 <= sensed.time < 3.0)
+
+    simulation.drive(Meddler(plc, stop, 4.0), plc.interval)
+    run = simulation.run()
+    stood = np.array([x for time, x in seen if 2.4 < time < 3.0])
+    assert np.ptp(stood, axis=0).max() < 1e-5
+    assert np.ptp(np.array([x for _, x in seen]), axis=0).max() > 0.1
+    assert run.succeeded, run.verdict

@@ -123,7 +123,8 @@ class PlantInterlock:
                     self.marked[p] for p in places if p in self.factory.net.gears[robot].places
                 )
             ]
-            return f"{', '.join(absent)} is not there with what it brings"
+            are = "is" if len(absent) == 1 else "are"
+            return f"{' and '.join(absent)} {are} not there with what is brought"
         if not self.ready(operation) and (
             not operation.inputs or self.factory.drops(operation.index)
         ):
