@@ -121,7 +121,7 @@ def test_the_tutorial_shows_what_is_printed(
     "page",
     [
         *("index.md", "ten-minutes.md"),
-        *("guide/products.md", "guide/pace.md", "guide/faults.md"),
+        *("guide/products.md", "guide/pace.md", "guide/faults.md", "guide/plc.md"),
     ],
 )
 def test_the_way_in_shows_what_is_printed(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 SECTIONS = {
@@ -82,20 +81,6 @@ class Declarations:
     types: tuple[DataType, ...]
     units: tuple[OrganizationUnit, ...]
     configuration: Configuration
-
-
-def names(declared: Declarations) -> Iterator[str]:
-    """Every name that is declared, as often as it is."""
-    for data_type in declared.types:
-        yield data_type.name
-        if isinstance(data_type, Structure):
-            yield from (element.name for element in data_type.elements)
-    for unit in declared.units:
-        yield unit.name
-        yield from (variable.name for _, variables in unit.sections for variable in variables)
-    configuration = declared.configuration
-    yield from (configuration.name, configuration.resource, configuration.task)
-    yield configuration.instance
 
 
 def comment(text: str) -> str:
