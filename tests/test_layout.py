@@ -6,7 +6,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
 
 from factory.compiler.compiler import compile_pag
 from factory.geometry.product import product_geometry
@@ -19,8 +18,8 @@ from factory.modes.modes import operation_modes
 from factory.problem.template import Law, Point
 from factory.support.errors import InputError, RunError
 from tests.layout_values import (
+    DRAWN,
     Drawn,
-    drawn_layouts,
     paper_layout,
     random_layout,
     row_of_inserts,
@@ -50,7 +49,7 @@ def test_the_same_input_gives_the_same_layout() -> None:
     assert first.guidepaths == second.guidepaths and first.visits == second.visits
 
 
-@given(drawn_layouts)
+@pytest.mark.parametrize("drawn", DRAWN[::2], ids=str)
 def test_robots_meet_where_their_operation_is(drawn: Drawn) -> None:
     layout = random_layout(*drawn)
     factory = layout.factory
@@ -65,7 +64,7 @@ def test_robots_meet_where_their_operation_is(drawn: Drawn) -> None:
     assert len(operation_modes(layout, 2e-4)) == len(factory.operations)
 
 
-@given(drawn_layouts)
+@pytest.mark.parametrize("drawn", DRAWN[1::2], ids=str)
 def test_payload_extents_are_those_of_their_parts(drawn: Drawn) -> None:
     layout = random_layout(*drawn)
     product, factory = layout.product, layout.factory

@@ -32,7 +32,7 @@ def texts(element: ElementTree.Element) -> list[str]:
     return [t.text or "" for t in element.iter(f"{SVG}text")]
 
 
-@pytest.mark.parametrize("seed", [None, *range(8)])
+@pytest.mark.parametrize("seed", [None, *range(3)])
 def test_everything_is_drawn(seed: int | None) -> None:
     layout = paper_layout() if seed is None else many_layouts(25, range(seed, seed + 1))[0]
     root, factory = drawn(layout), layout.factory
@@ -142,5 +142,5 @@ def test_outlines_are_convex_hulls() -> None:
 
 
 def test_the_drawing_grows_with_the_number_of_robots() -> None:
-    sizes = [len(write_svg(random_layout(n, 1, "balanced", "plain"))) for n in (100, 400)]
+    sizes = [len(write_svg(random_layout(n, 1, "balanced", "plain"))) for n in (40, 160)]
     assert sizes[1] < 4.6 * sizes[0]

@@ -48,7 +48,7 @@ def cycle(layout: Layout) -> float:
     return max(gear_times(layout, PACE))
 
 
-@settings(max_examples=25)
+@settings(max_examples=10)
 @given(drawn_layouts)
 def test_between_the_bound_and_the_first_layout(drawn: Drawn) -> None:
     """The bound is that of the first layout too, which no search has touched."""

@@ -55,7 +55,9 @@ def test_a_planned_example_is_no_slower_than_the_written_one(name: str) -> None:
 BRICKS = ["30023-1-Lighthouse", "6966-1-JediStarfighter-Mini"]
 
 
-@pytest.mark.parametrize("name", BRICKS)
+@pytest.mark.parametrize(
+    "name", [BRICKS[0], *(pytest.param(name, marks=pytest.mark.slow) for name in BRICKS[1:])]
+)
 def test_bricks_without_their_steps_block_no_operation(name: str) -> None:
     file = LDRAW / f"{name}.pag"
     if not file.exists():

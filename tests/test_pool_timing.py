@@ -196,12 +196,12 @@ def test_a_pool_too_large_for_the_engine_bounds_the_units_inside(monkeypatch) ->
 def test_the_engine_has_memory_for_all_pairs_of_bodies(monkeypatch) -> None:
     """Of a model whose pairs take most of it: the engine ends in an error where it is too small."""
     monkeypatch.setattr(model, "ARENA", 1)
-    mates = (f"n{k} = mate(n{2 * k}, n{2 * k + 1});\n" for k in range(1, 128))
-    parts = (f"n{k} = atomic();\n" for k in range(128, 256))
+    mates = (f"n{k} = mate(n{2 * k}, n{2 * k + 1});\n" for k in range(1, 64))
+    parts = (f"n{k} = atomic();\n" for k in range(64, 128))
     pag = read_pag("".join(["root = n1;\n", *mates, *parts]), all_templates())
     made = physical_model(factory.lay_out(factory.compile(pag)), 1)
     bodies = made.xml.count("<body ") + 1
     memory = int(re.search(r'memory="(\d+)M"', made.xml)[1])
-    assert memory == 1 + 4 * bodies * (bodies - 1) // 2**20 > 4
+    assert memory == 1 + 4 * bodies * (bodies - 1) // 2**20 > 1
     m = loading.load(made)
     mujoco.mj_step(m, mujoco.MjData(m))

@@ -46,7 +46,7 @@ def assert_well_made(run: Terminal, name: str, units: int) -> None:
 ONE_LARGE = [LARGE[0], pytest.param(LARGE[1], marks=pytest.mark.slow)]
 
 
-@pytest.mark.parametrize("name", [*SMALL, *ONE_LARGE])
+@pytest.mark.parametrize("name", [SMALL[0], *ONE_LARGE])
 def test_products_are_proved(run: Terminal, name: str) -> None:
     document = run("check", product(name), "--json").json
     n, robots = document["transitions"] // 2 - 1, document["robots"]
@@ -54,7 +54,9 @@ def test_products_are_proved(run: Terminal, name: str) -> None:
     assert all(document[k] for k in ("gear_net", "live", "safe", "reversible", "legal"))
 
 
-@pytest.mark.parametrize("name", SMALL)
+@pytest.mark.parametrize(
+    "name", [SMALL[0], *(pytest.param(name, marks=pytest.mark.slow) for name in SMALL[1:])]
+)
 def test_small_products_are_made(run: Terminal, name: str) -> None:
     assert_well_made(run, name, 2)
 
@@ -84,7 +86,8 @@ def test_few_robots_take_the_time_that_is_predicted(run: Terminal, file: Path, h
     assert done["cycle_time_s"] == pytest.approx(done["predicted_cycle_time_s"], rel=0.02)
 
 
-@pytest.mark.parametrize("name", ONE_LARGE)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LARGE)
 def test_large_products_are_built(run: Terminal, tmp_path: Path, name: str) -> None:
     done = run("build", product(name), "--mjcf", tmp_path / "m.xml", "--units", 1, "--json")
     assert done.status == 0, done.err

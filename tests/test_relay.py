@@ -107,7 +107,7 @@ def middles(layout: Layout) -> dict[str, tuple[float, float]]:
     return found
 
 
-@settings(max_examples=25)
+@settings(max_examples=10)
 @given(drawn_layouts, seeds, st.booleans())
 def test_relays_anywhere_are_proved_and_certified(drawn: Drawn, seed: int, most: bool) -> None:
     """Also that they are gear nets as the language writes them."""
@@ -122,7 +122,7 @@ def test_relays_anywhere_are_proved_and_certified(drawn: Drawn, seed: int, most:
     assert all(pool[part] >= was[part] for part in was)
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(drawn_layouts, seeds)
 def test_everything_goes_where_it_went(drawn: Drawn, seed: int) -> None:
     """All is made at the same places, and the robots of a way run it all between them."""

@@ -22,11 +22,9 @@ RUNS: list[Any] = [
     ("paper", {}),
     pytest.param("chest", {"settings": Settings(stage=1)}, marks=pytest.mark.slow),
     pytest.param("truck", {"fuse": True}, marks=pytest.mark.slow),
-    ("20", {"wip": 2}),
     ("20", {"wip": 1, "fuse": True}),
     ("paper", {"settings": Settings(outfeed=0.05)}),
     ("paper", {"world": "ideal", "wip": 1}),
-    ("20", {"world": "ideal", "wip": 2}),
 ]
 
 LONG = 120.0
