@@ -73,6 +73,20 @@ def test_what_cannot_slide_is_brought_by_a_lift(text: str, lowered: set[str]) ->
     assert verify(factory.net).holds
 
 
+@pytest.mark.parametrize("strokes", [(0.2, 0.1), (0.1, 0.2)])
+def test_a_lift_goes_as_far_as_the_farthest_of_its_tours_asks_for(
+    strokes: tuple[float, ...],
+) -> None:
+    made = laid_out_with_lifts(FENCE).factory
+    lowered = next(o for o in made.operations if o.approach is not None and o.lowered >= 0)
+    assert lowered.approach is not None
+    tours = tuple(
+        replace(lowered, approach=replace(lowered.approach, stroke=stroke)) for stroke in strokes
+    )
+    robot = lowered.robots[lowered.lowered]
+    assert replace(made, operations=tours).strokes[robot] == 0.2
+
+
 @pytest.mark.parametrize("text", [FENCE, NESTED], ids=["fence", "nested"])
 @pytest.mark.parametrize(
     ("world", "distributed"), [("ideal", True), ("mujoco", False), ("mujoco", True)]
