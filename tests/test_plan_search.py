@@ -36,14 +36,6 @@ TEMPLATES = all_templates()
 EXPECTED = Expected(Pace())
 
 
-@given(st.floats(0.0, 5.0))
-def test_the_expected_time_of_a_way_is_that_of_a_trapezoid(way: float) -> None:
-    """What a robot covers in it, from rest to rest, is the way."""
-    pace, time = Pace(), float(EXPECTED.rest(np.float64(way)))
-    peak = min(pace.speed, pace.acceleration * time / 2)
-    assert peak * (time - peak / pace.acceleration) == pytest.approx(way, abs=1e-9)
-
-
 @st.composite
 def graphs(draw: st.DrawFn, least: int = 2, most: int = 5) -> Blocking:
     """Blocking graphs of any units, dense or not."""
