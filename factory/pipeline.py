@@ -233,7 +233,7 @@ class Project:
     @cached_property
     def planned(self) -> Factory:
         """The same, but for lifts of robots with several tours."""
-        if self.plan.turns:
+        if self.plan.turns or self.plan.names:
             return self._shared(self.plan)
         if self.pag.mix is None:
             return self.compiled

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import json
 import random
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from factory.lang import read_pag
+from factory.lang import read_pag, write_pag
 from factory.lang.pag_reader import load_pag
-from factory.pipeline import all_templates
+from factory.layout.certificate import Fault
+from factory.layout.clearance import certify
+from factory.nets.verify import verify
+from factory.pipeline import Project, all_templates
 from factory.plant.matching import label_digests, matching, shifted
 from factory.problem.pag import PAG, Parameter
+from factory.problem.plan import Plan
+from factory.study.revision import Revision, revised
+from factory.support.errors import InputError
+from tests.command_line import spawn
 from tests.revisions import edited, kept_share, shuffled
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -25,7 +33,9 @@ def example(name: str) -> PAG:
 def van() -> PAG:
     """The truck's sister: a box in place of bed and logs."""
     nodes = {node.label: node for node in example("truck").nodes}
-    box = replace(nodes["bed"], label="box", parameters=(Parameter("box", (0.17, 0.12, 0.09)),))
+    values = {"box": (0.17, 0.12, 0.09), "pos": (-0.065, 0.0, 0.105), "density": 300.0}
+    parameters = tuple(Parameter(name, value) for name, value in values.items())
+    box = replace(nodes["bed"], label="box", parameters=parameters)
     boxed = replace(nodes["loaded"], label="boxed", inputs=("body", "box"))
     made = replace(nodes["truck"], label="van", inputs=("boxed",))
     for label in ("truck", "loaded", "bed", "log1", "log2"):
@@ -113,3 +123,94 @@ def _below(pag: PAG, label: str) -> list[str]:
     for x in todo:
         todo += pag[x].inputs
     return todo
+
+
+def project(pag: PAG) -> Project:
+    return Project(pag, all_templates())
+
+
+@pytest.fixture(scope="module")
+def truck_to_van() -> Revision:
+    return revised(project(example("truck")), project(van()))
+
+
+def test_robots_of_the_truck_stay_for_the_van(truck_to_van: Revision) -> None:
+    found = truck_to_van
+    assert sum(kept.whole for kept in found.kept) == 19
+    assert (found.gone, found.added) == (["r3", "r4"], [])
+    factory = found.new.layout.factory
+    names = [robot.name for robot in factory.robots]
+    assert names == ["r1", "r2", *(f"r{n}" for n in range(5, 24))]
+    assert verify(factory.net).live
+    assert certify(found.new.layout).holds
+
+
+def test_certificate_entries_are_inherited_and_forged_ones_refused(truck_to_van: Revision) -> None:
+    found, mine = truck_to_van, truck_to_van.inheritance
+    old, new = found.old.layout.certificate, found.new.layout.certificate
+    assert old is not None and new is not None
+    assert mine.inherited > mine.pairs / 2
+    assert [*mine.refuted(old, new, found.pairing)] == []
+    here, there = next(iter(mine.regions.items()))
+    other = next(n for n in range(len(new.regions)) if n not in mine.regions)
+    for forged, words in (
+        (replace(mine, regions={**mine.regions, other: there}), "entry"),
+        (replace(mine, regions={**mine.regions, here: there + 1}), "entry"),
+        (replace(mine, regions={**mine.regions, here: 10**6}), "no such region"),
+        (replace(mine, inherited=mine.inherited + 1), "miscounted"),
+        (replace(mine, offset=mine.offset + 0.01), "elsewhere"),
+    ):
+        assert any(words in fault for fault in forged.refuted(old, new, found.pairing)), words
+    false = replace(old, faults=(Fault("it is not clear", ("r1", "r2")),))
+    assert "does not hold" in next(mine.refuted(false, new, found.pairing))
+
+
+def test_the_same_product_keeps_everything() -> None:
+    pag = example("chair")
+    found = revised(project(pag), project(shifted(shuffled(pag, random.Random(4)), (0.1, 0, 0))))
+    assert all(kept.whole for kept in found.kept) and len(found.kept) == 19
+    assert found.inheritance.computed == 0
+    assert found.pairing.matching.shift == (0.1, 0.0, 0.0)
+
+
+def test_single_edits_of_the_chair_leave_most_robots_in_place() -> None:
+    pag, old, shares = example("chair"), project(example("chair")), list[float]()
+    for seed in (1, 2, 3, 5):
+        new = edited(pag, random.Random(seed), 1, ("change", "drop", "swap", "tool", "rename"))
+        found = revised(old, project(new))
+        shares.append(sum(kept.place for kept in found.kept) / len(found.kept))
+    assert min(shares) > 0.8
+    assert sum(shares) / len(shares) > 0.95
+
+
+def test_command_writes_a_plan_that_keeps_the_names(tmp_path: Path) -> None:
+    for name, pag in (("truck", example("truck")), ("van", van())):
+        (tmp_path / f"{name}.pag").write_text(write_pag(pag))
+    files, out = [str(tmp_path / f"{n}.pag") for n in ("truck", "van")], tmp_path / "out"
+    picture = tmp_path / "kept.svg"
+    done = spawn("revise", *files, "-o", str(out), "--picture", str(picture), "--json")
+    document = done.json
+    assert done.status == 0, done.err
+    assert document["robots"] == {"old": 23, "new": 21} and document["gone"] == ["r3", "r4"]
+    assert document["pairs_inherited"] + document["pairs_computed"] == document["pairs"]
+    assert 'class="gone"' in picture.read_text()
+    plan = json.loads((out / "plan.json").read_text())
+    assert plan["plan"]["names"][:3] == ["r1", "r2", "r5"]
+    checked = spawn("check", str(out / "plan.json"), "--json")
+    assert [gear["robot"] for gear in checked.json["gears"]][2] == "r5"
+    kept = spawn("revise", str(out / "plan.json"), files[1], "--json").json["kept"]
+    assert all(robot["place"] and robot["module"] for robot in kept) and len(kept) == 21
+
+
+def test_shared_robots_are_refused() -> None:
+    old = project(example("truck")).with_lines([["log1", "log2"]])
+    with pytest.raises(InputError, match="shared robots"):
+        revised(old, project(van()))
+
+
+def test_names_of_a_plan_are_checked() -> None:
+    for names in (("r1", "r1"), ("x1",), ("r0",), ("r01",), ("1",)):
+        with pytest.raises(ValueError, match="names"):
+            Plan(names=names)
+    with pytest.raises(InputError, match="robots"):
+        _ = project(example("truck")).with_plan(Plan(names=("r1", "r7"))).plain

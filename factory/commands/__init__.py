@@ -28,6 +28,7 @@ from factory.commands.programs import programs
 from factory.commands.render import render
 from factory.commands.report import report
 from factory.commands.requests import PLANNED
+from factory.commands.revise import revise
 from factory.commands.run import run
 from factory.commands.sweep import sweep
 from factory.commands.templates import templates
@@ -287,6 +288,7 @@ for _command in (
     import_,
     plan,
     *map(with_defaults, ON_A_FILE),
+    revise,
     sweep,
     monitor,
     templates,

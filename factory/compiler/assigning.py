@@ -170,7 +170,7 @@ def shared(base: Factory, plan: Plan, catalogue: Catalogue) -> Factory:
     """The factory of a plan, made from that with a robot for each tour. The type of each robot fits
     all its tours. Raises InputError (BadPlan) if the plan does not have these tours or robots."""
     if not plan.turns:
-        return base
+        return named(base, plan.names)
     tours = range(len(base.robots))
     if any(len(turn) != len(tours) for turn in plan.turns):
         raise _bad(f"each turn must name a robot for each of {len(tours)} tours")
@@ -201,7 +201,20 @@ def shared(base: Factory, plan: Plan, catalogue: Catalogue) -> Factory:
         types[robot] = catalogue.meet(types[robot], LIFT) or LIFT
     robots = [replace(first[n], index=n, name=f"r{n + 1}", type=types[n]) for n in every]
     made = assigned(base, robots, plan.turns)
-    return replace(made, plan=plan, adjusted=lifts)
+    return named(replace(made, plan=plan, adjusted=lifts), plan.names)
+
+
+def named(factory: Factory, names: Sequence[str]) -> Factory:
+    """The factory whose robots have other names; itself without any. Raises InputError (BadPlan) if
+    there is not one for each."""
+    if not names:
+        return factory
+    if len(names) != len(factory.robots):
+        raise _bad(f"it names {len(names)} robots, and there are {len(factory.robots)}")
+    both = zip(factory.robots, names, strict=True)
+    robots = tuple(replace(robot, name=name) for robot, name in both)
+    net, plan = gear_net(robots, factory.operations), replace(factory.plan, names=tuple(names))
+    return replace(factory, robots=robots, net=net, plan=plan)
 
 
 def _bad(words: str) -> InputError:

@@ -72,7 +72,9 @@ def compile_nodes(
     if troubles:
         raise InputError(troubles)
     net, parents = gear_net(robots, operations), tuple(draft.parents)
-    return Factory(pag, robots, operations, net, parents, replace(plan, turns=(), lifts=None))
+    return Factory(
+        pag, robots, operations, net, parents, replace(plan, turns=(), lifts=None, names=())
+    )
 
 
 def _check_types(nodes: Mapping[str, Node], output: Template, catalogue: Catalogue) -> None:

@@ -61,16 +61,8 @@ MOST = 100
 
 def certify(layout: Layout) -> Certificate:
     """The clearance certificate of a layout. Never raises; see `Certificate.holds`."""
-    factory = layout.factory
-    found = piles(factory, layout.product)
-    swept = regions(layout, found)
-    search = ClearanceSearch(layout, swept)
-    faults = [
-        *islice(embedding_faults(layout), MOST),
-        *islice(search.faults(), MOST),
-        *islice(_standoffs(layout, found), MOST),
-        *islice(_raised(layout, found), MOST),
-    ]
+    factory, search = layout.factory, ClearanceSearch.of(layout)
+    swept, faults = search.swept, search.all_faults()
     apart = Exclusions() if faults else exclusions(layout)
     top = max(region.z[1] for region in swept)
     return Certificate(
@@ -113,6 +105,23 @@ class ClearanceSearch:
         self.shared: dict[tuple[int, int, int, int], Shared] = {}
         self.pairs = 0
         self._members = [frozenset(o.robots) for o in layout.factory.operations]
+
+    @classmethod
+    def of(cls, layout: Layout) -> ClearanceSearch:
+        """That of all regions of a layout."""
+        return cls(layout, regions(layout, piles(layout.factory, layout.product)))
+
+    def all_faults(self) -> list[Fault]:
+        """What is wrong with the layout but for machines that are near each other in two places of
+        the net: the faults of its guidepaths, of regions, of what waits and of what is lowered."""
+        layout = self.layout
+        found = piles(layout.factory, layout.product)
+        return [
+            *islice(embedding_faults(layout), MOST),
+            *islice(self.faults(), MOST),
+            *islice(_standoffs(layout, found), MOST),
+            *islice(_raised(layout, found), MOST),
+        ]
 
     def faults(self) -> Iterator[Fault]:
         """Every pair that is too near with no reason."""
@@ -249,7 +258,7 @@ def _way(layout: Layout, found: Mapping[str, Pile], operation: Operation, slot: 
     label = operation.before[slot]
     before, visit = layout.ways[operation.index, robot]
     pile, end = found[label].carried(visit), visit.at + layout.standoff(operation, slot)
-    box = layout.guidepaths[robot].sweep(pile.box, max(before.at, end), end)
+    box = layout.guidepaths[robot].sweep(pile.box, before.at, end)
     return Region(robot, PAYLOADS, PAYLOAD_BODY, box, pile.z, label, operation.index)
 
 

@@ -39,13 +39,13 @@ class LayoutDraft:
     shapes: Sequence[Shape]
     stretched: Stretched
 
-    def layout(self) -> Layout:
-        """The layout that these lengths give, the output robot's path as short as can be; the
-        floor it takes is not known yet."""
+    def layout(self, least: float = 0.0) -> Layout:
+        """The layout that these lengths give, the output robot's path as short as can be, but of at
+        `least` such a travel [m]; the floor it takes is not known yet."""
         travel = list(self.stretched.travel)
         lanes = (-1, +1) if any(shape.spread for shape in self.shapes) else (0,)
         spare = min(_spare(self._layout(travel, lane)) for lane in lanes)
-        travel[0] = round(travel[0] - spare, 3)
+        travel[0] = max(least, round(travel[0] - spare, 3))
         return self._layout(travel)
 
     def _layout(self, travel: Sequence[float], lane: int = 0) -> Layout:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from factory.compiler.assigning import assigned
 from factory.geometry.solids import Product
 from factory.layout.embedding import certified
 from factory.layout.guidepath import Box, Guidepath
-from factory.layout.hands.hand import Hand
+from factory.layout.hands.hand import Hand, Point3
 from factory.layout.layout import Layout
+from factory.layout.pins import frame_of
 from factory.layout.repeated import repeated
 from factory.layout.shapes import payload_boxes
 from factory.layout.standby import part_of
@@ -27,10 +30,10 @@ AXES = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
 @dataclass(frozen=True, slots=True)
 class LayoutTable:
     """What is kept of a layout, by the names that `Layout` has; `visits`: for each operation those
-    of its robots. `standby`: where deputies can take
-    over, who does the tours of each robot in each turn of the layout of all that robots may do
-    (`Layout.standby`), whose values the others are; nothing where none may. `plain`: the layout
-    without relays, None where this is one."""
+    of its robots. `standby`: where deputies can take over, who does the tours of each robot in each
+    turn of the layout of all that robots may do (`Layout.standby`), whose values the others are;
+    nothing where none may. `plain`: the layout without relays, None where this is one. `frame`: the
+    box (low, high) about the product's middle, None where that is the product's own."""
 
     clearance: float
     guidepaths: tuple[Guidepath, ...]
@@ -39,6 +42,7 @@ class LayoutTable:
     hands: tuple[Hand | None, ...] = ()
     standby: tuple[tuple[int, ...], ...] = ()
     plain: LayoutTable | None = None
+    frame: tuple[Point3, Point3] | None = None
 
     def __post_init__(self) -> None:
         if not self.clearance > 0:
@@ -70,12 +74,16 @@ class LayoutTable:
             whole.hands,
             _turns(layout.factory, whole.factory) if layout.standby else (),
             None if layout.plain is None else cls.of(layout.plain),
+            frame_of(layout.product),
         )
 
     def laid_out(self, factory: Factory, product: Product, plain: Factory) -> Layout:
         """The layout of a factory, which without relays is `plain`, and its product, certified
         anew. Raises ValueError where the table is not of that factory, or things are not clear."""
         whole = self._whole(factory)
+        if self.frame is not None:
+            low, high = map(np.array, self.frame)
+            product = replace(product, low=low, high=high)
         self._check(whole)
         laid = Layout(
             whole,

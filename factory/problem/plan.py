@@ -40,12 +40,15 @@ class Plan:
     many robots hand over what each label names, on its way to the operation that takes it. `turns`:
     who does which tour (`Turns`), empty for one robot for each tour. `lifts`: the robots (index)
     whose lift is set for each of their tours, None where the hands have not been chosen yet.
+    `names`: those of the robots, as `r9`, where they are not r1, r2 and so on: a robot that stays
+    in the next revision of a product keeps its name.
     """
 
     forms: Mapping[str, int] = field(default_factory=dict)
     relays: Mapping[str, int] = field(default_factory=dict)
     turns: tuple[tuple[int, ...], ...] = ()
     lifts: frozenset[int] | None = None
+    names: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name, values, least, most in (
@@ -57,6 +60,14 @@ class Plan:
             if wrong := [value for value in values if not least <= value <= most]:
                 words = f"whole numbers from {least} to {most}, not {wrong[0]}"
                 raise ValueError(f"{name} must be {words}")
+        numbers = [name.removeprefix("r") for name in self.names]
+        valid = all(n.isascii() and n.isdecimal() and n[0] != "0" for n in numbers)
+        if (
+            not valid
+            or len({*self.names}) < len(numbers)
+            or "".join(self.names) != "".join(f"r{n}" for n in numbers)
+        ):
+            raise ValueError("names must be different names of robots, as 'r9'")
 
     def then(self, turns: Turns) -> Plan:
         """The plan in which other robots do what the robots of this one do: in turn t robot
@@ -68,7 +79,7 @@ class Plan:
             for unit in first
         )
         alone = len(every) == 1 and every[0] == tuple(range(len(every[0])))
-        return replace(self, turns=() if alone else every, lifts=None)
+        return replace(self, turns=() if alone else every, lifts=None, names=())
 
 
 AS_WRITTEN = Plan()

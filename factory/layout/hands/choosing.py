@@ -11,8 +11,9 @@ holds different things in different operations, and its hand has to suit all of 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -78,11 +79,21 @@ class Tours:
 class Hands:
     """The hands of a factory's robots. That of a carrier depends on its heading alone, since those
     that deliver to it depend on its line; that of another on its frame. `travels`: how far robots
-    are to go at the least [m], as layouts have shown."""
+    are to go at the least [m], as layouts have shown. `wanted`: hands of robots (index) with
+    one tour that they keep where these can hold."""
 
-    def __init__(self, factory: Factory, product: Product, push: float = PUSH) -> None:
+    def __init__(
+        self,
+        factory: Factory,
+        product: Product,
+        push: float = PUSH,
+        wanted: Mapping[int, Hand] = MappingProxyType({}),
+    ) -> None:
         self.factory, self.tours = factory, Tours.apart(factory)
-        self.holding = Holding(self.tours.factory, product, push, self.tours.turning)
+        self._wanted = {self.tours.of[robot]: hand for robot, hand in wanted.items()}
+        apart = self.tours.factory
+        points = {held(apart, tours[0]): hand.places for tours, hand in self._wanted.items()}
+        self.holding = Holding(apart, product, push, self.tours.turning, points)
         self.in_the_way = InTheWay(self.holding, self._carrier)
         adjusted = frozenset(tour for r in factory.adjusted for tour in self.tours.of[r])
         self.one_hand = OneHand(self.in_the_way, adjusted)
@@ -150,7 +161,10 @@ class Hands:
             alike = self.tours.alike(tours)
             unlike = [*dict.fromkeys(alike)]
             which = [unlike.index(tour) for tour in alike]
-            hands = self.one_hand.chosen(unlike, frames)
+            wanted = self._wanted.get(tours)
+            hands = (wanted and self.one_hand.like(wanted, tours[0], frames)) or (
+                self.one_hand.chosen(unlike, frames)
+            )
             covered = tuple(hands[0].covered[n] for n in which) if hands else ()
             self._chosen[tours, frames] = tuple(
                 replace(hands[n], covered=covered) for n in which if hands

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import product as pairs
+from types import MappingProxyType
 
 import numpy as np
 
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
-from factory.layout.hands.hand import Kind
+from factory.layout.hands.hand import Kind, Point3
 from factory.layout.hands.places import PUSH, Loads, Places, places, resized
 from factory.layout.hands.surfaces import Surfaces, Way
 from factory.layout.layout import carriers
@@ -19,7 +20,8 @@ from factory.plant.factory import Factory, Operation
 class Holding:
     """The robots of a factory and the surfaces of what they hold. `on`: the carrier that each
     delivers to, -1 for none; `axis`: along which each lies, 0 for x; `push`: their acceleration
-    [m/s²]; `turning`: robots that go on either way after what is delivered to them."""
+    [m/s²]; `turning`: robots that go on either way after what is delivered to them.
+    `wanted`: by label points at which it is to be held where it can be [m]."""
 
     def __init__(
         self,
@@ -27,9 +29,10 @@ class Holding:
         product: Product,
         push: float = PUSH,
         turning: frozenset[int] = frozenset(),
+        wanted: Mapping[str, Sequence[Point3]] = MappingProxyType({}),
     ) -> None:
         self.factory, self.product, self.push, self.turning = factory, product, push, turning
-        self.surfaces = Surfaces(product)
+        self.surfaces, self.wanted = Surfaces(product), wanted
         self.on = carriers(factory)
         self.axis = [0] * len(factory.robots)
         for robot, carrier in enumerate(self.on):
@@ -76,8 +79,9 @@ class Holding:
                 known = self.places(label, kind, axis, way)
                 found = resized(self.surfaces, parts, (axis, way), loads, known, radius)
             else:
+                of, asked = (self.surfaces, self.product, parts), self.wanted.get(label, ())
                 mix = self.factory.pag.mix is not None
-                found = places(self.surfaces, self.product, parts, kind, (axis, way), loads, mix)
+                found = places(*of, kind, (axis, way), loads, mix, asked)
             self._places[key] = found
         return self._places[key]
 

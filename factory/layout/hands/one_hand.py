@@ -104,6 +104,23 @@ class OneHand:
                 break
         return best
 
+    def like(self, hand: Hand, tour: int, frames: Frames) -> tuple[Hand, ...]:
+        """The hand of one tour that holds by the same places as another; nothing where it could
+        not."""
+        if hand.kind not in self._kinds(tour) or not self._possible(hand.kind, tour, frames):
+            return ()
+        groups = self._groups(hand.kind, tour, frames, 0.0)
+        at = groups.places.at[groups.chosen]
+        ends = np.array((hand.places[0], hand.places[-1]))
+        away = np.minimum(*(np.abs(at - both).max(axis=(1, 2)) for both in (ends, ends[::-1])))
+        away[~np.isfinite(groups.cost(hand.tip))] = np.inf
+        if not away.min(initial=np.inf) < LEVEL:
+            return ()
+        same = groups.among(np.array([away.argmin()]))
+        if hand.kind == "behind" and not self._below_pads([tour], [same]):
+            return ()
+        return self._hands(hand.kind, [tour], frames, hand.tip, [same])
+
     def of_kind(self, kind: Kind, tours: Sequence[int], frames: Frames) -> tuple[Hand, ...]:
         """The best hand of one kind, the one with the largest tips if others are as good; nothing
         where there is none. Of one tour each place has the tip that is best there."""

@@ -11,7 +11,7 @@ import numpy as np
 from factory.control.mode import Index, Truth
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
-from factory.layout.hands.hand import Kind
+from factory.layout.hands.hand import Kind, Point3
 from factory.layout.hands.outermost import outermost
 from factory.layout.hands.surfaces import Surfaces
 from factory.layout.hands.tips import Tip, shares, tip
@@ -69,6 +69,9 @@ SAME = 1e-9
 
 RAYS = 6
 """In so many directions from its middle it is looked at what a pad covers."""
+
+ASKED = 1e-4
+"""A place is one that is asked for within this distance [m]."""
 
 SMALLER = (2, 4, 6, 8)
 """Where there is little room, these of the RADII are tried too."""
@@ -135,10 +138,11 @@ def places(
     side: tuple[int, int],
     loads: Loads,
     on_raster: bool = False,
+    wanted: Sequence[Point3] = (),
 ) -> Places:
     """Places on the side of a sub-assembly that faces a direction, an axis and a way (+1, -1) along
     it, where nothing of it is further out; `loads`: what is held there; `on_raster`: with places
-    on lines that other sub-assemblies have too."""
+    on lines that other sub-assemblies have too; `wanted`: points [m] that are tried as well."""
     axis, way = side
     _, centre = centre_of(product, parts)
     across = [a for a in range(3) if a != axis]
@@ -149,6 +153,8 @@ def places(
         points = np.concatenate([points, _lines(low, high, centre)])
     if on_raster:
         points = np.concatenate([points, _raster(low, high, product.middle, across)])
+    asked = np.array(wanted, float).reshape(-1, 3)
+    points = np.concatenate([points, asked])
     small = float((high.max(axis=0) - low.min(axis=0))[across].min()) <= SMALL
     radii, smaller = (*RADII, *[FINE] * small), (*SMALLER, *[len(RADII)] * small)
     points = _rounded(points, float((high - low)[:, across].min()), product.middle)
@@ -159,7 +165,9 @@ def places(
     # the outermost, of which nothing is in the way, and those near the centre of mass
     first = np.lexsort((away, np.round(-out, 3)))[:TRIED]
     nearest = np.argsort(away)[: len(points) if small else NEAR]
-    points = points[np.unique(np.concatenate([first, nearest]))]
+    beside = np.abs(points[:, None, across] - asked[:, across]).max(axis=2)
+    kept = np.flatnonzero(beside.min(axis=1, initial=np.inf) < ASKED)
+    points = points[np.unique(np.concatenate([first, nearest, kept]))]
     sizes, load = np.array(radii), loads.about(points)
     used = strain(tip("suction"), side, sizes[:, None], load)
     useful = [n for n, radius in enumerate(radii) if radius <= LEAST or used[n].max() > EASY]

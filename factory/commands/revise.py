@@ -1,0 +1,74 @@
+"""The command `revise`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import click
+
+from factory.commands.options import OUTPUT, PATH, TEMPLATES, pag_files
+from factory.commands.outputs import writable, writable_folder
+from factory.commands.requests import OutputOptions, ProjectOptions
+from factory.support.console import emit, say
+from factory.support.progress import Waiting
+
+
+@click.command()
+@click.argument("old", type=PATH, shell_complete=pag_files)
+@click.argument("new", type=PATH, shell_complete=pag_files)
+@TEMPLATES
+@click.option("-o", "output", type=PATH, help="Folder for NEW's factory, as `build` writes it.")
+@click.option(
+    "--pin",
+    type=click.Choice(["all", "hands", "none"]),
+    default="all",
+    help="What of OLD's layout is kept where that can be.",
+)
+@click.option("--afresh", is_flag=True, help="Also say the cycle time of a layout made afresh.")
+@click.option("--picture", type=PATH, help="Draw what stays on NEW's floor: OUT.svg.")
+@OUTPUT
+def revise(
+    old: Path,
+    new: Path,
+    folders: tuple[Path, ...],
+    output: Path | None,
+    pin: str,
+    afresh: bool,
+    picture: Path | None,
+    out: OutputOptions,
+) -> int:
+    """Say what stays of the factory of OLD.pag in that of NEW.pag, and lay it out so that most
+    does. OLD may be a plan.json."""
+    from factory.nets.verify import proved
+    from factory.study.revision import PINS, revised
+    from factory.support.files import write_all
+    from factory.timing.prediction import pace
+
+    writable(new, picture)
+    writable_folder(output)
+    options = ProjectOptions(old, folders)
+    before = options.project(out.silent)
+    after = replace(options, file=new).project(out.silent, before.settings)
+    with Waiting("laying out with what stays", out.silent):
+        found = revised(before, after, PINS[pin])
+        verdict = proved(found.new.layout.factory.net)
+        seconds = pace(after.layout, after.settings)[0].seconds if afresh else None
+    files: list[str] = []
+    if output is not None:
+        from factory.exporting.build import BuildRequest, build
+
+        with Waiting("compiling the model", out.silent):
+            built = build(found.new, verdict, BuildRequest(None, output))
+        files += map(str, built.files)
+    if picture is not None:
+        from factory.exporting.revision_picture import draw_revision
+
+        write_all({picture: draw_revision((before.layout, found.new.layout), found.kept).encode()})
+        files.append(str(picture))
+    if out.as_json:
+        emit({**found.as_json(seconds), "files": files})
+    else:
+        for line in (*found.words(seconds), *(f"  {file}" for file in files if out.verbose)):
+            say(line)
+    return 0

@@ -1,0 +1,61 @@
+"""A picture of a revision: the floor of the new factory, its guidepaths coloured by what stays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from factory.layout.dimensions import CARRIAGE
+from factory.layout.guidepath import Guidepath
+from factory.layout.layout import Layout
+from factory.layout.pins import Kept
+from factory.support.canvas import Canvas, millimetres, page_box
+
+STYLE = """
+.floor { fill: #fbfbfa; stroke: #9aa5b1; stroke-width: 2; }
+.stays, .changed, .moved, .new, .gone { fill: none; stroke-width: 10; stroke-linecap: round; }
+.stays { stroke: #2f855a; } .changed { stroke: #2a5c9a; } .moved { stroke: #d9731a; }
+.new { stroke: #b42318; } .gone { stroke: #9aa5b1; stroke-dasharray: 14 18; }
+.r { font-weight: bold; }
+"""
+
+LEGEND = (
+    ("stays", "stays as it is"),
+    ("changed", "in place; program, contents, hand or arm change"),
+    ("moved", "stays, in another place or of another length"),
+    ("new", "new"),
+    ("gone", "gone"),
+)
+
+
+def draw_revision(layouts: tuple[Layout, Layout], kept: tuple[Kept, ...]) -> str:
+    """The document; `layouts`: the old and the new, of which robots are `kept`."""
+    canvas, (old, new) = Canvas(), layouts
+    floor = page_box(new.floor)
+    canvas.rectangle(floor, "floor")
+    shift = new.guidepaths[0].middle(new.guidepaths[0].length)[0]
+    shift -= old.guidepaths[0].middle(old.guidepaths[0].length)[0]
+    stay = {k.new: "stays" if k.whole else "changed" if k.place else "moved" for k in kept}
+    for robot in {*range(len(old.guidepaths))} - {k.old for k in kept}:
+        canvas.line("gone", *_ends(old.guidepaths[robot], shift))
+    for robot, path in enumerate(new.guidepaths):
+        canvas.line(stay.get(robot, "new"), *_ends(path))
+    size = 600.0 * CARRIAGE
+    for robot, path in zip(new.factory.robots, new.guidepaths, strict=True):
+        canvas.label(millimetres(path.carriage(path.length)), robot.name, size, "r")
+    left, right, top, bottom = floor
+    unit = max(14.0, (right - left) / 60)
+    title = f"{old.factory.pag.root} -> {new.factory.pag.root}"
+    canvas.text((left, top - unit), title, 1.5 * unit, "h")
+    y = bottom + unit
+    for style, words in LEGEND:
+        y += 1.4 * unit
+        canvas.line(style, (left, y - 0.3 * unit), (left + 2 * unit, y - 0.3 * unit))
+        canvas.text((left + 2.6 * unit, y), words, unit)
+    page = left - unit, max(right, left + 36 * unit) + unit, top - 4 * unit, y + unit
+    return canvas.document(f"{title}: what stays", page, STYLE)
+
+
+def _ends(path: Guidepath, shift: float = 0.0) -> Iterator[tuple[float, float]]:
+    for at in (path.reach, path.length):
+        x, y = path.carriage(at)
+        yield millimetres((x + shift, y))

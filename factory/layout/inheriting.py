@@ -1,0 +1,101 @@
+"""Inherited entries of a clearance certificate (Theorem 12): what a certificate says of a pair of
+regions depends on these two alone, and on the modes that they are in.
+
+So where both robots of a pair are where they were and hold what they held, what was certified of
+them still holds, word for word; only pairs with a region that is new are computed.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from factory.layout.certificate import ALWAYS, Certificate, Region
+from factory.layout.layout import Layout
+from factory.layout.pins import SAME
+from factory.plant.pairing import Pairing
+
+
+@dataclass(frozen=True)
+class Inheritance:
+    """Which `regions` of a certificate (index) are which of another's, and how many `pairs` there
+    are of different robots in one layer, of which so many are `inherited`. `offset`: by how much
+    the floor of the new layout lies further along the output robot's path [m]."""
+
+    regions: Mapping[int, int] = field(repr=False)
+    pairs: int
+    inherited: int
+    offset: float
+
+    @property
+    def computed(self) -> int:
+        """How many pairs are new."""
+        return self.pairs - self.inherited
+
+    @classmethod
+    def of(cls, old: Layout, new: Layout, pairing: Pairing) -> Inheritance:
+        """What the certificate of a layout has from that of another. Both have one."""
+        assert old.certificate is not None and new.certificate is not None, "both are certified"
+        first, second = (made.guidepaths[0] for made in (old, new))
+        offset = second.middle(second.length)[0] - first.middle(first.length)[0]
+        named = {_named(r, pairing, offset): n for n, r in enumerate(old.certificate.regions)}
+        mine = [_key(region) for region in new.certificate.regions]
+        regions = {n: named[key] for n, key in enumerate(mine) if key in named}
+        kept = [r for n, r in enumerate(new.certificate.regions) if n in regions]
+        counts = _pairs([*new.certificate.regions]), _pairs(kept)
+        return cls(regions, *counts, round(offset, 6))
+
+    def refuted(self, old: Certificate, new: Certificate, pairing: Pairing) -> Iterator[str]:
+        """What is wrong with it: an entry that is not in the old certificate, or is of something
+        else. Uses nothing of how it was found."""
+        if not old.holds:
+            yield "the old certificate does not hold"
+        for number, other in self.regions.items():
+            if not (0 <= number < len(new.regions) and 0 <= other < len(old.regions)):
+                yield f"entry {number}: there is no such region"
+                continue
+            one, before = new.regions[number], old.regions[other]
+            name = f"entry {number}, {one.label or 'a body'} of {new.robots[one.robot]}"
+            boxes = np.array(one.box) - (self.offset, self.offset, 0.0, 0.0), np.array(before.box)
+            if np.abs(boxes[0] - boxes[1]).max() > SAME or one.z != before.z:
+                yield f"{name}: it is elsewhere than in the old certificate"
+            if (one.layer, one.kind) != (before.layer, before.kind):
+                yield f"{name}: it is of another kind"
+            mode = pairing.operations.get(before.mode, ALWAYS) if before.mode >= 0 else ALWAYS
+            if pairing.robots.get(before.robot) != one.robot or mode != one.mode:
+                yield f"{name}: it is of another robot, or in another mode"
+        kept = [r for n, r in enumerate(new.regions) if n in self.regions]
+        if (self.pairs, self.inherited) != (_pairs([*new.regions]), _pairs(kept)):
+            yield "the pairs are miscounted"
+
+
+def _key(region: Region) -> tuple[object, ...]:
+    box = tuple(round(value, 6) + 0.0 for value in region.box)
+    return region.robot, region.layer, region.kind, box, region.z, region.label, region.mode
+
+
+def _named(region: Region, pairing: Pairing, offset: float) -> tuple[object, ...]:
+    """The key of an old region as it would be in the new certificate."""
+    old, new = pairing.old, pairing.new
+    label = region.label
+    if label in old.by_label:
+        number = pairing.operations.get(old.by_label[label].index)
+        label = "" if number is None else new.operations[number].label
+        label = label or f"no longer {region.label}"
+    low, high, *across = region.box
+    box = tuple(round(v, 6) + 0.0 for v in (low + offset, high + offset, *across))
+    mode = region.mode if region.mode == ALWAYS else pairing.operations.get(region.mode, -2)
+    robot = pairing.robots.get(region.robot, -1)
+    return robot, region.layer, region.kind, box, region.z, label, mode
+
+
+def _pairs(regions: list[Region]) -> int:
+    """How many pairs of regions in one layer are of different robots."""
+    layers = Counter(region.layer for region in regions)
+    robots = Counter((region.layer, region.robot) for region in regions)
+    return sum(n * (n - 1) // 2 for n in layers.values()) - sum(
+        n * (n - 1) // 2 for n in robots.values()
+    )

@@ -1,0 +1,115 @@
+"""Pins: what holds of a layout for the factory of the product's next revision."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from factory.geometry.meshes import Array
+from factory.geometry.solids import Product
+from factory.layout.hands.hand import Hand, Point3
+from factory.layout.layout import Layout, carriers
+from factory.layout.stops import carried
+from factory.plant.pairing import Pairing
+
+SAME = 1e-6
+"""Lengths that differ by less are the same [m]."""
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A robot that stays, by its numbers in both factories, and which grades it keeps."""
+
+    old: int
+    new: int
+    program: bool
+    contents: bool
+    module: bool
+    place: bool
+
+    @property
+    def whole(self) -> bool:
+        """Whether it stays as it is."""
+        return self.program and self.contents and self.module and self.place
+
+
+@dataclass(frozen=True)
+class Pins:
+    """By the numbers of a new factory the values of an old layout: `sides` and `travel` [m] of
+    robots, `stations` of operations [m], `hands`; `ends`: where guidepaths end, as `ends_of`."""
+
+    sides: Mapping[int, int] = field(default_factory=dict)
+    travel: Mapping[int, float] = field(default_factory=dict)
+    stations: Mapping[int, float] = field(default_factory=dict)
+    hands: Mapping[int, Hand] = field(default_factory=dict)
+    ends: Mapping[int, Array] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, old: Layout, pairing: Pairing) -> Pins:
+        """Those of a layout for the new factory of a pairing."""
+        on, kept = carriers(old.factory), pairing.robots
+        on_new = carriers(pairing.new)
+        beside = (r for r in kept if r and kept.get(on[r]) == on_new[kept[r]])
+        paths = old.guidepaths
+        stations = {
+            pairing.operations[n]: round(paths[robot].length - old.station(n), 6)
+            for robot in kept
+            for n in carried(old.factory, robot)
+            if n in pairing.operations
+        }
+        return cls(
+            {kept[r]: -1 if paths[r].heading == paths[on[r]].side else 1 for r in beside},
+            {new: paths[robot].travel for robot, new in kept.items()},
+            stations,
+            {new: hand for robot, new in kept.items() if (hand := old.hand(robot)) is not None},
+            {new: ends_of(old, robot) for robot, new in kept.items()},
+        )
+
+    def in_place(self, layout: Layout, robot: int) -> bool:
+        """Whether a robot's guidepath ends where it did; that of the output robot its B end."""
+        away = np.abs(ends_of(layout, robot) - self.ends[robot])
+        return bool(away[int(robot == 0) :].max() < SAME)
+
+    def displaced(self, layout: Layout) -> int:
+        """How many robots are not in place."""
+        return sum(not self.in_place(layout, robot) for robot in self.ends)
+
+
+def ends_of(layout: Layout, robot: int) -> Array:
+    """Where the product's middle is at the A and the B end of a guidepath, from where it is at the
+    B end of the output robot's (2, 2) [m]."""
+    path, first = layout.guidepaths[robot], layout.guidepaths[0]
+    both = np.array([path.middle(path.reach), path.middle(path.length)])
+    return np.asarray((both - first.middle(first.length)).round(6) + 0.0)
+
+
+def same_module(layouts: tuple[Layout, Layout], robots: tuple[int, int]) -> bool:
+    """Whether robots of two layouts have the same hand, length, offset and arm; the length of the
+    output robot's path does not count."""
+    paths = [made.guidepaths[robot] for made, robot in zip(layouts, robots, strict=True)]
+    hands = [made.hand(robot) for made, robot in zip(layouts, robots, strict=True)]
+    holds = [hand and (hand.kind, hand.tip, hand.places) for hand in hands]
+    lengths = np.array([[path.offset, path.arm, path.travel * (robots[0] > 0)] for path in paths])
+    return holds[0] == holds[1] and bool(np.abs(lengths[0] - lengths[1]).max() < SAME)
+
+
+def framed(product: Product, old: Product) -> Product:
+    """The product in the frame of another: in a box about the middle of that, which holds both."""
+    middle = old.middle
+    reach = np.max([old.high - middle, product.high - middle, middle - product.low], axis=0)
+    low, high = middle - reach, middle + reach
+    low[2], high[2] = min(old.low[2], product.low[2]), max(old.high[2], product.high[2])
+    return replace(product, low=low, high=high)
+
+
+def frame_of(product: Product) -> tuple[Point3, Point3] | None:
+    """The box (low, high) of a product that is in the frame of another [m]; None for its own."""
+    solids = product.solids.values()
+    low = np.min([solid.low for solid in solids], axis=0)
+    high = np.max([solid.high for solid in solids], axis=0)
+    if np.array_equal(low, product.low) and np.array_equal(high, product.high):
+        return None
+    (x, y, z), (u, v, w) = product.low.tolist(), product.high.tolist()
+    return (x, y, z), (u, v, w)
