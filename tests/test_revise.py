@@ -15,8 +15,9 @@ from factory.layout.certificate import Fault
 from factory.layout.clearance import certify
 from factory.nets.verify import verify
 from factory.pipeline import Project, all_templates
+from factory.plant.family import family
 from factory.plant.matching import label_digests, matching, shifted
-from factory.problem.pag import PAG, Parameter
+from factory.problem.pag import PAG, Mix, Parameter
 from factory.problem.plan import Plan
 from factory.study.revision import Revision, revised
 from factory.support.errors import InputError
@@ -214,3 +215,66 @@ def test_names_of_a_plan_are_checked() -> None:
             Plan(names=names)
     with pytest.raises(InputError, match="robots"):
         _ = project(example("truck")).with_plan(Plan(names=("r1", "r7"))).plain
+
+
+def shuffled_van() -> PAG:
+    return shifted(shuffled(van(), random.Random(7)), (0.3, 0.0, -0.01))
+
+
+def test_a_family_has_what_is_equal_once_whatever_it_is_called(tmp_path: Path) -> None:
+    plain, renamed = (
+        family(example("truck"), pag, (3, 1), tmp_path) for pag in (van(), shuffled_van())
+    )
+    assert len(plain.common) == len(renamed.common) == 18
+    assert plain.renamed == {} and len(renamed.renamed) == 18
+    assert renamed.matching.shift == (0.3, 0.0, -0.01)
+    assert read_pag(write_pag(plain.pag), all_templates()) == plain.pag
+    assert plain.pag.mix == Mix((("truck", 3), ("van", 1)))
+    assert {n.label for n in plain.pag.product("van").nodes} == {n.label for n in van().nodes}
+    robots = [len(project(made.pag).planned.robots) for made in (plain, renamed)]
+    assert robots == [23, 23]
+
+
+def test_equal_names_with_other_content_are_told_apart(tmp_path: Path) -> None:
+    other = edited(van(), random.Random(2), 1, ("change",))
+    changed = next(n.label for n in other.nodes if n not in van().nodes)
+    made = family(example("truck"), other, (1, 1), tmp_path)
+    assert made.names[changed] == (f"{changed}.b" if changed in made.pag.by_label else changed)
+    assert read_pag(write_pag(made.pag), all_templates()) == made.pag
+
+
+def test_meshes_of_a_family_are_found_from_its_folder(tmp_path: Path) -> None:
+    gearbox = example("gearbox")
+    nodes = tuple(n for n in gearbox.nodes if n.label != "wheel")
+    less = replace(
+        gearbox,
+        root="basic",
+        nodes=tuple(
+            replace(
+                n,
+                label="basic" if n.label == "gearbox" else n.label,
+                inputs=tuple(x for x in n.inputs if x != "wheel"),
+            )
+            for n in nodes
+        ),
+    )
+    made = family(gearbox, less, (1, 1), tmp_path)
+    meshes = (str(part.parameter("mesh")) for part in made.pag.parts())
+    assert all((tmp_path / mesh).is_file() for mesh in meshes)
+
+
+def test_command_writes_a_family(tmp_path: Path) -> None:
+    (tmp_path / "van.pag").write_text(write_pag(shuffled_van()))
+    files = EXAMPLES / "truck.pag", tmp_path / "van.pag"
+    done = spawn("mix", *files, "--count", "3:1", "-o", tmp_path / "family.pag", "--json")
+    assert (done.status, len(done.json["common"])) == (0, 18)
+    assert (tmp_path / "family.pag").read_text().startswith("mix = 3 truck, 1 ")
+    for words, code in (
+        ((files[0], files[0]), "BadMix"),
+        ((*files, "--count", "3"), "BadValue"),
+        ((*files, "--count", "0:1"), "BadValue"),
+        ((tmp_path / "family.pag", files[1]), "BadMix"),
+    ):
+        refused = spawn("mix", *words, "-o", tmp_path / "no.pag", "--json")
+        assert (refused.status, refused.codes) == (2, [code])
+        assert not (tmp_path / "no.pag").exists()

@@ -19,6 +19,7 @@ from factory.commands.doctor import doctor
 from factory.commands.export import export
 from factory.commands.fidelity import fidelity
 from factory.commands.import_ import import_
+from factory.commands.mix import mix
 from factory.commands.monitor import monitor
 from factory.commands.new import new
 from factory.commands.pareto import pareto
@@ -288,6 +289,7 @@ for _command in (
     import_,
     plan,
     *map(with_defaults, ON_A_FILE),
+    mix,
     revise,
     sweep,
     monitor,

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from factory.layout.dimensions import CARRIAGE
 from factory.layout.guidepath import Guidepath
 from factory.layout.layout import Layout
-from factory.layout.pins import Kept
+from factory.layout.pins import StayingRobot
 from factory.support.canvas import Canvas, millimetres, page_box
 
 STYLE = """
@@ -27,7 +27,7 @@ LEGEND = (
 )
 
 
-def draw_revision(layouts: tuple[Layout, Layout], kept: tuple[Kept, ...]) -> str:
+def draw_revision(layouts: tuple[Layout, Layout], kept: tuple[StayingRobot, ...]) -> str:
     """The document; `layouts`: the old and the new, of which robots are `kept`."""
     canvas, (old, new) = Canvas(), layouts
     floor = page_box(new.floor)

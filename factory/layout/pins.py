@@ -19,7 +19,7 @@ SAME = 1e-6
 
 
 @dataclass(frozen=True)
-class Kept:
+class StayingRobot:
     """A robot that stays, by its numbers in both factories, and which grades it keeps."""
 
     old: int

@@ -69,6 +69,11 @@ class Plan:
         ):
             raise ValueError("names must be different names of robots, as 'r9'")
 
+    @property
+    def is_as_written(self) -> bool:
+        """Whether it is the plan of the paper's factory, but for names of robots."""
+        return replace(self, names=()) == AS_WRITTEN
+
     def then(self, turns: Turns) -> Plan:
         """The plan in which other robots do what the robots of this one do: in turn t robot
         `turns[t][r]` (index) what robot r does. Its lifts are to be found again."""

@@ -21,7 +21,8 @@ from factory.layout.hands.choosing import Hands
 from factory.layout.inheriting import Inheritance
 from factory.layout.layout import Layout
 from factory.layout.pinning import Pinning
-from factory.layout.pins import Kept, Pins, framed, same_module
+from factory.layout.pins import Pins, StayingRobot, framed, same_module
+from factory.layout.request import Ground
 from factory.pipeline import Project
 from factory.plant.factory import Factory
 from factory.plant.matching import matching, shifted
@@ -34,7 +35,7 @@ Pin = Literal["all", "hands", "none"]
 PINS: dict[str, Pin] = {"all": "all", "hands": "hands", "none": "none"}
 """What can be pinned, by name."""
 
-SIMPLE = "give the PAG: `revise` compiles it with a robot for each tour, and without relays"
+SIMPLE = "give the PAG: `revise` compiles it with a robot for each tour"
 
 
 @dataclass(frozen=True)
@@ -47,11 +48,11 @@ class Revision:
     pins: Pins = field(repr=False)
 
     @cached_property
-    def kept(self) -> tuple[Kept, ...]:
+    def kept(self) -> tuple[StayingRobot, ...]:
         """The robots that stay."""
         pairing, layouts = self.pairing, (self.old.layout, self.new.layout)
         return tuple(
-            Kept(
+            StayingRobot(
                 robot,
                 other,
                 pairing.keeps_program(robot),
@@ -148,12 +149,12 @@ class Revision:
 
 def revised(old: Project, new: Project, pin: Pin = "all") -> Revision:
     """The revision of a product, laid out with the old layout `all` pinned, its `hands` alone, or
-    `none` of it. Raises InputError (Usage) for shared robots and relays, RunError (Layout) where
+    `none` of it. Raises InputError (Usage) for shared robots, RunError (Layout) where
     the pinned layout is not clear."""
     for made in (old, new):
         made.pag.check_alone("revise")
-        if made.plan.turns or made.plan.relays or made.plan.forms or made.ground.deputies:
-            raise usage_error(f"'{made.file}' has shared robots or relays", SIMPLE)
+        if not (made.plan.is_as_written and made.ground == Ground(made.ground.floor)):
+            raise usage_error(f"'{made.file}' has shared robots", SIMPLE)
     matched = matching(old.pag, new.pag)
     if any(matched.shift):
         x, y, z = matched.shift
