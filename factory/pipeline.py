@@ -45,7 +45,7 @@ class Project:
     """A PAG with all that follows from it: its geometry, factory and layout, each computed when it
     is first used. `templates`, `catalogue` and `plan` are what it is compiled with, `settings` and
     `ground` what it is laid out for; `laid`: the table of its layout, None where one is looked
-    for."""
+    for. `lowered`: by operations the input to be lowered there, if it can be."""
 
     pag: PAG
     templates: Mapping[str, Template] = field(repr=False)
@@ -54,6 +54,7 @@ class Project:
     ground: Ground = field(default_factory=Ground)
     plan: Plan = field(default_factory=Plan)
     laid: LayoutTable | None = field(default=None, repr=False)
+    lowered: Mapping[str, str] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of_made(cls, made: Factory | Layout, settings: Settings | None = None) -> Project:
@@ -144,11 +145,14 @@ class Project:
         """A project for each product of a mix, alone; itself for one product."""
         if self.pag.mix is None:
             return (self,)
-        alone = [
-            self.with_plan(self._single).with_pag(self.pag.product(x)) for x in self.pag.products
-        ]
+        from factory.compiler.mixing import lowered_alike
+
+        made = self.with_plan(self._single)
+        alone = [made.with_pag(self.pag.product(x)) for x in self.pag.products]
         for project in alone:
             project.__dict__["product"] = self.product
+        for number, lowered in lowered_alike([project.approached for project in alone]).items():
+            alone[number] = alone[number]._changed({"product"}, lowered=lowered)
         return tuple(alone)
 
     @property
@@ -173,7 +177,8 @@ class Project:
             return together(filter(None, (one.matings for one in self.each)))
         from factory.compiler.mating.mating import matings
 
-        return matings(expand(self.pag, self.templates, self._single), self.product)
+        nodes = expand(self.pag, self.templates, self._single)
+        return matings(nodes, self.product, True, self.lowered)
 
     @property
     def overlaps(self) -> DrawnOverlaps:

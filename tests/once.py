@@ -11,6 +11,7 @@ import pickle
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from hashlib import sha256
+from types import MappingProxyType
 from typing import Any
 
 import pytest
@@ -59,8 +60,8 @@ def stages_once() -> Iterator[Stages]:
             return lay_out(ground, factory, product, settings, hands, catalogue)
         return laid_out(ground, factory, product, settings, hands is not None, catalogue)
 
-    def of_nodes(nodes, product, lifts=True):
-        return judged(nodes, product, lifts)
+    def of_nodes(nodes, product, lifts=True, lowered=MappingProxyType({})):
+        return judged(nodes, product, lifts, lowered)
 
     judged = stages.once(matings)
     with pytest.MonkeyPatch.context() as patch:

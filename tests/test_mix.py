@@ -253,6 +253,29 @@ def test_a_mix_runs(file: Path, run: Terminal, world: str) -> None:
     assert drops[1::2] == ["dropoff_e", "dropoff@2_e", "dropoff@3_e"] * 2 + ["dropoff_e"]
 
 
+LAMPS = """unit = mm; mix = 2 shaded, 1 bare;
+shaded = mate ( base, shade ); bare = mate ( base, globe );
+base = atomic ( box = (40, 40, 20), pos = (0, 0, 10) );
+shade = atomic ( box = (30, 30, 30), pos = (0, 0, 35) );
+globe = atomic ( sphere = 20, pos = (0, 0, 40) )"""
+
+
+def test_what_could_slide_is_lowered_where_its_line_lowers(tmp_path: Path, run: Terminal) -> None:
+    """A ball alone would slide over the base. It comes on the line of a shade that is lowered, held
+    where the carrier stands in one place for both."""
+    file = tmp_path / "lamps.pag"
+    file.write_text(LAMPS)
+    alone = tmp_path / "bare.pag"
+    alone.write_text(
+        LAMPS.replace("mix = 2 shaded, 1 bare", "root = bare")
+        .replace("shaded = mate ( base, shade );", "")
+        .replace("shade = atomic ( box = (30, 30, 30), pos = (0, 0, 35) );", "")
+    )
+    assert run("check", alone, "--json").json["approaches"]["lower"] == 0
+    done = run("run", file, "--units", 6, "--jitter", 0.3, "--json")
+    assert (done.status, done.json["robots"], done.json["unintended_contacts"]) == (0, 3, 0)
+
+
 def test_check_says_what_is_shared(file: Path, run: Terminal) -> None:
     found = run("check", file, "--json").json
     assert found["products"] == [

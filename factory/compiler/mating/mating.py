@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import ceil
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,9 +33,15 @@ UPRIGHT = 2
 """The axis z, along which inputs are lowered."""
 
 
-def matings(nodes: Mapping[str, Node], product: Product, lifts: bool = True) -> Matings:
+def matings(
+    nodes: Mapping[str, Node],
+    product: Product,
+    lifts: bool = True,
+    lowered: Mapping[str, str] = MappingProxyType({}),
+) -> Matings:
     """Judges every operation with two inputs or more, with `lifts` or without. Near-linear in the
-    parts, except where very many lie behind one another."""
+    parts, except where very many lie behind one another. `lowered`: by operations the input that is
+    to be lowered if it can be, even where it could slide."""
     met = meetings(nodes)
     if not met.all:
         return Matings((), {})
@@ -42,10 +49,11 @@ def matings(nodes: Mapping[str, Node], product: Product, lifts: bool = True) -> 
     judge = _Judge(met, product, {label: node.last for label, node in nodes.items()})
     for axis in (0, 1):
         judge.slide(axis, finder.along(axis, met.axes == axis))
-    unclean = judge.slides.max(axis=1) < STRICT
+    asked = [lowered.get(meeting.label, "") for meeting in met.all]
+    unclean = (judge.slides.max(axis=1) < STRICT) | (np.array(asked) != "")
     if lifts and unclean.any():
         judge.lower(finder.along(UPRIGHT, unclean), unclean)
-    made = tuple(judge.mating(number) for number in range(len(met.all)))
+    made = tuple(judge.mating(number, label) for number, label in enumerate(asked))
     return Matings(made, judge.contents(made))
 
 
@@ -86,12 +94,16 @@ class _Judge:
         self.lowers[~either, 0] = BLOCKED
         self.overlaps[UPRIGHT] = overlaps
 
-    def mating(self, number: int) -> Mating:
-        """The best approach: that of the stricter level, or sliding if both are equal."""
+    def mating(self, number: int, asked: str = "") -> Mating:
+        """The best approach: that of the stricter level, or sliding if both are equal; lowering of
+        the input that is `asked` for, if that can be lowered."""
         meeting = self.meetings.all[number]
         slides, clashing = self.slides[number].tolist(), self.clashing[number].tolist()
         slide, lower = max(slides), max(self.lowers[number].tolist())
-        if slide == lower == BLOCKED:
+        column = 0 if asked == meeting.inputs[0] else 1
+        if asked and self.lowers[number, column] > BLOCKED:
+            approach = self._lowered(number, column)
+        elif slide == lower == BLOCKED:
             column = clashing.index(min(clashing))
             clashes = self._clashes(number, meeting.axis, column)
             other = self._clashes(number, meeting.axis, 1 - column)
@@ -116,10 +128,14 @@ class _Judge:
     def _lowering(self, number: int, level: int) -> Approach:
         """Lowering of the input with the shorter stroke if both can be lowered, else of the
         last."""
+        stroke = self._strokes(self.meetings.all[number])
+        columns = [c for c in (1, 0) if self.lowers[number, c] == level]
+        return self._lowered(number, min(columns, key=lambda c: stroke[c]))
+
+    def _lowered(self, number: int, column: int) -> Approach:
+        """Lowering of the first input (0) or the last (1)."""
         meeting = self.meetings.all[number]
         stroke = self._strokes(meeting)
-        columns = [c for c in (1, 0) if self.lowers[number, c] == level]
-        column = min(columns, key=lambda c: stroke[c])
         overlaps = self._overlaps(number, UPRIGHT, column)
         lowered = meeting.inputs[-1 if column else 0]
         return Approach("lower", meeting.axis, SIGNS, lowered, stroke[column], (overlaps, overlaps))

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from itertools import product as pairs
 
 import numpy as np
@@ -133,6 +134,13 @@ def in_one_place(options: Sequence[Groups]) -> list[Groups]:
     shares = np.max([o.share[at] for o, at in pairs], axis=0)
     best = np.lexsort((shares, costs))[:1]
     return [one.among(at[best]) for one, at in pairs]
+
+
+def on_one_line(options: Sequence[Groups], way: tuple[float, float]) -> list[Groups]:
+    """The groups of each label that are as far along a way of the floor as some of every other."""
+    lines = [np.round(option.across(way), 5) for option in options]
+    common = reduce(np.intersect1d, lines)
+    return [o.among(np.isin(line, common)) for o, line in zip(options, lines, strict=True)]
 
 
 def bad(share: Array, pinned: Array) -> Array:

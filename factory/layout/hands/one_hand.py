@@ -28,6 +28,7 @@ from factory.layout.hands.groups import (
     in_line,
     in_one_place,
     least,
+    on_one_line,
 )
 from factory.layout.hands.hand import Hand, Kind
 from factory.layout.hands.holding import held
@@ -135,6 +136,8 @@ class OneHand:
             options = [self._groups(kind, tour, frames, radius) for tour in tours]
             if not alone and self.in_the_way.holding.on[tours[0]] < 0:
                 options = in_one_place(options)
+            elif not alone and any(map(self._is_one_of_two, tours)):
+                options = on_one_line(options, frames[0][1])
             if not all(map(len, options)):
                 continue
             cost, by, chosen = _level(options, *frames[0], lifted)
@@ -170,6 +173,13 @@ class OneHand:
                 above.add(carrier)
                 carrier = holding.on[carrier]
         return above.isdisjoint(holding.factory.strokes)
+
+    def _is_one_of_two(self, tour: int) -> bool:
+        """Whether another robot delivers at the same junction: the carrier stands in one place for
+        both."""
+        last = self.in_the_way.holding.last(tour)
+        guests = [r for r, x in zip(last.robots, last.before, strict=True) if x != NOPART]
+        return len(guests) > 1 and last.carrier not in guests
 
     def _label(self, tour: int) -> str:
         return held(self.in_the_way.holding.factory, tour)
