@@ -84,6 +84,9 @@ def plant(
         else:
             say(f"{server.address}  (Ctrl-C to stop)")
         sys.stdout.flush()
+        if expose:
+            reach = f"anyone who can reach {host} can drive this factory's robots"
+            print(f"warning: {reach}; the connection is not encrypted", file=sys.stderr)
         record = carry_on(made, asked, True, None, [], True)
     if not out.as_json:
         summarise(record, layout.factory, out.verbose)

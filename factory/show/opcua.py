@@ -84,7 +84,7 @@ class OpcuaPlant:
 
     def __enter__(self) -> OpcuaPlant:
         logging.getLogger("asyncua").setLevel(logging.CRITICAL)
-        Thread(target=self._loop.run_forever, daemon=True).start()
+        Thread(target=self._serve, daemon=True).start()
         try:
             self._call(self._start())
         except OSError as error:
@@ -101,6 +101,10 @@ class OpcuaPlant:
     ) -> None:
         self._call(self._nodes["server"].stop())
         self._loop.call_soon_threadsafe(self._loop.stop)
+
+    def _serve(self) -> None:
+        self._loop.run_forever()
+        self._loop.close()
 
     def _call(self, work: Coroutine[Any, Any, Any]) -> Any:
         return asyncio.run_coroutine_threadsafe(work, self._loop).result()
