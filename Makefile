@@ -2,7 +2,7 @@
 PY := .venv/bin/python
 FACTORY := $(PY) -m factory
 
-.PHONY: help demo test test-all oracles bench fidelity faults docs gallery lint golden wheel setup clean
+.PHONY: help demo test test-all oracles bench fidelity faults compare docs gallery lint golden wheel setup clean
 
 help:
 	@echo "make demo      run the paper's example: a video and a poster in renders/"
@@ -11,6 +11,7 @@ help:
 	@echo "make bench     times and sizes, written to docs/benchmarks.md"
 	@echo "make fidelity  how far the physics can be believed, written to docs/fidelity.md"
 	@echo "make faults    what becomes of factories in which things go wrong, written to docs/faults.md"
+	@echo "make compare   beside what others publish, written to docs/comparison.md"
 	@echo "make docs      the documentation site, in docs/_build/html"
 	@echo "make gallery   render the stills of the gallery anew"
 	@echo "make lint      ruff and mypy"
@@ -43,6 +44,9 @@ fidelity: setup
 
 faults: setup
 	$(PY) -m benches.faults $(ARGS)
+
+compare: setup
+	$(PY) -m benches.compare $(ARGS)
 
 docs:
 	@tools/setup docs

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from benches import reporting
+from benches.compare.__main__ import REPORT as COMPARISON
 from benches.faults.__main__ import REPORT as FAULTS
 from benches.fidelity.__main__ import REPORT as FIDELITY
 from benches.reporting import Report
@@ -19,7 +20,11 @@ from benches.speed.__main__ import REPORT
 from benches.speed.factories import laid_out, produce, robots_at_least
 from factory.simulation.simulation import Simulation
 
-KEPT = [(report, file) for report in (REPORT, FAULTS) for file in report.folder.glob("*.json")]
+KEPT = [
+    (report, file)
+    for report in (REPORT, FAULTS, COMPARISON)
+    for file in report.folder.glob("*.json")
+]
 
 
 @pytest.mark.parametrize(("report", "file"), KEPT, ids=lambda it: getattr(it, "stem", ""))
@@ -31,7 +36,9 @@ def test_a_section_is_rendered_from_what_was_kept(report: Report, file: Path) ->
     assert text in report.path.read_text()
 
 
-@pytest.mark.parametrize("report", [REPORT, FAULTS, FIDELITY], ids=lambda report: report.path.stem)
+@pytest.mark.parametrize(
+    "report", [REPORT, FAULTS, FIDELITY, COMPARISON], ids=lambda report: report.path.stem
+)
 def test_the_report_is_that_of_all_that_was_kept(report: Report) -> None:
     assert report.text() == report.path.read_text()
 

@@ -27,15 +27,19 @@ Job = Callable[[], Found]
 
 @dataclass(frozen=True)
 class Process:
-    """Wall time [s], largest resident set [MB] and stdout of a process that has ended."""
+    """Wall time [s], largest resident set [MB], stdout, processor time [s] and exit status of a
+    process that has ended."""
 
     seconds: float
     megabytes: float
     text: str
+    processor: float
+    status: int
 
 
-def run(command: Sequence[object], **environment: str) -> Process:
-    """Run it, with some more environment. Ends everything, with what it says, if it fails."""
+def run(command: Sequence[object], may_fail: bool = False, /, **environment: str) -> Process:
+    """Run it, with some more environment. Ends everything, with what it says, if it fails, unless
+    it `may_fail`: with exit status 1."""
     words = [str(word) for word in command]
     begin = perf_counter()
     with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as said:
@@ -52,9 +56,10 @@ def run(command: Sequence[object], **environment: str) -> Process:
         out.seek(0)
         said.seek(0)
         text, why = out.read(), said.read()
-    if process.returncode:
+    if process.returncode > may_fail or process.returncode < 0:
         raise SystemExit(f"{' '.join(words)} ended with status {process.returncode}\n{why}")
-    return Process(took, usage.ru_maxrss / 1024, text)
+    busy = usage.ru_utime + usage.ru_stime
+    return Process(took, usage.ru_maxrss / 1024, text, busy, process.returncode)
 
 
 def fresh(work: Callable[..., Found], **given: Any) -> Found:
