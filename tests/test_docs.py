@@ -122,6 +122,7 @@ def test_the_tutorial_shows_what_is_printed(
     [
         *("index.md", "ten-minutes.md"),
         *("guide/products.md", "guide/pace.md", "guide/faults.md", "guide/plc.md"),
+        "guide/revise.md",
     ],
 )
 def test_the_way_in_shows_what_is_printed(
