@@ -115,4 +115,4 @@ many robots as the tree has roles, on guidepaths, laid out and proved free of de
 anything moves; with hands, contact and welds when it runs. The rocket is the same set as a tree
 without shapes: each part is a default box. Its factory is built, not run, here; where it has no
 row, it is among the [large products](benchmarks.md#large-products), with an older figure. Fewer
-robots for it (`--robots 250`, as many as theirs) are found by a search that was not measured here."""
+robots for it (`--robots 250`, as many as theirs) are found by a search that was not measured."""
