@@ -6,7 +6,6 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-import networkx as nx
 import numpy as np
 
 from factory.geometry.mesh_file import areas_of
@@ -86,6 +85,8 @@ def _fill(mesh: trimesh.Trimesh) -> None:
 def _rims(faces: Indices) -> list[list[int]]:
     """The holes of a mesh: the shortest cycles of its open edges, each edge in one, in the
     orientation of the triangles that close them."""
+    import networkx as nx
+
     edges = np.concatenate([faces[:, [1, 0]], faces[:, [2, 1]], faces[:, [0, 2]]])
     _, first, count = np.unique(
         np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
