@@ -15,7 +15,7 @@ STYLE = """
 .stays, .changed, .moved, .new, .gone { fill: none; stroke-width: 10; stroke-linecap: round; }
 .stays { stroke: #2f855a; } .changed { stroke: #2a5c9a; } .moved { stroke: #d9731a; }
 .new { stroke: #b42318; } .gone { stroke: #9aa5b1; stroke-dasharray: 14 18; }
-.r { font-weight: bold; }
+.r { font-weight: bold; } .gone-name { fill: #9aa5b1; }
 """
 
 LEGEND = (
@@ -35,13 +35,15 @@ def draw_revision(layouts: tuple[Layout, Layout], kept: tuple[StayingRobot, ...]
     shift = new.guidepaths[0].middle(new.guidepaths[0].length)[0]
     shift -= old.guidepaths[0].middle(old.guidepaths[0].length)[0]
     stay = {k.new: "stays" if k.whole else "changed" if k.place else "moved" for k in kept}
-    for robot in {*range(len(old.guidepaths))} - {k.old for k in kept}:
+    size = 600.0 * CARRIAGE
+    for robot in sorted({*range(len(old.guidepaths))} - {k.old for k in kept}):
         canvas.line("gone", *_ends(old.guidepaths[robot], shift))
+        name = old.factory.robots[robot].name
+        canvas.label(_beyond(old.guidepaths[robot], shift), name, size, "r gone-name")
     for robot, path in enumerate(new.guidepaths):
         canvas.line(stay.get(robot, "new"), *_ends(path))
-    size = 600.0 * CARRIAGE
     for robot, path in zip(new.factory.robots, new.guidepaths, strict=True):
-        canvas.label(millimetres(path.carriage(path.length)), robot.name, size, "r")
+        canvas.label(_beyond(path), robot.name, size, "r")
     left, right, top, bottom = floor
     unit = max(14.0, (right - left) / 60)
     title = f"{old.factory.pag.root} -> {new.factory.pag.root}"
@@ -59,3 +61,9 @@ def _ends(path: Guidepath, shift: float = 0.0) -> Iterator[tuple[float, float]]:
     for at in (path.reach, path.length):
         x, y = path.carriage(at)
         yield millimetres((x + shift, y))
+
+
+def _beyond(path: Guidepath, shift: float = 0.0) -> tuple[float, float]:
+    """Where the name of a robot stands: behind the end of its guidepath."""
+    x, y = path.carriage(path.length + 0.7 * CARRIAGE)
+    return millimetres((x + shift, y))
