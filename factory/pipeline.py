@@ -183,12 +183,11 @@ class Project:
     @property
     def overlaps(self) -> DrawnOverlaps:
         """Which parts overlap in the finished product; none of default boxes."""
-        from factory.geometry.overlapping import DrawnOverlaps, overlaps_of, within
+        from factory.geometry.overlapping import DrawnOverlaps, overlaps_of
 
         if not is_shaped(self.pag):
             return DrawnOverlaps()
-        found = overlaps_of(self.product)
-        return within(found, *self.pag.insides) if self.pag.mix else found
+        return overlaps_of(self.product, *(self.pag.insides if self.pag.mix else ()))
 
     @property
     def warnings(self) -> tuple[Diagnostic, ...]:

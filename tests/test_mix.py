@@ -276,6 +276,16 @@ def test_what_could_slide_is_lowered_where_its_line_lowers(tmp_path: Path, run: 
     assert (done.status, done.json["robots"], done.json["unintended_contacts"]) == (0, 3, 0)
 
 
+def test_products_end_at_one_height(shaped: Path, run: Terminal) -> None:
+    """A product that is 5 mm higher would hang over the tray that takes it away."""
+    base = "base = atomic ( box = ( 0.2, 0.1, 0.02 ), pos = ( 0, 0, 0.01 ) );"
+    high = base.replace("base", "other").replace("0.02", "0.015").replace("0.01 )", "0.0125 )")
+    shaped.write_text(SHAPED.replace("mate ( base, z )", "mate ( other, z )") + "\n" + high)
+    done = run("run", shaped, "--json")
+    assert (done.status, done.codes) == (1, ["Layout"])
+    assert "'b@2' ends 5.00 mm higher than 'a'" in done.json["errors"][0]["message"]
+
+
 def test_check_says_what_is_shared(file: Path, run: Terminal) -> None:
     found = run("check", file, "--json").json
     assert found["products"] == [

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from weakref import finalize
 
@@ -19,6 +19,9 @@ SILENT = 2e-5
 
 EVERYWHERE = 5e-4
 """The depth of overlaps in a drawing without fits [m]."""
+
+Insides = tuple[frozenset[str], ...]
+"""The parts of each of several products."""
 
 NAMED = 6
 """The most allowed pairs that are named."""
@@ -83,15 +86,16 @@ class DrawnOverlaps:
         return words
 
 
-_KNOWN: dict[int, DrawnOverlaps] = {}
+_KNOWN: dict[tuple[int, Insides], DrawnOverlaps] = {}
 """The overlaps of existing products, by identity."""
 
 
-def overlaps_of(product: Product) -> DrawnOverlaps:
-    """The overlaps of all parts of a product, computed once."""
-    key = id(product)
+def overlaps_of(product: Product, *insides: frozenset[str]) -> DrawnOverlaps:
+    """The overlaps of all parts of a product, computed once; `insides`: of the parts of each of
+    several products, whose parts are together in it."""
+    key = id(product), insides
     if key not in _KNOWN:
-        _KNOWN[key] = _found(product)
+        _KNOWN[key] = _found(product, insides)
         finalize(product, _KNOWN.pop, key, None)
     return _KNOWN[key]
 
@@ -103,22 +107,18 @@ def everywhere(product: Product) -> tuple[AllowedOverlap, ...]:
     return (AllowedOverlap(EVERYWHERE),) if needed else ()
 
 
-def within(overlaps: DrawnOverlaps, *products: Collection[str]) -> DrawnOverlaps:
-    """The overlaps between parts of one product, given by the parts of each."""
-    return DrawnOverlaps(
-        tuple(
-            pair
-            for pair in overlaps.pairs
-            if any(pair.one in parts and pair.other in parts for parts in products)
-        ),
-        tuple(part for part in overlaps.open if any(part in parts for parts in products)),
-    )
-
-
-def _found(product: Product) -> DrawnOverlaps:
-    labels, bodies = [*product.solids], [drawn(solid) for solid in product.solids.values()]
+def _found(product: Product, insides: Insides) -> DrawnOverlaps:
+    solids = {
+        label: solid
+        for label, solid in product.solids.items()
+        if not insides or any(label in inside for inside in insides)
+    }
+    labels, bodies = [*solids], [drawn(solid) for solid in solids.values()]
     pairs = []
-    for one, other in near_pairs([*product.solids.values()], -SILENT).tolist():
+    for one, other in near_pairs([*solids.values()], -SILENT).tolist():
+        both = {labels[one], labels[other]}
+        if insides and not any(both <= inside for inside in insides):
+            continue
         if bodies[one] is not None and bodies[other] is not None:
             depth = common(bodies[one], bodies[other]).depth
             if depth > SILENT:

@@ -55,6 +55,9 @@ from factory.problem.pag import NOPART
 TOLERANCE = 1e-6
 """Distances are compared to this [m]: a thousandth of what a layout is rounded to."""
 
+EVEN = 4e-4
+"""The tray takes products that are no higher than this over it [m]."""
+
 MOST = 100
 """So many faults are listed; there is no use in more."""
 
@@ -121,6 +124,7 @@ class ClearanceSearch:
             *islice(self.faults(), MOST),
             *islice(_standoffs(layout, found), MOST),
             *islice(_raised(layout, found), MOST),
+            *_uneven(layout, found),
         ]
 
     def faults(self) -> Iterator[Fault]:
@@ -250,6 +254,20 @@ def _raised(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
                 )
                 here = Region(guest, PAYLOADS, PAYLOAD_BODY, found[label].box, found[label].z)
                 yield fault(layout.factory, message, here, lacking=MARGIN - over)
+
+
+def _uneven(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
+    """What is higher than the product of another unit: the tray takes all at one height."""
+    factory = layout.factory
+    lows = {product: found[product].z[0] for product in factory.products}
+    lowest = min(lows, key=lows.__getitem__)
+    for product, low in lows.items():
+        if (above := low - lows[lowest]) > EVEN:
+            message = (
+                f"'{product}' ends {above * 1000:.2f} mm higher than '{lowest}', and the outfeed's"
+                " tray takes both at one height: move its parts down"
+            )
+            yield fault(factory, message, factory.dropoff.carrier, lacking=above)
 
 
 def _way(layout: Layout, found: Mapping[str, Pile], operation: Operation, slot: int) -> Region:

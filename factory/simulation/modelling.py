@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from factory.geometry.overlapping import overlaps_of, within
+from factory.geometry.overlapping import overlaps_of
 from factory.layout.bins import Bin, bins_of
 from factory.layout.layout import Layout
 from factory.mjcf.timestep import timed
@@ -54,7 +54,8 @@ def _overlaps(layout: Layout) -> tuple[Diagnostic, ...]:
         for o in factory.operations
         if o.approach is not None and o.turn in firsts
     )
-    found = within(overlaps_of(layout.product), *factory.pag.insides).faults(allowed)
+    insides = factory.pag.insides if factory.period > 1 else ()
+    found = overlaps_of(layout.product, *insides).faults(allowed)
     return (*found, *(fault for fault in blocked if fault is not None))
 
 

@@ -84,14 +84,15 @@ class Checked:
             return {}
         from factory.geometry.overlapping import overlaps_of
 
-        allowed = self.factory.pag.allowed
+        pag = self.factory.pag
+        allowed, insides = pag.allowed, pag.insides if pag.mix else ()
         rows = [
             {
                 "parts": [pair.one, pair.other],
                 "depth_mm": round(1e3 * pair.depth, 6),
                 "allowed_mm": round(1e3 * most_allowed(allowed, pair.one, pair.other), 6),
             }
-            for pair in overlaps_of(self.product).pairs
+            for pair in overlaps_of(self.product, *insides).pairs
         ]
         return {"overlaps": rows}
 
