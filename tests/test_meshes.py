@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 import trimesh
 
+from factory.geometry.mending import zipped
 from factory.geometry.mesh_file import EXPECTED, UnreadableMesh
 from factory.geometry.mesh_reader import read_mesh
+from factory.geometry.meshes import is_closed, volume_of
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import Product
 from factory.problem.pag import PAG
@@ -202,8 +204,18 @@ MENDED: tuple[tuple[Callable[[], trimesh.Trimesh], str, float], ...] = (
     (with_a_sliver, "had slivers or small holes", EDGE**3),
     (cracked, "had cracks", TUBE),
     (two_sided, "had duplicate triangles", EDGE**3),
-    (divided_twice, "had slivers or small holes", 0.1 * 50 * np.sin(np.pi / 50) * 0.05**2),
 )
+
+
+def test_faces_of_a_solid_are_zipped_where_they_divide_an_edge_differently() -> None:
+    mesh = divided_twice()
+    mesh.merge_vertices()
+    vertices, faces = np.array(mesh.vertices), np.array(mesh.faces)
+    closed = zipped(vertices, faces)
+    assert not is_closed(faces) and is_closed(closed)
+    assert volume_of(vertices, closed) == pytest.approx(5 * np.sin(np.pi / 50) * 0.05**2)
+    open_box = faces[: len(faces) // 2]
+    assert zipped(vertices, open_box) is open_box
 
 
 @pytest.mark.parametrize("kind", ["stl", "obj", "ply", "glb"])

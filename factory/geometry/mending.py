@@ -1,5 +1,5 @@
 """Repair of meshes that bound no volume: small gaps are closed, and triangles are oriented
-outwards."""
+outwards. Meshes of a solid's faces are zipped where these divide a common edge differently."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 GAP = 1e-5
 """In an open mesh, vertices closer than about this share of the longest edge are merged."""
 
-FEW, HOLES, SLIVERS = 4, 0.05, 0.001
-"""Holes with few corners are filled if that adds no more than the second number's share of the
-surface, others if it adds no more than the third: the rim of a large hole says little about its
+HOLES, SLIVERS = 0.05, 0.001
+"""Holes with three or four corners are filled if that adds no more than the first share of the
+surface, others if it adds no more than the second: the rim of a large hole says little about its
 interior."""
 
 HOLLOW = 1e-6
@@ -53,33 +53,16 @@ def mended(vertices: Array, faces: Indices) -> tuple[Array, Indices, str]:
     return vertices, faces, ""
 
 
-def _body(vertices: Array, faces: Indices) -> trimesh.Trimesh:
-    import trimesh
-
-    return trimesh.Trimesh(vertices.copy(), faces.copy(), process=False)
-
-
-def _weld(mesh: trimesh.Trimesh) -> None:
-    """Merge vertices that are next to each other."""
-    step = GAP * float(np.ptp(mesh.vertices, axis=0).max())
-    mesh.merge_vertices(digits_vertex=int(np.ceil(-np.log10(step))))
-    faces = np.asarray(mesh.faces)
-    mesh.update_faces((faces != np.roll(faces, 1, axis=1)).all(axis=1))
-
-
-def _drop_twins(mesh: trimesh.Trimesh) -> None:
-    """Remove duplicate triangles."""
-    mesh.update_faces(mesh.unique_faces())
-
-
-def _fill(mesh: trimesh.Trimesh) -> None:
-    """Close small holes, and cracks along edges that two faces divide into different segments."""
-    vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
-    filled = [(len(rim), _zipped(vertices, rim)) for rim in _rims(faces)]
-    for few, share in ((True, HOLES), (False, SLIVERS)):
-        added = [triangles for corners, triangles in filled if (corners <= FEW) == few]
-        if added and areas_of(vertices, np.concatenate(added)).sum() <= share * mesh.area:
-            mesh.faces = np.concatenate([mesh.faces, *added])
+def zipped(vertices: Array, faces: Indices) -> Indices:
+    """The faces of a mesh that is made of the faces of a solid, with triangles in the cracks along
+    edges that two of these divide into different segments; the mesh as it is where it has none, or
+    holes that are no cracks."""
+    added = [_zip(vertices, rim) for rim in _rims(faces)]
+    if added and areas_of(vertices, np.concatenate(added)).sum() <= SLIVERS * (
+        areas_of(vertices, faces).sum()
+    ):
+        return np.concatenate([faces, *added])
+    return faces
 
 
 def _rims(faces: Indices) -> list[list[int]]:
@@ -102,7 +85,7 @@ def _rims(faces: Indices) -> list[list[int]]:
     return rims
 
 
-def _zipped(vertices: Array, rim: list[int]) -> Indices:
+def _zip(vertices: Array, rim: list[int]) -> Indices:
     """The triangles (m, 3) that close a hole. Each cuts off the corner whose neighbours are nearest
     to each other, so that a crack is closed from its ends."""
     corners, triangles = list(rim), []
@@ -111,6 +94,41 @@ def _zipped(vertices: Array, rim: list[int]) -> Indices:
         cut = int(np.linalg.norm(vertices[before] - vertices[after], axis=1).argmin())
         triangles.append((before[cut], corners.pop(cut), after[cut]))
     return np.array(triangles)
+
+
+def _body(vertices: Array, faces: Indices) -> trimesh.Trimesh:
+    import trimesh
+
+    return trimesh.Trimesh(vertices.copy(), faces.copy(), process=False)
+
+
+def _weld(mesh: trimesh.Trimesh) -> None:
+    """Merge vertices that are next to each other."""
+    step = GAP * float(np.ptp(mesh.vertices, axis=0).max())
+    mesh.merge_vertices(digits_vertex=int(np.ceil(-np.log10(step))))
+    faces = np.asarray(mesh.faces)
+    mesh.update_faces((faces != np.roll(faces, 1, axis=1)).all(axis=1))
+
+
+def _drop_twins(mesh: trimesh.Trimesh) -> None:
+    """Remove duplicate triangles."""
+    mesh.update_faces(mesh.unique_faces())
+
+
+def _fill(mesh: trimesh.Trimesh) -> None:
+    """Close small holes. They are found in a mesh of the same triangles with random vertices,
+    because trimesh adds no flat triangles, and flat ones close a side that has one vertex more than
+    its neighbour."""
+    from trimesh import repair
+
+    vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    for use_fan, most in ((False, HOLES), (True, SLIVERS)):
+        anywhere = _body(np.random.default_rng(0).random(vertices.shape), faces)
+        repair.fill_holes(anywhere, use_fan=use_fan)
+        filled = _body(vertices, np.asarray(anywhere.faces))
+        if len(filled.faces) > len(faces) and filled.area <= (1 + most) * mesh.area:
+            mesh.faces = filled.faces
+            return
 
 
 def _wind(mesh: trimesh.Trimesh) -> None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from factory.geometry.glb_reader import Colour
-from factory.geometry.mending import mended
+from factory.geometry.mending import zipped
 from factory.geometry.mesh_file import MeshFile, areas_of
 from factory.geometry.meshes import Array, Indices, is_closed, volume_of
 from factory.geometry.pieces import MOST_PIECES, components, submeshes
@@ -134,7 +134,8 @@ def most_of(areas: Array, colours: Sequence[Colour]) -> Colour:
 def solids_of(body: FileBody) -> tuple[FileBody, ...]:
     """The solids of a body, separated where they touch, each with its cavities and in its
     predominant colour; the body itself if it is one solid, or cannot be closed."""
-    vertices, faces, _ = mended(*body.mesh.merged())
+    vertices, drawn = body.mesh.merged()
+    faces = zipped(vertices, drawn)
     if not is_closed(faces):
         return (body,)
     number = shells(vertices, faces)
@@ -142,7 +143,8 @@ def solids_of(body: FileBody) -> tuple[FileBody, ...]:
     volume = np.array([volume_of(vertices, faces[number == n]) for n in range(count)])
     outer = np.flatnonzero(volume > 0)
     if len(outer) < 2 or count > MOST_PIECES:
-        return (body,)
+        whole = replace(body, mesh=MeshFile(((vertices, faces),)), colours=())
+        return (body if faces is drawn else whole,)
     boxes = np.array([_box(vertices[faces[number == n]].reshape(-1, 3)) for n in range(count)])
     of = np.arange(count)
     for n in np.flatnonzero(volume <= 0):
