@@ -276,6 +276,49 @@ def test_what_could_slide_is_lowered_where_its_line_lowers(tmp_path: Path, run: 
     assert (done.status, done.json["robots"], done.json["unintended_contacts"]) == (0, 3, 0)
 
 
+BESIDE_EACH_OTHER = {
+    "the best places of two labels are not on one line": """mix = 2 s1, 1 s1v;
+s1 = mate ( p0, p1, p2, p3 );
+p0 = atomic ( box = ( 0.1, 0.02, 0.01 ), pos = ( 0.00000, 0.00000, 0.00500 ) );
+p1 = atomic ( box = ( 0.06, 0.02, 0.06 ), pos = ( -0.01400, 0.00500, 0.04100 ) );
+p2 = atomic ( sphere = 0.015, pos = ( -0.01100, 0.00900, 0.08700 ) );
+p3 = atomic ( sphere = 0.015, pos = ( -0.01600, 0.01200, 0.11800 ) );
+s1v = mate ( p0, p1v, p2, p3 );
+p1v = atomic ( box = (0.05400,0.01800,0.05400), pos = ( -0.01400, 0.00500, 0.04100 ) );""",
+    "a carrier stands behind the beginning of its guidepath for one of two": """mix = 3 s6, 1 s6v;
+s1 = mate ( p0, p1 );
+s2 = mate ( p3, p2 );
+s3 = mate ( p4, p5 );
+s4 = mate ( p6, s1 );
+s5 = mate ( s2, s3 );
+s6 = mate ( s4, s5 );
+p0 = atomic ( box = ( 0.04, 0.06, 0.01 ), pos = ( 0.00000, 0.00000, 0.00500 ) );
+p1 = atomic ( box = ( 0.1, 0.01, 0.01 ), pos = ( 0.03100, -0.03400, 0.01600 ) );
+p2 = atomic ( sphere = 0.015, pos = ( 0.09700, -0.02500, 0.02600 ) );
+p3 = atomic ( sphere = 0.01, pos = ( 0.09700, -0.01600, 0.05200 ) );
+p4 = atomic ( box = ( 0.04, 0.06, 0.01 ), pos = ( -0.03950, -0.01000, 0.01600 ) );
+p5 = atomic ( box = ( 0.06, 0.02, 0.06 ), pos = ( 0.01700, -0.03000, 0.05200 ) );
+p6 = atomic ( box = ( 0.02, 0.1, 0.04 ), pos = ( 0.10100, 0.02700, 0.08250 ) );
+s2v = mate ( p3v, p2 );
+s3v = mate ( p4v, p5 );
+s5v = mate ( s2v, s3v );
+s6v = mate ( s4, s5v );
+p3v = atomic ( sphere = 0.00700, pos = ( 0.09700, -0.01600, 0.05200 ) );
+p4v = atomic ( box = (0.02800,0.04200,0.00700), pos = ( -0.03950, -0.01000, 0.01600 ) );""",
+}
+"""Families whose layouts were refused, each for a cause of its own."""
+
+
+@pytest.mark.parametrize("cause", BESIDE_EACH_OTHER)
+def test_labels_of_a_line_are_held_where_its_carrier_can_stand(
+    cause: str, tmp_path: Path, run: Terminal
+) -> None:
+    file = tmp_path / "family.pag"
+    file.write_text(BESIDE_EACH_OTHER[cause])
+    done = run("run", file, "--units", 4, "--jitter", 0.3, "--json")
+    assert (done.status, done.json["unintended_contacts"]) == (0, 0)
+
+
 def test_products_end_at_one_height(shaped: Path, run: Terminal) -> None:
     """A product that is 5 mm higher would hang over the tray that takes it away."""
     base = "base = atomic ( box = ( 0.2, 0.1, 0.02 ), pos = ( 0, 0, 0.01 ) );"

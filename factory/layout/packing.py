@@ -123,7 +123,7 @@ class Packing:
             alternatives = (self._guests(way, stop, r, side) for r, side in sides.items())
             for guests in product(*alternatives):
                 if not way.piles:
-                    yield self._added(way, stop, 0.0, guests)
+                    yield self._added(way, stop, up(self._back(stop, guests)), guests)
                 else:
                     yield from self._stations(way, stop, guests, least)
 
@@ -162,7 +162,7 @@ class Packing:
         self, way: _Way, stop: Stop, guests: Sequence[Guest], least: float
     ) -> Iterator[_Way]:
         """The stations at which something comes clear, as long as the way there is worth it."""
-        least = up(least + max(0.0, -min(self._further(stop, guests).values(), default=0.0)))
+        least = up(least + self._back(stop, guests))
         tried = {least, *self._next(way, least)}
         for guest in guests:
             tried |= way.beside[guest.side].starts(guest.outline, least)
@@ -196,6 +196,10 @@ class Packing:
             way.time + time,
             way.cost + self._cost(way, time, station, guests, len(stop.unlike)),
         )
+
+    def _back(self, stop: Stop, guests: Iterable[Guest]) -> float:
+        """How far behind its station it stands for the operation of a stop farthest back [m]."""
+        return max(0.0, -min(self._further(stop, guests).values(), default=0.0))
 
     def _further(self, stop: Stop, guests: Iterable[Guest]) -> dict[int, float]:
         """How much further than at its station it stands for the operations of a stop [m]."""

@@ -79,10 +79,12 @@ class _Builder:
         guests = stop.guests
         if self.choose:
             self.sides |= self._later(guests) if self.piles else self._mates(guests)
+        back = max(0.0, -min(self.further(stop).values(), default=0.0))
         if self.piles:
             free = (self._free(guest, self.sides[guest]) for guest in guests)
-            back = max(0.0, -min(self.further(stop).values(), default=0.0))
             self.station = up(max(self.own.least(stop, self.station) + back, *free))
+        else:
+            self.station = up(back)
         for guest in guests:
             frontier, high = self.frontier[self.sides[guest]], self.outlines[guest].high
             for layer in LAYERS:

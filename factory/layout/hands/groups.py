@@ -137,10 +137,21 @@ def in_one_place(options: Sequence[Groups]) -> list[Groups]:
 
 
 def on_one_line(options: Sequence[Groups], way: tuple[float, float]) -> list[Groups]:
-    """The groups of each label that are as far along a way of the floor as some of every other."""
+    """The groups of each label that are equally far along a way of the floor: as far as is the
+    least bad for all labels together, in the middle if several are."""
     lines = [np.round(option.across(way), 5) for option in options]
-    common = reduce(np.intersect1d, lines)
-    return [o.among(np.isin(line, common)) for o, line in zip(options, lines, strict=True)]
+    common, every = reduce(np.intersect1d, lines), np.concatenate(lines)
+    if not len(common):
+        return [option.among(np.zeros(len(option), bool)) for option in options]
+    both = [*zip(options, lines, strict=True)]
+    tips: tuple[TipName, ...] = "suction", "pin"
+    costs = [
+        min(max(float(o.cost(tip)[line == at].min()) for o, line in both) for tip in tips)
+        for at in common
+    ]
+    off = np.abs(common - (every.min() + every.max()) / 2)
+    best = common[np.lexsort((off, np.round(costs, 3)))[0]]
+    return [option.among(line == best) for option, line in both]
 
 
 def bad(share: Array, pinned: Array) -> Array:
