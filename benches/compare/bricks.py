@@ -93,8 +93,7 @@ once, in a process of its own; the cache is empty when a product's first one beg
 the processor: the machine was busy with other work. *Clean run*:
 exit status 0, that is, all units made, the record refines the net, the monitor agrees, no
 unintended contact. *Reason*: the [codes](reference/diagnostics.md) of the
-verdict: the Island Hopper as it is drawn has parts that overlap. *Blocked*: operations of the
-tree, taken as it is drawn, in which parts pass through each other on straight ways, as `check`
+verdict. *Blocked*: operations of the tree, taken as it is drawn, in which parts pass through each other on straight ways, as `check`
 says; such pairs do not collide, and a run names them.
 
 What ConstructionBots.jl publishes for LEGO models:
@@ -113,6 +112,5 @@ Not the same problem. Theirs: mobile robots that carry parts over a free floor, 
 alone or in teams, kept apart while they move; how parts are joined is abstracted away. Ours: as
 many robots as the tree has roles, on guidepaths, laid out and proved free of deadlock before
 anything moves; with hands, contact and welds when it runs. The rocket is the same set as a tree
-without shapes: each part is a default box. Its factory is built, not run, here; where it has no
-row, it is among the [large products](benchmarks.md#large-products), with an older figure. Fewer
-robots for it (`--robots 250`, as many as theirs) are found by a search that was not measured."""
+without shapes: each part is a default box. Its factory is built, not run, here.
+Fewer robots for it (`--robots 250`, as many as theirs) need a search that was not measured."""
