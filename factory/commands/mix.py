@@ -11,9 +11,7 @@ from factory.commands.outputs import writable
 from factory.commands.requests import OutputOptions
 from factory.support.console import emit, say
 from factory.support.errors import Diagnostic, InputError
-
-MOST = 60
-"""The most units in a period."""
+from factory.support.settings import MOST_UNITS
 
 
 @click.command()
@@ -67,7 +65,7 @@ def _counts(text: str) -> tuple[int, int]:
     words = text.split(":")
     if len(words) == 2 and all(w.isascii() and w.isdecimal() and len(w) <= 2 for w in words):
         first, second = map(int, words)
-        if first and second and first + second <= MOST:
+        if first and second and first + second <= MOST_UNITS:
             return first, second
-    message = f"--count takes two numbers from 1, together at most {MOST}, not '{text}'"
+    message = f"--count takes two numbers from 1, together at most {MOST_UNITS}, not '{text}'"
     raise InputError(Diagnostic("BadValue", message, None, "for example --count 3:1"))

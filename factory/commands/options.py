@@ -328,5 +328,19 @@ PICTURE = options(
     click.option("--poster", type=PATH, help="Write a still of a film's best moment (.png)."),
     gathered(PictureOptions, "shown"),
 )
+
+
+def address(port: int) -> Callable[[F], F]:
+    """Where a server listens; `port`: the default."""
+    ports, here = click.IntRange(0, 65535), "127.0.0.1"
+    free = "Port to listen on; 0: any free port."
+    local = "Address to listen on; local connections only by default."
+    return options(
+        click.option("--port", type=ports, default=port, help=free),
+        click.option("--host", default=here, help=local),
+        click.option("--expose", is_flag=True, help="Allow a HOST that other machines can reach."),
+    )
+
+
 OF_A_PICTURE = tuple(field.name for field in fields(PictureOptions))
 """The parameters of PICTURE."""

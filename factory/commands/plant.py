@@ -8,7 +8,7 @@ import click
 
 from factory.commands.grouped import Grouped
 from factory.commands.monitor import tell_failures
-from factory.commands.options import FLOOR, LENIENT, MOTION, OUTPUT, RUN, SOURCE
+from factory.commands.options import FLOOR, LENIENT, MOTION, OUTPUT, RUN, SOURCE, address
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.run import summarise
 from factory.commands.warnings import announced
@@ -23,16 +23,7 @@ SCAN = 10
 @click.command(cls=Grouped)
 @SOURCE
 @RUN
-@click.option(
-    "--port",
-    type=click.IntRange(0, 65535),
-    default=4840,
-    help="Port to listen on; 0: any free port.",
-)
-@click.option(
-    "--host", default="127.0.0.1", help="Address to listen on; local connections only by default."
-)
-@click.option("--expose", is_flag=True, help="Allow a HOST that other machines can reach.")
+@address(4840)
 @click.option(
     "--scan",
     type=click.IntRange(1, 1000),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -12,6 +13,9 @@ from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.support.console import emit, say
 from factory.support.progress import Waiting
+
+if TYPE_CHECKING:
+    from factory.study.revision import Pin
 
 
 @click.command()
@@ -33,7 +37,7 @@ def revise(
     new: Path,
     folders: tuple[Path, ...],
     output: Path | None,
-    pin: str,
+    pin: Pin,
     afresh: bool,
     picture: Path | None,
     out: OutputOptions,
@@ -41,7 +45,7 @@ def revise(
     """Say what stays of the factory of OLD.pag in that of NEW.pag, and lay it out so that most
     does. OLD may be a plan.json."""
     from factory.nets.verify import proved
-    from factory.study.revision import PINS, revised
+    from factory.study.revision import revised
     from factory.support.files import write_all
     from factory.timing.prediction import pace
 
@@ -51,7 +55,7 @@ def revise(
     before = options.project(out.silent)
     after = replace(options, file=new).project(out.silent, before.settings)
     with Waiting("laying out with what stays", out.silent):
-        found = revised(before, after, PINS[pin])
+        found = revised(before, after, pin)
         verdict = proved(found.new.layout.factory.net)
         seconds = pace(after.layout, after.settings)[0].seconds if afresh else None
     files: list[str] = []

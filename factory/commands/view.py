@@ -10,7 +10,18 @@ from typing import TYPE_CHECKING
 import click
 
 from factory.commands.grouped import Grouped
-from factory.commands.options import DRAW, FAULTS, FLOOR, MOTION, OUTPUT, RELAY, RUNS, SOURCE, WIP
+from factory.commands.options import (
+    DRAW,
+    FAULTS,
+    FLOOR,
+    MOTION,
+    OUTPUT,
+    RELAY,
+    RUNS,
+    SOURCE,
+    WIP,
+    address,
+)
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced
 from factory.simulation.options import RunOptions
@@ -26,16 +37,7 @@ FOR_EVER = 10**9
 @click.command(cls=Grouped)
 @SOURCE
 @FAULTS
-@click.option(
-    "--port",
-    type=click.IntRange(0, 65535),
-    default=8765,
-    help="Port to listen on; 0: any free port.",
-)
-@click.option(
-    "--host", default="127.0.0.1", help="Address to listen on; local connections only by default."
-)
-@click.option("--expose", is_flag=True, help="Allow a HOST that other machines can reach.")
+@address(8765)
 @click.option("--paused", is_flag=True, help="Wait until Play is pressed.")
 @DRAW
 @WIP

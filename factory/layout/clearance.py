@@ -64,8 +64,8 @@ MOST = 100
 
 def certify(layout: Layout) -> Certificate:
     """The clearance certificate of a layout. Never raises; see `Certificate.holds`."""
-    factory, search = layout.factory, ClearanceSearch.of(layout)
-    swept, faults = search.swept, search.all_faults()
+    factory, (search, faults) = layout.factory, searched(layout)
+    swept = search.swept
     apart = Exclusions() if faults else exclusions(layout)
     top = max(region.z[1] for region in swept)
     return Certificate(
@@ -88,6 +88,21 @@ def certify(layout: Layout) -> Certificate:
     )
 
 
+def searched(layout: Layout) -> tuple[ClearanceSearch, list[Fault]]:
+    """The search among all regions of a layout, and what is wrong with it but for machines that are
+    near each other in two places of the net: the faults of its guidepaths, of regions, of what
+    waits, of what is lowered, and of what is taken away."""
+    found = piles(layout.factory, layout.product)
+    search = ClearanceSearch(layout, regions(layout, found))
+    return search, [
+        *islice(embedding_faults(layout), MOST),
+        *islice(search.faults(), MOST),
+        *islice(_standoffs(layout, found), MOST),
+        *islice(_raised(layout, found), MOST),
+        *_uneven(layout, found),
+    ]
+
+
 def separation(one: Box, other: Box) -> float:
     """The distance of two boxes [m]; negative by how deep they overlap."""
     x = max(other[0] - one[1], one[0] - other[1])
@@ -108,24 +123,6 @@ class ClearanceSearch:
         self.shared: dict[tuple[int, int, int, int], Shared] = {}
         self.pairs = 0
         self._members = [frozenset(o.robots) for o in layout.factory.operations]
-
-    @classmethod
-    def of(cls, layout: Layout) -> ClearanceSearch:
-        """That of all regions of a layout."""
-        return cls(layout, regions(layout, piles(layout.factory, layout.product)))
-
-    def all_faults(self) -> list[Fault]:
-        """What is wrong with the layout but for machines that are near each other in two places of
-        the net: the faults of its guidepaths, of regions, of what waits and of what is lowered."""
-        layout = self.layout
-        found = piles(layout.factory, layout.product)
-        return [
-            *islice(embedding_faults(layout), MOST),
-            *islice(self.faults(), MOST),
-            *islice(_standoffs(layout, found), MOST),
-            *islice(_raised(layout, found), MOST),
-            *_uneven(layout, found),
-        ]
 
     def faults(self) -> Iterator[Fault]:
         """Every pair that is too near with no reason."""

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from math import ceil
 
 from factory.geometry.solids import Product
-from factory.layout.certificate import Fault
-from factory.layout.clearance import ClearanceSearch, certify
+from factory.layout.certificate import Certificate, Fault
+from factory.layout.clearance import certify, searched
 from factory.layout.dimensions import TOOL_TRAVEL, Clearance, up
 from factory.layout.drafting import LayoutDraft
 from factory.layout.durations import Pace, cycle_of
@@ -94,6 +94,7 @@ class Pinning:
         self.payloads, self.on = payload_boxes(factory, product), carriers(factory)
         self.task = Task(factory, clearance, pace, [1.0] * len(self.on), hands=hands)
         self._shapes: dict[tuple[int, ...], list[Shape]] = {}
+        self._certificates: dict[Stretch, Certificate] = {}
         self.faults: tuple[Fault, ...] = ()
 
     def layout(self) -> Layout | None:
@@ -104,7 +105,7 @@ class Pinning:
             best = self._placed(best, robot)
         for _ in range(AGAIN):
             best = self._cleared(best)
-            certificate = certify(best.layout)
+            certificate = self._certificate(best)
             if certificate.holds:
                 return replace(best.layout, certificate=certificate)
             self.faults = certificate.faults
@@ -112,8 +113,13 @@ class Pinning:
             clear = [way for way in ways if not way.faults]
             if not clear or best.faults:
                 return None
-            best = min(clear, key=lambda way: (len(certify(way.layout).faults), way.score))
+            best = min(clear, key=lambda way: (len(self._certificate(way).faults), way.score))
         return None
+
+    def _certificate(self, seen: _Seen) -> Certificate:
+        if seen.stretch not in self._certificates:
+            self._certificates[seen.stretch] = certify(seen.layout)
+        return self._certificates[seen.stretch]
 
     def _begun(self) -> _Seen:
         """The pinned values, and those of a packed layout for all else."""
@@ -292,7 +298,7 @@ class Pinning:
             Stretched([*far], [*stretch.stations], sides),
         )
         layout = draft.layout(self.pins.travel[0])
-        faults = tuple(ClearanceSearch.of(layout).all_faults())
+        faults = tuple(searched(layout)[1])
         lacking = sum(fault.lacking or JAM for fault in faults)
         score = lacking + WEIGHT * self.pins.displaced(layout) + LENGTH * layout.guidepath_length
         score += TIME * cycle_of(layout, self.task.pace)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
@@ -18,6 +19,9 @@ Turns = Sequence[Sequence[int]]
 robot (index) that does its tour. NOBODY does the tours of products that are not made in it."""
 
 NOBODY = -1
+
+NAME = re.compile(r"r[1-9][0-9]*")
+"""A name of a robot."""
 
 
 def in_turn(label: str, turn: int) -> str:
@@ -60,13 +64,8 @@ class Plan:
             if wrong := [value for value in values if not least <= value <= most]:
                 words = f"whole numbers from {least} to {most}, not {wrong[0]}"
                 raise ValueError(f"{name} must be {words}")
-        numbers = [name.removeprefix("r") for name in self.names]
-        valid = all(n.isascii() and n.isdecimal() and n[0] != "0" for n in numbers)
-        if (
-            not valid
-            or len({*self.names}) < len(numbers)
-            or "".join(self.names) != "".join(f"r{n}" for n in numbers)
-        ):
+        valid = all(NAME.fullmatch(name) for name in self.names)
+        if not valid or len({*self.names}) < len(self.names):
             raise ValueError("names must be different names of robots, as 'r9'")
 
     @property

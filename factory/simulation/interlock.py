@@ -72,8 +72,8 @@ class PlantInterlock:
         grips = [robot for robot in robots if now.grip[robot] != before.grip[robot]]
         self.held_back.difference_update(jobs, grips)
         for robot in jobs:
-            if 1 <= before.job[robot] <= len(self.factory.operations):
-                self._leave(robot, self.factory.operations[before.job[robot] - 1])
+            if (left := self._operation(before.job[robot])) is not None:
+                self._leave(robot, left)
         for robot in grips:
             if not now.grip[robot]:
                 self._open(robot)
@@ -86,19 +86,22 @@ class PlantInterlock:
 
     # jobs
 
+    def _operation(self, job: int) -> Operation | None:
+        """The operation of a job, None where there is none."""
+        operations = self.factory.operations
+        return operations[job - 1] if 1 <= job <= len(operations) else None
+
     def _follows(self, robot: int) -> bool:
         """Whether a robot is not the carrier of its job: carriers begin."""
-        job = self.commands.job[robot]
-        return not any(o.index == job - 1 and o.carrier == robot for o in self.factory.operations)
+        operation = self._operation(self.commands.job[robot])
+        return operation is None or operation.carrier != robot
 
     def _enter(self, robot: int, job: int) -> None:
         """A robot takes up a job; if it is the carrier, the operation starts."""
-        name = self.factory.robots[robot].name
-        if not 1 <= job <= len(self.factory.operations):
+        name, operation = self.factory.robots[robot].name, self._operation(job)
+        if operation is None:
             self._refuse(robot, f"{name} takes up job {job}: there is no such operation")
-            return
-        operation = self.factory.operations[job - 1]
-        if robot not in operation.robots:
+        elif robot not in operation.robots:
             self._refuse(robot, f"{name} has no part in {_name(operation)}")
         elif robot in self.grips.closed:
             what = f"{name} takes up {_name(operation)} before its grip has opened"
@@ -194,12 +197,10 @@ class PlantInterlock:
 
     def _under_way(self, robot: int) -> Operation | None:
         """The operation that a robot has as its job, if that has started."""
-        job = self.commands.job[robot]
-        if not 1 <= job <= len(self.factory.operations):
+        operation = self._operation(self.commands.job[robot])
+        if operation is None or robot not in operation.robots:
             return None
-        operation = self.factory.operations[job - 1]
-        taking_part = robot in operation.robots and self.marked[operation.place]
-        return operation if taking_part else None
+        return operation if self.marked[operation.place] else None
 
     def _far(self, operation: Operation) -> str:
         """Which axis is further than a grip reaches from where parts change hands, "" for none."""

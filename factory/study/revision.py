@@ -31,9 +31,7 @@ from factory.support.errors import Diagnostic, RunError, usage_error
 from factory.timing.prediction import pace
 
 Pin = Literal["all", "hands", "none"]
-
-PINS: dict[str, Pin] = {"all": "all", "hands": "hands", "none": "none"}
-"""What can be pinned, by name."""
+"""What is pinned of the old layout."""
 
 SIMPLE = "give the PAG: `revise` compiles it with a robot for each tour"
 
