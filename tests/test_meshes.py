@@ -13,11 +13,12 @@ import pytest
 import trimesh
 
 from factory.geometry.mending import zipped
-from factory.geometry.mesh_file import EXPECTED, UnreadableMesh
+from factory.geometry.mesh_file import EXPECTED, MeshFile, UnreadableMesh
 from factory.geometry.mesh_reader import read_mesh
 from factory.geometry.meshes import is_closed, volume_of
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import Product
+from factory.importing.bodies import FileBody, solids_of
 from factory.problem.pag import PAG
 from factory.support.errors import InputError
 from tests.command_line import Terminal
@@ -214,6 +215,8 @@ def test_faces_of_a_solid_are_zipped_where_they_divide_an_edge_differently() -> 
     closed = zipped(vertices, faces)
     assert not is_closed(faces) and is_closed(closed)
     assert volume_of(vertices, closed) == pytest.approx(5 * np.sin(np.pi / 50) * 0.05**2)
+    (solid,) = solids_of(FileBody("p", MeshFile(((vertices, faces),))))
+    assert is_closed(solid.mesh.merged()[1])
     open_box = faces[: len(faces) // 2]
     assert zipped(vertices, open_box) is open_box
 
