@@ -5,16 +5,19 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from itertools import combinations
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from factory.layout import exclusions
 from factory.layout.certificate import ALWAYS, KINDS, PAYLOAD_BODY, STATIONS, Certificate, Region
 from factory.layout.clearance import ClearanceSearch, certify, separation
 from factory.layout.crossings import touching
 from factory.layout.dimensions import PAYLOADS, SIDE
 from factory.layout.layout import Layout
+from factory.pipeline import read
 from tests.layout_values import (
     DRAWN,
     Drawn,
@@ -305,3 +308,16 @@ def test_only_who_is_coupled_may_share_room() -> None:
     assert faults((1, "part3", mate), (2, "sub2", ALWAYS)) == 0
     assert faults((1, "part3", mate), (4, "part1", ALWAYS)) == 1
     assert faults((1, "part3", mate), (4, "part1", alone)) == 1
+
+
+def test_robots_without_a_common_operation_share_floor_where_the_net_keeps_them_apart(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Two carriages of this family are nearer than the clearance, in places that one circuit with
+    one token goes through; without their circuits the layout is refused."""
+    layout = read(Path(__file__).parent / "data" / "crossing.pag").layout
+    assert layout.certificate is not None and layout.certificate.holds
+    (near,) = layout.certificate.crossing
+    assert near.robots == ("r10", "r12")
+    monkeypatch.setattr(exclusions, "_circuits", lambda net, pairs: {})
+    assert near in certify(layout).faults

@@ -185,7 +185,8 @@ class Certificate:
     end stops are beyond the regions by less than half of that. `layers` gives each layer's z range
     and `gaps` the vertical distance to the one below [m]; where a coupled region is nearer to
     another robot's, `shared` names the junction. `apart`: what keeps machines apart
-    that come near. It holds if there is no fault; at most `clearance.MOST` faults are listed.
+    that come near; `crossing`: the robots that share floor without a common operation, as faults
+    but for that. It holds if there is no fault; at most `clearance.MOST` faults are listed.
     """
 
     clearance: float
@@ -198,6 +199,7 @@ class Certificate:
     faults: tuple[Fault, ...] = ()
     pairs: int = 0
     apart: Exclusions = field(default_factory=Exclusions, repr=False)
+    crossing: tuple[Fault, ...] = field(default=(), repr=False)
 
     @property
     def holds(self) -> bool:

@@ -5,8 +5,10 @@ guidepaths and the parts' real geometry. Two regions in one layer have to be a c
 unless they are never taken at once. They are not where a payload is *coupled*, on the way that it
 goes in the mode of operation X alone, and the other region is that of a payload of another robot of
 X, which is then in that very mode; nor where both are coupled, in modes that have a robot in
-common. A coupled pair in one mode is looked at again: where the carrier brings a pile as well, the
-other waits at its standoff. Near linear.
+common; nor, of robots that have no operation in common (*crossing*), where the coordinated net
+excludes or orders all places in which they are near (`exclusions`). A coupled pair in one mode is
+looked at again: where the carrier brings a pile as well, the other waits at its standoff. Near
+linear.
 """
 
 from __future__ import annotations
@@ -66,7 +68,10 @@ def certify(layout: Layout) -> Certificate:
     """The clearance certificate of a layout. Never raises; see `Certificate.holds`."""
     factory, (search, faults) = layout.factory, searched(layout)
     swept = search.swept
+    faults = [fault for fault in faults if fault not in search.crossing]
     apart = Exclusions() if faults else exclusions(layout)
+    if faults or apart.faults:
+        faults += search.crossing
     top = max(region.z[1] for region in swept)
     return Certificate(
         layout.clearance,
@@ -85,6 +90,7 @@ def certify(layout: Layout) -> Certificate:
         (*faults[:MOST], *apart.faults[:MOST]),
         search.pairs,
         apart,
+        tuple(search.crossing),
     )
 
 
@@ -115,13 +121,15 @@ def separation(one: Box, other: Box) -> float:
 class ClearanceSearch:
     """Finds the pairs of regions that are too near, and why some of them may be.
 
-    `pairs` counts those looked at, to tell how the work grows.
+    `pairs` counts those looked at, to tell how the work grows; `crossing`: the faults of robots
+    without a common operation, which the coordinated net may keep apart.
     """
 
     def __init__(self, layout: Layout, swept: list[Region]) -> None:
         self.layout, self.swept = layout, swept
         self.shared: dict[tuple[int, int, int, int], Shared] = {}
         self.pairs = 0
+        self.crossing = list[Fault]()
         self._members = [frozenset(o.robots) for o in layout.factory.operations]
 
     def faults(self) -> Iterator[Fault]:
@@ -130,7 +138,10 @@ class ClearanceSearch:
             here = [region for region in self.swept if region.layer == layer]
             for one, other in self.near(here):
                 if not self.settled(one, other):
-                    yield self._fault(one, other)
+                    near = self._fault(one, other)
+                    if self._cross(one, other):
+                        self.crossing.append(near)
+                    yield near
 
     def near(self, here: list[Region]) -> Iterator[tuple[Region, Region]]:
         """Pairs in one layer that are less than a clearance apart in plan: of different robots,
@@ -160,6 +171,12 @@ class ClearanceSearch:
         if not kinds <= {*LOADS}:
             return False
         return self._joined(one, other) or self._joined(other, one) or self._in_turn(one, other)
+
+    def _cross(self, one: Region, other: Region) -> bool:
+        """Whether they are regions of robots, not of stations, that have no operation in common."""
+        robots = self.layout.factory.robots
+        mine, others = (robots[region.robot].operations for region in (one, other))
+        return {one.kind, other.kind}.isdisjoint(STATIONS) and {*mine}.isdisjoint(others)
 
     def _serves(self, region: Region) -> bool:
         """Whether the outfeed takes a region in: itself, the robot under it, the product let go."""

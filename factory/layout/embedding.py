@@ -60,7 +60,7 @@ def _parted(layout: Layout, certificate: Certificate) -> dict[int, float]:
     its payload is clear of all that passes: of two that are too near, the one that needs less [m].
     """
     carried, found = [r for r in certificate.regions if r.kind in LOADS], dict[int, float]()
-    for fault in certificate.faults:
+    for fault in {*certificate.faults, *certificate.crossing}:
         pair = [r.index for r in layout.factory.robots if r.name in fault.robots]
         ways = list[tuple[float, int]]()
         for robot, other in permutations(pair) if len(pair) == 2 else ():
