@@ -234,8 +234,9 @@ ALL = [SEEDS, pytest.param(range(24), marks=pytest.mark.slow)]
 
 
 def outcomes(seeds: range = SEEDS, touching: bool = False) -> list[tuple[float, float, float]]:
-    """Of random products and settings: the timestep, the error predicted and the largest measured
-    figure [mm], of those that have a good timestep; things may touch if told so."""
+    """Of random products and settings: the timestep, the error predicted for a drive and the
+    largest measured, half of that of two drives that meet [mm], of those that have a good timestep;
+    things may touch if told so."""
     found = []
     for seed in seeds:
         settings, jitter = asked(seed)
@@ -250,9 +251,8 @@ def outcomes(seeds: range = SEEDS, touching: bool = False) -> list[tuple[float, 
                 floor, RunRequest(units=2, seed=seed, jitter=jitter, settings=settings)
             )
             assert simulation.request.settings == made
-            found.append(
-                (made.step, 1e3 * error, max(measured(simulation, touching=touching).values()))
-            )
+            tracking, *of_two = measured(simulation, touching=touching).values()
+            found.append((made.step, 1e3 * error, max(tracking, max(of_two) / 2)))
     return found
 
 

@@ -3,7 +3,7 @@
 A reference changes its acceleration at once. In the step in which it does, a drive is told the
 speed of half a step before with the new acceleration, and pushes for the new one: it gets a wrong
 speed, which it then takes away. How far off it gets meanwhile is what is predicted. Hands that meet
-are no farther apart, and welds give no more, than drives are off (docs/decisions/timestep.md).
+are no farther apart, and welds give no more, than two drives are off (docs/decisions/timestep.md).
 """
 
 from __future__ import annotations
@@ -135,8 +135,8 @@ def _usual(found: Sequence[Settings]) -> Settings:
 
 
 def predicted_error(settings: Settings, layout: Layout, jitter: float = 0.0) -> float:
-    """The largest error of an axis against its reference that a run may show [m], and so the
-    largest gap and residual of a weld."""
+    """The largest error of an axis against its reference that a run may show [m]; a gap between two
+    robots, and the residual of a weld, may be twice that."""
     return max(axis.error(settings) for axis in _axes(settings, layout, jitter))
 
 
