@@ -554,7 +554,8 @@ def test_a_robot_seen_to_leave_first_as_operations_end_has_not_left_before() -> 
     """Within a tick of another look its setpoint is not counted: that it stood is all that is
     known, however long it is that it came."""
     every = np.arange(1)
-    anatomy = SimpleNamespace(slide=every, dof=every, drive=every)
+    bent = SimpleNamespace(robots=())
+    anatomy = SimpleNamespace(slide=every, dof=every, drive=every, bent=bent)
 
     def seen(time: float, at: float, at_end: bool = True) -> Observation:
         return Observation(

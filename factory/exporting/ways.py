@@ -8,7 +8,7 @@ come near, and their circuits, are in the clearance certificate. Stationary mach
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from factory.layout.exclusions import awaited_positions, coordinated
 from factory.layout.feeding import outlets_of
@@ -56,6 +56,7 @@ class _Writer:
         robot = self._model.factory.robots[one.robot].name
         if name == robot:
             bodies, joints = [names.carriage(robot)], [names.slide(robot)]
+            joints += [names.slide_across(robot)] * (one.bodies.bent is not None)
             if one.robot in self._model.factory.strokes:
                 bodies, joints = [*bodies, names.head(robot)], [*joints, names.lift(robot)]
             scales = [self._scales[joint] for joint in joints]
@@ -80,10 +81,19 @@ def _way(
     def span(scale: Scale, ends: Span) -> list[float]:
         return sorted(round(scale.at(end), 6) for end in ends)
 
+    def legs(first: Span, second: Span) -> Iterator[tuple[Span, ...]]:
+        """The spans of the joints, leg by leg where the guidepath has bends."""
+        if one.bodies.bent is None:
+            yield first, second
+            return
+        for points in one.bodies.bent.framed(min(first), max(first)):
+            (a, b), (c, d) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+            yield (a, c), (b, d), second
+
     return {
         "machine": one.machine,
         "bodies": bodies,
         "joints": joints,
         "welds": welds,
-        "spans": [[*map(span, scales, sweep)] for sweep in one.sweeps],
+        "spans": [[*map(span, scales, leg)] for sweep in one.sweeps for leg in legs(*sweep)],
     }

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from itertools import islice
+from itertools import product as combinations
 
 import numpy as np
 import shapely
@@ -229,11 +230,12 @@ def _standoffs(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
         carrier = operation.template.carrier - 1
         if operation.before[carrier] == NOPART or len(operation.inputs) == 1:
             continue
-        pile = _way(layout, found, operation, carrier)
+        piles = _way(layout, found, operation, carrier)
         for slot, label in enumerate(operation.before):
             if slot == carrier or label == NOPART:
                 continue
-            guest = _way(layout, found, operation, slot)
+            guests = _way(layout, found, operation, slot)
+            guest = guests[0]
             before, visit = layout.ways[operation.index, guest.robot]
             room = before.at - visit.at - layout.standoff(operation, slot)
             if room < -TOLERANCE:
@@ -244,7 +246,10 @@ def _standoffs(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
                 )
                 yield fault(layout.factory, message, guest, lacking=-room)
             if slot != operation.lowered:
-                yield from _met(layout, pile, guest)
+                pairs = combinations(piles, guests)
+                yield from _met(
+                    layout, *min(pairs, key=lambda pair: separation(pair[0].box, pair[1].box))
+                )
 
 
 def _raised(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
@@ -284,14 +289,18 @@ def _uneven(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
             yield fault(factory, message, factory.dropoff.carrier, lacking=above)
 
 
-def _way(layout: Layout, found: Mapping[str, Pile], operation: Operation, slot: int) -> Region:
+def _way(
+    layout: Layout, found: Mapping[str, Pile], operation: Operation, slot: int
+) -> list[Region]:
     """What a robot's payload sweeps in a mode before its gate opens."""
     robot = operation.robots[slot]
     label = operation.before[slot]
     before, visit = layout.ways[operation.index, robot]
     pile, end = found[label].carried(visit), visit.at + layout.standoff(operation, slot)
-    box = layout.guidepaths[robot].sweep(pile.box, before.at, end)
-    return Region(robot, PAYLOADS, PAYLOAD_BODY, box, pile.z, label, operation.index)
+    return [
+        Region(robot, PAYLOADS, PAYLOAD_BODY, box, pile.z, label, operation.index)
+        for box in layout.guidepaths[robot].sweeps(pile.box, before.at, end)
+    ]
 
 
 def _met(layout: Layout, pile: Region, guest: Region) -> Iterator[Fault]:

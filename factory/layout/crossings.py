@@ -10,6 +10,7 @@ integers.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from math import dist
 
 import numpy as np
@@ -17,7 +18,7 @@ import shapely
 from numpy.typing import NDArray
 
 from factory.layout.certificate import Fault, fault
-from factory.layout.guidepath import Point2
+from factory.layout.guidepath import Guidepath, Point2
 from factory.layout.layout import Layout, carriers
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
@@ -48,8 +49,16 @@ def _grid(point: Point2) -> Grid:
 def _off_grid(layout: Layout, robot: int) -> Iterator[Fault]:
     factory, path = layout.factory, layout.guidepaths[robot]
     name = factory.robots[robot].name
-    ends = *path.a, *path.carriage(path.reach), *path.carriage(path.length)
-    if not all(abs(v * 1000 - round(v * 1000)) < 1e-3 for v in ends):
+    corners = [at for bend in path.bends for at in (bend.at, bend.end)]
+    within = (v for at in corners for v in path.corner(at))
+    ends = *path.a, *path.carriage(path.reach), *path.carriage(path.length), *within
+    if corners and not _rounded(corners, path):
+        message = (
+            f"{name}: the corners of its guidepath are not {2000 * path.rounding:g} mm apart, and"
+            f" {1000 * path.rounding:g} mm from its ends"
+        )
+        yield fault(factory, message, robot)
+    elif not all(abs(v * 1000 - round(v * 1000)) < 1e-3 for v in ends):
         message = f"{name}: its guidepath, {ends[2:4]} to {ends[4:]}, is not in whole millimetres"
         yield fault(factory, message, robot)
     elif not (path.travel > 0 and path.reach > 0):
@@ -112,14 +121,31 @@ def _ends_at(layout: Layout, robot: int, operation: Operation) -> Iterator[Fault
 
 def _crossings(layout: Layout) -> Iterator[Fault]:
     """Segments along the axes meet where their bounding boxes do."""
-    ends = [(_grid(g.carriage(g.reach)), _grid(g.carriage(g.length))) for g in layout.guidepaths]
-    points = np.array(ends, np.int64).reshape(-1, 2, 2)
+    legs = [(i, leg) for i, path in enumerate(layout.guidepaths) for leg in _legs(path)]
+    points = np.array([leg for _, leg in legs], np.int64).reshape(-1, 2, 2)
     low, high = points.min(axis=1), points.max(axis=1)
-    for i, j in touching(low, high):
-        x, y = (int(v) / 1000 for v in np.maximum(low[i], low[j]))
+    for first, second in touching(low, high):
+        (i, _), (j, _) = legs[first], legs[second]
+        if i == j:
+            continue
+        x, y = (int(v) / 1000 for v in np.maximum(low[first], low[second]))
         names = [layout.factory.robots[robot].name for robot in (i, j)]
         message = f"the guidepaths of {names[0]} and {names[1]} cross at ({x:g}, {y:g})"
         yield fault(layout.factory, message, i, j)
+
+
+def _legs(path: Guidepath) -> Iterator[tuple[Grid, Grid]]:
+    """The ends of the legs of a guidepath from where its robot delivers to where it receives."""
+    corners = [path.corner(at) for bend in path.bends for at in (bend.at, bend.end)]
+    points = [_grid(p) for p in (path.carriage(path.reach), *corners, path.carriage(path.length))]
+    yield from pairwise(points)
+
+
+def _rounded(corners: list[float], path: Guidepath) -> bool:
+    """Whether the corners of a guidepath are so far from each other and its ends as they are
+    round."""
+    apart = np.diff([path.reach - path.rounding, *corners, path.length + path.rounding])
+    return bool((apart >= 2 * path.rounding - 1e-9).all())
 
 
 def touching(low: NDArray[np.int64], high: NDArray[np.int64]) -> Iterator[tuple[int, int]]:

@@ -1,14 +1,19 @@
-"""Guidepaths: straight lines on the floor, and how robots are stretched to their payloads.
+"""Guidepaths: lines on the floor, and how robots are stretched to their payloads.
 
 Every part is carried in its place in the finished product, relative to the product's middle. Where
 that middle is in the world is the robot's *station*: at a mate the middles of all robots coincide,
-so the parts are assembled when they meet. A guidepath is the straight line of that point.
+so the parts are assembled when they meet. A guidepath is the line of that point: straight, or with
+bends, along which the robot goes without turning.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
+
+from factory.layout.way import Array, Bend, way_of
 
 Box = tuple[float, float, float, float]
 """(xlo, xhi, ylo, yhi) [m]."""
@@ -50,7 +55,8 @@ class Guidepath:
     lengths in [m].
 
     Arc length x of the carriage runs from A = 0; delivering at x = reach, receiving at B = reach +
-    travel.
+    travel. `bends`: where the guidepath goes on beside its line, to the side t, its corners of a
+    `rounding`; then x is the coordinate of `factory.layout.way`.
     """
 
     heading: Point2
@@ -62,6 +68,8 @@ class Guidepath:
     arm: float
     nest: float
     aside: float = 0.0
+    bends: tuple[Bend, ...] = ()
+    rounding: float = 0.0
 
     @property
     def length(self) -> float:
@@ -80,15 +88,28 @@ class Guidepath:
 
     def middle(self, x: float) -> Point2:
         """Where the product's middle is when the carriage is at arc length x."""
+        if self.bends:
+            back, across = self._bent(x)
+            return self._placed(back - self.reach, across)
         back = x - self.reach
         return self.a[0] - self.heading[0] * back, self.a[1] - self.heading[1] * back
 
     def carriage(self, x: float) -> Point2:
         """f: where the carriage's centre is at arc length x."""
+        if self.bends:
+            back, across = self._bent(x)
+            return self._placed(back, across + self.offset)
         return (
             self.a[0] - self.heading[0] * x + self.side[0] * self.offset,
             self.a[1] - self.heading[1] * x + self.side[1] * self.offset,
         )
+
+    def corner(self, at: float) -> Point2:
+        """Where the carriage's line would have the corner at an arc length, were it not round."""
+        ways = way_of(self.bends, self.rounding)
+        leg = int((at > ways.corner[0]).sum())
+        back, across = (ways.point + ways.way * (at - ways.start)[..., None])[0, leg].tolist()
+        return self._placed(back, across + self.offset)
 
     def world(self, extent: Extent, middle: Point2) -> Box:
         """A box given in the robot's frame (u, t), as it lies in the world about `middle`."""
@@ -102,16 +123,51 @@ class Guidepath:
         """A box about the product's middle, in the world's directions, in the robot's frame."""
         return project(box, self.heading, self.side)
 
-    def sweep(self, box: Box, start: float, end: float) -> Box:
+    def sweeps(self, box: Box, start: float, end: float) -> list[Box]:
         """What a box about the product's middle sweeps while the carriage goes from one arc length
-        to another."""
-        (x0, y0), (x1, y1) = self.middle(start), self.middle(end)
-        return (
-            min(x0, x1) + box[0],
-            max(x0, x1) + box[1],
-            min(y0, y1) + box[2],
-            max(y0, y1) + box[3],
-        )
+        to another, a box for each piece of the way."""
+        if self.bends:
+            (x, y), pieces = self.middle(0.0), self.pieces(min(start, end), max(start, end))
+            at = np.array([x, y])
+            ends = [(p.min(axis=0) + at, p.max(axis=0) + at) for p in pieces]
+        else:
+            (x0, y0), (x1, y1) = self.middle(start), self.middle(end)
+            ends = [((min(x0, x1), min(y0, y1)), (max(x0, x1), max(y0, y1)))]
+        return [
+            (float(x0 + box[0]), float(x1 + box[1]), float(y0 + box[2]), float(y1 + box[3]))
+            for (x0, y0), (x1, y1) in ends
+        ]
+
+    def swept(self, foot: Extent, start: float, end: float) -> list[Box]:
+        """What a box in the robot's frame about its carriage sweeps on such a way."""
+        if not self.bends:
+            return [hull([self.world(foot, self.carriage(x)) for x in (start, end)])]
+        at, middle = self.carriage(0.0), self.middle(0.0)
+        about = self.world(foot, (at[0] - middle[0], at[1] - middle[1]))
+        return self.sweeps(about, start, end)
+
+    def pieces(self, low: float, high: float) -> list[Array]:
+        """The guidepath between two arc lengths piece by piece, relative to where it is at 0: each
+        lies in the hull of its points (k, 2) [m]."""
+        frame = np.array([np.negative(self.heading), self.side])
+        return [points @ frame for points in self.framed(low, high)]
+
+    def framed(self, low: float, high: float) -> list[Array]:
+        """The same points as distances back from A and to the side t [m]."""
+        if not self.bends:
+            return [np.array([[low, 0.0], [high, 0.0]])]
+        return [*way_of(self.bends, self.rounding).pieces(0, low, high)]
+
+    def _bent(self, x: float) -> Point2:
+        """How far back and to the side a robot is from where it is at 0."""
+        place, _, _ = way_of(self.bends, self.rounding).at(np.array([0]), np.array([x]))
+        back, across = place[0].tolist()
+        return back, across
+
+    def _placed(self, back: float, across: float) -> Point2:
+        """What is so far back from A, and to the side."""
+        (u, v), (s, t) = self.heading, self.side
+        return self.a[0] - u * back + s * across, self.a[1] - v * back + t * across
 
 
 @dataclass(frozen=True, slots=True)

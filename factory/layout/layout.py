@@ -23,6 +23,7 @@ from factory.layout.guidepath import Box, Extent, Feeder, Guidepath, Point2, hul
 from factory.layout.hands.hand import Hand
 from factory.layout.hands.mounted import Mount, grip_of
 from factory.layout.visits import LEAST, Visit, Visits, beyond_station, stop_offset
+from factory.layout.way import Ways
 from factory.plant.approaches import Overlap
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
@@ -109,6 +110,13 @@ class Layout(Pictured):
     def guidepath_length(self) -> float:
         """Total length of the guidepaths [m]."""
         return float(sum(g.length for g in self.guidepaths))
+
+    @cached_property
+    def bent(self) -> tuple[tuple[int, ...], Ways]:
+        """The robots (index) whose guidepaths have bends, and the ways that these are."""
+        robots = tuple(n for n, path in enumerate(self.guidepaths) if path.bends)
+        paths = [self.guidepaths[robot] for robot in robots]
+        return robots, Ways.of([p.bends for p in paths], [p.rounding for p in paths])
 
     @property
     def area(self) -> float:

@@ -48,8 +48,8 @@ def _magazines(layout: Layout, coordinated: Coordinated, robots: Staying) -> Ite
         slider = hanging.slider[outlet.name]
         pad = _pad(hanging, named[slider], slider, hanging.raised[outlet.name])
         part = robots.held(robot, number, leaf.label)
-        at = part.way * layout.visits[number, robot].at + UP * layout.visits[number, robot].lift
-        hung, partners = pad + part.moved(at).going(UP), robots.partners[robot]
+        visit, partners = layout.visits[number, robot], robots.partners[robot]
+        hung = pad + part.at(visit.at, visit.lift).going(UP)
         machine = f"magazine of {layout.factory.robots[robot].name}"
         way = ((0.0, outlet.feeder.stroke), (0.0, 0.0))
         top = ((way[0][1], way[0][1]), way[1])
@@ -114,8 +114,8 @@ def _tray(layout: Layout, coordinated: Coordinated, robots: Staying) -> Iterator
     tray, partners = boxed(("tray",) * len(boxes), boxes, along), robots.partners[0]
     for number, place in coordinated.away.items():
         product = robots.held(0, number, layout.factory.operations[number].inputs[0])
-        at = product.way * layout.visits[number, 0].at + UP * layout.visits[number, 0].lift
-        held, way = tray + product.moved(at).going(along), ((0.0, layout.outfeed_way), (0.0, 0.0))
+        visit, way = layout.visits[number, 0], ((0.0, layout.outfeed_way), (0.0, 0.0))
+        held = tray + product.at(visit.at, visit.lift).going(along)
         dropoff = layout.factory.operations[number].place
         label = layout.factory.operations[number].inputs[0]
         yield Presence(0, "tray", (dropoff,), tray, (STILL,), partners, True)

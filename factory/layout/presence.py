@@ -21,6 +21,7 @@ from factory.control.mode import Index, Truth
 from factory.geometry.meshes import Array
 from factory.layout.crossings import near as near_boxes
 from factory.layout.dimensions import PAYLOADS
+from factory.layout.guidepath import Guidepath
 
 ACROSS = 5e-5
 """Bodies of machines that work together come no nearer than this: a robot's pad is 0.2 mm off what
@@ -41,6 +42,9 @@ UP = np.array([0.0, 0.0, 1.0])
 Span = tuple[float, float]
 """From where to where an axis goes, in either order [m]."""
 
+Leg = tuple[Array, Span]
+"""Points (k, 3) whose hull holds all the ways of the first axis [m], and the span of the second."""
+
 
 STILL: tuple[Span, Span] = (0.0, 0.0), (0.0, 0.0)
 """The spans of a machine that stays where its bodies are told."""
@@ -51,7 +55,7 @@ class MachineBodies:
     """Convex bodies of a machine in the world, its axes at 0: their `names`, `boxes` (n, 2, 3) and
     `corners` (k, 3) as seen from `origins` (n, 3) [m], the `layers` in which they are (n,), and
     which of them `rise` with its second axis (n,). Its first axis moves all of them along the
-    vector `way` (3,)."""
+    vector `way` (3,), or along a guidepath that is `bent`."""
 
     names: tuple[str, ...]
     boxes: Array
@@ -60,18 +64,32 @@ class MachineBodies:
     layers: Index
     rise: Truth
     way: Array
+    bent: Guidepath | None = None
 
-    def swept(self, first: Span, second: Span) -> Array:
-        """The boxes (n, 2, 3) of all that they take as the axes go over two spans [m]."""
-        swept = self.boxes + np.sort(self.along(first), axis=0)
+    def swept(self, leg: Leg) -> Array:
+        """The boxes (n, 2, 3) of all that they take on a leg."""
+        points, second = leg
+        swept = self.boxes + np.stack([points.min(axis=0), points.max(axis=0)])
         swept[self.rise, :, 2] += np.sort(second)
         return np.asarray(swept)
 
-    def along(self, first: Span) -> Array:
-        """How far bodies move as the first axis goes from one end of a span to the other (2, 3)
-        [m], and as far beyond as it may be off: a slider, which stands out of its way, is not."""
+    def legs(self, first: Span, second: Span) -> Iterator[Leg]:
+        """The legs on which bodies move as the axes go over two spans [m], and as far beyond as the
+        first may be off: a slider, which stands out of its way, is not."""
         off = ALONG * (1.0 - abs(self.way[2]))
-        return np.outer([min(first) - off, max(first) + off], self.way)
+        low, high = min(first) - off, max(first) + off
+        if self.bent is None:
+            yield np.outer([low, high], self.way), second
+            return
+        for points in self.bent.pieces(low, high):
+            yield np.pad(points, ((0, 0), (0, 1))), second
+
+    def at(self, first: float, second: float) -> MachineBodies:
+        """The same where the axes are at two positions [m]."""
+        place = self.way * first
+        if self.bent is not None:
+            place = np.append(self.bent.pieces(first, first + ROUNDING)[0][0], 0.0)
+        return self.moved(place + UP * second)
 
     def moved(self, by: Array) -> MachineBodies:
         """The same, elsewhere."""
@@ -79,7 +97,7 @@ class MachineBodies:
 
     def going(self, way: Array) -> MachineBodies:
         """The same of a machine whose first axis moves them along another vector (3,)."""
-        return replace(self, way=way)
+        return replace(self, way=way, bent=None)
 
     def __add__(self, other: MachineBodies) -> MachineBodies:
         """Those of both, which move alike."""
@@ -91,6 +109,7 @@ class MachineBodies:
             np.concatenate([self.layers, other.layers]),
             np.concatenate([self.rise, other.rise]),
             self.way,
+            self.bent,
         )
 
 
@@ -114,14 +133,19 @@ class Presence:
     since: int = -1
 
     @cached_property
+    def legs(self) -> list[Leg]:
+        """The legs (m) of all pairs of spans."""
+        return [leg for spans in self.sweeps for leg in self.bodies.legs(*spans)]
+
+    @cached_property
     def boxes(self) -> Array:
-        """What each body sweeps in each pair of spans, as boxes (m n, 2, 3) [m]."""
-        return np.concatenate([self.bodies.swept(*spans) for spans in self.sweeps])
+        """What each body sweeps on each leg, as boxes (m n, 2, 3) [m]."""
+        return np.concatenate([*map(self.bodies.swept, self.legs)])
 
     @cached_property
     def layers(self) -> Index:
         """In which layer each of them is (m n,)."""
-        return np.tile(self.bodies.layers, len(self.sweeps))
+        return np.tile(self.bodies.layers, len(self.legs))
 
     @cached_property
     def hull(self) -> Array:
@@ -134,11 +158,10 @@ class Presence:
 
     def solid(self, number: int) -> Polytope:
         """What is really in one of the boxes."""
-        sweep, body = divmod(number, len(self.bodies.names))
-        first, second = self.sweeps[sweep]
+        leg, body = divmod(number, len(self.bodies.names))
+        points, second = self.legs[leg]
         rise = UP * bool(self.bodies.rise[body])
-        along = self.bodies.along(first)
-        ends = [end + rise * z for end in along for z in {*second}]
+        ends = [point + rise * z for point in points for z in {*second}]
         corners = self.bodies.corners[body] + self.bodies.origins[body]
         return polytope(np.concatenate([corners + end for end in ends]))
 

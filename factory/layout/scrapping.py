@@ -45,9 +45,8 @@ def _ways_back(layout: Layout, robot: int, found: Mapping[str, Pile]) -> Iterato
         leaves = then.after[then.robots.index(robot)] == NOPART
         pile = found[label].carried(layout.visits[number, robot])
         at = stops[step if leaves else onward]
-        yield Region(
-            robot, PAYLOADS, PAYLOAD_BODY, path.sweep(pile.box, path.length, at), pile.z, label
-        )
+        for box in path.sweeps(pile.box, path.length, at):
+            yield Region(robot, PAYLOADS, PAYLOAD_BODY, box, pile.z, label)
         if grip is not None:
-            hand = path.sweep(path.world(grip, (0.0, 0.0)), path.length, at)
-            yield Region(robot, PAYLOADS, HAND_BODY, hand, pile.z, label)
+            for box in path.sweeps(path.world(grip, (0.0, 0.0)), path.length, at):
+                yield Region(robot, PAYLOADS, HAND_BODY, box, pile.z, label)

@@ -30,6 +30,7 @@ from factory.layout.dimensions import (
     PAYLOAD,
     PAYLOADS,
 )
+from factory.layout.guidepath import Guidepath
 from factory.layout.hands.limbs import Limb, limbs, rises_first
 from factory.layout.layout import Layout
 from factory.layout.presence import ROUNDING, MachineBodies, Presence, Span, corners_of
@@ -119,7 +120,7 @@ class Staying:
             np.tile(origin, (count, 1)),
             np.full(count, PAYLOADS),
             np.ones(count, bool),
-            _way(layout, robot),
+            *_way(layout, robot),
         )
 
     def ends(self) -> Iterator[tuple[Presence, Presence]]:
@@ -281,7 +282,7 @@ def _own(layout: Layout, robot: int) -> MachineBodies:
         np.zeros((len(found), 3)),
         np.array([layer for _, layer in found]),
         np.array([limb.lifted for limb, _ in found]),
-        _way(layout, robot),
+        *_way(layout, robot),
     )
 
 
@@ -305,9 +306,10 @@ def in_world(boxes: Array, heading: tuple[float, float], at: tuple[float, float]
     return np.asarray(np.concatenate([plan, boxes[:, :, 2:]], axis=2))
 
 
-def _way(layout: Layout, robot: int) -> Array:
-    """How a robot moves as its arc length grows: against its heading."""
-    return np.array([*layout.guidepaths[robot].heading, 0.0]) * -1.0
+def _way(layout: Layout, robot: int) -> tuple[Array, Guidepath | None]:
+    """How a robot moves as its arc length grows: against its heading, or as its guidepath bends."""
+    path = layout.guidepaths[robot]
+    return np.array([*path.heading, 0.0]) * -1.0, path if path.bends else None
 
 
 def _partners(layout: Layout) -> list[frozenset[int]]:

@@ -115,13 +115,13 @@ def _bodies(layout: Layout, robot: int) -> Iterator[Region]:
         (ARM_BODY, ARMS, 0.0, path.reach - path.arm, ARM_WIDTH / 2, (ARM_LOW, ARM_TOP)),
     ):
         foot: Extent = (-half, max(ahead, 0.0), -side, side)
-        box = hull([path.world(foot, path.carriage(x)) for x in ends])
-        yield Region(robot, layer, kind, box, z)
+        for box in path.swept(foot, *ends):
+            yield Region(robot, layer, kind, box, z)
     if any(across := cross_of(layout, robot)):
         rim, (low, high) = path.reach - path.arm, sorted(side * path.left for side in across)
         foot = rim - ROOT, rim, low, high
-        box = hull([path.world(foot, path.carriage(x)) for x in ends])
-        yield Region(robot, ARMS, ARM_BODY, box, (ARM_LOW, ARM_TOP))
+        for box in path.swept(foot, *ends):
+            yield Region(robot, ARMS, ARM_BODY, box, (ARM_LOW, ARM_TOP))
 
 
 def _payloads(layout: Layout, robot: int, found: Mapping[str, Pile]) -> Iterator[Region]:
@@ -143,11 +143,10 @@ def _payloads(layout: Layout, robot: int, found: Mapping[str, Pile]) -> Iterator
         if grip is not None:
             found_here.append((HAND_BODY, Pile(path.world(grip, (0.0, 0.0)), pile.z)))
         for kind, held in found_here:
-            stand = path.sweep(held.box, at, at if leaves else stops[step])
-            yield Region(robot, PAYLOADS, kind, stand, held.z, label)
-            if leaves:
-                way = path.sweep(held.box, at, stops[step])
-                yield Region(robot, PAYLOADS, kind, way, held.z, label, onward.index)
+            for box in path.sweeps(held.box, at, at if leaves else stops[step]):
+                yield Region(robot, PAYLOADS, kind, box, held.z, label)
+            for box in path.sweeps(held.box, at, stops[step]) if leaves else ():
+                yield Region(robot, PAYLOADS, kind, box, held.z, label, onward.index)
 
 
 def _feeder(layout: Layout, label: str, robot: int) -> Iterator[Region]:

@@ -18,6 +18,17 @@ def drive(robot: str) -> str:
     return f"{robot}/drive"
 
 
+def slide_across(robot: str) -> str:
+    """The joint of a robot across its heading, where its guidepath has bends,
+    `r3/slide_across`."""
+    return f"{robot}/slide_across"
+
+
+def drive_across(robot: str) -> str:
+    """The actuator of that joint, `r3/drive_across`."""
+    return f"{robot}/drive_across"
+
+
 def head(robot: str) -> str:
     """The body of a robot that its lift moves, and that holds its payload, `r3/head`."""
     return f"{robot}/head"

@@ -15,7 +15,7 @@ from factory.layout.hands.limbs import Limb
 from factory.layout.layout import Guidepath, Point2
 from factory.mjcf.elements import add, number, numbers
 from factory.mjcf.hands import Styles, add_hand
-from factory.mjcf.names import carriage, head
+from factory.mjcf.names import carriage, drive_across, head, slide_across
 from factory.mjcf.stops import Stops
 from factory.problem.robot_types import RobotType
 from factory.support.errors import Diagnostic, InputError, Position
@@ -181,7 +181,7 @@ def instantiate(
     slide = next(j for j in body.iter("joint") if j.get("name") == f"{robot}/slide")
     slide.set("ref", number(path.length))
     stops.limit(slide)
-    actuators = []
+    actuators: list[Element] = []
     for actuator in model.actuators:
         kind = actuator.get("name") or ""
         named = {"name": f"{robot}/{kind}", "joint": f"{robot}/{actuator.get('joint')}"}
@@ -195,7 +195,31 @@ def instantiate(
         add_inertia(moved, gains)
         if hoist and gains is hoist.drive:
             hoist.stops.limit(moved)
+        if gains is drive and path.bends:
+            actuators.append(_bend(body, moved, actuators[-1], robot, path, stops))
     return body, actuators
+
+
+def _bend(
+    body: Element, slide: Element, actuator: Element, robot: str, path: Guidepath, stops: Stops
+) -> Element:
+    """A second slide for a guidepath with bends, beside the one along the heading, which gets the
+    stops that the way has there; its actuator, which is like the first."""
+    across = deepcopy(slide)
+    across.set("name", slide_across(robot))
+    across.set("axis", numbers((0.0, path.left, 0.0)))
+    body.insert([*body].index(slide) + 1, across)
+    ends = [place for piece in path.framed(stops.low, stops.high) for place in piece.tolist()]
+    b_end = path.framed(path.length, path.length + 1e-6)[0][0]
+    beyond = stops.high - path.length
+    for joint, values, at, more in zip(
+        (slide, across), zip(*ends, strict=True), b_end.tolist(), (0.0, beyond), strict=True
+    ):
+        joint.set("ref", number(at))
+        Stops(min(values) - more, max(values) + more, stops.buffers).limit(joint)
+    second = deepcopy(actuator)
+    second.attrib.update(name=drive_across(robot), joint=slide_across(robot))
+    return second
 
 
 def heading_quaternion(path: Guidepath) -> tuple[float, float, float, float]:

@@ -73,6 +73,10 @@ def scales_of(layout: Layout) -> dict[str, Scale]:
     robots, lifts = layout.factory.robots, layout.factory.lift_axis
     at = start_positions(layout, layout.factory.net.initial_marking).tolist()
     carriages = {names.slide(robot.name): Scale(at[robot.index], -1.0) for robot in robots}
+    for robot in layout.bent[0]:
+        back, across = layout.guidepaths[robot].framed(at[robot], at[robot])[0][0].tolist()
+        carriages[names.slide(robots[robot].name)] = Scale(back, -1.0)
+        carriages[names.slide_across(robots[robot].name)] = Scale(across)
     return carriages | {names.lift(robots[r].name): Scale(at[axis]) for r, axis in lifts.items()}
 
 

@@ -2,7 +2,8 @@
 
 A weld joins a part, at its origin, with a frame fixed to the part's holder. Holders do nothing but
 slide: a carriage along its guidepath, a lift on a carriage. So the frame on a holder follows from
-the coordinates of at most two slide joints, and never turns.
+the coordinates of at most two slide joints, or three where guidepaths have bends, and never
+turns.
 """
 
 from __future__ import annotations
@@ -32,8 +33,9 @@ ROWS = 6
 
 @dataclass(frozen=True, eq=False)
 class Slides:
-    """The slide joints that carry each body (nbody, 2), its own before that of its parent:
-    addresses `qpos` and `dof` of each, and its direction `way` (nbody, 2, 3), 0 for none."""
+    """The slide joints that carry each body (nbody, k), its own before those of its parent:
+    addresses `qpos` and `dof` of each, and its direction `way` (nbody, k, 3), 0 for none. A body
+    has one slide, or two where it follows a guidepath with bends: k is 2 or 4."""
 
     qpos: Index = field(repr=False)
     dof: Index = field(repr=False)
@@ -42,9 +44,11 @@ class Slides:
     @classmethod
     def of(cls, m: mujoco.MjModel, d: mujoco.MjData) -> Slides:
         """Those of a model, whose kinematics in `d` are up to date."""
-        own = np.where(m.body_jntnum > 0, m.body_jntadr, -1)
+        most = 1 + int((m.body_jntnum > 1).any())
+        own = m.body_jntadr[:, None] + np.arange(most)
+        own[np.arange(most) >= m.body_jntnum[:, None]] = -1
         own[m.jnt_type[own] != SLIDE] = -1
-        joint = np.stack([own, own[m.body_parentid]], axis=1)
+        joint = np.concatenate([own, own[m.body_parentid]], axis=1)
         way = np.where(joint[:, :, None] < 0, 0.0, d.xaxis[joint])
         return cls(m.jnt_qposadr[joint], m.jnt_dofadr[joint], way)
 
@@ -58,7 +62,7 @@ class Slides:
 @dataclass(frozen=True, eq=False)
 class WeldFrames:
     """Where n welds hold the origins of their parts: at `base` (n, 3) + sum over k of
-    `way` (n, 2, 3) · qpos[`along` (n, 2)] [m], turned by the quaternion `turn` (n, 4)."""
+    `way` (n, k, 3) · qpos[`along` (n, k)] [m], turned by the quaternion `turn` (n, 4)."""
 
     base: Array = field(repr=False)
     along: Index = field(repr=False)
@@ -80,7 +84,7 @@ class WeldFrames:
         return WeldFrames(self.base[welds], self.along[welds], self.way[welds], self.turn[welds])
 
     def at(self, slides: Array) -> Array:
-        """Where they are (n, 3) [m] at coordinates of their slides (n, 2), which are
+        """Where they are (n, 3) [m] at coordinates of their slides (n, k), which are
         qpos[`along`]."""
         return np.asarray(self.base + np.einsum("nk,nkj->nj", slides, self.way))
 
@@ -89,7 +93,8 @@ def check_holders(m: mujoco.MjModel, welds: Index) -> None:
     """Raises ValueError where the first body of a weld does more than slide."""
     joints, up = m.body_jntnum, m.body_parentid
     first = m.jnt_type[np.minimum(m.body_jntadr, m.njnt - 1)]
-    slides = (joints == 0) | (joints == 1) & (first == SLIDE)
+    last = m.jnt_type[np.minimum(m.body_jntadr + np.maximum(joints, 1), m.njnt) - 1]
+    slides = (joints == 0) | (joints <= 2) & (first == SLIDE) & (last == SLIDE)
     for body in np.unique(m.eq_obj1id[welds]):
         if not (slides[body] and slides[up[body]] and m.body_weldid[up[up[body]]] == 0):
             raise ValueError(f"{m.body(int(body)).name} holds parts and does more than slide")

@@ -16,9 +16,10 @@ def beside(simulation: Recordable) -> EngineMonitor:
     """A monitor of the engine of a simulation: `observe` is an observer of its run, and `glance`
     one that need not be called after every tick. It uses only the engine, the layout, the start of
     the simulation, and the times at which operations end."""
-    anatomy = Anatomy.of(simulation.engine, simulation.layout.factory)
+    subject = subject_of_run(simulation)
+    anatomy = Anatomy.of(simulation.engine, simulation.layout.factory, subject.bent)
     first = simulation.state().observation
-    monitor = EngineMonitor(subject_of_run(simulation), anatomy, first)
+    monitor = EngineMonitor(subject, anatomy, first)
     simulation.at_ends.append(monitor.observe)
     return monitor
 

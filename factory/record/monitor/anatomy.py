@@ -8,13 +8,60 @@ from typing import Any
 
 import numpy as np
 
+from factory.layout.way import Array, Ways
 from factory.mjcf import names
 from factory.mjcf.weld_frames import GRIP, KINDS, WeldFrames, check_holders
 from factory.plant.factory import Factory
 from factory.record.state import Index
 
+Bent = tuple[tuple[int, ...], Ways]
+"""The robots (index) whose guidepaths have bends, and the ways that these are."""
+
 Holder = tuple[int, int]
 """Kind and, for a grip, the robot's index; -1 for others, and for a robot that is gone."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class BentWays:
+    """The `ways` of the `robots` (b,) whose guidepaths have bends, and the addresses (b, 2) of the
+    positions, speeds and setpoints of their two slides."""
+
+    robots: Index
+    ways: Ways
+    slides: Index
+    dofs: Index
+    drives: Index
+
+    @classmethod
+    def of(cls, m: Any, called: list[str], bent: Bent) -> BentWays:
+        """Those of robots `called` in a model. Raises KeyError where it lacks them."""
+        robots, ways = bent
+        named = [called[robot] for robot in robots]
+        pairs = [
+            [m.joint(name).id for name in (names.slide(r), names.slide_across(r))] for r in named
+        ]
+        joints = np.array(pairs, np.intp).reshape(-1, 2)
+        acts = [
+            [m.actuator(name).id for name in (names.drive(r), names.drive_across(r))] for r in named
+        ]
+        drives = np.array(acts, np.intp).reshape(-1, 2)
+        return cls(
+            np.array(robots, np.intp),
+            ways,
+            np.asarray(m.jnt_qposadr[joints], np.intp),
+            np.asarray(m.jnt_dofadr[joints], np.intp),
+            np.asarray(m.actuator_ctrladr[drives], np.intp),
+        )
+
+    def along(self, qpos: Array, qvel: Array) -> tuple[Array, Array]:
+        """Their arc lengths [m] and speeds [m/s]."""
+        x = self.ways.nearest(qpos[self.slides])
+        _, first, _ = self.ways.at(np.arange(len(x)), x)
+        return x, (qvel[self.dofs] * first).sum(axis=-1) / (first**2).sum(axis=-1)
+
+    def reached(self, ctrl: Array) -> Array:
+        """The arc lengths [m] of their setpoints."""
+        return self.ways.nearest(ctrl[self.drives])
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +72,7 @@ class Anatomy:
     `joint`, `setpoint`, and `owner`, a robot's index or -1 for the outfeed. Copies of parts (C,):
     `copies`, their names, `label`, and `body` in qpos; `copy_of` (nbody,): the copy that a body is,
     or -1. Constraints (E,): `holder`, None for one that holds no part, `part`, its label, and
-    `frames`, the place of the part.
+    `frames`, the place of the part. `bent`: the guidepaths with bends.
     """
 
     slide: Index = field(repr=False)
@@ -41,16 +88,19 @@ class Anatomy:
     holder: tuple[Holder | None, ...] = field(repr=False)
     part: tuple[str, ...] = field(repr=False)
     frames: WeldFrames = field(repr=False)
+    bent: BentWays = field(repr=False)
 
     @classmethod
-    def of(cls, m: Any, factory: Factory) -> Anatomy:
-        """The anatomy of a model. Raises ValueError where the model is not of that factory."""
+    def of(cls, m: Any, factory: Factory, bent: Bent) -> Anatomy:
+        """The anatomy of a model of a factory, some of whose guidepaths are `bent`. Raises
+        ValueError where the model is not of that factory."""
         from factory.support.engine import mujoco  # logs are written and read without the engine
 
         robots = {r.name: r.index for r in factory.robots}
         try:
             slide = [m.joint(names.slide(r)).id for r in robots]
             drive = [m.actuator(names.drive(r)).id for r in robots]
+            ways = BentWays.of(m, [*robots], bent)
         except KeyError as error:
             raise ValueError(f"the model is not of this factory: {error}") from error
         actuators = range(len(m.actuator_ctrladr))
@@ -78,6 +128,7 @@ class Anatomy:
             tuple(_holder(words, robots) for words in welds),
             tuple(_part(words) for words in welds),
             WeldFrames.of(m, d),
+            ways,
         )
 
 

@@ -94,7 +94,7 @@ def _judged(
     inside = seen(*span)
     start: Marking = frozenset(log.marking[span[0]].tolist())
     here = replace(subject, start=start, wip=None)
-    monitor = Monitor(here, Anatomy.of(m, subject.factory), next(inside))
+    monitor = Monitor(here, Anatomy.of(m, subject.factory, subject.bent), next(inside))
     monitor.motion.came[:] = -np.inf  # whoever is there may have come long ago
     for observation in inside:
         monitor.see(observation)

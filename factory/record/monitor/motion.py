@@ -63,7 +63,11 @@ class _State:
     def of(cls, anatomy: Anatomy, seen: Observation) -> _State:
         """The state in an observation."""
         x, v = seen.qpos[anatomy.slide], seen.qvel[anatomy.dof]
-        return cls(seen.time, x, v, seen.ctrl[anatomy.drive], seen.at_end)
+        s, bent = seen.ctrl[anatomy.drive], anatomy.bent
+        if len(bent.robots):
+            x[bent.robots], v[bent.robots] = bent.along(seen.qpos, seen.qvel)
+            s[bent.robots] = bent.reached(seen.ctrl)
+        return cls(seen.time, x, v, s, seen.at_end)
 
 
 class _Setpoints:

@@ -60,7 +60,7 @@ def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
 
 def _seen(log: Log, subject: MonitorSubject, m: Any) -> Report:
     """The report of a monitor on the states of a log, and on its firings and figures."""
-    seen, anatomy = observations(log), Anatomy.of(m, subject.factory)
+    seen, anatomy = observations(log), Anatomy.of(m, subject.factory, subject.bent)
     monitor = Monitor(subject, anatomy, next(seen))
     for observation in seen:
         monitor.see(observation)

@@ -11,6 +11,7 @@ from typing import Any
 from factory.compiler.taking_over import without_gone
 from factory.layout.exclusions import goes_early
 from factory.layout.layout import Layout
+from factory.layout.way import Bend, Ways
 from factory.nets.history import firings
 from factory.nets.petri import Marking
 from factory.plant.factory import Factory, Operation
@@ -20,6 +21,9 @@ from factory.support.settings import Settings
 
 PATIENCE = 4.0
 """A run stalls when nothing happens for this many times the longest time of an operation."""
+
+Bent = tuple[tuple[Bend, ...], float]
+"""The bends of a guidepath, and their rounding [m]."""
 
 Manned = tuple[int, tuple[int, ...]]
 """An operation and the robots that take part in it (indices)."""
@@ -34,7 +38,8 @@ class MonitorSubject:
     frame of the product [m]; `start`: the marking in which the run begins; `wip`: the bound on
     units inside; `patience` [s]: time without an event until a run counts as stalled; `early`:
     (operation, robot) where a robot goes ahead regardless of the settings, so that its hand is out
-    of the way; `others`: the goals of operations (index) with other robots after a takeover.
+    of the way; `others`: the goals of operations (index) with other robots after a takeover;
+    `bends`: those of guidepaths, and their rounding [m], by robot (index).
     """
 
     factory: Factory
@@ -47,9 +52,10 @@ class MonitorSubject:
     wip: int | None = None
     early: frozenset[tuple[int, int]] = frozenset()
     others: Mapping[Manned, tuple[float, ...]] = field(default_factory=dict, repr=False)
+    bends: Mapping[int, Bent] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
-        for name in ("places", "others"):
+        for name in ("places", "others", "bends"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
 
     def after(self, crew: Factory) -> MonitorSubject:
@@ -59,7 +65,15 @@ class MonitorSubject:
         before = zip(crew.operations, self.goals, strict=True)
         goals = tuple(self.others.get((o.index, o.robots), goals) for o, goals in before)
         early = frozenset((o, number[robot]) for o, robot in self.early if robot in number)
-        return replace(self, factory=without_gone(crew), goals=goals, early=early, others={})
+        bends = {number[robot]: bent for robot, bent in self.bends.items() if robot in number}
+        gone = without_gone(crew)
+        return replace(self, factory=gone, goals=goals, early=early, others={}, bends=bends)
+
+    @cached_property
+    def bent(self) -> tuple[tuple[int, ...], Ways]:
+        """The robots (index) whose guidepaths have bends, and the ways that these are."""
+        rows = [*self.bends.values()]
+        return (*self.bends,), Ways.of([row for row, _ in rows], [round_ for _, round_ in rows])
 
     @cached_property
     def counts(self) -> Mapping[int, int]:
@@ -113,6 +127,13 @@ class MonitorSubject:
     def _others(self) -> list[list[Any]]:
         return [[number, [*robots], [*goals]] for (number, robots), goals in self.others.items()]
 
+    def _bends(self) -> list[list[Any]]:
+        """The bends of guidepaths, robot by robot."""
+        return [
+            [robot, rounding, [[bend.at, bend.across] for bend in row]]
+            for robot, (row, rounding) in self.bends.items()
+        ]
+
     def as_json(self) -> dict[str, Any]:
         """The data in a log, beside the PAG and the settings."""
         return {
@@ -122,6 +143,7 @@ class MonitorSubject:
             "patience": self.patience,
             "early": sorted(list(pair) for pair in self.early),
             **({"others": self._others()} if self.others else {}),
+            **({"bends": self._bends()} if self.bends else {}),
         }
 
 
@@ -153,6 +175,10 @@ def subject_of(
     marking = factory.net.initial_marking if start is None else start
     patience, early = round(PATIENCE * travel, 6), frozenset(goes_early(layout))
     subject = MonitorSubject(factory, goals, radii, places, settings, marking, patience, wip, early)
+    bent = {robot: layout.guidepaths[robot] for robot in layout.bent[0]}
+    if bent:
+        bends = {robot: (path.bends, path.rounding) for robot, path in bent.items()}
+        subject = replace(subject, bends=bends)
     return subject if layout.whole is layout else _with_others(subject, layout.whole)
 
 
@@ -200,6 +226,10 @@ def subject_from(
     early = frozenset((int(o), int(r)) for o, r in kept.get("early", ()))
     marking = frozenset(start)
     others = {(int(o), tuple(robots)): tuple(row) for o, robots, row in kept.get("others", ())}
+    bends = {
+        int(robot): (tuple(Bend(float(at), float(across)) for at, across in row), float(rounding))
+        for robot, rounding, row in kept.get("bends", ())
+    }
     return MonitorSubject(
-        factory, goals, radii, places, settings, marking, patience, wip, early, others
+        factory, goals, radii, places, settings, marking, patience, wip, early, others, bends
     )

@@ -81,18 +81,15 @@ def stage_of(simulation: Simulation) -> DrawnFactory:
     """What there is to be drawn of a simulation that has not begun; bodies are where they are in
     the world."""
     layout, world = simulation.layout, simulation.physical
-    m, d, factory, address = world.m, world.d, layout.factory, world.motion.axes.qpos
+    m, d, factory, (at, _) = world.m, world.d, layout.factory, world.motion.axes.measured(world.d)
     low, high = d.xpos.copy(), d.xpos.copy()
     for robot in factory.robots:
-        body, x = (
-            m.body(names.carriage(robot.name)).id,
-            float(d.qpos[address[robot.index]]),
-        )
-        ends = [layout.home(robot.index, o) for o in robot.operations]
-        heading = np.array([*layout.guidepaths[robot.index].heading, 0.0])
-        for end in (min(ends), max(ends)):
-            place = d.xpos[body] - heading * (end - x)
-            low[body], high[body] = np.minimum(low[body], place), np.maximum(high[body], place)
+        body, path = m.body(names.carriage(robot.name)).id, layout.guidepaths[robot.index]
+        ends, x = [layout.home(robot.index, o) for o in robot.operations], float(at[robot.index])
+        away = np.concatenate(path.pieces(min(ends), max(ends))) - path.pieces(x, x)[0][0]
+        places = d.xpos[body] + np.pad(away, ((0, 0), (0, 1)))
+        low[body] = np.minimum(low[body], places.min(axis=0))
+        high[body] = np.maximum(high[body], places.max(axis=0))
     return DrawnFactory(
         factory,
         m,
@@ -107,8 +104,8 @@ def stage_of(simulation: Simulation) -> DrawnFactory:
 def _ends(simulation: Simulation) -> Iterator[tuple[Operation, Floats]]:
     """The state of the engine with the robots of an operation where it ends."""
     layout, world = simulation.layout, simulation.physical
-    start, address = world.d.qpos, world.motion.axes.qpos
     for operation in layout.factory.operations:
-        qpos, slides = start.copy(), address[[*operation.robots]]
-        qpos[slides] = [layout.visits[operation.index, robot].at for robot in operation.robots]
+        qpos, at = world.d.qpos.copy(), layout.visits
+        stops = np.array([at[operation.index, robot].at for robot in operation.robots])
+        world.motion.axes.configure(qpos, np.array(operation.robots), stops)
         yield operation, qpos

@@ -8,9 +8,56 @@ from dataclasses import dataclass
 import numpy as np
 
 from factory.control.mode import Array, Index
+from factory.layout.layout import Layout
+from factory.layout.way import Ways
 from factory.mjcf import names
-from factory.plant.factory import Factory
 from factory.support.engine import mujoco
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Across:
+    """The second slides of robots whose guidepaths have bends: `axes` (b,), their carriages; the
+    `ways` that these go; `row` (axes,): the number of an axis among them, -1 for none. Each (b,):
+    `qpos`, `dof`, `actuator`: addresses in the engine's model."""
+
+    axes: Index
+    ways: Ways
+    row: Index
+    qpos: Index
+    dof: Index
+    actuator: Index
+
+    @classmethod
+    def of(cls, m: mujoco.MjModel, layout: Layout, count: int) -> Across:
+        """Those of a layout with so many axes in its compiled model."""
+        robots, ways = layout.bent
+        called = [layout.factory.robots[robot].name for robot in robots]
+        joint = np.array([m.joint(names.slide_across(name)).id for name in called], np.intp)
+        drives = [m.actuator(names.drive_across(name)).id for name in called]
+        axes, row = np.array(robots, np.intp), np.full(count, -1)
+        row[axes] = np.arange(len(axes))
+        address, dof = m.jnt_qposadr[joint], m.jnt_dofadr[joint]
+        return cls(axes, ways, row, address, dof, np.array(drives, np.intp))
+
+    def among(self, axes: Index) -> tuple[Index, Index]:
+        """Which of some axes these are, and their numbers."""
+        row = self.row[axes]
+        (which,) = (row >= 0).nonzero()
+        return which, row[which]
+
+    def spread(self, x: Array, along: Array) -> Array:
+        """What is so much along axes (k, axes) at positions (axes,) [m], on their slides and then
+        on the second ones (k, axes + b)."""
+        _, first, _ = self.ways.at(np.arange(len(self.axes)), x[self.axes])
+        both, slides = along[:, self.axes, None] * first, along.copy()
+        slides[:, self.axes] = both[..., 0]
+        return np.concatenate([slides, both[..., 1]], axis=1)
+
+    def along(self, places: Array, speeds: Array) -> tuple[Array, Array]:
+        """Positions [m] and speeds [m/s] (b,) of places and velocities (b, 2)."""
+        x = self.ways.nearest(places)
+        _, first, _ = self.ways.at(np.arange(len(x)), x)
+        return x, (speeds * first).sum(axis=-1) / (first**2).sum(axis=-1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -19,7 +66,8 @@ class Axes:
     tray and the shutter of its shed.
 
     Each (axes,): `qpos`, `dof`, `body`, `tree`, `actuator`: addresses in the engine's model.
-    `lift`: the axis of a robot's lift, by the robot (index).
+    `lift`: the axis of a robot's lift, by the robot (index); `across`: the second slides of robots
+    whose guidepaths have bends.
     """
 
     qpos: Index
@@ -28,10 +76,12 @@ class Axes:
     tree: Index
     actuator: Index
     lift: Mapping[int, int]
+    across: Across
 
     @classmethod
-    def of(cls, m: mujoco.MjModel, factory: Factory) -> Axes:
-        """The axes of a factory in its compiled model."""
+    def of(cls, m: mujoco.MjModel, layout: Layout) -> Axes:
+        """The axes of a layout in its compiled model."""
+        factory = layout.factory
         carriages = [robot.name for robot in factory.robots]
         lifts = [carriages[robot] for robot in factory.strokes]
         slides = [*map(names.slide, carriages), *map(names.lift, lifts)]
@@ -43,7 +93,8 @@ class Axes:
         actuator = np.array([m.actuator(name).id for name in drives])
         lift = {robot: len(carriages) + n for n, robot in enumerate(factory.strokes)}
         address, dof = m.jnt_qposadr[joint], m.jnt_dofadr[joint]
-        return cls(address, dof, body, m.body_treeid[body], actuator, lift)
+        across = Across.of(m, layout, len(slides))
+        return cls(address, dof, body, m.body_treeid[body], actuator, lift, across)
 
     def __len__(self) -> int:
         return len(self.qpos)
@@ -59,4 +110,35 @@ class Axes:
 
     def measured(self, d: mujoco.MjData) -> tuple[Array, Array]:
         """Positions [m] and speeds [m/s] of all carriages and lifts."""
-        return d.qpos[self.qpos[: self.tray]], d.qvel[self.dof[: self.tray]]
+        x, v = d.qpos[self.qpos[: self.tray]], d.qvel[self.dof[: self.tray]]
+        bent = self.across
+        if len(bent.axes):
+            x[bent.axes], v[bent.axes] = bent.along(
+                np.stack([x[bent.axes], d.qpos[bent.qpos]], axis=-1),
+                np.stack([v[bent.axes], d.qvel[bent.dof]], axis=-1),
+            )
+        return x, v
+
+    def put(self, d: mujoco.MjData, axes: Index, x: Array) -> None:
+        """Axes are at positions [m] from now on, and stand."""
+        self.configure(d.qpos, axes, x)
+        d.qvel[self.dof[axes]] = 0.0
+        d.qvel[self.across.dof[self.across.among(axes)[1]]] = 0.0
+
+    def configure(self, qpos: Array, axes: Index, x: Array) -> None:
+        """Have axes at positions [m] in a configuration (nq,)."""
+        qpos[self.qpos[axes]] = x
+        which, rows = self.across.among(axes)
+        if len(rows):
+            place, _, _ = self.across.ways.at(rows, x[which])
+            qpos[self.qpos[axes[which]]], qpos[self.across.qpos[rows]] = place.T
+
+    def off(self, d: mujoco.MjData, x: Array) -> Array:
+        """How far all axes (axes,) are from where they would be at positions [m]."""
+        off = np.abs(d.qpos[self.qpos] - x)
+        bent = self.across
+        if len(bent.axes):
+            place, _, _ = bent.ways.at(np.arange(len(bent.axes)), x[bent.axes])
+            here = np.stack([d.qpos[self.qpos[bent.axes]], d.qpos[bent.qpos]], axis=-1)
+            off[bent.axes] = np.linalg.norm(here - place, axis=-1)
+        return np.asarray(off)

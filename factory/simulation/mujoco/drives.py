@@ -18,7 +18,10 @@ from __future__ import annotations
 import numpy as np
 
 from factory.control.mode import Array, Index
+from factory.simulation.mujoco.axes import Across
 from factory.support.engine import mujoco
+
+NO_AXES = np.empty(0, np.intp)
 
 INPUTS = 3
 """A setpoint: position [m], speed [m/s], force [N]."""
@@ -29,24 +32,39 @@ class Drives:
     axes of which at most one moves; their buffers are of one size, and side by side.
 
     `mass` [kg] (axes,): what the force of a setpoint accelerates; `own` without a load. `weight`
-    [N] (axes,): what it carries. `control` (axes,): where an axis's setpoint is in `ctrl`.
+    [N] (axes,): what it carries. `control` (axes,): where an axis's setpoint is in `ctrl`. Where a
+    guidepath has bends an axis has two drives, one for each slide (`across`).
     """
 
-    def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, actuators: Index, own: Array) -> None:
+    def __init__(
+        self,
+        m: mujoco.MjModel,
+        d: mujoco.MjData,
+        actuators: Index,
+        own: Array,
+        across: Across | None = None,
+    ) -> None:
         self.own, self.mass, self.weight = own, own.copy(), np.zeros(len(own))
+        self._across = across
+        if across is not None:
+            actuators = np.concatenate([actuators, across.actuator])
         self.control = m.actuator_ctrladr[actuators]
         self.timestep = float(m.opt.timestep)
         self._d, self._actuators = d, actuators
         self._history = m.actuator_delay, m.actuator_history[:, 0]
         samples = int(m.actuator_history[actuators[0], 0])
-        self.most = samples - 2
         size = 2 + (1 + INPUTS) * samples
         at = m.actuator_historyadr[actuators]
         first, self._row = int(at.min()), (at - at.min()) // size
         count = int(self._row.max()) + 1
         self._buffers = d.history[first : first + count * size].reshape(-1, size)
-        early = np.arange(samples) - samples - self.most - 0.5
+        early = np.arange(samples) - 2 * samples + 1.5
         self._head = np.concatenate([[samples - 1.0], self.timestep * early])
+
+    @property
+    def most(self) -> int:
+        """How many setpoints a buffer has room for, and one to spare."""
+        return len(self._head) - 3
 
     @property
     def time(self) -> float:
@@ -69,31 +87,64 @@ class Drives:
         legs = np.stack([place, lagging, np.broadcast_to(force[:, None], place.shape)], axis=-1)
         rest = np.where(v[-1] == 0.0, weight, force[-1])
         after = np.stack([x[-1], v[-1], rest], axis=-1)
-        return np.concatenate([legs.reshape(-1, *after.shape), after[None]]).swapaxes(0, 1)
+        told = np.concatenate([legs.reshape(-1, *after.shape), after[None]]).swapaxes(0, 1)
+        if len(self._bent(axes)[1]):
+            a = np.concatenate([np.repeat(a, steps, axis=0), np.where(v[-1] == 0.0, 0.0, a[-1:])])
+            lag = np.append(np.full(len(a) - 1, self.timestep / 2), 0.0)
+            return self.bent(axes, told, a.T, lag)
+        return told
+
+    def bent(self, axes: Index, told: Array, a: Array, lag: Array) -> Array:
+        """Setpoints (n, samples, 3) of axes, whose speeds are those of so long before, `lag`
+        (samples,) [s], under accelerations (n, samples) [m/s²]: where guidepaths have bends those
+        of the first slides, and those of the second slides after all (n + b, samples, 3)."""
+        which, rows = self._bent(axes)
+        if self._across is None or not len(rows):
+            return told
+        x, v, a = told[which, :, 0].T, (told[which, :, 1] + a[which] * lag).T, a[which].T
+        place, first, second = self._across.ways.at(rows, x)
+        speed = first * v[..., None]
+        gain = first * a[..., None] + second * (v**2)[..., None]
+        force = self.mass[axes[which]][:, None] * gain
+        both = np.stack([place, speed - lag[:, None, None] * gain, force], axis=-1)
+        told = told.copy()
+        told[which] = both[:, :, 0].swapaxes(0, 1)
+        return np.concatenate([told, both[:, :, 1].swapaxes(0, 1)])
+
+    def _bent(self, axes: Index) -> tuple[Index, Index]:
+        """Which of some axes have a second slide, and the numbers of those."""
+        if self._across is None or not len(self._across.axes):
+            return NO_AXES, NO_AXES
+        return self._across.among(axes)
+
+    def _rows(self, axes: Index) -> Index:
+        """The drives of axes: their own, and then the second ones."""
+        _, rows = self._bent(axes)
+        return np.concatenate([axes, len(self.own) + rows]) if len(rows) else axes
 
     def follow(self, axes: Index, setpoints: Array) -> None:
         """Let axes follow setpoints (n, samples, 3), one a timestep from now on; the last is
         held."""
-        samples, actuators = setpoints.shape[1], self._actuators[axes]
-        rows, head = self._row[axes], self._head.copy()
+        drives, samples = self._rows(axes), setpoints.shape[1]
+        actuators, rows, head = self._actuators[drives], self._row[drives], self._head.copy()
         delay, kept = self._history
         delay[actuators], kept[actuators] = self.most * self.timestep, len(head) - 1
         head[1:] += self.time + samples * self.timestep
         self._buffers[rows, 1 : 1 + len(head)] = head
-        self._buffers[rows, -INPUTS * samples :] = setpoints.reshape(len(axes), -1)
+        self._buffers[rows, -INPUTS * samples :] = setpoints.reshape(len(drives), -1)
         self.show(axes, setpoints[:, -1])
 
     def show(self, axes: Index, setpoint: Array) -> None:
         """Have the setpoints (n, 3) of now in `ctrl`, which a step puts behind the last sample."""
-        self._d.ctrl.reshape(-1, INPUTS)[self._actuators[axes]] = setpoint
+        self._d.ctrl.reshape(-1, INPUTS)[self._actuators[self._rows(axes)]] = setpoint
 
     def stand(self, axes: Index, x: Array) -> None:
         """Let axes stand at x [m]."""
-        actuators, (delay, kept) = self._actuators[axes], self._history
+        actuators, (delay, kept) = self._actuators[self._rows(axes)], self._history
         delay[actuators] = kept[actuators] = 0
         setpoint = self._d.ctrl.reshape(-1, INPUTS)
-        setpoint[actuators, 0], setpoint[actuators, 1] = x, 0.0
-        setpoint[actuators, 2] = self.weight[axes]
+        told = np.stack([x, np.zeros(len(axes)), self.weight[axes]], axis=-1)[:, None]
+        setpoint[actuators] = self.bent(axes, told, np.zeros((len(axes), 1)), np.zeros(1))[:, 0]
 
     def load(self, axes: Index, mass: Array, weight: Array) -> None:
         """From the next setpoints on axes move a mass beside their own [kg], and carry a weight

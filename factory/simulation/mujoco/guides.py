@@ -6,6 +6,7 @@ import numpy as np
 
 from factory.control.mode import Array, Index
 from factory.mjcf.model import GRAVITY, ROLLING
+from factory.simulation.mujoco.axes import Across
 from factory.support.engine import mujoco
 
 
@@ -15,8 +16,8 @@ class Guides:
     `empty` (axes,): friction without a load [N], which the model has when this is made.
     """
 
-    def __init__(self, m: mujoco.MjModel, dof: Index) -> None:
-        self._m, self._dof = m, dof
+    def __init__(self, m: mujoco.MjModel, dof: Index, across: Across) -> None:
+        self._m, self._dof, self._across = m, dof, across
         self.empty = m.dof_frictionloss[dof].copy()
         self._loads = np.zeros(len(dof))
 
@@ -33,3 +34,7 @@ class Guides:
     def _rub(self, axes: Index) -> None:
         weight = self._loads[axes] * GRAVITY
         self._m.dof_frictionloss[self._dof[axes]] = self.empty[axes] + ROLLING * weight
+        which, rows = self._across.among(np.asarray(axes))
+        if len(rows):
+            same = self._m.dof_frictionloss[self._dof[np.asarray(axes)[which]]]
+            self._m.dof_frictionloss[self._across.dof[rows]] = same

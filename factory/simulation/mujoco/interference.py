@@ -29,10 +29,10 @@ class Interference:
 
     def __init__(self, world: MujocoWorld) -> None:
         self._world, self._m, self._d = world, world.m, world.d
-        axes = world.motion.axes
+        self._axes = axes = world.motion.axes
         self._robots = slice(axes.tray)
-        self._qpos, self._dof = axes.qpos[self._robots], axes.dof[self._robots]
-        self._actuator = axes.actuator[self._robots]
+        self._dof = np.concatenate([axes.dof[self._robots], axes.across.dof])
+        self._actuator = np.concatenate([axes.actuator[self._robots], axes.across.actuator])
         self._gain = np.ones(len(self._actuator))
         self._measures: list[Measure] = []
         self._measured: tuple[Array, Array] | None = None
@@ -51,17 +51,19 @@ class Interference:
     def rub(self, axes: Index, newtons: float) -> None:
         """Axes have dry friction when they are empty, and as much more under a load as ever."""
         self._world.motion.guides.rub(axes, newtons)
-        self._m.dof_solimp[self._dof[axes], :2] = HARD
+        self._m.dof_solimp[self._dof[self._slides(axes)], :2] = HARD
 
     def drag(self, axes: Index, speed: Array) -> None:
         """Axes have damping with which their drives' greatest force holds a `speed` [m/s]."""
-        force = self._m.actuator_forcerange[self._actuator[axes], 1]
-        self._m.dof_damping[self._dof[axes]] = force / speed
+        force, second = self._m.actuator_forcerange[self._actuator[axes], 1], self._second(axes)
+        damping = force / speed
+        self._m.dof_damping[self._dof[self._slides(axes)]] = [*damping, *damping[second]]
 
     def weaken(self, axes: Index, factor: float) -> None:
         """Drives give `factor` times the force that they are asked for."""
-        drives = self._actuator[axes]
-        self._gain[axes] *= factor
+        slides = self._slides(axes)
+        drives = self._actuator[slides]
+        self._gain[slides] *= factor
         self._m.actuator_biasprm[drives, 1:3] *= factor
         self._m.actuator_forcerange[drives] *= factor
         if factor != 1.0:
@@ -79,9 +81,9 @@ class Interference:
         self._world.motion.sleep.wake([body])
 
     def off(self, axis: int) -> float:
-        """How far an axis is from its setpoint [m]."""
+        """How far an axis is from its setpoint [m], in the direction of its slide."""
         setpoint = self._d.ctrl.reshape(-1, INPUTS)[self._actuator[axis], 0]
-        return float(self._d.qpos[self._qpos[axis]] - setpoint)
+        return float(self._d.qpos[self._axes.qpos[axis]] - setpoint)
 
     def greatest_force(self, axis: int) -> float:
         """Of an axis's drive [N]."""
@@ -100,9 +102,11 @@ class Interference:
         for axis in np.flatnonzero(self._gain != 1.0).tolist():
             bias[axis] = (self._gain[axis] - 1.0) * self._setpoint(axis)[2]
         if self._measured is not None:
-            q, v = self._measured
+            x, speed = self._axes.measured(self._d)
+            wrong = np.stack([self._measured[0] - x, self._measured[1] - speed])
             kp, kv = self._m.actuator_biasprm[self._actuator, 1:3].T
-            bias += kp * (q - self._d.qpos[self._qpos]) + kv * (v - self._d.qvel[self._dof])
+            off, slip = self._axes.across.spread(x, wrong)
+            bias += kp * off + kv * slip
             self._world.motion.sleep.wake(self._world.motion.axes.body[self._robots].tolist())
         self._m.actuator_biasprm[self._actuator, 0] = bias
 
@@ -113,7 +117,16 @@ class Interference:
 
     def _measure(self) -> None:
         if self._measures:
-            q, v = self._d.qpos[self._qpos].copy(), self._d.qvel[self._dof].copy()
+            q, v = (values.copy() for values in self._axes.measured(self._d))
             for measure in self._measures:
                 q, v = measure(q, v)
             self._measured = q, v
+
+    def _second(self, axes: Index) -> Index:
+        """Which of some axes have a second slide."""
+        return self._axes.across.among(np.asarray(axes))[0]
+
+    def _slides(self, axes: Index) -> Index:
+        """The slides of axes: their own, and then the second ones."""
+        rows = self._axes.across.among(np.asarray(axes))[1]
+        return np.concatenate([np.asarray(axes), self._axes.tray + rows])

@@ -33,16 +33,17 @@ class Motion:
     def __init__(
         self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, start: Array, gains: Array
     ) -> None:
-        self.axes, self.settings, self._d = Axes.of(m, model.factory), model.settings, d
-        robots = self.axes.actuator[: self.axes.tray]
+        self.axes, self.settings, self._d = Axes.of(m, model.layout), model.settings, d
+        robots, across = self.axes.actuator[: self.axes.tray], self.axes.across
         m.actuator_biasprm[robots, 1:3] *= np.asarray(gains)[:, None]
+        m.actuator_biasprm[across.actuator, 1:3] *= np.asarray(gains)[across.axes, None]
         body, dof = self.axes.body, self.axes.dof
         own = m.body_subtreemass[body] + m.dof_armature[dof]
-        self.drives = Drives(m, d, self.axes.actuator, own.round(9))
-        self.guides = Guides(m, dof)
+        self.drives = Drives(m, d, self.axes.actuator, own.round(9), across)
+        self.guides = Guides(m, dof, across)
         self.sleep = Sleep(m, d, self.axes.tree)
         x, v = np.append(start, [0.0, 0.0]), np.zeros(len(self.axes))
-        d.qpos[self.axes.qpos] = x
+        self.axes.put(d, np.arange(len(x)), x)
         self.robots = Follower(x, v, self.drives, self.settings.steps)
         tray = Follower(x, v, self.drives, self.settings.steps)
         self.outfeed = Outfeed(d, model, self.axes, tray, self.drives)
@@ -76,7 +77,7 @@ class Motion:
     def put(self, at: Mapping[int, float]) -> None:
         """Axes are put somewhere else [m], and stand there."""
         axes, x = np.array([*at], np.intp), np.array([*at.values()])
-        self._d.qpos[self.axes.qpos[axes]], self._d.qvel[self.axes.dof[axes]] = x, 0.0
+        self.axes.put(self._d, axes, x)
         self.robots.x[axes] = x
         self.robots.stop(axes)
         self.sleep.wake(self.axes.body[axes].tolist())
@@ -203,7 +204,8 @@ class Motion:
             x, v = self._planned(axes, np.minimum(self.drives.time - begun, reach))
             self.robots.x[axes], self.robots.v[axes] = x, v
             force = self.drives.mass[axes] * a + self.drives.weight[axes]
-            self.drives.show(axes, np.stack([x, v, force], axis=-1))
+            told = np.stack([x, v, force], axis=-1)[:, None]
+            self.drives.show(axes, self.drives.bent(axes, told, a[:, None], np.zeros(1))[:, 0])
 
     def _planned(self, axes: Index, t: Array) -> tuple[Array, Array]:
         """Where axes are on their plans, and how fast, some time [s] after those began."""

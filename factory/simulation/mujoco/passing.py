@@ -15,6 +15,7 @@ from factory.mjcf import names
 from factory.mjcf.model import Model
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
+from factory.simulation.mujoco.axes import Axes
 from factory.simulation.request import RunRequest
 from factory.support.engine import mujoco
 
@@ -55,8 +56,8 @@ class Passing:
         factory, layout = model.factory, model.layout
         outlets = outlets_of(layout)
         carriers = [outlet.robot for outlet in outlets]
-        joints = [m.joint(names.slide(factory.robots[robot].name)).id for robot in carriers]
-        self._d, self._address, self._dof = d, m.jnt_qposadr[joints], m.jnt_dofadr[joints]
+        self._d, self._carriers = d, np.array(carriers, np.intp)
+        self._axes = Axes.of(m, layout)
         self._home = np.array([layout.guidepaths[robot].length for robot in carriers])
         self._clear = self._home - [passing(outlet.layout, outlet.leaf) for outlet in outlets]
         hands = [layout.hand(robot) for robot in carriers]
@@ -94,7 +95,7 @@ class Passing:
     def is_aside(self, number: int) -> bool:
         """Whether a robot is out of the way of what its feeder shows. One whose hand is there
         before that comes down is never in its way."""
-        at = self._d.qpos[self._address[number]]
+        at = self._at()[0][number]
         return bool(self._first[number] or at <= self._clear[number])
 
     def is_under(self, number: int) -> bool:
@@ -105,8 +106,8 @@ class Passing:
     def clear(self) -> Truth:
         """Whether each robot (n,) is so far away with its part that the next can come down; or, if
         its hand has to be there first, rests at home without one."""
-        at, still = self._d.qpos[self._address], np.abs(self._d.qvel[self._dof]) < STILL
-        home = ~self.holds & still & (at >= self._home - HOME)
+        at, v = self._at()
+        home = ~self.holds & (np.abs(v) < STILL) & (at >= self._home - HOME)
         self._lifts.narrow(home, self._d)
         return np.asarray(np.where(self._first, home, ~self.holds | (at <= self._clear)))
 
@@ -115,5 +116,10 @@ class Passing:
         above: the part has to be down before."""
         if self._kinds[number] == "above":
             return 0.0
-        way = float(self._home[number] - self._d.qpos[self._address[number]])
+        way = float(self._home[number] - self._at()[0][number])
         return self._fastest.rest(max(way, 0.0))
+
+    def _at(self) -> tuple[Array, Array]:
+        """Where the robots (n,) are [m], and how fast [m/s]."""
+        x, v = self._axes.measured(self._d)
+        return x[self._carriers], v[self._carriers]

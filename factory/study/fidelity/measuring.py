@@ -133,7 +133,7 @@ class DriveFigures:
     def tick(self, v: Array, force: Array) -> None:
         """The steps of a tick: speeds (n + 1, nv), forces (n, nu)."""
         d, motion = self.world.d, self.world.motion
-        error = np.abs(d.qpos[motion.axes.qpos] - motion.robots.x)
+        error = motion.axes.off(d, motion.robots.x)
         self.error = max(self.error, float(error.max()))
         share = np.abs(force) / self.limit
         self.peak = max(self.peak, float(share.max()))

@@ -71,7 +71,7 @@ class Extents:
 
 class Neighbours:
     """The holders of a model's parts, by their codes, where the run begins; `culls`: some may be
-    left out."""
+    left out, but not where guidepaths have bends."""
 
     def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, parts: Parts, axes: Axes) -> None:
         shutter = parts.tray + len(parts.feeders.welds) + 1
@@ -80,7 +80,7 @@ class Neighbours:
             dict(zip(axes.tree.tolist(), self._holder.tolist(), strict=True)) | parts.feeders.trees
         )
         count = parts.masks.own(trees, shutter) + 1
-        self.culls, self._calm = count > FEW, -np.inf
+        self.culls, self._calm = count > FEW and not len(axes.across.axes), -np.inf
         self._active: Index | None = None
         self._seen, self._moved = np.ones(count, bool), False
         if self.culls:

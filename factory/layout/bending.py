@@ -1,0 +1,51 @@
+"""Bend guidepaths: what brings a robot its inputs is moved as it is, the robot goes round.
+
+A guidepath with bends ends where it ended, along its heading, and begins elsewhere along the same
+heading. So the branch behind it is only moved; nothing turns, and all that meets still meets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from factory.layout.guidepath import Guidepath, Point2
+from factory.layout.layout import Layout, carriers
+from factory.layout.way import Bend
+
+
+@dataclass(frozen=True, slots=True)
+class Detour:
+    """How the guidepath of a robot is bent: its `bends`, and its new `travel` [m]."""
+
+    travel: float
+    bends: tuple[Bend, ...] = ()
+
+    def of(self, path: Guidepath, rounding: float) -> Guidepath:
+        """A guidepath with this travel and these bends."""
+        round_ = rounding if self.bends else 0.0
+        return replace(path, travel=self.travel, bends=self.bends, rounding=round_)
+
+
+def bent(layout: Layout, detours: Mapping[int, Detour], rounding: float) -> Layout:
+    """A layout in which guidepaths, by robot (index), are bent, with corners of a rounding [m]; it
+    is not certified. The output robot, before which the outfeed stands, keeps its own."""
+    on, paths = carriers(layout.factory), list(layout.guidepaths)
+    moved, longer = list[Point2](), list[float]()
+    for robot, path in enumerate(layout.guidepaths):
+        x, y = moved[on[robot]] if on[robot] >= 0 else (0.0, 0.0)
+        a = round(path.a[0] + x, 3), round(path.a[1] + y, 3)
+        paths[robot] = path = replace(path, a=a)
+        if robot in detours:
+            paths[robot] = detours[robot].of(path, rounding)
+        begins, began = paths[robot].middle(paths[robot].length), path.middle(path.length)
+        moved.append((x + begins[0] - began[0], y + begins[1] - began[1]))
+        longer.append(paths[robot].length - path.length)
+    operations = layout.factory.operations
+    visits = {
+        (number, robot): replace(visit, at=round(visit.at + longer[robot], 6))
+        if robot and operations[number].carrier == robot
+        else visit
+        for (number, robot), visit in layout.visits.items()
+    }
+    return replace(layout, guidepaths=tuple(paths), visits=visits, certificate=None)
