@@ -24,7 +24,7 @@ from factory.layout.presence import Presence
 from factory.mjcf import stock
 from factory.mjcf.loading import load
 from factory.mjcf.model import build_model
-from factory.nets.coordinated import Order
+from factory.nets.coordinated import Order, Past
 from factory.pipeline import read
 from factory.problem.robot_types import load_catalogue
 from factory.simulation.ordering import Ordering
@@ -222,6 +222,18 @@ def test_a_product_is_the_same_with_its_certificate() -> None:
 
 
 # --- order places in a run ------------------------------------------------------------------------
+
+
+def test_an_order_after_a_pass_waits_for_what_the_pass_follows() -> None:
+    """The pass of another machine may be of its last round: the transition that it follows has to
+    have fired in this one."""
+    fired = {3: 0, 5: 0, 4: 1}
+    ordering = Ordering([Order(3, 4, 1, Past(3, 0, 0.2), 5, 0)])
+    assert ordering.hold_up(4, fired.__getitem__, lambda: np.array([0.3]))
+    fired[3] = 1
+    assert not ordering.hold_up(4, fired.__getitem__, lambda: np.array([0.3]))
+    ordering.ask_anew()
+    assert ordering.hold_up(4, fired.__getitem__, lambda: np.array([0.1]))
 
 
 def test_an_operation_waits_for_another() -> None:

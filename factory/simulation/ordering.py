@@ -8,20 +8,23 @@ the axis is: so it is after an undo too, and where a run begins in any marking.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 
 from factory.control.mode import Array
 from factory.nets.coordinated import Order, Past
 
 
 class Ordering:
-    """The order places of a coordinated net, by the transition that waits. `held`: the passes that
+    """The order places of a coordinated net, by the transition that waits; of one that begins with
+    a pass also the transition that the pass follows is waited for. `held`: the passes that
     transitions have been found to wait for; `lacking`: the transitions that they have."""
 
     def __init__(self, orders: Iterable[Order] = ()) -> None:
         self.held, self.lacking = set[Past](), set[int]()
         self._by_start: dict[int, list[Order]] = {}
         for order in orders:
-            self._by_start.setdefault(order.start, []).append(order)
+            before = [replace(order, past=None)] if order.past else []
+            self._by_start.setdefault(order.start, []).extend([*before, order])
 
     def ask_anew(self) -> None:
         """Nothing has been found yet."""

@@ -154,7 +154,8 @@ class RobotBlocks:
         over = f"{self._completed(order.end)} >= {self._completed(order.before)}"
         over += f" + {order.held}" if order.held else ""
         side = f"{'>=' if past.direction > 0 else '<='} {_real(past.at)}"
-        return f"({count} <> Unit + 1 OR {over} OR Axes[{past.axis + 1}].Position {side})"
+        there = f"{over} OR Axes[{past.axis + 1}].Position {side}"
+        return f"({count} > Unit + 1 OR {count} = Unit + 1 AND ({there}))"
 
     def _completed(self, transition: int) -> str:
         """How often a transition of the compiled net has fired."""
