@@ -1,4 +1,4 @@
-"""Makes the meshes of the products `chest` and `gearbox`: run it to write them again.
+"""Makes the meshes of the products `chest`, `gearbox` and `peg`: run it to write them again.
 
     python examples/make_meshes.py [FOLDER]
 
@@ -340,6 +340,27 @@ def coupling() -> Part:
     return rings
 
 
+# --- the peg in its pocket ------------------------------------------------------------------------
+
+POCKETED = (40.0, 20.0)
+"""Length and width of the peg."""
+
+LOOSE = 0.2
+"""Between the peg and each wall of its pocket."""
+
+
+def base() -> Part:
+    """A plate from z = 0 with four walls round a pocket for the peg, in its middle."""
+    u, v = (length / 2 + LOOSE for length in POCKETED)
+    wall, floor, rim = 8.0, 10.0, 22.0
+    found = block(-40.0, 40.0, -40.0, 40.0, 0.0, floor)
+    for x in (-u - wall, u):
+        found += block(x, x + wall, -v - wall, v + wall, floor, rim)
+    for y in (-v - wall, v):
+        found += block(-u, u, y, y + wall, floor, rim)
+    return found
+
+
 PARTS = {
     "chest/thick_shelf": lambda: shelf(8.0),
     "chest/thin_shelf": lambda: shelf(6.0),
@@ -359,6 +380,7 @@ PARTS = {
     "gearbox/sight": lambda: plug("y", -47.0, -37.0, (36.0, 0.0)),
     "gearbox/drain": lambda: plug("x", 65.0, 55.0, (0.0, 36.0)),
     "gearbox/wheel": coupling,
+    "peg/base": base,
 }
 """What makes the mesh of each part."""
 

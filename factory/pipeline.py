@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from factory.compiler.compiler import compile_pag
 from factory.compiler.expanding import expand
+from factory.compiler.turning import check_shapes, placed
 from factory.lang.pag_reader import load_pag
 from factory.lang.template_reader import load_templates
 from factory.layout.request import Ground
@@ -178,7 +179,8 @@ class Project:
         from factory.compiler.mating.mating import matings
 
         nodes = expand(self.pag, self.templates, self._single)
-        return matings(nodes, self.product, True, self.lowered)
+        lowered = {**placed(nodes, self.catalogue), **self.lowered}
+        return matings(nodes, self.product, True, lowered)
 
     @property
     def overlaps(self) -> DrawnOverlaps:
@@ -277,6 +279,7 @@ class Project:
         factory = compile_pag(
             self.pag, self.templates, self.catalogue, self.approaches, self._single
         )
+        check_shapes(factory, is_shaped(self.pag))
         own = {name for name, template in self.templates.items() if not _is_shipped(template)}
         tried = own and own & {operation.template.name for operation in factory.operations}
         if tried:

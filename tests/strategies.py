@@ -172,6 +172,7 @@ def templates(draw: st.DrawFn) -> Template:
         tuple(defaults.items()),
         geometry,
         draw(_failures(any(brings), any(b == "nopart" for b in before[: j - 1] + before[j:]))),
+        brought=draw(st.sampled_from(["", "pick"])) if sum(brings) > brings[j - 1] else "",
     )
 
 

@@ -37,6 +37,9 @@ def smallest_product(template: Template) -> str:
     made = [f"{p} = atomic ()" for p in parts]
     if template.name == "dropoff":
         return "root = p0; " + "; ".join(made)
+    if template.name in ("pick", "place"):
+        block, pin = "box = (0.08, 0.08, 0.02)", "box = (0.04, 0.02, 0.03), pos = (0, 0, 0.025)"
+        return f"root = s; s = place ( p0, p1 ); p0 = atomic ( {block} ); p1 = atomic ( {pin} )"
     if template.name == "insert":
         return "root = s; s = mate ( p0, p1, p2 ); p2 = atomic (); " + "; ".join(made)
     operation = f"s = {template.name} ( {', '.join(parts)} )"
@@ -75,8 +78,12 @@ def test_robot_types_load(name: str) -> None:
     robot = load_catalogue()[name]
     assert robot.summary
     m = mujoco.MjModel.from_xml_path(str(robot.mjcf))
-    assert m.joint("slide").type == mujoco.mjtJoint.mjJNT_SLIDE
-    assert m.actuator("drive").trnid[0] == m.joint("slide").id
+    first, kind = "slide", mujoco.mjtJoint.mjJNT_SLIDE
+    if robot.fixed:
+        first, kind = "turn", mujoco.mjtJoint.mjJNT_HINGE
+    assert m.joint(first).type == kind
+    assert m.actuator("drive").trnid[0] == m.joint(first).id
+    assert m.njnt == len(robot.moves)
     assert m.actuator_forcelimited[m.actuator("drive").id]
     assert m.site("nest").id >= 0
     model = load_robot_model(robot)

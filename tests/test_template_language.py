@@ -170,6 +170,8 @@ def test_what_is_shipped() -> None:
         "insert",
         "inspect",
         "mate",
+        "pick",
+        "place",
         "press",
         "relay",
         "screw",
@@ -177,6 +179,7 @@ def test_what_is_shipped() -> None:
     ]
     assert TEMPLATES["dropoff"].result == "nopart"
     assert TEMPLATES["mate"].further == TEMPLATES["mate"].instead == "insert"
+    assert (TEMPLATES["place"].further, TEMPLATES["place"].brought) == ("place", "pick")
     assert TEMPLATES["insert"].inputs == ("LAB1", "LAB2")
     dwells = {name: dict(t.parameters)["dwell"] for name, t in TEMPLATES.items() if t.parameters}
     assert dwells == {"glue": 2.0, "inspect": 0.5, "press": 1.5, "screw": 1.0, "weld": 1.0}

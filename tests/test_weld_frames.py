@@ -70,7 +70,7 @@ def test_velocities_of_holders_are_the_engines(model: mujoco.MjModel) -> None:
 def test_a_holder_that_turns_is_refused() -> None:
     xml = """<mujoco><worldbody>
       <body name="slider"><joint type="slide"/><geom size="0.1"/>
-        <body name="arm"><joint type="{}"/><geom size="0.1"/></body></body>
+        <body name="arm"><joint type="{}" axis="1 0 0"/><geom size="0.1"/></body></body>
       <body name="part"><freejoint/><geom size="0.1"/></body>
     </worldbody><equality><weld body1="arm" body2="part"/></equality></mujoco>"""
     check_holders(mujoco.MjModel.from_xml_string(xml.format("slide")), np.array([0]))
@@ -78,3 +78,31 @@ def test_a_holder_that_turns_is_refused() -> None:
     check_holders(turns, np.array([], int))
     with pytest.raises(ValueError, match="arm holds parts and does more than slide"):
         check_holders(turns, np.array([0]))
+
+
+def test_a_holder_that_turns_about_the_vertical_turns_what_it_holds() -> None:
+    """Frames follow from the joints as the engine has them, off the axis too."""
+    xml = """<mujoco><worldbody>
+      <body name="head" pos="0.3 0.1 0.2"><joint type="slide" axis="0 0 1"/><geom size="0.1"/>
+        <body name="tool" quat="0.8 0 0 0.6">
+          <joint type="hinge" axis="0 0 -1" pos="0.05 0.02 0" ref="0.4"/><geom size="0.1"/>
+        </body></body>
+      <body name="part"><freejoint/><geom size="0.1"/></body>
+    </worldbody><equality>
+      <weld body1="tool" body2="part" relpose="0.07 0.01 -0.03 0.6 0 0 0.8"/>
+    </equality></mujoco>"""
+    m = mujoco.MjModel.from_xml_string(xml)
+    check_holders(m, np.array([0]))
+    d = mujoco.MjData(m)
+    for start, at in (((0.0, 0.0), (0.1, 0.9)), ((0.05, 0.4), (0.02, -1.3))):
+        d.qpos[:2] = start
+        mujoco.mj_kinematics(m, d)
+        frames = WeldFrames.of(m, d)
+        d.qpos[:2] = at
+        mujoco.mj_kinematics(m, d)
+        slides = d.qpos[frames.along]
+        turn = np.empty(4)
+        mujoco.mju_mulQuat(turn, d.xquat[m.body("tool").id], m.eq_data[0, 6:10])
+        wanted = held_at(m, np.array([0]), d.xpos, d.xmat)
+        assert frames.at(slides) == pytest.approx(wanted, abs=1e-12)
+        assert abs(frames.turned(slides)[0] @ turn) == pytest.approx(1.0, abs=1e-12)

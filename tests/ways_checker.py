@@ -70,7 +70,9 @@ def _swept(m: mujoco.MjModel, way: Json) -> tuple[list[str], Boxes]:
         solid = (g for g in _geoms(m, body) if m.geom_contype[g] or m.geom_conaffinity[g])
         for geom in solid:
             at = _box(m, geom, d.geom_xpos[geom], d.geom_xmat[geom].reshape(3, 3))
-            _sweep(m, d, (m.body(body).id, joints), way["spans"], at, boxes)
+            standing = m.geom_type[geom] == mujoco.mjtGeom.mjGEOM_CYLINDER
+            standing &= abs(abs(d.geom_xmat[geom][8]) - 1.0) < 1e-9
+            _sweep(m, d, (m.body(body).id, joints), way["spans"], at, boxes, standing)
             names += [m.geom(geom).name] * len(way["spans"])
     for weld in map(m.equality, way["welds"]):
         holder, part = int(m.eq_obj1id[weld.id]), int(m.eq_obj2id[weld.id])
@@ -91,8 +93,11 @@ def _sweep(
     spans: list[list[list[float]]],
     box: Boxes,
     boxes: list[Boxes],
+    standing: bool = False,
 ) -> None:
-    """Add what a box of a body sweeps as slides go over spans, one group after the other."""
+    """Add what a box of a body sweeps as joints go over spans, one group after the other. One that
+    turns about the vertical comes first: it is the body's own. What is in the box may be a
+    `standing` cylinder."""
     body, joints = moved
     for group in spans:
         swept = box.copy()
@@ -100,9 +105,25 @@ def _sweep(
             if m.jnt_bodyid[joint] not in _above(m, body):
                 continue
             begin = m.qpos0[m.jnt_qposadr[joint]]
+            if m.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE:
+                turns = np.linspace(low - begin, high - begin, 90) * d.xaxis[joint][2]
+                swept = _turned(swept, d.xanchor[joint], turns, standing)
+                continue
             ends = np.outer([low - begin, high - begin], d.xaxis[joint])
             swept += [ends.min(axis=0), ends.max(axis=0)]
         boxes.append(swept)
+
+
+def _turned(box: Boxes, anchor: Boxes, turns: Boxes, standing: bool) -> Boxes:
+    """The box of a box, or of a cylinder that stands in it, which turns about a vertical axis."""
+    half = (box[1] - box[0]) / 2 * standing
+    ends = np.array([box[0] + half, box[1] - half])
+    x, y = np.meshgrid(ends[:, 0] - anchor[0], ends[:, 1] - anchor[1])
+    c, s = np.cos(turns)[:, None], np.sin(turns)[:, None]
+    u, v = c * x.ravel() - s * y.ravel() + anchor[0], s * x.ravel() + c * y.ravel() + anchor[1]
+    low, high = box[:, 2]
+    plan = np.array([[u.min(), v.min()], [u.max(), v.max()]]) + np.outer([-1, 1], half[:2])
+    return np.column_stack([plan, [low, high]])
 
 
 def _above(m: mujoco.MjModel, body: int) -> Iterator[int]:

@@ -15,6 +15,7 @@ from types import MappingProxyType
 from factory.compiler.assigning import beside, gear_net
 from factory.compiler.domains import check_prepared
 from factory.compiler.expanding import Node, expand
+from factory.compiler.turning import check_turned
 from factory.plant.approaches import Approach
 from factory.plant.factory import Factory, Operation, Robot
 from factory.problem.pag import NOPART, PAG
@@ -68,7 +69,10 @@ def compile_nodes(
     draft = _Draft(nodes, catalogue, approaches)
     draft.compile(pag, output)
     robots, operations = draft.robots(), tuple(draft.operations)
-    troubles = draft.troubles or [*check_prepared(robots, operations)]
+    troubles = draft.troubles or [
+        *check_prepared(robots, operations),
+        *check_turned(pag, robots, operations, catalogue),
+    ]
     if troubles:
         raise InputError(troubles)
     net, parents = gear_net(robots, operations), tuple(draft.parents)
@@ -139,7 +143,14 @@ class _Draft:
     def robots(self) -> tuple[Robot, ...]:
         """The robots allocated."""
         return tuple(
-            Robot(i, f"r{i + 1}", self.types[i], tuple(reversed(visits)), self.births[i])
+            Robot(
+                i,
+                f"r{i + 1}",
+                self.types[i],
+                tuple(reversed(visits)),
+                self.births[i],
+                self.catalogue[self.types[i]].fixed,
+            )
             for i, visits in enumerate(self.visits)
         )
 
@@ -202,7 +213,9 @@ class _Draft:
         return tuple(robots[slot] for slot in range(len(template.robots)))
 
     def _lift(self, wanted: str, node: Node) -> str:
-        """The type of a robot that fills the role of a `wanted` and has a lift."""
+        """The type of a robot that fills the role of a `wanted` and lowers what it brings."""
+        if self.catalogue[wanted].lowers:
+            return wanted
         met = self.catalogue.meet(LIFT, wanted) if LIFT in self.catalogue.types else None
         if met is not None and self.catalogue.fits(met, LIFT):
             return met

@@ -44,10 +44,28 @@ def expand(pag: PAG, templates: Mapping[str, Template], plan: Plan = AS_WRITTEN)
     nodes: dict[str, Node] = {}
     for assembly in pag.postorder():
         for label, template, inputs, last in _operations(assembly, templates, plan.forms):
+            inputs = tuple(_brought(nodes, template, inputs, templates))
             size, dwell = 1 + sum(nodes[x].size for x in inputs), _dwell(template, assembly)
             nodes[label] = Node(label, template, inputs, dwell, size, assembly.position, last)
     nodes = _in_postorder(nodes, pag.root) if plan.forms else nodes
     return handed_over(nodes, plan.relays, templates)
+
+
+def _brought(
+    nodes: dict[str, Node], of: Template, inputs: tuple[str, ...], templates: Mapping[str, Template]
+) -> Iterator[str]:
+    """The inputs of an operation, those that are not its carrier's after their hand-over by the
+    template that it asks for (`x/pick` for x), which is added to the nodes unless it is written."""
+    variables = sorted(of.inputs, key=variable_number)
+    for variable, label in zip(variables, inputs, strict=False):
+        node, by = nodes[label], templates.get(of.brought)
+        if by is None or node.template is by or variable == of.before[of.carrier - 1]:
+            yield label
+            continue
+        name = f"{label}/{by.name}"
+        dwell = _dwell(by, Assembly(name, by.name, (label,)))
+        nodes[name] = Node(name, by, (label,), dwell, node.size + 1, node.position)
+        yield name
 
 
 def handed_over(

@@ -1,6 +1,6 @@
 """URDF of the engine's model of the factory: a prismatic joint for each robot, each lift and the
-outfeed (its position is the arc length or height in a run's log), a floating joint for each part;
-meshes are in a folder beside the file.
+outfeed (its position is the arc length or height in a run's log), a revolute one for a tool that
+turns, a floating joint for each part; meshes are in a folder beside the file.
 
 Links have the names of the bodies in the MJCF, the log and the MCAP.
 """
@@ -13,9 +13,13 @@ from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
+import numpy as np
+
 from factory.exporting.subject import Subject
 from factory.geometry.meshes import Array, Mesh, hull_mesh
 from factory.geometry.solids import rotation
+from factory.geometry.turning import upright
+from factory.layout.guidepath import LEVER
 from factory.mjcf import names
 from factory.mjcf.elements import add, exact, numbers
 from factory.mjcf.mesh_files import stl
@@ -49,7 +53,8 @@ class _Writer:
         from factory.support.engine import mujoco
 
         self.m, self.speed, self.folder, self.replica = m, speed, folder, replica
-        self.geom, self.slide = mujoco.mjtGeom, int(mujoco.mjtJoint.mjJNT_SLIDE)
+        self.geom, joint = mujoco.mjtGeom, mujoco.mjtJoint
+        self.kinds = {int(joint.mjJNT_SLIDE): "prismatic", int(joint.mjJNT_HINGE): "revolute"}
         self.files: dict[str, bytes] = {}
         pairs = zip(m.actuator_trnid[:, 0].tolist(), m.actuator_forcerange[:, 1], strict=True)
         self.force = {joint: float(most) for joint, most in pairs}
@@ -90,20 +95,24 @@ class _Writer:
     def _joint(self, root: Element, body: int) -> None:
         m, name = self.m, self.m.body(body).name
         joint = m.body_jntadr[body]
-        slides = joint >= 0 and int(m.jnt_type[joint]) == self.slide
-        kind = "prismatic" if slides else "floating" if joint >= 0 else "fixed"
+        kind = self.kinds.get(int(m.jnt_type[joint]), "floating") if joint >= 0 else "fixed"
+        slides, speed = kind == "prismatic", self.speed
         element = add(root, "joint", name=m.joint(joint).name if joint >= 0 else name, type=kind)
         at, turn = m.body_pos[body], m.body_quat[body]
         if slides:
             at = at - rotation(turn) @ m.jnt_axis[joint] * m.qpos0[m.jnt_qposadr[joint]]
+        if kind == "revolute":
+            w, _, _, z = upright(-m.jnt_axis[joint][2] * m.qpos0[m.jnt_qposadr[joint]])
+            w, z = turn[0] * w - turn[3] * z, turn[0] * z + turn[3] * w
+            turn, speed = np.array([w, 0.0, 0.0, z]), speed / LEVER
         _origin(element, at, turn)
         add(element, "parent", link=m.body(m.body_parentid[body]).name)
         add(element, "child", link=name)
-        if slides:
+        if kind in ("prismatic", "revolute"):
             add(element, "axis", xyz=numbers(m.jnt_axis[joint]))
-            low, high, speed = (numbers([value]) for value in (*m.jnt_range[joint], self.speed))
+            low, high, most = (numbers([value]) for value in (*m.jnt_range[joint], speed))
             effort = exact([self.force.get(int(joint), 0.0)])
-            add(element, "limit", lower=low, upper=high, effort=effort, velocity=speed)
+            add(element, "limit", lower=low, upper=high, effort=effort, velocity=most)
 
     def _shapes(self, link: Element, tag: str, geom: int) -> list[Element]:
         """The elements of a geom's shape; a capsule has three. A mesh is a file: of one that

@@ -54,11 +54,13 @@ class _Writer:
         """One presence."""
         name, held = one.machine, self._model.carried.carried.get(one.label, ())
         robot = self._model.factory.robots[one.robot].name
+        of = self._model.factory.robots[one.robot]
+        first, tool = names.first_axis(of), [names.tool(robot)] * of.fixed
         if name == robot:
-            bodies, joints = [names.carriage(robot)], [names.slide(robot)]
+            bodies, joints = [names.carriage(robot)], [first]
             joints += [names.slide_across(robot)] * (one.bodies.bent is not None)
             if one.robot in self._model.factory.strokes:
-                bodies, joints = [*bodies, names.head(robot)], [*joints, names.lift(robot)]
+                bodies, joints = [*bodies, names.head(robot), *tool], [*joints, names.lift(robot)]
             scales = [self._scales[joint] for joint in joints]
             return _way(one, bodies, joints, [names.grip(robot, label) for label in held], scales)
         if name == "tray":

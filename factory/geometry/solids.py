@@ -40,7 +40,8 @@ class Solid:
     and `quaternion` (4,) place it; `mass` [kg], `centre` (3,) of mass, `inertia` (3, 3) about it
     [kg m²]; `low`, `high` (3,) its bounding box; `corners` (n, 3): surface points whose
     displacements bound that of the whole; `pieces`: the vertices (n, 3) of the convex bodies that
-    represent it in collisions (`factory.geometry.pieces` states how exactly): one for most.
+    represent it in collisions (`factory.geometry.pieces` states how exactly): one for most; `fed`:
+    the angle about the vertical by which it is turned where it is presented [rad].
     """
 
     label: str
@@ -57,6 +58,7 @@ class Solid:
     mesh: Mesh | None = None
     corners: Array = field(default_factory=lambda: np.zeros((0, 3)), repr=False)
     pieces: tuple[Array, ...] = field(default=(), repr=False)
+    fed: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -120,6 +122,7 @@ def primitive(
         None,
         corners @ turn.T + place,
         (piece @ turn.T + place,),
+        fed_angle(node),
     )
 
 
@@ -145,7 +148,15 @@ def from_mesh(
         properties.mesh,
         corners,
         tuple(piece @ turn.T + place for piece in properties.mesh.pieces) or (corners,),
+        fed_angle(node),
     )
+
+
+def fed_angle(node: Assembly) -> float:
+    """The angle about the vertical by which a part is presented turned [rad]."""
+    angle = node.parameter("fed", 0.0)
+    assert isinstance(angle, float)
+    return angle
 
 
 def _mass(node: Assembly, volume: float) -> float:

@@ -44,12 +44,14 @@ class TemplateMaker:
         law = self._law(contents.get("F"), count, parameters)
         further: Token | None = contents.get("further")
         instead: Token | None = contents.get("instead")
+        brought: Token | None = contents.get("brought")
         if name is not None:
             self._check_name(name)
         if labels is not None:
             self._check_labels(labels, count, carrier)
             self._check_kind(labels, clause.geometry, further)
             self._check_instead(labels, carrier, instead)
+            self._check_brought(labels, carrier, brought)
         failures = self._failures(labels, carrier)
         if name is None or robots is None or carrier is None or labels is None or law is None:
             return None
@@ -71,6 +73,8 @@ class TemplateMaker:
             at(further) if further else None,
             at(instead) if instead else None,
             tuple(map(at, robots)),
+            str(brought or ""),
+            at(brought) if brought else None,
         )
 
     def _bad(self, message: str, at: Token, hint: str) -> None:
@@ -224,6 +228,14 @@ class TemplateMaker:
             message = f"{self.draft.name} has no robot to spare"
             hint = "leave this clause out: it is for carriers that take what two others bring"
             self._bad(message, instead, hint)
+
+    def _check_brought(self, labels: Labels, carrier: int | None, brought: Token | None) -> None:
+        """`brought` needs a robot that brings something to the carrier."""
+        brings = [i for i, label in enumerate(labels.before, 1) if label != NOPART and i != carrier]
+        if brought is not None and not brings:
+            message = f"no robot brings anything to the carrier of {self.draft.name}"
+            hint = "leave this clause out: it is for robots that have their inputs handed over"
+            self._bad(message, brought, hint)
 
     def _check_labels(self, labels: Labels, count: int | None, carrier: int | None) -> None:
         """The conditions on <a; b>, each with its code."""

@@ -26,7 +26,8 @@ Folder = str | os.PathLike[str]
 @lru_cache(maxsize=256)
 def read_template(text: str, file: str = "<text>") -> Template:
     """The template of a text. Raises InputError with every error of the text. `load_templates`
-    checks the templates named by `further` and `instead`. A text is parsed once a process."""
+    checks the templates named by `further`, `instead` and `brought`. A text is parsed once a
+    process."""
     findings = Findings(source_of(text, file))
     template = TemplateMaker(read_clauses(findings), findings).make()
     findings.raise_if_any()
@@ -81,8 +82,11 @@ def _twice(second: Template, first: Template) -> Diagnostic:
 
 
 def _check_others(templates: Mapping[str, Template]) -> Iterator[Diagnostic]:
-    """Errors of the templates that others name as `further` or `instead`."""
+    """Errors of the templates that others name as `further`, `instead` or `brought`."""
     for template in templates.values():
+        if template.brought:
+            at = template.brought_position or template.position
+            yield from _check_hand_over(template, at, templates)
         if template.further:
             at = template.further_position or template.position
             why = "cannot take further inputs one by one"
@@ -98,6 +102,21 @@ def _check_others(templates: Mapping[str, Template]) -> Iterator[Diagnostic]:
                 message = f"{quoted(other.name)} {why}: it has no {', '.join(sorted(lacking))}"
                 hint = "give it the same parameters, with their defaults"
                 yield Diagnostic("BadTemplate", message, at, hint)
+
+
+def _check_hand_over(
+    template: Template, at: Position | None, templates: Mapping[str, Template]
+) -> Iterator[Diagnostic]:
+    """Errors of the template by which another has its inputs handed over first."""
+    name = template.brought
+    other = templates.get(name)
+    if other is None:
+        hint = did_you_mean(name, list(templates), "templates")
+        yield Diagnostic("BadTemplate", f"there is no template {quoted(name)}", at, hint)
+    elif len(other.inputs) != 1 or other.before[other.carrier - 1] != NOPART:
+        message = f"{quoted(name)} hands nothing over to {quoted(template.name)}"
+        hint = "that takes one input, which another robot brings to its carrier, as pick does"
+        yield Diagnostic("BadTemplate", message, at, hint)
 
 
 def _check_other(

@@ -29,6 +29,7 @@ FORMS: Mapping[str, str] = MappingProxyType(
         "F": "F = navigation on W to ( A1 + 2r, A2 + 2r, B3 ) within eps;",
         "further": "further = insert;",
         "instead": "instead = insert;",
+        "brought": "brought = pick;",
         "failure": "failure = { residual > 5e-4 : again 2 then scrap, lost : scrap };",
         "parameters": "parameters = ( dwell = 1.0 );",
     }
@@ -92,7 +93,7 @@ class _Builder(Transformer[Token, Any]):
     def header(self, content: Any) -> Any:
         return content
 
-    robots = carrier = further = instead = failure = parameters = header
+    robots = carrier = further = instead = brought = failure = parameters = header
     identifications = header
 
     def names(self, *items: Any) -> tuple[Any, ...]:
@@ -203,7 +204,7 @@ def _names(expected: frozenset[str]) -> str:
     """Kinds of tokens in words: signs and keywords in quotes, any name as `a name`."""
     signs = [_lark().get_terminal(kind) for kind in expected - {"WORD", "STRING", END}]
     names = {"R", "j", "F", "W", "a", "b"}
-    names |= {"further", "instead", "failure", "parameters", "geometry"}
+    names |= {"further", "instead", "brought", "failure", "parameters", "geometry"}
     if "WORD" not in expected:
         names = set()
     shown = sorted(f"'{sign.pattern.value}'" for sign in signs if sign.pattern.value not in names)

@@ -70,6 +70,7 @@ GEOMETRY: Mapping[str, Kind] = MappingProxyType(
         "box": Kind(3, "( 0.1, 0.1, 0.05 )", positive=True, long=True),
         "cylinder": Kind(2, "( 0.02, 0.1 )", positive=True, long=True),
         "sphere": Kind(1, "0.05", positive=True, long=True),
+        "fed": Kind(1, "0.61", low=-3.15, high=3.15),
     }
 )
 SHAPES = ("mesh", "box", "cylinder", "sphere")

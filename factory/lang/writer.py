@@ -62,6 +62,7 @@ def write_template(template: Template) -> str:
         f"F = {_law(template.law)}",
         *([f"further = {template.further}"] if template.further else []),
         *([f"instead = {template.instead}"] if template.instead else []),
+        *([f"brought = {template.brought}"] if template.brought else []),
         *([f"failure = {_failures(template)}"] if template.failures != LOST else []),
         *_parameters(template),
     ]

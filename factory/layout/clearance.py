@@ -49,7 +49,7 @@ from factory.layout.dimensions import (
 )
 from factory.layout.exclusions import exclusions
 from factory.layout.guidepath import Box
-from factory.layout.layout import Layout
+from factory.layout.layout import Layout, delivery
 from factory.layout.sweeps import Pile, piles, regions
 from factory.plant.approaches import MARGIN
 from factory.plant.factory import Operation
@@ -171,7 +171,13 @@ class ClearanceSearch:
             return gap >= self.layout.clearance - TOLERANCE
         if not kinds <= {*LOADS}:
             return False
-        return self._joined(one, other) or self._joined(other, one) or self._in_turn(one, other)
+        return (
+            self._joined(one, other)
+            or self._joined(other, one)
+            or self._in_turn(one, other)
+            or self._over(one, other)
+            or self._over(other, one)
+        )
 
     def _cross(self, one: Region, other: Region) -> bool:
         """Whether they are regions of robots, not of stations, that have no operation in common."""
@@ -197,6 +203,17 @@ class ClearanceSearch:
         if self._members[one.mode].isdisjoint(self._members[other.mode]):
             return False
         self._share(one, other, one.mode, other.mode)
+        return True
+
+    def _over(self, one: Region, other: Region) -> bool:
+        """Whether one is that of a fixed robot over a station of the other's: what is there is
+        below its tool, or they are near in space (`exclusions`)."""
+        end = delivery(self.layout.factory, one.robot)
+        if not self.layout.factory.robots[one.robot].fixed or end is None:
+            return False
+        if end.carrier != other.robot:
+            return False
+        self._share(one, other, end.index, end.index)
         return True
 
     def _share(self, one: Region, other: Region, first: int, second: int) -> None:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from factory.layout.certificate import Fault, fault
 from factory.layout.guidepath import Guidepath, Point2
-from factory.layout.layout import Layout, carriers
+from factory.layout.layout import Layout, carriers, delivery
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
 
@@ -61,7 +61,7 @@ def _off_grid(layout: Layout, robot: int) -> Iterator[Fault]:
     elif not all(abs(v * 1000 - round(v * 1000)) < 1e-3 for v in ends):
         message = f"{name}: its guidepath, {ends[2:4]} to {ends[4:]}, is not in whole millimetres"
         yield fault(factory, message, robot)
-    elif not (path.travel > 0 and path.reach > 0):
+    elif not (path.fixed or (path.travel > 0 and path.reach > 0)):
         message = f"{name}: its guidepath has no length (it receives and delivers at {path.a})"
         yield fault(factory, message, robot)
     stops = layout.stops(robot) or [0.0]
@@ -93,8 +93,10 @@ def _ends_at(layout: Layout, robot: int, operation: Operation) -> Iterator[Fault
     carrier, name, (u, t) = operation.carrier, factory.robots[robot].name, (path.heading, path.side)
     on, other = layout.guidepaths[carrier], factory.robots[carrier].name
     in_line = len(operation.robots) == 2 and len(operation.inputs) == 1 and t == on.side
-    if t != on.heading and not (in_line and u == on.heading):
-        message = f"{name}: its side {t} is not {other}'s heading {on.heading}: it is mirrored"
+    end = delivery(factory, robot)
+    along = on.heading if end is None else layout.guidepaths[end.carrier].heading
+    if t != along and not (in_line and u == on.heading):
+        message = f"{name}: its side {t} is not {other}'s heading {along}: it is mirrored"
         yield fault(factory, message, robot, carrier)
     slot = operation.robots.index(robot)
     wanted = on.middle(layout.station(number) + layout.stop_offset(number, slot)[1])

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from math import floor, inf
 
 from factory.geometry.solids import Product
+from factory.geometry.turning import fed_of
 from factory.layout.certificate import (
     ALWAYS,
     ARM_BODY,
@@ -20,7 +21,7 @@ from factory.layout.certificate import (
 from factory.layout.dimensions import BEHIND, SIDE, WALL, Clearance, up
 from factory.layout.guidepath import Box, Guidepath
 from factory.layout.hands.hand import Point3
-from factory.layout.layout import Layout, carriers
+from factory.layout.layout import Layout, carriers, delivery
 from factory.layout.shapes import Shape, headings
 from factory.layout.stretching import Stretched
 from factory.layout.sweeps import piles, regions
@@ -78,17 +79,25 @@ class LayoutDraft:
         frames = headings(self.factory, self.stretched.sides)
         for robot, carrier in enumerate(carriers(self.factory)):
             (u, t), shape, a = frames[robot], self.shapes[robot], (0.0, 0.0)
-            if carrier >= 0:
-                number = self.factory.robots[robot].operations[-1]
+            if carrier >= 0 and (end := delivery(self.factory, robot)) is not None:
+                number = end.index
                 on, further = paths[carrier], shape.shift(number)[1]
                 further -= self.shapes[carrier].shift(number)[0]
                 a = on.middle(on.length - self.stretched.stations[number] + further)
             a = (round(a[0], 3), round(a[1], 3))
             offset = round(shape.offset + lane * shape.spread, 3)
-            paths.append(
-                Guidepath(u, t, a, travel[robot], shape.reach, offset, shape.arm, shape.nest)
-            )
+            turn = self._turn(robot)
+            way = travel[robot] if turn is None else abs(turn)
+            sizes = way, shape.reach, offset, shape.arm, shape.nest
+            paths.append(Guidepath(u, t, a, *sizes, turn=turn))
         return tuple(paths)
+
+    def _turn(self, robot: int) -> float | None:
+        """How far a fixed robot turns what it takes back to where that belongs [rad]."""
+        if not self.factory.robots[robot].fixed:
+            return None
+        (label,) = self.factory.deliveries(robot)
+        return -fed_of(self.product, self.factory.contents[label]) + 0.0
 
 
 def _outfeed(path: Guidepath, shape: Shape, c: Clearance) -> Box:

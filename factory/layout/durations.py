@@ -96,7 +96,11 @@ def operation_times(layout: Layout, pace: Pace) -> list[float]:
 
 def _ways(layout: Layout) -> dict[tuple[int, int], float]:
     """How far a robot goes in an operation, by both [m]."""
-    return {leg: abs(visit.at - before.at) for leg, (before, visit) in layout.ways.items()}
+    paths = layout.guidepaths
+    return {
+        (number, robot): abs(visit.at - before.at) * paths[robot].lever
+        for (number, robot), (before, visit) in layout.ways.items()
+    }
 
 
 def _operation_time(

@@ -23,6 +23,9 @@ Extent = tuple[float, float, float, float]
 
 Point2 = tuple[float, float]
 
+LEVER = 0.1
+"""At the end of an arm of this length [m] what turns is as fast as other robots are."""
+
 
 def project(box: Box, u: Point2, t: Point2) -> Extent:
     """A box of the world in the frame (u, t), both along world axes."""
@@ -54,6 +57,10 @@ class Guidepath:
     `aside`: how far to the side t of the carriage's line that is, in a lane beside another's. All
     lengths in [m].
 
+    A robot that is fixed goes nowhere: `turn` is the angle [rad] by which it turns what it holds
+    about the vertical, from where it receives to where it delivers, None for all others. Its x is
+    an angle too, and `travel` how far it turns; carriage and middle stay where they are.
+
     Arc length x of the carriage runs from A = 0; delivering at x = reach, receiving at B = reach +
     travel. `bends`: where the guidepath goes on beside its line, to the side t, its corners of a
     `rounding`; then x is the coordinate of `factory.layout.way`.
@@ -70,6 +77,17 @@ class Guidepath:
     aside: float = 0.0
     bends: tuple[Bend, ...] = ()
     rounding: float = 0.0
+    turn: float | None = None
+
+    @property
+    def fixed(self) -> bool:
+        """Whether the robot stands at its station, and turns."""
+        return self.turn is not None
+
+    @property
+    def lever(self) -> float:
+        """How far [m] the robot goes along for each unit of x: 1, or LEVER where x is an angle."""
+        return LEVER if self.fixed else 1.0
 
     @property
     def length(self) -> float:
@@ -91,7 +109,7 @@ class Guidepath:
         if self.bends:
             back, across = self._bent(x)
             return self._placed(back - self.reach, across)
-        back = x - self.reach
+        back = 0.0 if self.fixed else x - self.reach
         return self.a[0] - self.heading[0] * back, self.a[1] - self.heading[1] * back
 
     def carriage(self, x: float) -> Point2:
@@ -99,6 +117,7 @@ class Guidepath:
         if self.bends:
             back, across = self._bent(x)
             return self._placed(back, across + self.offset)
+        x = self.reach if self.fixed else x
         return (
             self.a[0] - self.heading[0] * x + self.side[0] * self.offset,
             self.a[1] - self.heading[1] * x + self.side[1] * self.offset,

@@ -12,6 +12,7 @@ from factory.geometry.common_places import Top, common_places
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Solid
 from factory.geometry.suction import GAP, PadPlace, pad_place
+from factory.geometry.turning import presented
 from factory.layout.dimensions import PAYLOAD
 from factory.layout.feeding import Outlet, lines_of, outlets_of
 from factory.layout.guidepath import Guidepath
@@ -130,4 +131,4 @@ def _path(outlet: Outlet) -> Guidepath:
 
 
 def _solid(outlet: Outlet) -> Solid:
-    return outlet.layout.product.solids[outlet.leaf.label]
+    return presented(outlet.layout.product.solids[outlet.leaf.label])

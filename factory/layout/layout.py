@@ -236,6 +236,9 @@ class Layout(Pictured):
         """
         carrier = operation.template.carrier - 1
         pile, label = operation.before[carrier], operation.before[slot]
+        path = self.guidepaths[operation.robots[slot]]
+        if slot == operation.lowered and path.fixed:
+            return min(BESIDE, path.travel)
         if slot == operation.lowered:
             return max(BESIDE, self._beside_hand(operation, slot) if pile == NOPART else 0.0)
         if slot == carrier or label == NOPART:
@@ -244,7 +247,6 @@ class Layout(Pictured):
             lowered = operation.lowered  # that waits for this one, and so for the carrier
             chained = lowered >= 0 and self._beside_hand(operation, lowered) > 0
             return max(BESIDE * chained, self._beside_hand(operation, slot))
-        path = self.guidepaths[operation.robots[slot]]
         ahead = path.frame(self.payloads[label])[1]
         towards = -path.frame(self.payloads[pile])[0]
         return max(0.0, ahead + towards + self.clearance)
@@ -253,9 +255,9 @@ class Layout(Pictured):
         """How far short of the meeting point what is brought is clear of the way of the carrier's
         hand and mast, where that has to be there first [m]; else 0."""
         hand, grip = self.hand(operation.carrier), self.grip(operation.carrier)
-        if hand is None or grip is None or not hand.first:
-            return 0.0
         path, on = self.guidepaths[operation.robots[slot]], self.guidepaths[operation.carrier]
+        if hand is None or grip is None or on.fixed or not hand.first:
+            return 0.0
         x, y = self.visits[operation.index, operation.carrier].shift
         over = x * path.heading[0] + y * path.heading[1]
         ahead = path.frame(self.payloads[operation.before[slot]])[1]
@@ -304,9 +306,21 @@ class Layout(Pictured):
 
 
 def carriers(factory: Factory) -> list[int]:
-    """For each robot the carrier it delivers to; -1 for the output robot, and one that is gone."""
-    lasts = [robot.operations[-1] if robot.operations else -1 for robot in factory.robots]
-    return [-1 if n < 0 or factory.drops(n) else factory.operations[n].carrier for n in lasts]
+    """For each robot the carrier on whose guidepath its own ends: the one it delivers to, or that
+    of a fixed robot which takes what it brings; -1 for the output robot, and one that is gone."""
+    ends = (delivery(factory, robot.index) for robot in factory.robots)
+    return [-1 if o is None or factory.drops(o.index) else o.carrier for o in ends]
+
+
+def delivery(factory: Factory, robot: int) -> Operation | None:
+    """The operation at whose station the guidepath of a robot (index) ends: its last, or that of a
+    fixed robot which takes what it brings; None for one that is gone."""
+    while True:
+        operations = factory.robots[robot].operations
+        last = factory.operations[operations[-1]] if operations else None
+        if last is None or last.carrier == robot or not factory.robots[last.carrier].fixed:
+            return last
+        robot = last.carrier
 
 
 __all__ = ["BESIDE", "Box", "Extent", "Feeder", "Guidepath", "Layout", "Point2", "carriers"]

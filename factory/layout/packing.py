@@ -136,8 +136,7 @@ class Packing:
     def _later(self, way: _Way, count: int) -> Iterator[tuple[int, Outline]]:
         """From which side which outline may come in so many operations after the next."""
         for stop in self.own.stops[len(way.piles) + 1 :][:count]:
-            robots = [robot for robot in stop.first.robots if robot != self.robot]
-            for sides in self._options(stop, robots):
+            for sides in self._options(stop, stop.guests):
                 for robot, side in sides.items():
                     yield side, self.outline(robot, side)
 
@@ -147,6 +146,8 @@ class Packing:
         outline, strip = self.outline(robot, side), self.own.strips[side]
         early = self.own.early(stop, side, outline.shape)
         wanted = up(outline.least + early) if early > 0 else 0.0
+        if outline.shape.fixed:
+            return [Guest(robot, outline, side, 0.0)]
         near = Guest(robot, outline, side, max(outline.clear(strip), wanted), wanted)
         if outline.crown == -inf:
             return [near]
@@ -212,7 +213,7 @@ class Packing:
         pace, operation = self.task.pace, stop.first
         longest = rested = pace.rest(station - way.station)
         for guest in guests:
-            if guest.outline.shape.tool:
+            if guest.outline.shape.tool or guest.robot not in operation.robots:
                 continue
             if not way.piles:
                 longest = max(longest, pace.rest(guest.travel))
@@ -254,7 +255,8 @@ class Packing:
         for guest in way.guests:
             outline = guest.outline
             clear = outline.clear(strip(guest.side, guest.station + outline.high[PAYLOADS]))
-            guests.append(_came(beside, guest, guest.station, max(clear, guest.wanted)))
+            least = 0.0 if outline.shape.fixed else max(clear, guest.wanted)
+            guests.append(_came(beside, guest, guest.station, least))
             if guests[-1].travel == inf:
                 return None
             beside = _taken(beside, guests[-1:])
@@ -270,7 +272,7 @@ class Packing:
         """The station of each operation, by its number."""
         outlines = {guest.robot: guest for guest in way.guests}
         for stop, station in zip(self.own.stops, way.stations, strict=True):
-            there = (outlines[robot] for robot in stop.first.robots if robot in outlines)
+            there = (outlines[robot] for robot in stop.guests)
             further = self._further(stop, there)
             for operation in stop.operations:
                 yield operation.index, station + further.get(operation.index, 0.0)
@@ -299,8 +301,11 @@ def bare(factory: Factory, robot: int, hand: Hand | None) -> int:
 
 
 def _came(beside: Mapping[int, Skyline], guest: Guest, station: float, least: float) -> Guest:
-    """A robot at a station, with what is beside the path already, at least so far out."""
+    """A robot at a station, with what is beside the path already, at least so far out: nowhere
+    else if it is fixed."""
     travel = beside[guest.side].travel(guest.outline, station, least)
+    if guest.outline.shape.fixed and travel > least:
+        travel = inf
     return replace(guest, station=station, travel=travel)
 
 

@@ -40,7 +40,7 @@ class Shape:
     where none is chosen, and the box `grip` of what of that is among the payloads; how far to the
     side the `post` of its feeder stands [m]; by operation how far the product's middle is ahead, to
     the side and above where the robot has it on its first tour (`shifts`), nothing where it is
-    always there: boxes are about the latter."""
+    always there: boxes are about the latter; whether it is `fixed` at its station."""
 
     piles: Mapping[int, Extent]
     last: Extent
@@ -55,6 +55,7 @@ class Shape:
     post: float = 0.0
     least: float = 0.0
     shifts: Mapping[int, Point3] = field(default_factory=dict)
+    fixed: bool = False
 
     def shift(self, operation: int) -> Point3:
         """How far the product's middle is ahead and to the side of where the guidepath has it, and
@@ -207,9 +208,9 @@ def held_shape(
     least = max(least, hands.travels.get(robot, 0.0))
     over = PAYLOAD - float(hands.holding.product.low[2])
     grip, nest = grip_of(hand, Mount(u, t, reach, arm, offset, (x, y), over)), round(max(ahead), 6)
-    return Shape(
-        boxes, last, offset, arm, reach, nest, False, spread, hand, grip, post, up(least), shifts
-    )
+    fixed = factory.robots[robot].fixed
+    least, given = up(least), (offset, arm, reach, nest, False, spread)
+    return Shape(boxes, last, *given, hand, grip, post, least, shifts, fixed)
 
 
 def _moves(hands: Hands, robot: int, carrier: int, frame: Frame) -> tuple[dict[int, Point3], float]:

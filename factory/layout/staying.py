@@ -17,6 +17,7 @@ import numpy as np
 
 from factory.geometry.meshes import Array
 from factory.geometry.pieces import cylinder_piece
+from factory.geometry.turning import fed_of, turning_pieces
 from factory.layout.coordinating import HOME, Coordinated
 from factory.layout.dimensions import (
     ARM_LOW,
@@ -111,12 +112,17 @@ class Staying:
         (x, y), (dx, dy) = layout.guidepaths[robot].middle(0.0), visit.shift
         up = PAYLOAD - float(product.low[2]) + visit.height
         origin = np.array([x + dx, y + dy, up]) - [*product.middle[:2], 0.0]
+        pieces = {part: layout.product.solids[part].pieces for part in parts}
         boxes = np.concatenate([self._pieces[part] for part in parts]) + origin
-        count, solids = len(boxes), layout.product.solids
+        if fed_of(product, parts):
+            pieces = {parts[0]: turning_pieces(product.solids[parts[0]])}
+            ends = [[piece.min(axis=0), piece.max(axis=0)] for piece in pieces[parts[0]]]
+            boxes = np.array(ends) + origin
+        count = len(boxes)
         return MachineBodies(
             tuple(part for part in parts for _ in self._pieces[part]),
             boxes,
-            tuple(piece for part in parts for piece in solids[part].pieces),
+            tuple(piece for part in parts for piece in pieces[part]),
             np.tile(origin, (count, 1)),
             np.full(count, PAYLOADS),
             np.ones(count, bool),
@@ -307,9 +313,11 @@ def in_world(boxes: Array, heading: tuple[float, float], at: tuple[float, float]
 
 
 def _way(layout: Layout, robot: int) -> tuple[Array, Guidepath | None]:
-    """How a robot moves as its arc length grows: against its heading, or as its guidepath bends."""
+    """How a robot moves as its arc length grows: against its heading, or as its guidepath bends;
+    not at all if it turns."""
     path = layout.guidepaths[robot]
-    return np.array([*path.heading, 0.0]) * -1.0, path if path.bends else None
+    ahead = 0.0 if path.fixed else -1.0
+    return np.array([*path.heading, 0.0]) * ahead, path if path.bends else None
 
 
 def _partners(layout: Layout) -> list[frozenset[int]]:

@@ -15,10 +15,12 @@ from factory.support.errors import Diagnostic, InputError
 class Stop:
     """Where a robot stands for one operation or, on a line, for several: those to which the same
     robots deliver. `visits`: how often it comes there from another stop, in all its tours but those
-    that are the same for another unit of a period."""
+    that are the same for another unit of a period; `guests`: the robots whose guidepaths end
+    there."""
 
     operations: tuple[Operation, ...]
     visits: int = 1
+    guests: tuple[int, ...] = ()
 
     @property
     def first(self) -> Operation:
@@ -31,11 +33,6 @@ class Stop:
         return tuple({operation.written: operation for operation in self.operations}.values())
 
     @property
-    def guests(self) -> list[int]:
-        """The robots that deliver there. Raises InputError (Layout) as `guests_of`."""
-        return guests_of(self.first)
-
-    @property
     def joins(self) -> bool:
         """Whether something is added there to what the robot holds."""
         return any(len(operation.inputs) > 1 for operation in self.operations)
@@ -44,7 +41,8 @@ class Stop:
 def stops_of(factory: Factory, robot: int) -> tuple[tuple[Stop, ...], bool]:
     """Where a robot stands for the operations after which it carries something, in an order in
     which it goes ahead from one to the next on each of its tours, and whether there is none since
-    it comes back to some: then in the order in which it comes there first."""
+    it comes back to some: then in the order in which it comes there first. Raises InputError
+    (Layout) as `guests_of`."""
     kept = frozenset(carried(factory, robot))
     tours = [
         [(_where(factory.operations[n], robot), factory.operations[n]) for n in tour if n in kept]
@@ -62,7 +60,10 @@ def stops_of(factory: Factory, robot: int) -> tuple[tuple[Stop, ...], bool]:
             before = where
     visits = Counter(where for where, _ in arrivals)
     order = _ordered(found, onward)
-    stops = tuple(Stop(tuple(found[where]), visits[where]) for where in order or found)
+    stops = tuple(
+        Stop(tuple(found[where]), visits[where], guests_of(factory, found[where][0]))
+        for where in order or found
+    )
     return stops, not order
 
 
@@ -102,15 +103,22 @@ def carried(factory: Factory, robot: int) -> list[int]:
     ]
 
 
-def guests_of(operation: Operation) -> list[int]:
-    """The robots that deliver to the carrier of an operation. Raises InputError (Layout) where the
-    layout cannot have them: two guidepaths can end at one point of a third, one from each side; a
-    third cannot."""
+def guests_of(factory: Factory, operation: Operation) -> tuple[int, ...]:
+    """The robots whose guidepaths end at the station of an operation: those that deliver to its
+    carrier, and those that bring something to one of these that is fixed. Raises InputError
+    (Layout) where the layout cannot have them: two guidepaths can end at one point of a third, one
+    from each side; a third cannot."""
+    if factory.robots[operation.carrier].fixed:
+        return ()
     guests = [robot for robot in operation.robots if robot != operation.carrier]
     goals = operation.template.law.goals
     away = any(goals[operation.robots.index(guest)].end != "A" for guest in guests)
+    for guest in [robot for robot in guests if factory.robots[robot].fixed]:
+        numbers = factory.robots[guest].operations
+        taking = (factory.operations[n] for n in numbers if factory.operations[n] != operation)
+        guests += dict.fromkeys(robot for o in taking for robot in o.robots if robot != guest)
     if len(guests) <= 2 and not away:
-        return guests
+        return tuple(guests)
     message, hint = (
         f"{len(guests)} guidepaths would end at one point of the carrier's",
         "give further inputs to another template (further = insert), two at a point at most",

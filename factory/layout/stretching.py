@@ -104,6 +104,8 @@ class _Builder:
         for robot, station in self.guests:
             outline, side = self.outlines[robot], self.sides[robot]
             travel = outline.clear(strip(side, station + outline.high[PAYLOADS]))
+            if outline.shape.fixed:
+                travel = 0.0
             found.append(Guest(robot, outline, side, travel, station=station))
         return found
 
@@ -112,14 +114,14 @@ class _Builder:
         low, frontier = self.outlines[guest].low, self.frontier[side]
         return max(frontier[layer] - low[layer] for layer in LAYERS)
 
-    def _mates(self, guests: list[int]) -> Sides:
+    def _mates(self, guests: Sequence[int]) -> Sides:
         """Of two that meet here, the longer goes away from where this robot delivers."""
         strip, outlines = self.own.strips[-1], self.outlines
         outward = {g: outlines[g].clear(strip) + outlines[g].behind for g in guests}
         ordered = sorted(guests, key=lambda g: (outward[g], g), reverse=True)
         return dict(zip(ordered, (-1, +1), strict=False))
 
-    def _later(self, guests: list[int]) -> Sides:
+    def _later(self, guests: Sequence[int]) -> Sides:
         """Where it comes sooner; a second one opposite."""
         if not guests:
             return {}

@@ -13,7 +13,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
+from factory.geometry.turning import turning_box
 from factory.layout.certificate import (
     ARM_BODY,
     BOOM,
@@ -72,21 +74,31 @@ class Pile:
 
 
 def piles(factory: Factory, product: Product) -> dict[str, Pile]:
-    """The extents of every label from its parts' solids, inputs before what is made of them."""
-    x, y, _ = product.middle
-    ground = float(product.low[2]) - PAYLOAD
-    found: dict[str, Pile] = {}
+    """The extents of every label from its parts' solids, inputs before what is made of them; of a
+    part that is presented turned, in all its orientations until it is joined."""
+    found, turning = dict[str, Pile](), dict[str, Pile]()
     for operation in reversed(factory.making):
-        inputs = [found[label] for label in operation.inputs]
+        label, inputs = operation.label, [found[x] for x in operation.inputs]
         if not inputs:
-            solid = product.solids[operation.label]
-            (xlo, ylo, zlo), (xhi, yhi, zhi) = solid.low, solid.high
-            inputs = [Pile((xlo - x, xhi - x, ylo - y, yhi - y), (zlo - ground, zhi - ground))]
-        found[operation.label] = Pile(
+            solid = product.solids[label]
+            inputs = [_pile(product, solid.low, solid.high)]
+            if solid.fed:
+                turning[label] = _pile(product, *turning_box(solid))
+        elif len(inputs) == 1 and operation.inputs[0] in turning:
+            turning[label] = turning[operation.inputs[0]]
+        found[label] = Pile(
             hull([pile.box for pile in inputs]),
             (float(min(p.z[0] for p in inputs)), float(max(p.z[1] for p in inputs))),
         )
-    return found
+    return found | turning
+
+
+def _pile(product: Product, low: Array, high: Array) -> Pile:
+    """The extents of what is in a box of the product, from low (3,) to high (3,)."""
+    x, y, _ = product.middle
+    ground = float(product.low[2]) - PAYLOAD
+    (xlo, ylo, zlo), (xhi, yhi, zhi) = low, high
+    return Pile((xlo - x, xhi - x, ylo - y, yhi - y), (zlo - ground, zhi - ground))
 
 
 def regions(layout: Layout, found: Mapping[str, Pile]) -> list[Region]:

@@ -6,9 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from factory.geometry.meshes import Array
+from factory.geometry.turning import fed_of, presented, upright
+from factory.layout.guidepath import Guidepath
 from factory.layout.layout import Layout
 from factory.layout.visits import Visit
 from factory.mjcf.parts import place_in
+from factory.mjcf.robots import heading_quaternion
 from factory.plant.fused_bodies import FusedBodies, bodies_of
 
 Point3 = tuple[float, float, float]
@@ -17,13 +20,15 @@ Point3 = tuple[float, float, float]
 @dataclass(frozen=True, eq=False, slots=True)
 class Grip:
     """A robot (index) holds a body, by its `label` in the factory, with its `centre` (3,) of mass
-    [m], on a tour that begins with an operation (index) of a `layout` that has it."""
+    [m], on a tour that begins with an operation (index) of a `layout` that has it; by what angle
+    about the vertical it is turned then, `fed` [rad]."""
 
     robot: int
     label: str
     centre: Array
     layout: Layout
     begins: int
+    fed: float = 0.0
 
     @property
     def visit(self) -> Visit:
@@ -33,12 +38,18 @@ class Grip:
     @property
     def position(self) -> Point3:
         """Where the body's centre of mass is, in the frame of the robot's carriage, or of its head
-        [m]."""
+        or tool [m]."""
         path = self.layout.guidepaths[self.robot]
         at, foot = path.middle(0.0), path.carriage(0.0)
         (x, y), height = self.visit.shift, self.visit.height
         middle = (at[0] + x - foot[0], at[1] + y - foot[1])
-        return turned(place_in(self.layout.product, self.centre, middle, height), path.heading)
+        place = place_in(self.layout.product, self.centre, middle, height)
+        ahead, aside, up = turned(place, path.heading)
+        hand = self.layout.hand(self.robot)
+        if not path.fixed or hand is None:
+            return ahead, aside, up
+        x, y, _ = self.layout.mount(self.robot).reached(hand)[0]
+        return ahead - x, aside - y, up
 
 
 def grips_of(layout: Layout, bodies: FusedBodies) -> Iterator[Grip]:
@@ -51,8 +62,22 @@ def grips_of(layout: Layout, bodies: FusedBodies) -> Iterator[Grip]:
         for label in bodies.handled(factory, robot):
             found.setdefault(layout.named(label), label)
         for name, label in found.items():
-            begins, *_ = factory.tours[robot][factory.tour_with(robot, label)]
-            yield Grip(robot, name, bodies.centre[label], every, begins)
+            turn = factory.tour_with(robot, label)
+            begins, *_ = factory.tours[robot][turn]
+            brought = factory.deliveries(robot)[turn : turn + 1]
+            fed = next((fed_of(every.product, factory.contents[x]) for x in brought), 0.0)
+            centre = presented(every.product.solids[label]).centre if fed else bodies.centre[label]
+            yield Grip(robot, name, centre, every, begins, fed)
+
+
+def seen_from(path: Guidepath, turn: float) -> tuple[float, float, float, float]:
+    """The quaternion of what is turned about the vertical by an angle [rad], in the frame of a
+    robot that lies along its guidepath."""
+    w, _, _, z = heading_quaternion(path)
+    if not turn:
+        return w, 0, 0, -z
+    c, _, _, s = upright(turn)
+    return w * c + z * s, 0, 0, w * s - z * c
 
 
 def turned(v: Point3, heading: tuple[float, float]) -> Point3:

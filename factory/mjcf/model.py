@@ -21,6 +21,7 @@ from xml.sax.saxutils import quoteattr
 from factory.control.profile import SpeedProfile
 from factory.layout.bins import Bin
 from factory.layout.feeding import outlets_of
+from factory.layout.guidepath import LEVER
 from factory.layout.hanging import Hanging
 from factory.layout.layout import Layout
 from factory.mjcf.bins import add_bins
@@ -37,6 +38,7 @@ from factory.mjcf.robots import (
 )
 from factory.mjcf.scene import add_scene
 from factory.mjcf.stops import lift_stops
+from factory.mjcf.tools import gyration
 from factory.mjcf.unseen import leave_out_what_is_shown
 from factory.mjcf.welds import add_exclusions, add_welds
 from factory.plant.approaches import Pair
@@ -54,6 +56,9 @@ CARRIAGE_MASS = 1.9
 
 HEAD_MASS = 0.4
 """What the head of a `lift` weighs without payload [kg]."""
+
+TOOL_INERTIA = 0.00202
+"""What the drive of a fixed robot's tool turns without payload: that, and its motor's [kg m²]."""
 
 HOIST_MASS = 2.0
 """What a `lift`'s hoist accelerates without payload: its head, and its motor's inertia [kg]."""
@@ -186,8 +191,7 @@ def build_model(
         label: sum(bodies.mass[body] for body in found) for label, found in bodies.carried.items()
     }
     drives = tuple(
-        drive_for(CARRIAGE_MASS, load, settings.acceleration, settings)
-        for load in heaviest(layout, masses)
+        _drive(layout, robot, load, settings) for robot, load in enumerate(heaviest(layout, masses))
     )
     root = ElementTree.parse(SKELETON).getroot()
     root.set("model", product_name(factory))
@@ -289,6 +293,15 @@ def drive_for(
     kv = min(2 * mass * stiffness, DAMPED * empty * rate)
     force = settings.force * mass * acceleration + 5
     return Drive(round(kp, 3), round(kv, 3), round(force, 3), settings.samples, round(inertia, 3))
+
+
+def _drive(layout: Layout, robot: int, load: float, settings: Settings) -> Drive:
+    """The drive of a robot's first axis, for the heaviest load [kg] of it; of one that turns for
+    its moment of inertia."""
+    if not layout.guidepaths[robot].fixed:
+        return drive_for(CARRIAGE_MASS, load, settings.acceleration, settings)
+    moment = load * gyration(layout, robot) ** 2
+    return drive_for(TOOL_INERTIA, moment, settings.acceleration / LEVER, settings, HOIST_STIFFNESS)
 
 
 def _hoists(layout: Layout, masses: Mapping[str, float], settings: Settings) -> dict[int, Hoist]:

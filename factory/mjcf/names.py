@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from factory.plant.factory import Robot
+
 
 def carriage(robot: str) -> str:
     """The body of a robot, `r3/carriage`."""
@@ -11,6 +13,16 @@ def carriage(robot: str) -> str:
 def slide(robot: str) -> str:
     """The joint of a robot along its guidepath, `r3/slide`."""
     return f"{robot}/slide"
+
+
+def turn(robot: str) -> str:
+    """The joint of a fixed robot's tool, about the vertical, `r3/turn`."""
+    return f"{robot}/turn"
+
+
+def first_axis(robot: Robot) -> str:
+    """The joint of a robot's first axis: along its guidepath, or about the vertical."""
+    return turn(robot.name) if robot.fixed else slide(robot.name)
 
 
 def drive(robot: str) -> str:
@@ -32,6 +44,11 @@ def drive_across(robot: str) -> str:
 def head(robot: str) -> str:
     """The body of a robot that its lift moves, and that holds its payload, `r3/head`."""
     return f"{robot}/head"
+
+
+def tool(robot: str) -> str:
+    """The body of a fixed robot that turns, and that holds its payload, `r3/tool`."""
+    return f"{robot}/tool"
 
 
 def lift(robot: str) -> str:

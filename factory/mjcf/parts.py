@@ -8,6 +8,7 @@ from xml.etree.ElementTree import Element
 
 from factory.geometry.meshes import Array, Mesh
 from factory.geometry.solids import Product, Solid
+from factory.geometry.turning import presented, upright
 from factory.layout.dimensions import PAYLOAD
 from factory.layout.hanging import Hanging
 from factory.layout.layout import Layout, Point2
@@ -40,7 +41,8 @@ def place_in(
 
 def presented_at(layout: Layout, label: str) -> tuple[float, float, float]:
     """Where a part's centre of mass is in its feeder."""
-    operation, centre = layout.factory.by_label[label], layout.product.solids[label].centre
+    operation = layout.factory.by_label[label]
+    centre = presented(layout.product.solids[label]).centre
     elevation = layout.visits[operation.index, operation.carrier].elevation
     return place_in(layout.product, centre, layout.meeting(operation), elevation)
 
@@ -64,6 +66,8 @@ def add_parts(
             at = home if shown else parked_at(layout, label, number)
             name = part(label, number)
             body = _add_body(world, name, at, solid.mass, solid.inertia)
+            if solid.fed:
+                body.set("quat", numbers(upright(solid.fed)))
             _add_geoms(body, name, solid, solid.centre, insets.of(label), shown)
 
 

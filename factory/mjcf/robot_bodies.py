@@ -80,7 +80,7 @@ def role_of(factory: Factory, robot: int) -> str:
     """What a robot does, for its paint."""
     if robot == 0:
         return "output"
-    if not factory.deliveries(robot):
+    if factory.robots[robot].fixed or not factory.deliveries(robot):
         return "tool"
     first = factory.operations[factory.robots[robot].operations[0]]
     return "carrier" if first.inputs else "fed"

@@ -13,10 +13,12 @@ from xml.etree.ElementTree import Element
 from factory.layout.dimensions import FINGER_TOP, MAST, PAYLOAD
 from factory.layout.hands.limbs import Limb
 from factory.layout.layout import Guidepath, Point2
+from factory.mjcf import names
 from factory.mjcf.elements import add, number, numbers
 from factory.mjcf.hands import Styles, add_hand
 from factory.mjcf.names import carriage, drive_across, head, slide_across
 from factory.mjcf.stops import Stops
+from factory.mjcf.tools import LIFTED, TOOL, mount_tool
 from factory.problem.robot_types import RobotType
 from factory.support.errors import Diagnostic, InputError, Position
 
@@ -25,9 +27,6 @@ OWN_HAND = {"finger", "pin", "column", "pad"}
 
 CAP = "cap"
 """The geom on top of the mast, which is none where a tower is."""
-
-LIFTED = 0.4
-"""Mass of a lift's head without what stands for a hand [kg]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,10 +176,17 @@ def instantiate(
         towers = any(limb.name == "tower" for limb in held.limbs)
         _fit_arm(body, path, OWN_HAND | {CAP} if towers else OWN_HAND)
         lifted = next((b for b in body.iter("body") if b.get("name") == head(robot)), None)
-        add_hand(body, lifted, held.styles, robot, held.limbs, model.name)
-    slide = next(j for j in body.iter("joint") if j.get("name") == f"{robot}/slide")
+        turning = [limb for limb in held.limbs if path.fixed and limb.name in TOOL]
+        others = [limb for limb in held.limbs if limb not in turning]
+        add_hand(body, lifted, held.styles, robot, others, model.name)
+        tool = next((b for b in body.iter("body") if b.get("name") == names.tool(robot)), None)
+        add_hand(body, tool, held.styles, robot, turning, model.name)
+    first = names.turn(robot) if path.fixed else names.slide(robot)
+    slide = next(j for j in body.iter("joint") if j.get("name") == first)
     slide.set("ref", number(path.length))
     stops.limit(slide)
+    if path.turn is not None:
+        mount_tool(body, slide, path.turn, held.limbs)
     actuators: list[Element] = []
     for actuator in model.actuators:
         kind = actuator.get("name") or ""

@@ -46,8 +46,9 @@ def add_scene(world: Element, statistic: Element, layout: Layout) -> None:
     center = overview.position + overview.distance * overview.axes[2]
     fill(statistic, center=tuple(center.tolist()), extent=overview.distance / 1.5)
     _floor_and_light(world, layout)
-    for robot in range(len(layout.guidepaths)):
-        _rail(world, layout, robot)
+    for robot, path in enumerate(layout.guidepaths):
+        if not path.fixed:
+            _rail(world, layout, robot)
 
 
 def _rail(world: Element, layout: Layout, robot: int) -> None:

@@ -72,7 +72,7 @@ def scales_of(layout: Layout) -> dict[str, Scale]:
     """Those of carriages and lifts, which are 0 at the start of a run, by the names of joints."""
     robots, lifts = layout.factory.robots, layout.factory.lift_axis
     at = start_positions(layout, layout.factory.net.initial_marking).tolist()
-    carriages = {names.slide(robot.name): Scale(at[robot.index], -1.0) for robot in robots}
+    carriages = {names.first_axis(robot): Scale(at[robot.index], -1.0) for robot in robots}
     for robot in layout.bent[0]:
         back, across = layout.guidepaths[robot].framed(at[robot], at[robot])[0][0].tolist()
         carriages[names.slide(robots[robot].name)] = Scale(back, -1.0)

@@ -1,9 +1,9 @@
 """The welds of a compiled model: the frames that they join, and how far these are apart.
 
-A weld joins a part, at its origin, with a frame fixed to the part's holder. Holders do nothing but
-slide: a carriage along its guidepath, a lift on a carriage. So the frame on a holder follows from
-the coordinates of at most two slide joints, or three where guidepaths have bends, and never
-turns.
+A weld joins a part, at its origin, with a frame fixed to the part's holder. Holders slide: a
+carriage along its guidepath, a lift on a carriage; and the tool of a fixed robot turns about the
+vertical on a lift that slides. So the frame on a holder follows from the coordinates of at most two
+joints, or three where guidepaths have bends, of which the holder's first may turn it.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ KINDS = {"park": PARK, "feed": FEED, "grip": GRIP, "hold": HOLD}
 """What holds a part, by the first word of a weld's name: its parking place, its feeder, a robot,
 the outfeed's tray."""
 
-SLIDE = 2
-"""The engine's number of the slide joint, `mjJNT_SLIDE`: logs are written and read without the
-engine."""
+SLIDE, HINGE = 2, 3
+"""The engine's numbers of the joints `mjJNT_SLIDE` and `mjJNT_HINGE`: logs are written and read
+without the engine."""
 
 ROWS = 6
 """Rows of a weld among the engine's constraints: three of place, three of turn."""
@@ -33,13 +33,17 @@ ROWS = 6
 
 @dataclass(frozen=True, eq=False)
 class Slides:
-    """The slide joints that carry each body (nbody, k), its own before those of its parent:
-    addresses `qpos` and `dof` of each, and its direction `way` (nbody, k, 3), 0 for none. A body
-    has one slide, or two where it follows a guidepath with bends: k is 2 or 4."""
+    """The joints that carry each body (nbody, k), its own before those of its parent: addresses
+    `qpos` and `dof` of each, and the direction `way` (nbody, k, 3) of one that slides, 0 for none.
+    A body has one slide, or two where it follows a guidepath with bends: k is 2 or 4. Where the
+    axis of its own stands that turns it about the vertical (`anchor`, nbody, 3), and how far by
+    each unit of its coordinate (`spin`, nbody): 1 or -1, 0 for none."""
 
     qpos: Index = field(repr=False)
     dof: Index = field(repr=False)
     way: Array = field(repr=False)
+    anchor: Array = field(repr=False)
+    spin: Array = field(repr=False)
 
     @classmethod
     def of(cls, m: mujoco.MjModel, d: mujoco.MjData) -> Slides:
@@ -47,10 +51,13 @@ class Slides:
         most = 1 + int((m.body_jntnum > 1).any())
         own = m.body_jntadr[:, None] + np.arange(most)
         own[np.arange(most) >= m.body_jntnum[:, None]] = -1
-        own[m.jnt_type[own] != SLIDE] = -1
+        turns = (own[:, 0] >= 0) & (m.jnt_type[own[:, 0]] == HINGE)
+        own[(m.jnt_type[own] != SLIDE) & (m.jnt_type[own] != HINGE)] = -1
         joint = np.concatenate([own, own[m.body_parentid]], axis=1)
-        way = np.where(joint[:, :, None] < 0, 0.0, d.xaxis[joint])
-        return cls(m.jnt_qposadr[joint], m.jnt_dofadr[joint], way)
+        slides = (joint >= 0) & (m.jnt_type[joint] == SLIDE)
+        way = np.where(slides[:, :, None], d.xaxis[joint], 0.0)
+        spin = np.where(turns, d.xaxis[own[:, 0]][:, 2].round(), 0.0)
+        return cls(m.jnt_qposadr[joint], m.jnt_dofadr[joint], way, d.xanchor[own[:, 0]], spin)
 
     def velocity(self, bodies: Index, qvel: Array) -> Array:
         """Velocities of bodies that only slide (..., n, 3) [m/s] from all speeds (..., nv)."""
@@ -62,41 +69,66 @@ class Slides:
 @dataclass(frozen=True, eq=False)
 class WeldFrames:
     """Where n welds hold the origins of their parts: at `base` (n, 3) + sum over k of
-    `way` (n, k, 3) · qpos[`along` (n, k)] [m], turned by the quaternion `turn` (n, 4)."""
+    `way` (n, k, 3) · qpos[`along` (n, k)] [m], turned by the quaternion `turn` (n, 4). A holder
+    that turns has turned its part by `spin` (n,) · qpos[`along` (n, 0)] besides, about a vertical
+    axis that is `arm` (n, 2) away from there when that is 0 [m]."""
 
     base: Array = field(repr=False)
     along: Index = field(repr=False)
     way: Array = field(repr=False)
     turn: Array = field(repr=False)
+    spin: Array = field(repr=False)
+    arm: Array = field(repr=False)
 
     @classmethod
     def of(cls, m: mujoco.MjModel, d: mujoco.MjData) -> WeldFrames:
         """Those of all welds of a model, in order; `d` is in any configuration, and its kinematics
         are up to date."""
         slides, holder = Slides.of(m, d), m.eq_obj1id
-        along, way = slides.qpos[holder], slides.way[holder]
+        along, way, spin = slides.qpos[holder], slides.way[holder], slides.spin[holder]
         base = held_at(m, np.arange(m.neq), d.xpos, d.xmat)
         base -= (way * d.qpos[along][:, :, None]).sum(axis=1)
-        return cls(base, along, way, _products(d.xquat[holder], m.eq_data[:, 6:10]))
+        turn, angle = _products(d.xquat[holder], m.eq_data[:, 6:10]), spin * d.qpos[along[:, 0]]
+        away = base[:, :2] - slides.anchor[holder][:, :2]
+        arm = np.where(spin[:, None] != 0, _turned(away, -angle), 0.0)
+        base[:, :2] += np.where(spin[:, None] != 0, arm - away, 0.0)
+        return cls(base, along, way, _spun(turn, -angle), spin, arm)
 
     def chosen(self, welds: Index) -> WeldFrames:
         """Those of some welds, in that order."""
-        return WeldFrames(self.base[welds], self.along[welds], self.way[welds], self.turn[welds])
+        return WeldFrames(
+            self.base[welds],
+            self.along[welds],
+            self.way[welds],
+            self.turn[welds],
+            self.spin[welds],
+            self.arm[welds],
+        )
 
     def at(self, slides: Array) -> Array:
-        """Where they are (n, 3) [m] at coordinates of their slides (n, k), which are
+        """Where they are (n, 3) [m] at coordinates of their joints (n, k), which are
         qpos[`along`]."""
-        return np.asarray(self.base + np.einsum("nk,nkj->nj", slides, self.way))
+        found = np.asarray(self.base + np.einsum("nk,nkj->nj", slides, self.way))
+        if self.spin.any():
+            found[:, :2] += _turned(self.arm, self.spin * slides[:, 0]) - self.arm
+        return found
+
+    def turned(self, slides: Array) -> Array:
+        """How they are turned (n, 4), quaternions, at coordinates of their joints (n, 2)."""
+        return _spun(self.turn, self.spin * slides[:, 0]) if self.spin.any() else self.turn
 
 
 def check_holders(m: mujoco.MjModel, welds: Index) -> None:
-    """Raises ValueError where the first body of a weld does more than slide."""
+    """Raises ValueError where the first body of a weld does more than slide, or turn about the
+    vertical on what slides."""
     joints, up = m.body_jntnum, m.body_parentid
-    first = m.jnt_type[np.minimum(m.body_jntadr, m.njnt - 1)]
+    first = np.minimum(m.body_jntadr, m.njnt - 1)
     last = m.jnt_type[np.minimum(m.body_jntadr + np.maximum(joints, 1), m.njnt) - 1]
-    slides = (joints == 0) | (joints <= 2) & (first == SLIDE) & (last == SLIDE)
+    slides = (joints == 0) | (joints <= 2) & (m.jnt_type[first] == SLIDE) & (last == SLIDE)
+    upright = abs(m.jnt_axis[first, 2]) == 1.0
+    turns = (joints == 1) & (m.jnt_type[first] == HINGE) & upright
     for body in np.unique(m.eq_obj1id[welds]):
-        if not (slides[body] and slides[up[body]] and m.body_weldid[up[up[body]]] == 0):
+        if not ((slides | turns)[body] and slides[up[body]] and m.body_weldid[up[up[body]]] == 0):
             raise ValueError(f"{m.body(int(body)).name} holds parts and does more than slide")
 
 
@@ -123,6 +155,18 @@ def residuals(d: mujoco.MjData) -> Array:
 def soften(m: mujoco.MjModel, factor: float) -> None:
     """Multiply the time constants of all welds by a factor."""
     m.eq_solref[:, 0] *= factor
+
+
+def _turned(points: Array, angle: Array) -> Array:
+    """Points of the plane (n, 2), turned about 0 by angles (n,)."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([c * points[:, 0] - s * points[:, 1], s * points[:, 0] + c * points[:, 1]], 1)
+
+
+def _spun(turn: Array, angle: Array) -> Array:
+    """Quaternions (n, 4), turned further about the vertical by angles (n,)."""
+    zero = np.zeros(len(angle))
+    return _products(np.stack([np.cos(angle / 2), zero, zero, np.sin(angle / 2)], axis=1), turn)
 
 
 def _products(p: Array, q: Array) -> Array:

@@ -6,14 +6,14 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from xml.etree.ElementTree import Element
 
+from factory.geometry.turning import presented, upright
 from factory.layout.feeding import outlets_of
 from factory.layout.hanging import Hanging
 from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.mjcf.elements import add, numbers
-from factory.mjcf.grips import grips_of, turned
+from factory.mjcf.grips import grips_of, seen_from, turned
 from factory.mjcf.parts import parked_at, place_in
-from factory.mjcf.robots import heading_quaternion
 from factory.plant.fused_bodies import FusedBodies, Inside
 
 
@@ -28,19 +28,21 @@ def add_welds(
     factory = layout.factory
     for grip in grips_of(layout, bodies):
         robot = factory.robots[grip.robot]
-        w, _, _, z = heading_quaternion(layout.guidepaths[grip.robot])
         holder = names.head if grip.robot in factory.strokes else names.carriage
+        holder = names.tool if robot.fixed else holder
         name, body = names.grip(robot.name, grip.label), names.part(grip.label, 1)
-        _weld(equality, name, holder(robot.name), body, (*grip.position, w, 0, 0, -z))
+        turn = seen_from(layout.guidepaths[grip.robot], grip.fed)
+        _weld(equality, name, holder(robot.name), body, (*grip.position, *turn))
     outlets = {outlet.name: outlet for outlet in outlets_of(layout)}
     for outlet in outlets.values():
         path, slider = layout.guidepaths[outlet.robot], hanging.slider[outlet.name]
-        w, _, _, z = heading_quaternion(path)
         (x, y), (u, v) = (o.layout.meeting(o.leaf) for o in (outlet, outlets[slider]))
         height = outlet.elevation - hanging.raised[outlet.name]
-        centre, shown = bodies.centre[outlet.label], outlet.name == slider == outlet.label
+        solid, shown = layout.product.solids[outlet.label], outlet.name == slider == outlet.label
+        centre = presented(solid).centre if solid.fed else bodies.centre[outlet.label]
         offset = place_in(layout.product, centre, (x - u, y - v), height)
-        pose, body = (*turned(offset, path.heading), w, 0, 0, -z), names.part(outlet.label, 1)
+        pose = *turned(offset, path.heading), *seen_from(path, solid.fed)
+        body = names.part(outlet.label, 1)
         _weld(equality, names.feed(outlet.name), names.slider(slider), body, pose, shown)
         if outlet.name == outlet.label:
             _park(equality, layout, outlet.label, copies[outlet.label], int(shown))
@@ -53,8 +55,10 @@ def add_welds(
 
 def _park(equality: Element, layout: Layout, label: str, copies: int, used: int) -> None:
     """Where the copies of a body are kept, all but the first `used` of them now."""
+    solid = layout.product.solids.get(label)
+    fed = solid.fed if solid else 0.0
     for n in range(1, copies + 1):
-        at = (*parked_at(layout, label, n), 1, 0, 0, 0)
+        at = (*parked_at(layout, label, n), *upright(fed))
         _weld(equality, names.park(label, n), "world", names.part(label, n), at, n > used)
 
 

@@ -120,6 +120,8 @@ def operation_mode(layout: Layout, operation: Operation, eps: float) -> Mode:
     template, end = operation.template, np.array([path.length for path in paths])
     if template.before[carrier] != NOPART or not isclose(station, end[carrier], abs_tol=1e-9):
         template, end[carrier] = _inside(template), ends[carrier]
+    if any(path.fixed for path in paths):
+        template = replace(template, identifications=())  # no guidepath of another meets its axis
     setting = Setting(
         lower=np.array([layout.stop_offset(operation.index, s)[0] for s in range(len(paths))]),
         upper=end,
@@ -151,7 +153,7 @@ def _with_lifts(mode: Mode, layout: Layout, operation: Operation) -> Mode:
     strokes = np.array([layout.strokes[robot] for robot in robots])
     goals = np.array(layout.goals(operation.index)[count:])
     lowers = np.array([factory.lowers(robot) for robot in robots]) & (goals < strokes)
-    own = np.array([operation.robots.index(robot) for robot in robots])
+    own = np.array([_gate(layout, operation, robot) for robot in robots])
     return replace(
         mode,
         goals=np.append(mode.goals, goals),
@@ -160,6 +162,14 @@ def _with_lifts(mode: Mode, layout: Layout, operation: Operation) -> Mode:
         gate=np.append(mode.gate, np.where(lowers, own, -1)),
         standoff=np.append(mode.standoff, np.where(lowers, strokes - goals, 0.0)),
     )
+
+
+def _gate(layout: Layout, operation: Operation, robot: int) -> int:
+    """The slot of what has to stand before a robot lowers its lift: itself, which stands after all
+    others; the carrier, for one that is fixed and need not turn."""
+    path = layout.guidepaths[robot]
+    alone = path.fixed and not path.travel
+    return operation.template.carrier - 1 if alone else operation.robots.index(robot)
 
 
 @lru_cache(maxsize=256)
@@ -182,9 +192,11 @@ def robot_limits(
     layout: Layout, settings: Settings, seed: int = 0, jitter: float = 0.0
 ) -> tuple[Limits, np.ndarray]:
     """Each axis's speed and acceleration, and the factor on its controller's gain: drawn for each
-    robot within ± jitter by the seed, and the same for its lift."""
+    robot within ± jitter by the seed, and the same for its lift. One that turns goes along at the
+    end of its lever."""
     count = len(layout.guidepaths)
     draw = np.random.default_rng(seed).uniform(1 - jitter, 1 + jitter, size=(2, count))
     robots = [*range(count), *layout.strokes]
-    speed = settings.speed * draw[0, robots]
-    return Limits(speed, np.full(len(robots), settings.acceleration)), draw[1, robots]
+    levers = np.array([path.lever for path in layout.guidepaths] + [1.0] * len(layout.strokes))
+    speed = settings.speed * draw[0, robots] / levers
+    return Limits(speed, settings.acceleration / levers), draw[1, robots]

@@ -99,7 +99,9 @@ class Operation:
 class Robot:
     """A robot identifier: name r1, r2, ..., its type, and its operations in the gear's order.
 
-    `birth` is the operation that made it necessary (for diagnostics: the user's line).
+    `position` is that of the operation that made it necessary (for diagnostics: the user's line).
+    `fixed`: it stands at the station of the robot that it delivers to, and its first axis turns
+    what it holds about the vertical.
     """
 
     index: int
@@ -107,6 +109,7 @@ class Robot:
     type: str
     operations: tuple[int, ...]
     position: Position | None = field(default=None, compare=False)
+    fixed: bool = False
 
 
 @dataclass(frozen=True)

@@ -100,7 +100,8 @@ class Template:
     that are one; `before` a and `after` b: the label each robot carries, NOPART or a variable such
     as LAB1; `law` F; `further`: the template that takes inputs beyond those in a, "" if none does;
     `instead`: the one that does the same with one robot fewer, where the robot of one input keeps
-    what is joined, "" if none does;
+    what is joined, "" if none does; `brought`: the template by which a robot hands over first what
+    one that is not the carrier brings, "" if none does;
     `parameters`: keyword arguments and their defaults; `geometry`: True where the operation makes a
     part and takes mesh, pos, box and so on; `failures`: what is tested, and what is done about it.
     """
@@ -121,6 +122,8 @@ class Template:
     further_position: Position | None = field(default=None, compare=False)
     instead_position: Position | None = field(default=None, compare=False)
     robot_positions: tuple[Position, ...] = field(default=(), compare=False)
+    brought: str = ""
+    brought_position: Position | None = field(default=None, compare=False)
 
     @property
     def inputs(self) -> tuple[str, ...]:

@@ -123,7 +123,7 @@ class Panels:
             (area, KINDS[name]((area.width, area.height), scale, history, self.rows))
             for name, area in areas.items()
         ]
-        slides = [m.joint(names.slide(robot.name)).qposadr[0] for robot in history.factory.robots]
+        slides = [m.joint(names.first_axis(robot)).qposadr[0] for robot in history.factory.robots]
         self.slides = np.array(slides, np.intp)
 
     def compose(self, scene: Pixels, time: float, qpos: Array, elapsed: float) -> Pixels:

@@ -68,7 +68,7 @@ def _gather(replica: Replica, subject: MonitorSubject, operation: Operation) -> 
     """Put the robots of an operation at their goals, with lifts down."""
     m, qpos = replica.m, replica.d.qpos.copy()
     for robot in operation.robots:
-        slide = m.joint(names.slide(subject.factory.robots[robot].name))
+        slide = m.joint(names.first_axis(subject.factory.robots[robot]))
         qpos[slide.qposadr[0]] = subject.goal(operation, robot)
     replica.place(qpos)
 

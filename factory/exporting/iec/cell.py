@@ -123,8 +123,10 @@ def _types(layout: Layout) -> Iterator[DataType]:
 
 
 def _order(layout: Layout) -> str:
-    lifts = (layout.factory.robots[robot].name for robot in layout.strokes)
-    return "; ".join(("carriages of the robots", *(f"lift of {name}" for name in lifts)))
+    robots = layout.factory.robots
+    tools = (f"[{r.index + 1}] the tool of {r.name}, an angle" for r in robots if r.fixed)
+    lifts = (f"lift of {robots[robot].name}" for robot in layout.strokes)
+    return "; ".join((", ".join(("carriages of the robots", *tools)), *lifts))
 
 
 def _completed() -> OrganizationUnit:

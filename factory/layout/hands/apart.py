@@ -49,7 +49,7 @@ class HandsApart:
         """Whether a hand at a place stays on its own side: of the line of the carrier, where that
         comes from below too, else of what another that comes from the opposite side holds."""
         carrier, free = self.holding.on[robot], np.ones(len(found), bool)
-        if carrier < 0:
+        if carrier < 0 or self.holding.serves_fixed(robot):
             return free
         axis, side = (0, u[0]) if u[0] else (1, u[1])
         hand = self.hand_of(carrier, t)
@@ -95,7 +95,9 @@ class HandsApart:
         rises, with all that is behind that, since both are there at once; of one below the column,
         with all its way ahead, where it comes from and goes."""
         carrier = self.holding.on[robot]
-        if carrier < 0 or (hand := self.hand_of(carrier, t)).kind == "none":
+        if carrier < 0 or self.holding.serves_fixed(robot):
+            return
+        if (hand := self.hand_of(carrier, t)).kind == "none":
             return
         if kind == hand.kind == "below":  # fingers keep to their sides
             return

@@ -10,8 +10,9 @@ import numpy as np
 
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
+from factory.geometry.turning import axis_of, fed_of
 from factory.layout.hands.hand import Kind, Point3
-from factory.layout.hands.places import PUSH, Loads, Places, places, resized
+from factory.layout.hands.places import ASKED, PUSH, Loads, Places, places, resized
 from factory.layout.hands.surfaces import Surfaces, Way
 from factory.layout.layout import carriers
 from factory.plant.factory import Factory, Operation
@@ -60,6 +61,10 @@ class Holding:
         first = self.factory.operations[self.factory.robots[robot].operations[0]]
         return len(first.robots) == 1
 
+    def serves_fixed(self, robot: int) -> bool:
+        """Whether a fixed robot takes what a robot brings, when no carrier is there."""
+        return self.factory.robots[self.last(robot).carrier].fixed
+
     def made(self, robot: int) -> list[Operation]:
         """The operations of which a robot is the carrier."""
         operations = (self.factory.operations[o] for o in self.factory.robots[robot].operations)
@@ -81,9 +86,23 @@ class Holding:
             else:
                 of, asked = (self.surfaces, self.product, parts), self.wanted.get(label, ())
                 mix = self.factory.pag.mix is not None
-                found = places(*of, kind, (axis, way), loads, mix, asked)
+                found = places(*of, kind, (axis, way), loads, mix, (*asked, *self._axis(parts)))
+                found = self._about_axis(parts, found)
             self._places[key] = found
         return self._places[key]
+
+    def _axis(self, parts: Sequence[str]) -> Iterator[Point3]:
+        """The axis of a part that is presented turned: hands hold it there, so that it turns in
+        them about their pads."""
+        if fed_of(self.product, parts):
+            x, y, _ = axis_of(self.product.solids[parts[0]]).tolist()
+            yield x, y, 0.0
+
+    def _about_axis(self, parts: Sequence[str], found: Places) -> Places:
+        """The places from which a part can be turned: on its axis."""
+        for x, y, _ in self._axis(parts):
+            found = found.chosen(np.abs(found.at[:, :2] - (x, y)).max(axis=1) < ASKED)
+        return found
 
     def loads(self, label: str) -> Loads:
         """What the robot that takes a sub-assembly holds by it: that, and all that it becomes while

@@ -73,6 +73,8 @@ class OneHand:
         if holding.is_fed(tour) and holding.is_carrier(tour):
             return "below", "behind"  # the tower of a hand above stands beside a feeder's part
         last = holding.last(tour)
+        if holding.factory.robots[tour].fixed:
+            return ("above",)
         if last.lowered >= 0 and last.robots[last.lowered] == tour:
             return "above", "behind", "below"
         return "below", "behind", "above"

@@ -98,7 +98,7 @@ class Anatomy:
 
         robots = {r.name: r.index for r in factory.robots}
         try:
-            slide = [m.joint(names.slide(r)).id for r in robots]
+            slide = [m.joint(names.first_axis(r)).id for r in factory.robots]
             drive = [m.actuator(names.drive(r)).id for r in robots]
             ways = BentWays.of(m, [*robots], bent)
         except KeyError as error:

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.mjcf.weld_frames import GRIP, HOLD, WeldFrames
-from factory.plant.factory import Factory
 from factory.record.monitor.anatomy import Anatomy
+from factory.record.monitor.subject import MonitorSubject
 from factory.record.state import Array, Index, Observation
 
 HANGS = 2e-3
@@ -157,8 +157,9 @@ def _apart(
     than `most` [rad], NaN included; bodies by addresses (n, 7) in the states (k, nq) of the
     observations `look` (n, 1)."""
     pose = qpos[look, at]
-    apart = pose[:, :3] - frames.at(qpos[look, frames.along])
-    straight = _straight(pose[:, 3:], frames.turn, most)
+    slides = qpos[look, frames.along]
+    apart = pose[:, :3] - frames.at(slides)
+    straight = _straight(pose[:, 3:], frames.turned(slides), most)
     return np.sqrt(np.einsum("ni,ni->n", apart, apart)), ~straight
 
 
@@ -169,15 +170,28 @@ def _straight(one: Array, other: Array, most: float) -> NDArray[np.bool_]:
 
 
 def misplaced(
-    anatomy: Anatomy, factory: Factory, places: dict[str, Array], tolerance: float = 1e-6
+    anatomy: Anatomy, subject: MonitorSubject, places: dict[str, Array], tolerance: float = 1e-6
 ) -> list[int]:
     """The welds (by number) that turn a part, or hold it out of its place in the product relative
-    to the other parts of the same holder, for a robot on the same tour. Welds that a robot uses
+    to the other parts of the same holder, for a robot on the same tour. A part alone is turned by
+    the angle at which it is presented, but where a fixed robot delivers it. Welds that a robot uses
     only as a deputy are left out."""
+    factory = subject.factory
     first: dict[tuple[int, ...], tuple[Array, Array]] = {}
     inside, robots = factory.contents, range(len(factory.robots))
     brought = [{part for x in factory.deliveries(r) for part in inside[x]} for r in robots]
-    found, straight = [], _straight(anatomy.frames.turn, UPRIGHT, TURNED)
+    wanted = np.tile(UPRIGHT, (len(anatomy.holder), 1))
+    slides = np.zeros((len(anatomy.holder), 2))
+    for weld, holder in enumerate(anatomy.holder):
+        part = anatomy.part[weld]
+        if holder is None or holder[0] != GRIP or not _brings(brought, holder[1], inside[part]):
+            continue
+        if factory.robots[holder[1]].fixed:
+            slides[weld, 0] = subject.gear_goals[holder[1]][-1]
+        elif {part} in ({*inside[x]} for x in factory.deliveries(holder[1])):
+            half = subject.fed(part) / 2
+            wanted[weld] = np.cos(half), 0.0, 0.0, np.sin(half)
+    found, straight = [], _straight(anatomy.frames.turned(slides), wanted, TURNED)
     for weld, holder in enumerate(anatomy.holder):
         if holder is None or holder[0] not in (GRIP, HOLD):
             continue

@@ -132,7 +132,7 @@ class Monitor:
     def _look_at_frames(self) -> None:
         """Blame welds that hold a part out of its place in the product."""
         places = {part: np.array(place) for part, place in self.subject.places.items()}
-        for weld in misplaced(self.anatomy, self.subject.factory, places):
+        for weld in misplaced(self.anatomy, self.subject, places):
             holder, part = self.anatomy.holder[weld], self.anatomy.part[weld]
             words = f"the weld of {part} holds it out of its place in the product"
             self._blame("Frame", holder[1] if holder else -1, part, words)

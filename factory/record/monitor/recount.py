@@ -187,9 +187,10 @@ class _Places:
         """Measure the welds that close on bodies, and the pads on the first body they take."""
         frames, qpos = self._anatomy.frames.chosen(welds), now.qpos
         pose = qpos[self._at(bodies)]
-        gap = np.linalg.norm(pose[:, :3] - frames.at(qpos[frames.along]), axis=1)
+        slides = qpos[frames.along]
+        gap = np.linalg.norm(pose[:, :3] - frames.at(slides), axis=1)
         self._note("handoff_gap_max_mm", 1e3 * float(gap.max()))
-        self._note("handoff_angle_max_deg", _angle(pose[:, 3:], frames.turn))
+        self._note("handoff_angle_max_deg", _angle(pose[:, 3:], frames.turned(slides)))
         self._replica.switch(now.welds.astype(np.int32))
         self._replica.place(qpos)
         apart = self._pads.first_taken(self._replica.d, welds, now.welds[:, 0])

@@ -114,6 +114,12 @@ class MonitorSubject:
         """Arc length [m] at which a robot has its goal in an operation."""
         return self.goals[operation.index][self.slots[operation.index, robot]]
 
+    def fed(self, part: str) -> float:
+        """The angle about the vertical by which a part is presented turned [rad]."""
+        angle = self.factory.pag[self.factory.by_label[part].written].parameter("fed", 0.0)
+        assert isinstance(angle, float)
+        return angle
+
     def goes_ahead(self, operation: Operation, robot: int) -> bool:
         """Whether a robot may go to its goal in an operation before that starts."""
         slot = self.slots[operation.index, robot]

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.control.mode import Array, Index
+from factory.control.mode import Array, Index, Truth
 from factory.layout.layout import Layout
 from factory.layout.way import Ways
 from factory.mjcf import names
+from factory.mjcf.tools import gyration
 from factory.support.engine import mujoco
 
 
@@ -67,7 +68,8 @@ class Axes:
 
     Each (axes,): `qpos`, `dof`, `body`, `tree`, `actuator`: addresses in the engine's model.
     `lift`: the axis of a robot's lift, by the robot (index); `across`: the second slides of robots
-    whose guidepaths have bends.
+    whose guidepaths have bends; `inertia` (axes,): what a load of 1 kg adds to what an axis moves:
+    1 kg, or the moment of inertia [kg m²] of one that turns about the vertical, an angle [rad].
     """
 
     qpos: Index
@@ -77,6 +79,7 @@ class Axes:
     actuator: Index
     lift: Mapping[int, int]
     across: Across
+    inertia: Array
 
     @classmethod
     def of(cls, m: mujoco.MjModel, layout: Layout) -> Axes:
@@ -84,7 +87,7 @@ class Axes:
         factory = layout.factory
         carriages = [robot.name for robot in factory.robots]
         lifts = [carriages[robot] for robot in factory.strokes]
-        slides = [*map(names.slide, carriages), *map(names.lift, lifts)]
+        slides = [*map(names.first_axis, factory.robots), *map(names.lift, lifts)]
         drives = [*map(names.drive, carriages), *map(names.hoist, lifts)]
         slides += names.OUTFEED_SLIDE, names.SHUTTER
         drives += names.OUTFEED_DRIVE, names.SHUTTER
@@ -93,8 +96,16 @@ class Axes:
         actuator = np.array([m.actuator(name).id for name in drives])
         lift = {robot: len(carriages) + n for n, robot in enumerate(factory.strokes)}
         address, dof = m.jnt_qposadr[joint], m.jnt_dofadr[joint]
-        across = Across.of(m, layout, len(slides))
-        return cls(address, dof, body, m.body_treeid[body], actuator, lift, across)
+        across, inertia = Across.of(m, layout, len(slides)), np.ones(len(joint))
+        for robot in factory.robots:
+            if robot.fixed:
+                inertia[robot.index] = gyration(layout, robot.index) ** 2
+        return cls(address, dof, body, m.body_treeid[body], actuator, lift, across, inertia)
+
+    @property
+    def turns(self) -> Truth:
+        """Whether each axis turns about the vertical (axes,)."""
+        return np.asarray(self.inertia != 1.0)
 
     def __len__(self) -> int:
         return len(self.qpos)

@@ -39,6 +39,8 @@ class Motion:
         m.actuator_biasprm[across.actuator, 1:3] *= np.asarray(gains)[across.axes, None]
         body, dof = self.axes.body, self.axes.dof
         own = m.body_subtreemass[body] + m.dof_armature[dof]
+        turns = self.axes.turns
+        own[turns] = m.dof_M0[dof[turns]]
         self.drives = Drives(m, d, self.axes.actuator, own.round(9), across)
         self.guides = Guides(m, dof, across)
         self.sleep = Sleep(m, d, self.axes.tree)
@@ -64,8 +66,8 @@ class Motion:
         if not robots:
             return
         lift, mass, carriages = self.axes.lift, np.array(loads), np.array(robots)
-        self.drives.load(carriages, mass, np.zeros(len(mass)))
-        self.guides.load(carriages, mass)
+        self.drives.load(carriages, mass * self.axes.inertia[carriages], np.zeros(len(mass)))
+        self.guides.load(carriages, np.where(self.axes.turns[carriages], 0.0, mass))
         lifts = [n for n, robot in enumerate(robots) if robot in lift]
         if lifts:
             axes = np.array([lift[robots[n]] for n in lifts])

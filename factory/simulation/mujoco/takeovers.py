@@ -26,7 +26,8 @@ class Takeovers:
         q, frames = self._d.qpos, self._frames.chosen(welds)
         pose = q[self._qpos[bodies]]
         gap = np.linalg.norm(pose[:, :3] - frames.at(q[frames.along]), axis=1)
-        sine = np.sqrt(np.maximum(0.0, 1.0 - (pose[:, 3:] * frames.turn).sum(axis=1) ** 2))
+        turn = frames.turned(q[frames.along])
+        sine = np.sqrt(np.maximum(0.0, 1.0 - (pose[:, 3:] * turn).sum(axis=1) ** 2))
         turned = 2 * sine * self._radii[bodies]
         self.count += len(welds)
         self.gap = max(self.gap, float(gap.max()))

@@ -62,7 +62,7 @@ class Welds:
         self._held.update(dict.fromkeys(bodies, holder))
 
     def place(self, body: int, at: Place) -> None:
-        """Put a free body somewhere [m], upright and at rest."""
+        """Put a free body somewhere [m], at rest, in the orientation in which it is presented."""
         self._placed[body] = at
 
     def turn(self, body: int, quaternion: Array, aside: Array) -> None:
@@ -101,7 +101,7 @@ class Welds:
             return
         bodies, at = np.array([*self._placed]), np.array([*self._placed.values()])
         joint, d = self._m.body_jntadr[bodies], self._d
-        pose = np.hstack([at, np.broadcast_to([1.0, 0.0, 0.0, 0.0], (len(at), 4))])
-        d.qpos[self._m.jnt_qposadr[joint][:, None] + np.arange(7)] = pose
+        address = self._m.jnt_qposadr[joint][:, None] + np.arange(7)
+        d.qpos[address] = np.hstack([at, self._m.qpos0[address[:, 3:]]])
         d.qvel[self._m.jnt_dofadr[joint][:, None] + np.arange(6)] = 0.0
         d.xpos[bodies] = at

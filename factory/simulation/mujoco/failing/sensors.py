@@ -72,9 +72,12 @@ class Senses:
         if test is None or test.limit is None:
             return False
         m = self._world.m
-        pose = self._world.d.qpos[m.jnt_qposadr[m.body_jntadr[body]] + np.arange(7)]
+        address = m.jnt_qposadr[m.body_jntadr[body]] + np.arange(7)
+        pose, upright = self._world.d.qpos[address], m.qpos0[address[3:]]
         off = np.linalg.norm(pose[:3] - place + self._noise * self._draw.normal(size=3))
-        return bool(off > test.limit or 2 * np.arccos(min(1.0, abs(float(pose[3])))) > TURNED)
+        return bool(
+            off > test.limit or 2 * np.arccos(min(1.0, abs(float(pose[3:] @ upright)))) > TURNED
+        )
 
     def _gaps(self, welds: Index, bodies: Index) -> Array:
         """How far bodies are (n, 3) [m] from where welds should hold them."""

@@ -1,0 +1,107 @@
+"""The conditions NeedsTurn and Blocked of fixed robots: a part that is presented turned about the
+vertical is taken by a robot that turns it back, and what a fixed robot brings can be lowered.
+
+Until it is turned back, a part may be handed over from robot to robot, and nothing else may be done
+with it: its joints, and the tools that work on it, are where they are in the product.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
+
+from factory.compiler.expanding import Node
+from factory.plant.factory import Factory, Operation, Robot
+from factory.problem.pag import NOPART, PAG
+from factory.problem.robot_types import Catalogue
+from factory.problem.template import Template, variable_number
+from factory.support.errors import Diagnostic, InputError
+
+TURN = "turn"
+"""What an axis of a robot type does that turns what it holds about the vertical."""
+
+
+def check_turned(
+    pag: PAG, robots: Sequence[Robot], operations: Sequence[Operation], catalogue: Catalogue
+) -> Iterator[Diagnostic]:
+    """Every part that is presented turned and is joined, or worked on, as it is (NeedsTurn); and
+    every operation to which a fixed robot brings what cannot be lowered (Blocked)."""
+    fed = [part for part in pag.parts() if part.parameter("fed")]
+    taking = {label: o for o in operations if fed for label in o.inputs}
+    for part in fed:
+        label, operation = part.label, taking[part.label]
+        while not (turns := _turns(robots, operation, catalogue)) and _hands_over(operation):
+            label, operation = operation.label, taking[operation.label]
+        if not turns:
+            yield Diagnostic(
+                "NeedsTurn",
+                f"'{part.label}' is presented turned by {part.parameter('fed'):g} rad about the"
+                f" vertical, and '{operation.template.name}' turns nothing",
+                part.position,
+                f"write {_placing(operation, label)}: a manipulator turns it",
+            )
+    yield from _not_lowered(robots, operations)
+
+
+def _turns(robots: Sequence[Robot], operation: Operation, catalogue: Catalogue) -> bool:
+    """Whether the carrier of an operation turns what it takes."""
+    return TURN in catalogue[robots[operation.carrier].type].moves
+
+
+def _hands_over(operation: Operation) -> bool:
+    """Whether one robot takes over what another brings, and nothing else is done."""
+    return len(operation.inputs) == 1 and len(operation.robots) == 2 and not _tools(operation)
+
+
+def _tools(operation: Operation) -> bool:
+    """Whether a tool works in an operation, or its carrier brings what it keeps."""
+    template = operation.template
+    return bool(template.tools()) or template.before[template.carrier - 1] != NOPART
+
+
+def _placing(operation: Operation, label: str) -> str:
+    """The operation as `place` would be written."""
+    others = [x for x in operation.inputs if x != label] or ["base"]
+    return f"place ( {', '.join([*others, label])} )"
+
+
+def _not_lowered(robots: Sequence[Robot], operations: Sequence[Operation]) -> Iterator[Diagnostic]:
+    """Operations to which a fixed robot brings what slides, or is blocked."""
+    for o in operations:
+        for robot, label in zip(o.robots, o.before, strict=True):
+            if not robots[robot].fixed or label == NOPART or o.approach is None:
+                continue
+            if label != o.approach.lowered:
+                message = f"'{label}' cannot be lowered in '{o.label}', as {o.template.name} does"
+                hint = "leave the way from above free, or let it slide: mate ( ... )"
+                yield Diagnostic("Blocked", message, o.position, hint)
+
+
+def check_shapes(factory: Factory, shaped: bool) -> None:
+    """Raises InputError (Blocked) where a product whose parts are not `shaped` has fixed robots: of
+    default boxes it is not known what can be lowered."""
+    labels = {r: factory.deliveries(r.index)[0] for r in factory.robots if r.fixed}
+    if labels and not shaped:
+        hint = "give parts shapes: box = ( 0.04, 0.02, 0.03 ), pos = ( 0, 0, 0.037 )"
+        raise InputError(
+            Diagnostic("Blocked", f"'{label}' cannot be lowered: no part has a shape", at, hint)
+            for label, at in ((label, robot.position) for robot, label in labels.items())
+        )
+
+
+def placed(nodes: Mapping[str, Node], catalogue: Catalogue) -> dict[str, str]:
+    """By operations the input that a fixed robot brings to each, and so lowers."""
+    found = dict[str, str]()
+    for label, node in nodes.items():
+        of = node.template
+        for variable, taken in zip(_variables(of), node.inputs, strict=True):
+            wanted = catalogue.types.get(of.robots[of.before.index(variable)])
+            if wanted is not None and wanted.fixed:
+                found[label] = taken
+    return found
+
+
+@cache
+def _variables(template: Template) -> tuple[str, ...]:
+    """The label variables of a template's a, in the order of its inputs."""
+    return tuple(sorted(template.inputs, key=variable_number))
