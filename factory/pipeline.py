@@ -18,7 +18,7 @@ from factory.compiler.expanding import expand
 from factory.compiler.turning import check_shapes, placed
 from factory.lang.pag_reader import load_pag
 from factory.lang.template_reader import load_templates
-from factory.layout.request import Ground
+from factory.layout.request import Ground, hands_of
 from factory.plant.approaches import Approach
 from factory.plant.factory import Factory
 from factory.problem.pag import PAG
@@ -204,20 +204,21 @@ class Project:
 
     @cached_property
     def _hands(self) -> Hands | None:
-        """The hands to choose from, where they are chosen; None for a product of default boxes,
-        whose approaches are found with its layout."""
-        if not (self.settings.hands and is_shaped(self.pag)):
+        """The hands to choose from, where they are chosen."""
+        if not self.settings.hands:
             return None
-        from factory.layout.hands.choosing import Hands
-        from factory.layout.repeated import repeated
+        known = not self.plain.adjusted and "_unlifted" in self.__dict__
+        return self._unlifted if known else hands_of(self.plain, self.product, self.settings)
 
-        product = repeated(self.product, self.plain)
-        return Hands(self.plain, product, self.settings.acceleration)
+    @cached_property
+    def _unlifted(self) -> Hands:
+        """The hands to choose from before robots get lifts for what they bring on their tours."""
+        return hands_of(self.planned, self.product, self.settings)
 
     @cached_property
     def no_grips(self) -> tuple[NoGrip, ...]:
         """What no hand can hold, where hands are chosen; nothing for a product of default boxes."""
-        if self._hands is None:
+        if not is_shaped(self.pag) or self._hands is None:
             return ()
         from factory.layout.hands.nearest import no_grips
 
@@ -230,10 +231,8 @@ class Project:
         if not (self.settings.hands and plan.turns) or plan.lifts is not None:
             return factory
         from factory.layout.hands.adjusting import lifts_for
-        from factory.layout.repeated import repeated
 
-        product, push = repeated(self.product, factory), self.settings.acceleration
-        plan = replace(plan, lifts=lifts_for(factory, product, self.catalogue, push))
+        plan = replace(plan, lifts=lifts_for(self._unlifted, self.catalogue))
         return self._shared(plan) if plan.lifts else replace(factory, plan=plan)
 
     @cached_property
@@ -296,7 +295,12 @@ class Project:
         if self.laid is not None:
             return self._laid_out(self.laid)
         given = self.plain, self.product, self.settings, self._hands, self.catalogue
-        return self.ground.lay_out(*given)
+        return self.ground.lay_out(*given, *([self.draft] if "draft" in self.__dict__ else ()))
+
+    @cached_property
+    def draft(self) -> Layout:
+        """The layout of `plain` before it is certified, which may move it."""
+        return self.ground.drafted(self.plain, self.product, self.settings, self._hands)
 
     def _laid_out(self, laid: LayoutTable) -> Layout:
         from factory.compiler.mating.mating import judged
@@ -345,6 +349,5 @@ def read(
 ) -> Project:
     """The project of a PAG file. Raises InputError with every error found in the file."""
     templates = all_templates(folders)
-    return Project(
-        load_pag(path, templates), templates, load_catalogue(), settings or Settings(), ground
-    )
+    made = load_pag(path, templates), templates, load_catalogue()
+    return Project(*made, settings or Settings(), ground)

@@ -202,6 +202,30 @@ def test_so_many_robots_come_before_hands_for_all_labels() -> None:
     assert least.rank(28, 5.0) < least.rank(18, 9.0, bare=3)
 
 
+@pytest.mark.parametrize("robots", [3, 4])
+def test_only_what_can_be_the_best_is_certified(robots: int) -> None:
+    """A candidate with too many robots is not, nor one whose draft is slower than the best so far.
+    A draft is a lower bound of its layout, so the best is as if all were certified."""
+    search, before = Search(read(EXAMPLES / "paper.pag"), Aim(robots)), dict[int, Candidate]()
+    seen = list[tuple[Candidate, Candidate, bool]]()
+
+    def look(one: Candidate, best: Candidate) -> None:
+        first = id(one.project) not in before
+        so_far = before.setdefault(id(one.project), seen[-1][1] if seen else best)
+        certified = first and "layout" in one.project.__dict__
+        if certified:
+            assert one.robots <= robots
+            assert so_far.robots > robots or one.least < so_far.seconds
+        seen.append((one, best, certified))
+
+    search.look(look)
+    count = sum(certified for *_, certified in seen)
+    assert 0 < count < len(before)
+    few = [one for one, *_ in seen if one.robots <= robots and one.has_layout]
+    assert all(one.least <= one.seconds + 1e-6 for one in few)
+    assert search.rank(search.best) == min(map(search.rank, few))
+
+
 @pytest.mark.slow
 def test_forms_leave_no_robot_without_a_hand() -> None:
     project = read(EXAMPLES / "truck.pag")

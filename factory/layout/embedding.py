@@ -36,13 +36,15 @@ def lay_out(
     floor: Point2 | None = None,
     pace: Pace | None = None,
     hands: Hands | None = None,
+    draft: Layout | None = None,
 ) -> Layout:
     """The layout of a factory with its clearance certificate, the best found for robots of a
-    `pace`, with those of `hands` that suit it, if any. Raises RunError (Layout) where it
-    does not fit a floor of the given width and depth, saying by how much and where, or where an
-    operation's template asks for what cannot be kept clear."""
+    `pace`, with those of `hands` that suit it, if any; `draft`: what `optimised` found of it, if
+    that is known. Raises RunError (Layout) where it does not fit a floor of the given width and
+    depth, saying by how much and where, or where an operation's template asks for what cannot be
+    kept clear."""
     known, c, pace = judged(factory, product), Clearance(clearance), pace or Pace()
-    layout = optimised(known, product, c, pace, floor, (), hands)
+    layout = draft or optimised(known, product, c, pace, floor, (), hands)
     certificate = None
     for _ in range(AGAIN if hands else 0):
         certificate = certify(layout)

@@ -57,14 +57,14 @@ class Ground:
         settings: Settings,
         hands: Hands | None = None,
         catalogue: Catalogue | None = None,
+        draft: Layout | None = None,
     ) -> Layout:
         """The layout of a compiled factory; `hands`: those to choose from, where they are known;
-        `catalogue`: of the types of robots, the shipped one where None. Raises RunError (Layout)
-        where there is no room."""
+        `catalogue`: of the types of robots, the shipped one where None; `draft`: what was drafted
+        for it with these hands. Raises RunError (Layout) where there is no room."""
         from factory.compiler.mating.mating import judged
         from factory.layout.durations import Pace
         from factory.layout.embedding import lay_out
-        from factory.layout.hands.choosing import Hands
         from factory.layout.repeated import repeated
 
         pace = Pace.of(settings)
@@ -72,8 +72,8 @@ class Ground:
         if self.deputies:
             return self._with_deputies(factory, product, settings, hands, catalogue)
         if settings.hands and hands is None:
-            hands = Hands(factory, product, settings.acceleration)
-        layout = lay_out(factory, product, settings.clearance, self.floor, pace, hands)
+            hands = hands_of(factory, product, settings)
+        layout = lay_out(factory, product, settings.clearance, self.floor, pace, hands, draft)
         if self.relays:
             from factory.layout.relaying import relayed
 
@@ -82,6 +82,21 @@ class Ground:
                 raise InputError(SEVERAL_TOURS)
             layout = relayed(layout, settings, self.cycle, self.floor, hands)
         return layout
+
+    def drafted(
+        self, factory: Factory, product: Product, settings: Settings, hands: Hands | None
+    ) -> Layout:
+        """The draft of the layout of a compiled factory with these hands: the best one found,
+        before it is certified."""
+        from factory.compiler.mating.mating import judged
+        from factory.layout.dimensions import Clearance
+        from factory.layout.durations import Pace
+        from factory.layout.optimising import optimised
+        from factory.layout.repeated import repeated
+
+        factory, product = judged(factory, product), repeated(product, factory)
+        c, pace = Clearance(settings.clearance), Pace.of(settings)
+        return optimised(factory, product, c, pace, self.floor, (), hands)
 
     def _with_deputies(
         self,
@@ -108,3 +123,12 @@ class Ground:
         layout = part_of(replace(whole, product=product, standby=whole), factory)
         assert layout is not None, "its robots have their own tours"
         return layout
+
+
+def hands_of(factory: Factory, product: Product, settings: Settings) -> Hands:
+    """The hands to choose from for a compiled factory."""
+    from factory.compiler.mating.mating import judged
+    from factory.layout.hands.choosing import Hands
+    from factory.layout.repeated import repeated
+
+    return Hands(judged(factory, product), repeated(product, factory), settings.acceleration)

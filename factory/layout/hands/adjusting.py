@@ -4,24 +4,20 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from factory.geometry.solids import Product
 from factory.layout.hands.choosing import Hands
 from factory.layout.hands.holding import held
-from factory.layout.hands.places import PUSH
-from factory.plant.factory import Factory
 from factory.problem.robot_types import LIFT, Catalogue
 
 
-def lifts_for(
-    factory: Factory, product: Product, catalogue: Catalogue, push: float = PUSH
-) -> frozenset[int]:
-    """The robots (index) with several tours that have no lift, where one hand holds all that they
-    bring if they have one, and else none does."""
+def lifts_for(hands: Hands, catalogue: Catalogue) -> frozenset[int]:
+    """The robots (index) of `hands` with several tours that have no lift, where one hand holds all
+    that they bring if they have one, and else none does."""
+    factory, product, push = hands.factory, hands.holding.product, hands.holding.push
     lacking = {
         robot.index
         for robot in factory.robots
         if robot.index not in factory.strokes and catalogue.meet(robot.type, LIFT) is not None
-    } & without_hands(Hands(factory, product, push))
+    } & without_hands(hands)
     if not lacking:
         return frozenset()
     tried = replace(factory, adjusted=frozenset(lacking))
@@ -35,7 +31,7 @@ def without_hands(hands: Hands, however: bool = False) -> set[int]:
     for robot, tours in enumerate(hands.tours.of):
         if len({*hands.tours.alike(tours)}) > 1 and held(hands.holding.factory, tours[0]):
             chosen = (hands.hand(robot, u, t) for u, t in hands.holding.frames(tours[0]))
-            none = [hand is None or hand.kind == "none" for hand in chosen]
+            none = (hand is None or hand.kind == "none" for hand in chosen)
             if all(none) if however else any(none):
                 found.add(robot)
     return found

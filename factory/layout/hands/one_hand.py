@@ -135,7 +135,9 @@ class OneHand:
             return ()
         best, lowest = tuple[Hand, ...](), np.inf
         for radius in [0.0] if alone else self._radii(kind, tours, frames):
-            options = [self._groups(kind, tour, frames, radius) for tour in tours]
+            options = self._of_each(kind, tours, frames, radius)
+            if not options:
+                continue
             if not alone and self.in_the_way.holding.on[tours[0]] < 0:
                 options = in_one_place(options)
             elif not alone and any(map(self._is_one_of_two, tours)):
@@ -148,6 +150,17 @@ class OneHand:
             if not lowest:
                 break
         return best
+
+    def _of_each(
+        self, kind: Kind, tours: Sequence[int], frames: Frames, radius: float
+    ) -> list[Groups]:
+        """The groups of each tour; nothing where one of them has none."""
+        options = list[Groups]()
+        for tour in tours:
+            options.append(self._groups(kind, tour, frames, radius))
+            if not len(options[-1]):
+                return []
+        return options
 
     def _radii(self, kind: Kind, tours: Sequence[int], frames: Frames) -> list[float]:
         """The radii that a tip for several tours may have, the largest first [m]."""

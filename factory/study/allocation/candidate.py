@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from factory.compiler.parallel import Branches
+from factory.layout.durations import Pace, cycle_of
 from factory.pipeline import Project
 from factory.study.allocation.bundles import Filling
 from factory.support.errors import FactoryError
@@ -18,14 +19,18 @@ from factory.timing.prediction import pace
 class Candidate:
     """A product with `forms` chosen, by the joins of the product as written, and with the `filling`
     of its lines, None for one robot for each label: the project `single`, without the `branches`
-    that are asked for several times."""
+    that are asked for several times. `alone`: the same with a robot for each label, None for
+    itself."""
 
     single: Project
     forms: Mapping[str, int]
     filling: Filling | None = None
     branches: Branches = ()
+    alone: Project | None = None
 
     def __str__(self) -> str:
+        if "has_layout" not in self.__dict__:
+            return f"{self.robots} robots" if self.is_possible else "no factory"
         return f"{self.robots} robots, {self.seconds:.2f} s" if self.has_layout else "no layout"
 
     @cached_property
@@ -34,10 +39,11 @@ class Candidate:
         impossible."""
         return self.single.with_branches(self.branches) if self.branches else self.single
 
-    @property
+    @cached_property
     def robots(self) -> int:
         """Number of robots of its factory, tools included."""
-        return len(self.project.factory.robots)
+        project = self.project
+        return len((project.factory if project.ground.relays else project.planned).robots)
 
     @property
     def seconds(self) -> float:
@@ -62,6 +68,20 @@ class Candidate:
         return pace(self.project.layout, self.project.settings)
 
     @cached_property
+    def is_possible(self) -> bool:
+        """Whether there is such a factory."""
+        try:
+            return self.robots > 0
+        except FactoryError:
+            return False
+
+    @property
+    def least(self) -> float:
+        """Lower bound on its cycle time: that of its draft, in which no hand waits for another
+        [s]."""
+        return cycle_of(self.project.draft, Pace.of(self.project.settings))
+
+    @cached_property
     def has_layout(self) -> bool:
         """Whether it has a layout."""
         try:
@@ -75,18 +95,22 @@ class Candidate:
         slow = [robot for robot in factory.robots if robot.name == slowest]
         return [factory.operations[n].written for robot in slow for n in robot.operations]
 
-    @cached_property
+    @property
     def blocked(self) -> int:
         """Number of blocked operations."""
-        matings = self.single.matings
-        return len(matings.of_kind("blocked")) if matings else 0
+        return blocked(self.single)
 
-    @cached_property
+    @property
     def bare(self) -> int:
         """Number of labels that no hand of a robot for one label can hold."""
-        return sum(not grip.shared for grip in self.single.no_grips)
+        return len((self.alone or self.single).no_grips)
 
     @property
     def troubles(self) -> int:
         """Number of operations that are blocked, or bring what no such hand can hold."""
         return self.blocked + self.bare
+
+
+def blocked(project: Project) -> int:
+    """Number of blocked operations of a project."""
+    return len(project.matings.of_kind("blocked")) if project.matings else 0

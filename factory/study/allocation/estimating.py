@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
 
@@ -12,9 +12,11 @@ from factory.compiler.folding import Line
 from factory.compiler.mating.mating import admitted
 from factory.compiler.parallel import Branches
 from factory.layout.durations import Pace
+from factory.layout.hands.misses import NoGrip
 from factory.layout.shapes import payload_boxes
 from factory.pipeline import Project
-from factory.problem.plan import Plan
+from factory.plant.factory import Factory, Operation
+from factory.problem.plan import THIRD, Plan
 from factory.problem.shapes import is_shaped
 from factory.study.allocation.aim import STEP
 from factory.study.allocation.bundles import Filling
@@ -30,6 +32,9 @@ from factory.support.allowance import Allowance
 
 WIDE = 1.3
 """Ratio of successive bounds on cycles for LARGE products (else `aim.STEP`)."""
+
+ROUNDS = 8
+"""Number of times that forms are chosen again because no hand fits."""
 
 LARGE = 400
 """Number of labels from which a product is large."""
@@ -50,15 +55,19 @@ NEAR = 1.3
 @dataclass(frozen=True, slots=True)
 class Estimate:
     """Estimate for forms and lines: the number of `robots`, tools included, and the cycle time [s];
-    the `forms`, and the `filling` of the lines, None for one robot for each label."""
+    the `forms`, and the `filling` of the lines, None for one robot for each label; the number of
+    labels without a hand beyond those of the product as written, `bare`."""
 
     robots: int
     seconds: float
     forms: Mapping[str, int]
     filling: Filling | None = None
+    bare: int = 0
 
     def beats(self, other: Estimate) -> bool:
         """Whether it has no more robots than another and is clearly faster, or equals it."""
+        if self.bare > other.bare:
+            return False
         faster = self.seconds * NEAR <= other.seconds
         same = self.robots == other.robots and abs(self.seconds - other.seconds) < 1e-9
         return same or (self.robots <= other.robots and faster)
@@ -67,10 +76,13 @@ class Estimate:
 @dataclass(frozen=True)
 class Estimator:
     """Estimates for the product of a `project` with one robot for each label and no relays;
-    `branches` that its factories have several times."""
+    `branches` that its factories have several times. `refused`: forms (a join and its pile) that
+    leave a label without a hand, as has been seen so far."""
 
     project: Project
     branches: Branches = ()
+    refused: set[tuple[str, int]] = field(default_factory=set, compare=False)
+    _alone: dict[tuple[int, ...], Project] = field(default_factory=dict, compare=False)
 
     @cached_property
     def task(self) -> FormsTask:
@@ -82,16 +94,16 @@ class Estimator:
         return FormsTask(pag, templates, admits, boxes, Pace.of(project.settings))
 
     @cached_property
-    def written(self) -> Mapping[str, int]:
-        """The forms of the product as written."""
-        return written_forms(self.task)
+    def written(self) -> Candidate:
+        """The product as written."""
+        return self.candidate(written_forms(self.task))
 
     def candidate(self, forms: Mapping[str, int], filling: Filling | None = None) -> Candidate:
         """The product with these forms, and with lines if a filling is given."""
-        project = self._formed(forms)
+        alone = project = self.alone(forms)
         if filling is not None:
             project = project.with_plan(self._shift(project).plan(filling))
-        return Candidate(project, forms, filling, self.branches)
+        return Candidate(project, forms, filling, self.branches, alone)
 
     def front(self, budget: Allowance, robots: float = inf) -> list[Estimate]:
         """The estimates with lines of which no other is clearly better (see `estimates`)."""
@@ -105,30 +117,41 @@ class Estimator:
         """All estimates with at most `robots` robots and no more blocked operations than the
         product as written, for as many forms as the budget allows, those as written first: for
         each, the one with one robot for each label, then those with lines."""
-        tried = {tuple(self.written.values())}
-        yield from self.of_forms(self.written, robots)
+        tried = {tuple(self.written.forms.values())}
+        yield from self.of(self.written, robots)
         for task in self._tasks():
-            for bound in self.bounds(task, robots):
-                if budget.over():
-                    return
-                forms, _ = best_forms(task, bound)
-                key = tuple(forms.values())
-                if key in tried:
-                    continue
-                tried.add(key)
+            for one in self.held(task, budget, robots=robots):
+                key = tuple(one.forms.values())
+                if key not in tried:
+                    tried.add(key)
+                    yield from self.of(one, robots)
+
+    def held(
+        self, task: FormsTask, budget: Allowance, share: float = 1.0, robots: float = inf
+    ) -> Iterator[Candidate]:
+        """Those with the best forms under each bound, as long as no more than a `share` of the
+        budget is used. Forms that leave more labels without a hand than those of the product as
+        written are refused from then on, and chosen again."""
+        before: Mapping[str, int] = {}
+        for bound in self.bounds(task, robots):
+            for _ in range(ROUNDS):
+                forms, _ = best_forms(replace(task, refused=frozenset(self.refused)), bound)
+                if forms == before or budget.over(share):
+                    break
                 budget.spend()
-                yield from self.of_forms(forms, robots)
+                one, before = self.candidate(forms), forms
+                blame = {*blamed(one.single, forms)} if one.bare > self.written.bare else set()
+                if blame <= self.refused:
+                    yield one
+                    break
+                self.refused.update(blame)
 
-    def of_forms(self, forms: Mapping[str, int], robots: float = inf) -> Iterator[Estimate]:
-        """The estimates for forms; none where more operations are blocked than in the product as
-        written."""
-        project = self._formed(forms)
-        if _blocked(project) <= self._blocked_as_written:
-            yield from self._filled(project, forms, robots)
-
-    @cached_property
-    def _blocked_as_written(self) -> int:
-        return _blocked(self._formed(self.written))
+    def of(self, one: Candidate, robots: float = inf) -> Iterator[Estimate]:
+        """The estimates of a candidate with a robot for each label, also with lines; none where
+        more operations are blocked than in the product as written."""
+        if one.blocked <= self.written.blocked:
+            bare = max(0, one.bare - self.written.bare)
+            yield from (replace(e, bare=bare) for e in self._filled(one, robots))
 
     def _tasks(self) -> Iterator[FormsTask]:
         orders: tuple[Order, ...] = ("lines", "fewest", "robots")
@@ -146,12 +169,11 @@ class Estimator:
             yield bound
             bound /= step
 
-    def _filled(
-        self, project: Project, forms: Mapping[str, int], robots: float
-    ) -> Iterator[Estimate]:
-        """The estimates for forms with one robot for each label, and with lines for each
+    def _filled(self, one: Candidate, robots: float) -> Iterator[Estimate]:
+        """The estimates of a candidate with one robot for each label, and with lines for each
         filling."""
-        shift, tried = self._shift(project), set[tuple[Line, ...]]()
+        forms = one.forms
+        shift, tried = self._shift(one.single), set[tuple[Line, ...]]()
         large = len(self.task.nodes) >= LARGE
         if shift.count(()) <= robots:
             yield Estimate(shift.count(()), shift.seconds(()), forms)
@@ -168,12 +190,40 @@ class Estimator:
         boxes = payload_boxes(factory, project.product)
         return Shift.of(factory, project.catalogue, boxes, self.task.pace)
 
-    def _formed(self, forms: Mapping[str, int]) -> Project:
+    def alone(self, forms: Mapping[str, int]) -> Project:
         """The product with these forms, and one robot for each label."""
-        other = {label: form for label, form in forms.items() if form != self.written[label]}
-        return self.project.with_plan(Plan(other))
+        key = tuple(forms.values())
+        if key not in self._alone:
+            written = written_forms(self.task)
+            other = {label: form for label, form in forms.items() if form != written[label]}
+            self._alone[key] = self.project.with_plan(Plan(other))
+        return self._alone[key]
 
 
-def _blocked(project: Project) -> int:
-    """Number of blocked operations of a project."""
-    return len(project.matings.of_kind("blocked")) if project.matings else 0
+def blamed(project: Project, forms: Mapping[str, int]) -> Iterator[tuple[str, int]]:
+    """For each robot that no hand fits, the form (a join and its pile) that is the likely cause: of
+    the joins on this robot the one whose incoming parts are most in the way, else the one at which
+    it delivers; none where these have no such form."""
+    factory = project.plain
+    robots = {robot.name: robot for robot in factory.robots}
+    for no_grip in project.no_grips:
+        robot = robots[no_grip.robot]
+        operations = [factory.operations[number] for number in robot.operations]
+        piles = [o for o in operations if forms.get(o.label, THIRD) != THIRD]
+        carried = [o for o in piles if o.carrier == robot.index] or piles
+        if carried:
+            label = max(carried, key=lambda o: _in_the_way(no_grip, o, factory)).label
+            yield label, forms[label]
+
+
+def _in_the_way(no_grip: NoGrip, operation: Operation, factory: Factory) -> tuple[int, int]:
+    """Number of parts that come in an operation and are in the way of hands; then how early it
+    is."""
+    carrier = operation.template.carrier - 1
+    incoming = {
+        part
+        for slot, label in enumerate(operation.before)
+        if slot != carrier and label in factory.contents
+        for part in factory.contents[label]
+    }
+    return sum(part in incoming for miss in no_grip.misses for part in miss.parts), -operation.index

@@ -14,21 +14,15 @@ from dataclasses import replace
 from math import inf
 
 from factory.compiler.folding import kept_apart, lines_of
-from factory.layout.hands.misses import NoGrip
 from factory.pipeline import Project
-from factory.plant.factory import Factory, Operation
 from factory.problem.plan import THIRD
 from factory.study.allocation.aim import Aim, usual_effort
 from factory.study.allocation.bundles import Filling
 from factory.study.allocation.candidate import Candidate
 from factory.study.allocation.estimating import Estimator
-from factory.study.allocation.forms import best_forms
 from factory.study.allocation.least import least_robots
 from factory.support.allowance import Allowance
 from factory.support.errors import Diagnostic, InputError
-
-ROUNDS = 8
-"""Number of times that forms are chosen again because no hand fits."""
 
 CHANGES = 60
 """Number of changes in a row without improvement after which the search ends."""
@@ -69,9 +63,11 @@ def allocated(
         hint = "give it more --seconds, or less --effort"
         warn(Diagnostic("OutOfTime", message, None, hint))
     if isinstance(aim.robots, int) and best.robots > aim.robots:
-        message = f"no factory with {aim.robots} robots was found, only with {best.robots}"
-        more = "--seconds" if search.cut_off else "--effort"
-        hint = f"--robots {best.robots}, or a longer search with more {more}"
+        message = f"no factory with {aim.robots} robots was found"
+        hint = f"a longer search with more {'--seconds' if search.cut_off else '--effort'}"
+        if best.has_layout:
+            message += f", only with {best.robots}"
+            hint = f"--robots {best.robots}, or {hint}"
         raise InputError(Diagnostic("TooFewRobots", message + search.why(), None, hint))
     if aim.robots is None and aim.cycle is not None and best.seconds > aim.cycle:
         plain = best if best.filling is None else search.written
@@ -89,7 +85,7 @@ class Search:
         self.forms = Allowance(effort, aim.seconds)
         bare = replace(project.ground, relay=False, cycle=None)
         self.estimator = estimator or Estimator(project.with_ground(bare), aim.branches)
-        self.written = self.best = self.estimator.candidate(self.estimator.written)
+        self.written = self.best = self.estimator.written
 
     @property
     def cut_off(self) -> bool:
@@ -98,10 +94,12 @@ class Search:
 
     def rank(self, one: Candidate) -> tuple[float, ...]:
         """What a candidate is judged by, the less the better; one without a layout is the worst."""
-        if not one.has_layout:
-            return (inf,)
+        return self._ranked(one, one.seconds) if one.has_layout else (inf,)
+
+    def _ranked(self, one: Candidate, seconds: float) -> tuple[float, ...]:
+        """The rank of a candidate if its cycle takes so many `seconds`."""
         blocked, bare = one.blocked - self.written.blocked, one.bare - self.written.bare
-        return max(0, blocked), *self.aim.rank(one.robots, one.seconds, max(0, bare))
+        return max(0, blocked), *self.aim.rank(one.robots, seconds, max(0, bare))
 
     def look(self, seen: Seen = lambda *_: None) -> None:
         """For forms and lines, as long as there is effort left and something better may be found.
@@ -122,20 +120,10 @@ class Search:
 
     def singles(self) -> Iterator[Candidate]:
         """The candidates by estimate with a robot for each label, each forms once, under bounds
-        from long to short. Forms that leave a robot without a hand are refused from then on."""
-        estimator, before = self.estimator, dict[str, int]()
-        task = estimator.task
-        for bound in estimator.bounds(task) if task.free else ():
-            for _ in range(ROUNDS):
-                forms, _ = best_forms(task, bound)
-                if forms == before or self.budget.over(SINGLE):
-                    break
-                one, before = self._candidate(forms), forms
-                refused = task.refused | frozenset(blamed(one.single, forms))
-                if one.troubles <= self.written.troubles or refused == task.refused:
-                    yield one
-                    break
-                task = replace(task, refused=refused)
+        from long to short."""
+        task = self.estimator.task
+        if task.free:
+            yield from self.estimator.held(task, self.budget, SINGLE)
 
     def _shared(self) -> Iterator[Candidate]:
         """The candidates by estimate with robots that serve several labels, the most promising
@@ -146,7 +134,7 @@ class Search:
         if not front:
             self.forms.spent = 0
             front = self.estimator.front(self.forms)
-        front.sort(key=lambda one: aim.rank(one.robots, one.seconds))
+        front.sort(key=lambda one: aim.rank(one.robots, one.seconds, one.bare))
         for one in front:
             if self.budget.over(SHARED):
                 return
@@ -157,11 +145,33 @@ class Search:
         return self.estimator.candidate(forms, filling)
 
     def _judge(self, one: Candidate) -> bool:
-        """Whether it is better than the best so far; then it is the best."""
-        better = self.rank(one) < self.rank(self.best)
+        """Whether it is better than the best so far; then it is the best. Only what can be is laid
+        out, and only where its draft can be is it certified."""
+        better = one.is_possible and (self._wins(one) or self._may_win(one))
         if better:
             self.best = one
         return better
+
+    def _exceeds(self, one: Candidate) -> bool:
+        """Whether it has more robots than are allowed."""
+        return isinstance(self.aim.robots, int) and one.robots > self.aim.robots
+
+    def _wins(self, one: Candidate) -> bool:
+        """Whether it is better than the best whatever their cycle times, and has a layout or too
+        many robots, so that none is needed."""
+        surely = self._ranked(one, inf) < self._ranked(self.best, 0.0)
+        return surely and (self._exceeds(one) or one.has_layout)
+
+    def _may_win(self, one: Candidate) -> bool:
+        """Whether it is better than the best by the layouts of both."""
+        if self._exceeds(one) or self._exceeds(self.best):
+            return False
+        best = self.rank(self.best)
+        return (
+            self._ranked(one, 0.0) < best
+            and self._ranked(one, one.least) < best
+            and self.rank(one) < best
+        )
 
     def _better(self, changed: Iterator[Candidate], seen: Seen) -> bool:
         """Whether one of the first changes is better than the best, which it is then."""
@@ -179,38 +189,9 @@ class Search:
         """The best with one form changed: those of joins of the slowest robot first; on lines that
         are filled for the same."""
         best = self.best
-        first = best.of_the_slowest() if best.has_layout else []
+        first = [] if self._exceeds(best) or not best.has_layout else best.of_the_slowest()
         order = dict.fromkeys(label for label in (*first, *best.forms) if label in best.forms)
         for label in order:
             for form in (THIRD, 0, 1):
                 if form != best.forms[label]:
                     yield self._candidate({**best.forms, label: form}, best.filling)
-
-
-def blamed(project: Project, forms: Mapping[str, int]) -> Iterator[tuple[str, int]]:
-    """For each robot that no hand fits, the form (a join and its pile) that is the likely cause: of
-    the joins on this robot the one whose incoming parts are most in the way, else the one at which
-    it delivers; none where these have no such form."""
-    factory = project.plain
-    robots = {robot.name: robot for robot in factory.robots}
-    for no_grip in project.no_grips:
-        robot = robots[no_grip.robot]
-        operations = [factory.operations[number] for number in robot.operations]
-        piles = [o for o in operations if forms.get(o.label, THIRD) != THIRD]
-        carried = [o for o in piles if o.carrier == robot.index] or piles
-        if carried:
-            label = max(carried, key=lambda o: _in_the_way(no_grip, o, factory)).label
-            yield label, forms[label]
-
-
-def _in_the_way(no_grip: NoGrip, operation: Operation, factory: Factory) -> tuple[int, int]:
-    """Number of parts that come in an operation and are in the way of hands; then how early it
-    is."""
-    carrier = operation.template.carrier - 1
-    incoming = {
-        part
-        for slot, label in enumerate(operation.before)
-        if slot != carrier and label in factory.contents
-        for part in factory.contents[label]
-    }
-    return sum(part in incoming for miss in no_grip.misses for part in miss.parts), -operation.index

@@ -111,7 +111,7 @@ class FrontSweep:
     @cached_property
     def troubles(self) -> int:
         """Number of operations in trouble in the product as written."""
-        return self.estimator.candidate(self.estimator.written).troubles
+        return self.estimator.written.troubles
 
     def front(self) -> ParetoFront:
         """The front found so far."""
@@ -131,7 +131,7 @@ class FrontSweep:
         """Search for points, as long as there is effort left."""
         layouts = self.effort.layouts
         if layouts:
-            self.written = self._added(Candidate(self.project, self.estimator.written))
+            self.written = self._added(Candidate(self.project, self.estimator.written.forms))
         whole = self._estimate()
         if layouts:
             if self.project.settings.hands:
@@ -159,7 +159,7 @@ class FrontSweep:
         """The estimates of the forms of the best with one form changed."""
         best = [one.forms for share, one in candidates_front(self.estimates) if share <= 1]
         tried = {tuple(one.forms.values()) for one in self.estimates}
-        for label, form, forms in product(self.estimator.written, (THIRD, 0, 1), best):
+        for label, form, forms in product(self.estimator.written.forms, (THIRD, 0, 1), best):
             changed = {**forms, label: form}
             key = tuple(changed.values())
             if key not in tried:
@@ -167,7 +167,7 @@ class FrontSweep:
                     return
                 self.changes.spend()
                 tried.add(key)
-                yield from self.estimator.of_forms(changed)
+                yield from self.estimator.of(self.estimator.candidate(changed))
 
     def _say(self, what: str, done: int, total: int | None) -> None:
         self.seen(Step(what, done, total, len(self.points)))
