@@ -49,6 +49,11 @@ if TYPE_CHECKING:
 @FAULTS
 @RUN
 @ALLOW
+@click.option(
+    "--demand",
+    metavar="FILE|SEED",
+    help="Orders for a mix: a file with a line product,time for each; or drawn by a seed.",
+)
 @click.option("--video", type=PATH, help="Film the run (.mp4).")
 @click.option("--log", type=PATH, help="Log every tick to a file.")
 @click.option(

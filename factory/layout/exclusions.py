@@ -9,8 +9,8 @@ pair of robots whose hands collide where their common operation ends.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from heapq import heapify, heappop, heappush
 from itertools import product
 
@@ -44,6 +44,18 @@ from factory.nets.exclusion import (
 from factory.nets.marked import MarkedNet
 from factory.nets.verdict import listing
 from factory.plant.factory import Factory
+
+
+@dataclass(frozen=True)
+class Further:
+    """Further `presences` of machines, and which of the pairs that come near with them `counts`."""
+
+    presences: tuple[Presence, ...] = ()
+    counts: Callable[[Near], bool] = field(default=lambda pair: True)
+
+
+Presences = Callable[[Layout, Coordinated, Mapping[int, float]], Further]
+"""Those of a layout in its coordinated net, with robots that go where they are awaited."""
 
 ROUNDS = 8
 """Most rounds in which ways home are cut."""
@@ -86,23 +98,26 @@ def kept(layout: Layout) -> Exclusions:
     return known
 
 
-def exclusions(layout: Layout) -> Exclusions:
-    """Find what keeps the machines of a layout apart: ways home are cut where they are clear of
-    what comes near, until there is no new cut; what the net does not exclude then is ordered."""
+def exclusions(layout: Layout, further: Presences | None = None) -> Exclusions:
+    """Find what keeps the machines of a layout apart, with `further` presences if there are any:
+    ways home are cut where they are clear of what comes near, until there is no new cut; what the
+    net does not exclude then is ordered."""
     backs, passes = homes(layout), dict[Past, None]()
-    for further in range(ROUNDS, -1, -1):
+    for rounds in range(ROUNDS, -1, -1):
         net = with_machines(layout, passes)
         if net.deadlock:
             return Exclusions(faults=(_stuck(layout, net),))
         sequence = one_unit(net.net, layout.factory)
-        pairs = [*near([*presences(layout, net, backs)], layout.clearance)]
+        more = further(layout, net, backs) if further else Further()
+        every = [*presences(layout, net, backs), *more.presences]
+        pairs = [p for p in near(every, layout.clearance) if more.counts(p)]
         circuits = _circuits(net.net, dict(enumerate(pairs)))
         needed = {
             n: pair
             for n, boxed in enumerate(pairs)
             if n not in circuits and (pair := nearer(boxed, layout.clearance)) is not None
         }
-        cuts = _cuts(layout, net.net, sequence, needed.values()) if further else []
+        cuts = _cuts(layout, net.net, sequence, needed.values()) if rounds else []
         if passes.keys() >= {*cuts}:
             break
         passes |= dict.fromkeys(cuts)

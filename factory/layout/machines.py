@@ -32,15 +32,19 @@ def presences(
     """All of them, of robots that go where they are `awaited` by themselves, by index [m]."""
     robots = Staying(layout, coordinated, awaited)
     yield from robots.presences()
-    yield from _magazines(layout, coordinated, robots)
+    yield from magazines(layout, coordinated, robots)
     yield from _tray(layout, coordinated, robots)
 
 
-def _magazines(layout: Layout, coordinated: Coordinated, robots: Staying) -> Iterator[Presence]:
-    """The sliders of feeders, with the parts that hang from them, and the housings."""
+def magazines(
+    layout: Layout, coordinated: Coordinated, robots: Staying, every_part: bool = False
+) -> Iterator[Presence]:
+    """The sliders of feeders, with the parts that hang from them, and the housings; or, instead,
+    each slider with every part of its feeder, wherever it has one or comes down with one."""
     hanging, housed = Hanging.of(layout), set[int]()
     outlets = {(outlet.label, outlet.robot): outlet for outlet in outlets_of(layout)}
     named = {outlet.name: outlet for outlet in outlets.values()}
+    carrier = [o.carrier for o in layout.factory.operations]
     follows = {served.before: served for served in coordinated.served.values()}
     for number, served in coordinated.served.items():
         leaf = layout.factory.operations[number]
@@ -53,14 +57,15 @@ def _magazines(layout: Layout, coordinated: Coordinated, robots: Staying) -> Ite
         machine = f"magazine of {layout.factory.robots[robot].name}"
         way = ((0.0, outlet.feeder.stroke), (0.0, 0.0))
         top = ((way[0][1], way[0][1]), way[1])
-        for place, bodies, spans in (
-            (follows[number].up, pad, way),
-            (served.top, hung, top),
-            (served.down, hung, way),
-            (leaf.place, hung, STILL),
-        ):
+        shown = [(served.top, hung, top), (served.down, hung, way)]
+        if every_part:
+            others = (s for n, s in coordinated.served.items() if carrier[n] == robot)
+            shown = [(p, hung, w) for s in others for p, w in ((s.top, top), (s.down, way))]
+        else:
+            shown += [(follows[number].up, pad, way), (leaf.place, hung, STILL)]
+        for place, bodies, spans in shown:
             yield Presence(robot, machine, (place,), bodies, (spans,), partners, True, leaf.label)
-        if robot not in housed:
+        if robot not in housed and not every_part:
             housed.add(robot)
             yield _housing(outlet, f"feeder of {layout.factory.robots[robot].name}", partners)
 

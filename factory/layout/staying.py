@@ -104,6 +104,10 @@ class Staying:
                     told = robot.name, places, bodies, sweeps, partners, False, held, since
                     yield Presence(index, *told)
 
+    def own(self, robot: int) -> MachineBodies:
+        """Carriage, mast, arm and hand of a robot, with its axes at 0."""
+        return self._own[robot]
+
     def held(self, robot: int, operation: int, label: str) -> MachineBodies:
         """What a robot holds on its tour with an operation, with its axes at 0."""
         layout, product = self.layout, self.layout.product
@@ -173,7 +177,7 @@ class Staying:
         layout = self.layout
         before, number, wait = self._steps(robot, step)
         since, visit = layout.ways[number, robot]
-        begin, goal, low, high = since.at, self._goal(robot, step), since.lift, visit.lift
+        begin, goal, low, high = since.at, self.goal(robot, step), since.lift, visit.lift
         carriage, lift = self._chains(2 * before + 1, robot)
         begins = layout.factory.begins(robot, number)
         if begins and rises_first(layout, robot):
@@ -186,7 +190,7 @@ class Staying:
             if robot in layout.factory.adjusted and span[1] == goal:
                 sweeps += (((goal, goal), (low, high)),)
             yield (wait, *places, *lift.after), sweeps
-        if begins and not self._comes_last(robot, number):
+        if begins and not comes_last(layout, robot, number):
             home = layout.guidepaths[robot].length
             yield (wait, *carriage.after, *lift.after), (((home, home), (low, high)),)
 
@@ -195,7 +199,7 @@ class Staying:
         layout, factory = self.layout, self.layout.factory
         before, number, _ = self._steps(robot, step)
         since, visit = layout.ways[number, robot]
-        begin, end, goal = since.at, visit.at, self._goal(robot, step)
+        begin, end, goal = since.at, visit.at, self.goal(robot, step)
         low, high = since.lift, visit.lift
         carriage, lift = self._chains(2 * before + 1, robot)
         within, _ = self._chains(2 * number, robot)
@@ -225,7 +229,7 @@ class Staying:
         gear = self.layout.factory.robots[robot].operations
         return gear[step - 1], gear[step], self.layout.factory.net.gears[robot].places[2 * step]
 
-    def _goal(self, robot: int, step: int) -> float:
+    def goal(self, robot: int, step: int) -> float:
         """Where a robot goes in the wait before a step of its gear, an arc length [m]."""
         layout, (_, number, _) = self.layout, self._steps(robot, step)
         operation, hand = layout.factory.operations[number], layout.hand(robot)
@@ -234,13 +238,6 @@ class Staying:
             return since.at
         tall = hand is not None and hand.tall
         return self._awaited[robot] if tall or not operation.inputs else visit.at
-
-    def _comes_last(self, robot: int, operation: int) -> bool:
-        """Whether a robot comes home when the part of its feeder is down, which it is where a run
-        begins."""
-        hand = self.layout.hand(robot)
-        is_above = hand is not None and hand.kind == "above"
-        return is_above and not self.layout.factory.operations[operation].inputs
 
     def _chains(self, after: int, robot: int) -> tuple[Chain, Chain]:
         """The passes of a robot's carriage that follow a transition, and of its lift."""
@@ -267,6 +264,14 @@ class Staying:
             return at
         length = self.layout.guidepaths[axis].length
         return length if abs(length - at) <= HOME + ROUNDING else at
+
+
+def comes_last(layout: Layout, robot: int, operation: int) -> bool:
+    """Whether a robot comes home when the part of its feeder is down, which it is where a run
+    begins."""
+    hand = layout.hand(robot)
+    is_above = hand is not None and hand.kind == "above"
+    return is_above and not layout.factory.operations[operation].inputs
 
 
 def _own(layout: Layout, robot: int) -> MachineBodies:

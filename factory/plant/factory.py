@@ -6,7 +6,6 @@ number: operation i has start 2i, end 2i + 1 and operation place i.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -183,12 +182,6 @@ class Factory(Pictured):
     def sequence(self) -> tuple[str, ...]:
         """The product of each unit of a period, as the PAG has it."""
         return tuple(out_of_turn(label, turn) for turn, label in enumerate(self.products))
-
-    def made(self, begin: int, end: int) -> Mapping[str, int]:
-        """How many of each product the units from `begin` to `end` are."""
-        sequence = self.sequence
-        counts = Counter(sequence[unit % self.period] for unit in range(begin, end))
-        return {product: counts[product] for product in self.pag.products}
 
     def unit(self, operation: Operation, count: int) -> int:
         """For which unit an operation is that has been started, or ended, so often before."""

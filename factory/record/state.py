@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from factory.layout.layout import Layout
 from factory.nets.petri import Marking
 from factory.nets.undone import Undone
+from factory.plant.demand import Demand, Word
 from factory.record.failures import Account
 from factory.record.figures import PhysicsFigures
 from factory.support.errors import Diagnostic
@@ -142,6 +143,8 @@ class RecordedRequest(Protocol):
     @property
     def fuse(self) -> bool: ...
     @property
+    def demand(self) -> Demand | None: ...
+    @property
     def settings(self) -> Settings: ...
 
 
@@ -149,8 +152,9 @@ class Recordable(Protocol):
     """A run that can be recorded, such as `simulation.Simulation`.
 
     `asked`: the request before anything was chosen for it; `start`: the marking the run begins
-    from; `model` and the `engine`'s: None in the ideal world. Observers in `at_ends` are shown the
-    state in which operations have ended and parts have changed hands, before the engine continues.
+    from; `word`: which units are made; `model` and the `engine`'s: None in the ideal world.
+    Observers in `at_ends` are shown the state in which operations have ended and parts have changed
+    hands, before the engine continues.
     """
 
     @property
@@ -161,6 +165,8 @@ class Recordable(Protocol):
     def request(self) -> RecordedRequest: ...
     @property
     def start(self) -> Marking: ...
+    @property
+    def word(self) -> Word: ...
     @property
     def model(self) -> Model | None: ...
     @property

@@ -11,6 +11,7 @@ from factory.control.mode import Array, Index
 from factory.control.navigation import Bundle
 from factory.layout.layout import Layout
 from factory.nets.coordinated import Past
+from factory.plant.demand import Word
 from factory.plant.factory import Operation
 from factory.record.figures import PhysicsFigures
 from factory.record.state import Observation
@@ -32,7 +33,9 @@ class IdealWorld:
         self.x = np.array(start, float)
         self.v = np.zeros_like(self.x)
         self._factory, self._request = layout.factory, request
-        self._before = layout.factory.units(counts)
+        before = layout.factory.units(counts)
+        asked = request.demand, before + request.units, request.wip
+        self.word = Word(self._factory.sequence, *asked, made=before)
         self._plan = np.zeros((len(self.x), 4))
         self._plan[:, 1] = self.x
         self.dropoffs: list[float] = []
@@ -49,17 +52,18 @@ class IdealWorld:
         """A feeder gives a part for every unit asked for, and that may be let in."""
         if not self.hooks.admit(operation, unit):
             return False
-        if operation.inputs:
+        if operation.inputs or self.word.demand:
             return True
         wip = self._request.wip
         inside = wip is None or unit < self.delivered() + wip
-        return inside and unit < self._before + self._request.units
+        return inside and unit < self.word.most
 
     def apply(self, started: Sequence[Job], ended: Sequence[Job]) -> None:
         """Parts follow labels; only finished products are counted."""
         for operation, _ in ended:
             if self._factory.drops(operation.index):
                 self.supplied = True
+                self.word.made += 1
                 self.dropoffs.append(self.time)
 
     def step(
@@ -100,7 +104,7 @@ class IdealWorld:
 
     def delivered(self) -> int:
         """Products dropped off."""
-        return self._before + len(self.dropoffs)
+        return self.word.made
 
     def unstable(self) -> str:
         """It is always stable."""

@@ -21,6 +21,11 @@ APART = (
     ("--deputies", ("--relay", "--cycle"), "no robot can take over for one that relays"),
     ("[lines]", ("--robots", "--cycle"), "the search chooses which labels share a robot"),
     (
+        "--demand",
+        ("--distributed", "--from"),
+        "one supervisor skips what nobody has ordered, from the beginning on",
+    ),
+    (
         "--distributed",
         ("--faults", "--spares", "--deputies"),
         "robots that run their own programs do not recover",
@@ -47,7 +52,8 @@ class RunOptions:
     `fuse`: whether parts joined for good become one body, None where that pays; `max_time`: at most
     so long [simulated s]; `distributed`: robots run their own programs; `lenient`: what its bodies
     do does not count; `faults`: a file of what goes wrong, `spares`: robots in reserve, `swap`: how
-    long an exchange takes [s]. Raises InputError (Usage) with every value out of its bounds."""
+    long an exchange takes [s]; `demand`: a file of the orders for a mix, or a seed that draws them.
+    Raises InputError (Usage) with every value out of its bounds."""
 
     world: WorldName = "mujoco"
     units: int = 1
@@ -62,6 +68,7 @@ class RunOptions:
     faults: Path | None = None
     spares: int = 0
     swap: float | None = None
+    demand: str | None = None
 
     def __post_init__(self) -> None:
         check_choice("world", self.world, WORLDS)
@@ -89,22 +96,28 @@ class RunOptions:
         """The request of a run; `shown`: whether it is filmed or logged. Raises InputError."""
         from factory.nets.history import legal_marking
         from factory.plant.fused_bodies import fusing_pays
+        from factory.simulation.demand_file import demand_of
         from factory.simulation.request import RunRequest
 
+        layout, start, units, demand = project.layout, self.start, self.units, None
         check_together(
             {
+                "--demand": self.demand is not None,
+                "--from": start is not None,
                 "--distributed": self.distributed,
                 "--faults": self.faults is not None,
                 "--spares": self.spares > 0,
                 "--deputies": project.ground.deputies,
             }
         )
-        layout, start = project.layout, self.start
+        if self.demand is not None:
+            demand = demand_of(self.demand, project.pag, units)
+            units = len(demand.orders) or units
         if isinstance(start, str):
             start = legal_marking(layout.factory.net, start)
         return RunRequest(
             self.world,
-            self.units,
+            units,
             self.seed,
             self.jitter,
             project.settings,
@@ -115,6 +128,7 @@ class RunOptions:
             shown,
             recovers=self.recovers,
             catalogue=project.catalogue,
+            demand=demand,
         )
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from factory.layout.layout import Layout
+from factory.plant.demand import Demand
 from factory.record.log import Log
 from factory.record.log.writer import packed, versions
 from factory.record.monitor.subject import subject_of_run
@@ -18,6 +19,7 @@ from factory.record.verdict import FAULTS
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.errors import Diagnostic, FactoryError
+from factory.support.tables import value_of
 
 TAG = re.compile(r"<[^>]+>")
 
@@ -44,6 +46,7 @@ def request_of(header: Mapping[str, Any]) -> RunRequest:
         header["distributed"],
         header["fuse"],
         recovers="faults" in header,
+        demand=value_of(Demand, header["demand"]) if "demand" in header else None,
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from factory.nets.petri import Marking
+from factory.plant.demand import Demand
 from factory.problem.robot_types import Catalogue
 from factory.support.bounds import WORLDS, WorldName, check_choice, check_values
 from factory.support.settings import Settings
@@ -19,8 +20,9 @@ class RunRequest:
     own programs. `fuse`: parts joined for good become one rigid body. `shown`: it is filmed, logged
     or watched; if not, the model has nothing that is only shown, and the run is the same and
     faster. `recovers`: with some bodies more, for parts that are scrapped. `fast`: with what only
-    makes it faster. `catalogue`: robot types, the shipped ones where None. Raises InputError
-    (Usage) with every value out of its bounds.
+    makes it faster. `catalogue`: robot types, the shipped ones where None. `demand`: the
+    order in which the products of a mix are made, as its sequence says where None. Raises
+    InputError (Usage) with every value out of its bounds.
     """
 
     world: WorldName = "mujoco"
@@ -36,6 +38,7 @@ class RunRequest:
     recovers: bool = False
     fast: bool = True
     catalogue: Catalogue | None = field(default=None, hash=False)
+    demand: Demand | None = None
 
     def __post_init__(self) -> None:
         check_choice("world", self.world, WORLDS)

@@ -15,7 +15,7 @@ from factory.record.figures import PhysicsFigures
 from factory.record.monitor.report import Report
 from factory.record.state import Event
 from factory.record.verdict import RunVerdict, judged, kept_figures
-from factory.support.errors import Diagnostic
+from factory.support.errors import Diagnostic, RunError
 from factory.support.showing import drawn
 
 
@@ -69,7 +69,8 @@ class Run:
     run of the net; `trouble` is None for a run that reached its end; `monitor` is what a monitor
     reports that watched it, if one did. `lenient`: what is wrong with the bodies does not count;
     `period`: how many units come in a cycle of the net; `by_product`: how many units of each
-    product were made; `failures`: what went wrong, in a run that goes on when something does;
+    product were made; `word`: on demand, the products in the order in which they left; `failures`:
+    what went wrong, in a run that goes on when something does;
     `exchanges`: the nets that it went on in; `log`: its log."""
 
     world: str
@@ -94,6 +95,7 @@ class Run:
     lenient: bool = False
     period: int = 1
     by_product: Mapping[str, int] = field(default_factory=dict)
+    word: tuple[str, ...] = field(default=(), repr=False)
     failures: Failures | None = None
     exchanges: tuple[Exchange, ...] = ()
     log: Path | None = field(default=None, repr=False, compare=False)
@@ -188,6 +190,7 @@ class Run:
             "units": self.units,
             "products": self.products,
             "units_by_product": dict(self.by_product),
+            **({"word": list(self.word)} if self.word else {}),
             "cut_off": cut and cut.as_json(),
             "robots": self.robots,
             "seed": self.seed,
@@ -213,3 +216,10 @@ class Run:
             "verdict": self.verdict.as_json(),
             "events": [event.as_json() for event in self.events],
         }
+
+
+def require(run: Run) -> Run:
+    """The run itself, or RunError with what troubled it."""
+    if run.trouble is not None:
+        raise RunError(run.trouble)
+    return run

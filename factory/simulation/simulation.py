@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from factory.control.mode import Limits, Mode
 from factory.layout.layout import Layout
+from factory.layout.resting import on_demand, start_at_rest
 from factory.layout.starting import start_positions
 from factory.mjcf.timestep import timed
 from factory.modes.modes import operation_modes, robot_limits
@@ -17,6 +18,7 @@ from factory.modes.staging import HeadStart, stages_of
 from factory.nets.history import firings
 from factory.nets.petri import Marking
 from factory.nets.replay import replay
+from factory.plant.demand import Word
 from factory.plant.material import joins_of
 from factory.record.figures import PhysicsFigures
 from factory.record.state import Observer, State
@@ -31,11 +33,11 @@ from factory.simulation.run import Run, busy_times, entries_of
 from factory.simulation.signals import Controller
 from factory.simulation.supervisor import Supervisor
 from factory.simulation.world import World
-from factory.support.errors import Diagnostic, InputError, RunError
+from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import AUTO, MOST, Settings
 from factory.timing.cycle_time import CycleTime
+from factory.timing.on_demand import cycle_of
 from factory.timing.prediction import duration
-from factory.timing.timed import timed as timed_net
 from factory.timing.timing import Timing
 
 if TYPE_CHECKING:
@@ -71,9 +73,8 @@ class Simulation:
     that stalls or takes too long has its trouble, which `require` makes an error. `compiled`: what
     it shares with earlier runs, made by `compiled` for the same layout and a request that differs
     in seed and jitter alone. `counts`: how often each transition has fired where it starts;
-    `before`: products that had left by then. `asked`: the request as it was given; in `request` the
-    timestep is a number, and `wip` is one where the pool of parts is too large. `timing`: how long
-    everything takes.
+    `before`: products that had left by then. `asked`: the request as given; in `request` the
+    timestep is a number, and `wip` is one where the pool of parts is too large. `timing`: delays.
     """
 
     def __init__(
@@ -82,6 +83,8 @@ class Simulation:
         request: RunRequest = RunRequest(),  # noqa: B008 (frozen)
         compiled: Compiled | None = None,
     ) -> None:
+        if request.demand and request.world == "mujoco":
+            layout = on_demand(layout)
         self.layout, self.asked = layout, request
         self.request = request = replace(request, settings=_timed(layout, request, compiled))
         settings, world, net = request.settings, request.world, layout.factory.net
@@ -94,22 +97,21 @@ class Simulation:
         self.counts = firings(net, self.start)
         self.model: Model | None = None
         self.world: World
-        at = start_positions(layout, self.start)
+        at = (start_at_rest if request.demand else start_positions)(layout, self.start)
         if world == "ideal":
             self.world = IdealWorld(layout, request, at, self.counts)
         else:
             from factory.simulation.mujoco.world import MujocoWorld
 
-            self.model = (compiled and compiled.model) or modelled(
-                layout, request, self.under_way()
-            )
+            made = compiled and compiled.model
+            self.model = made or modelled(layout, request, self.under_way())
             self.request = request = replace(request, wip=self.model.wip)
             loaded = compiled.loaded if compiled else None
             self.world = MujocoWorld(self.model, request, at, gains, self.counts, loaded)
         self.world.hooks.state = self.state
         self.before = self.world.delivered()
-        made = (self._distributed if request.distributed else self._central)(stages)
-        self.supervisor: Supervisor | DistributedSupervisor | DrivenSupervisor = made
+        supervised = self._distributed if request.distributed else self._central
+        self.supervisor: Supervisor | DistributedSupervisor | DrivenSupervisor = supervised(stages)
         self.supervisor.ordering = Ordering(self.timing.coordinated.orders)
         if self.start != net.initial_marking:
             self.supervisor.ordering.keep_passes()
@@ -128,7 +130,7 @@ class Simulation:
     @cached_property
     def cycle(self) -> CycleTime:
         """The predicted cycle time, and what allows no less."""
-        return timed_net(self.timing, wip=self.request.wip).cycle
+        return cycle_of(self.timing, self.word, self.request.wip)
 
     @property
     def duration(self) -> float:
@@ -183,6 +185,11 @@ class Simulation:
 
         assert isinstance(self.world, MujocoWorld), "the ideal world has no bodies"
         return self.world
+
+    @property
+    def word(self) -> Word:
+        """Which units are made."""
+        return self.world.word
 
     @property
     def engine(self) -> EngineModel | None:
@@ -306,8 +313,9 @@ class Simulation:
             request.seed,
             request.jitter,
             trouble,
-            period=factory.period,
-            by_product=factory.made(self.before, world.delivered()),
+            period=1 if request.demand else factory.period,
+            by_product=self.word.counts(self.before, world.delivered()),
+            word=tuple(self.word.products(0, world.delivered())) if request.demand else (),
             exchanges=exchanges,
         )
 
@@ -340,10 +348,3 @@ def compiled(layout: Layout, request: RunRequest) -> Compiled:
 
     model = modelled(layout, request, {})
     return Compiled(modes, model, load(model))
-
-
-def require(run: Run) -> Run:
-    """The run itself, or RunError with what troubled it."""
-    if run.trouble is not None:
-        raise RunError(run.trouble)
-    return run

@@ -19,8 +19,10 @@ from factory.nets.petri import Marking
 from factory.nets.threaded import Threads
 from factory.nets.undo import marking_after
 from factory.nets.undone import Undone
+from factory.plant.demand import Word
 from factory.plant.factory import Factory, Operation
 from factory.record.state import Event
+from factory.simulation.ahead import Ahead
 from factory.simulation.bundles import Bundles
 from factory.simulation.ordering import Ordering
 from factory.simulation.world import World
@@ -36,44 +38,6 @@ class Active:
     bundle: Bundle | None = None
     axes: Index = field(default_factory=lambda: np.empty(0, np.intp))
     clocks: Array | None = None
-
-
-class Ahead:
-    """The stages of robots that go ahead while they wait, numbered after the operations: by the
-    operation that each is `of`, and by the one that it is `after`; `place`: where each is; `then`:
-    the one that follows another."""
-
-    def __init__(self, factory: Factory, stages: Sequence[HeadStart]) -> None:
-        count = len(factory.operations)
-        self.of: list[list[int]] = [[] for _ in range(count)]
-        self.after: list[list[int]] = [[] for _ in range(count)]
-        self.place: dict[int, int] = {}
-        self.then: dict[int, int] = {}
-        self._stages = dict(enumerate(stages, start=count))
-        for number, stage in enumerate(stages, start=count):
-            gear = factory.robots[stage.robot].operations
-            step = gear.index(stage.operation)
-            self.of[stage.operation].append(number)
-            if stage.follows:
-                self.then[number - 1] = number
-            else:
-                self.after[gear[step - 1]].append(number)
-            self.place[number] = factory.net.gears[stage.robot].places[2 * step]
-
-    def going(self, active: Iterable[int]) -> dict[int, HeadStart]:
-        """The stages among what is under way beside operations, by number."""
-        return {n: self._stages[n] for n in active if n in self._stages}
-
-    def waiting(self, marked: bytearray, x: Array) -> list[int]:
-        """Those of robots that wait where a run starts, with its axes at `x`, and have a way to
-        go."""
-        past = {n: stage.is_past(float(x[stage.axis])) for n, stage in self._stages.items()}
-        return [
-            number
-            for number, stage in self._stages.items()
-            if marked[self.place[number]] and not past[number]
-            if not stage.follows or past[number - 1]
-        ]
 
 
 class Supervisor:
@@ -119,6 +83,11 @@ class Supervisor:
         """Of all axes."""
         return self.bundles.limits
 
+    @property
+    def word(self) -> Word:
+        """Which units are made."""
+        return self.world.word
+
     def limit(self, limits: Limits) -> None:
         """From now on axes have these limits."""
         self.bundles.limit(limits)
@@ -127,6 +96,7 @@ class Supervisor:
     def step(self, ticks: int = 1) -> None:
         """Fire what is enabled as one detached set, then let the world go on for a tick, or for as
         many as `ticks` where nothing can fire in between."""
+        self.word.now = self.world.time
         started = self._startable()
         over = self._finished()
         if started or over:
@@ -139,8 +109,10 @@ class Supervisor:
                 [o for o in self.active.operations if o not in gone] + started,
                 self._going_ahead(started, ended, over),
             )
-        if self._prepared():
+        if self._prepared() or self.word.is_late:
             ticks = 1
+        if self.word.is_late:
+            self.enabled, self.world.hooks.busy = True, self.world.time
         self.near = self.world.step(self.active.bundle, self.active.axes, ticks, self.ordering.held)
         if self.ordering.held:
             self.enabled |= self.ordering.goes_on(self._sensed())
@@ -215,7 +187,7 @@ class Supervisor:
             return []
         bundle, axes = self.bundles.of(possible)
         inside = bundle.in_domain(self.world.sense()[0][axes])
-        self.enabled = not inside.all()
+        self.enabled = self._is_restless or not inside.all()
         return [number for number, within in zip(possible, inside.tolist(), strict=True) if within]
 
     def _prepared(self) -> tuple[int, ...]:
@@ -223,18 +195,56 @@ class Supervisor:
         asked again where there was none and nothing has changed."""
         if not (self.enabled or self.world.supplied):
             return ()
+        ready = self._ready()
+        while skipped := [o for o in ready if self._is_skipped(o)]:
+            self._skip(skipped)
+            ready = self._ready()
+        self.enabled, self.world.supplied = bool(ready) or self._is_restless, False
+        return tuple(o.index for o in ready)
+
+    def _ready(self) -> list[Operation]:
+        """The operations that are awaited and may start, with those of units that are skipped."""
         self.ordering.ask_anew()
         prepared, fired, unit = self.world.prepared, self.fired, self.factory.unit
-        hold_up, lacking = self.ordering.hold_up, self.world.lacking
-        ready = tuple(
-            o.index
+        hold_up, lacking, makes = self.ordering.hold_up, self.world.lacking, self.word.makes
+        return [
+            o
             for o in self.awaited()
             if o.label not in lacking
+            and (made := makes(unit(o, fired[o.start]))) is not None
             and not hold_up(o.start, fired.__getitem__, self._sensed)
+            and (made or self._rests(o))
             and prepared(o, unit(o, fired[o.start]))
-        )
-        self.enabled, self.world.supplied = bool(ready), False
-        return ready
+        ]
+
+    @property
+    def _is_restless(self) -> bool:
+        """Whether an operation waits to be skipped until its robots rest."""
+        return bool(self.word.demand) and any(map(self._is_skipped, self.awaited()))
+
+    def _is_skipped(self, operation: Operation) -> bool:
+        """Whether it is known that the next unit of an operation is not made."""
+        unit = self.factory.unit(operation, self.fired[operation.start])
+        return unit < self.word.fixed and not self.word.is_made(unit)
+
+    def _rests(self, operation: Operation) -> bool:
+        """Whether the robots of an operation stand, and do not go ahead of another."""
+        going = self.ahead.going(self.active.ahead).values()
+        if any(stage.robot in operation.robots for stage in going):
+            return False
+        axes = [*self.factory.axes[operation.index]]
+        return bool((np.abs(self.world.sense()[1][axes]) < STILL).all())
+
+    def _skip(self, operations: Sequence[Operation]) -> None:
+        """Operations of units that are not made start and end at once: nothing moves, but robots
+        that are not yet where they wait for the next go there."""
+        for event in (event for o in operations for event in (o.start, o.end)):
+            self._count((event,))
+        over, ahead = {o.index for o in operations}, self.active.ahead
+        waiting = self.ahead.waiting(self.marked, self._sensed())
+        begun = [n for n in waiting if n not in ahead and self.ahead.follows[n] in over]
+        if begun:
+            self._activate(self.active.operations, (*ahead, *begun))
 
     def _sensed(self) -> Array:
         """Where all axes are [m]."""
@@ -271,18 +281,21 @@ class Supervisor:
         return self.world.hooks.pass_on(operation, unit)
 
     def _fire(self, started: list[int], ended: list[int]) -> None:
-        operations, now, fired = self.factory.operations, self.world.time, self.fired
+        operations, fired = self.factory.operations, self.fired
         unit = self.factory.unit
         starts = [(o, unit(o, fired[o.start])) for o in (operations[n] for n in started)]
         ends = [(o, unit(o, fired[o.end])) for o in (operations[n] for n in ended)]
-        events = (*(o.start for o, _ in starts), *(o.end for o, _ in ends))
+        self._count((*(o.start for o, _ in starts), *(o.end for o, _ in ends)))
+        self.world.apply(starts, ends)
+
+    def _count(self, events: tuple[int, ...]) -> None:
+        """Fire transitions as one detached set."""
         self.enabled |= self.threads.fire(events)
         self.enabled |= not self.ordering.lacking.isdisjoint(events)
-        transitions = self.factory.net.threaded.transitions
+        transitions, now = self.factory.net.threaded.transitions, self.world.time
         for event in events:
-            fired[event] += 1
+            self.fired[event] += 1
             self.events.append(Event(now, transitions[event].name))
-        self.world.apply(starts, ends)
 
     def _going_ahead(self, started: list[int], ended: list[int], over: list[int]) -> list[int]:
         """The stages under way from now on: those that were, and have neither come to their goal

@@ -10,6 +10,7 @@ from typing import Protocol
 from factory.control.mode import Array, Index
 from factory.control.navigation import Bundle
 from factory.nets.coordinated import Past
+from factory.plant.demand import Word
 from factory.plant.factory import Operation
 from factory.record.failures import Account
 from factory.record.figures import PhysicsFigures
@@ -98,6 +99,10 @@ class World(Protocol):
     @property
     def hooks(self) -> Hooks:
         """Where others take part."""
+
+    @property
+    def word(self) -> Word:
+        """Which units are made."""
 
     @property
     def dropoffs(self) -> list[float]:

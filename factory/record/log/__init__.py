@@ -23,6 +23,8 @@
        undone, bytes                      undos, JSON, where there are any
        failures, bytes                    failures so far, JSON as in `run --json`, whose lists
                                           have only new entries, where there are any
+       units                              on demand, the units of the net that are made, as far as
+                                          that is fixed, and last of how many it is known
     E  the end: the file was closed properly
        figures, bytes (mujoco only)       the figures of its verdict, JSON: see `record.verdict`
        failures, bytes                    all failures, JSON as in `run --json`, where the run

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from factory.control.profile import World
 from factory.layout.hands.hand import Point3
 from factory.layout.saved import LayoutTable
+from factory.plant.demand import Demand
 from factory.record.log.blocks import Arrays
 from factory.record.project_table import ProjectTable
 from factory.support.settings import AUTO
@@ -63,6 +64,7 @@ class LogHeader(ProjectTable):
     places: tuple[str, ...]
     transitions: tuple[str, ...]
     faults: Mapping[str, Any] = field(default_factory=dict)
+    demand: Demand | None = None
 
     def __post_init__(self) -> None:
         counts = {"nq": (self.nq, 0), "nv": (self.nv, 0), "units": (self.units, 1)}

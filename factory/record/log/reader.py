@@ -82,7 +82,8 @@ class Log:
     all units were made and logged. `ends`: the states as operations ended, and `figures` of the
     bodies, from `kept_figures`; None in the ideal world. `undone`: each undo with the number of
     transitions that had fired before it. `failures`: of a run that recovers from them; where it was
-    killed, those up to the last detection.
+    killed, those up to the last detection. `units`: those of the net that are made, of a run on
+    demand, and last of how many units that is known.
     """
 
     header: Mapping[str, Any] = field(repr=False)
@@ -105,6 +106,7 @@ class Log:
     figures: Mapping[str, Any] | None = field(default=None, repr=False)
     undone: tuple[Placed, ...] = field(default=(), repr=False)
     failures: Failures | None = field(default=None, repr=False)
+    units: tuple[int, ...] | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -256,6 +258,7 @@ def log_in(data: memoryview, written: bool = False) -> Log:
         _figures(trouble["figures"]) if "figures" in trouble else None,
         undone_in(ticks, header),
         _failures(trouble, ticks, header),
+        next((tuple(a["units"].tolist()) for a in reversed(ticks) if "units" in a), None),
     )
 
 

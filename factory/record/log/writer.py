@@ -171,7 +171,13 @@ class LogWriter(Recorder):
         if ticks.time:
             news = self.written.news(self.simulation.state().account)
             failures = {"failures": np.frombuffer(news, "u1")} if news else {}
-            self._append(block(b"T", {**ticks.arrays(), **failures}))
+            self._append(block(b"T", {**ticks.arrays(), **failures, **self._units()}))
+
+    def _units(self) -> Arrays:
+        """The units of the net that are made on demand, as far as that is fixed; of how many it is
+        known comes last."""
+        word = self.simulation.word
+        return {"units": np.array([*word.units, word.fixed], np.int32)} if word.demand else {}
 
     def end(self, trouble: Diagnostic | None) -> None:
         self.trouble = trouble
@@ -289,6 +295,7 @@ def _header(
         },
         "distributed": simulation.request.distributed,
         **({} if account is None else {"faults": account.given}),
+        **({"demand": table_of(demand)} if (demand := simulation.request.demand) else {}),
         "fuse": simulation.request.fuse,
         "start": sorted(simulation.start),
         "monitor": subject_of_run(simulation).as_json(),

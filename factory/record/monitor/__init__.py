@@ -6,7 +6,7 @@ It observes positions, speeds, setpoints and active constraints, and never reads
 events or its marking. It works beside a run, or on a log (`factory.record.monitor.record`)."""
 
 from factory.record.monitor.anatomy import Anatomy
-from factory.record.monitor.monitor import EngineMonitor
+from factory.record.monitor.engine import EngineMonitor
 from factory.record.monitor.report import Report
 from factory.record.monitor.subject import MonitorSubject, subject_of, subject_of_run
 from factory.record.state import Recordable

@@ -27,8 +27,8 @@ def disagreements(
     names = subject.factory.net.threaded.transitions
     count = {t.name: subject.counts.get(number, 0) for number, t in enumerate(names)}
     label = {t.name: subject.factory.operations[n // 2].label for n, t in enumerate(names)}
-    ends = (o.end for o in subject.factory.operations if subject.moves_parts[o.index])
-    shown = {names[end].name for end in ends}
+    ends = (o for o in subject.factory.operations if subject.moves_parts[o.index])
+    shown = {names[o.end].name: o for o in ends}
     left = {(firing.transition, firing.unit): firing for firing in found}
     last = 0.0
     for t, name in recorded:
@@ -38,7 +38,7 @@ def disagreements(
         what = f"the record has {name}, in unit {unit}, at {t:.3f} s"
         if t < last:
             yield _violation(subject, t, label[name], f"{what}, after a later firing")
-        elif firing is None and name in shown:
+        elif firing is None and name in shown and subject.is_made(shown[name], unit):
             yield _violation(subject, t, label[name], f"{what}, which was not observed")
         elif firing and not firing.earliest - ROUNDING <= t <= firing.latest + ROUNDING:
             when = f"between {firing.earliest:.3f} and {firing.latest:.3f} s"

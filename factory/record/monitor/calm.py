@@ -94,12 +94,15 @@ def _judged(
     inside = seen(*span)
     start: Marking = frozenset(log.marking[span[0]].tolist())
     here = replace(subject, start=start, wip=None)
+    offset = units.more(here, begin)
+    if subject.word is not None:
+        here = replace(here, word=subject.word.later(offset))
     monitor = Monitor(here, Anatomy.of(m, subject.factory, subject.bent), next(inside))
     monitor.motion.came[:] = -np.inf  # whoever is there may have come long ago
     for observation in inside:
         monitor.see(observation)
     first, last = np.searchsorted(log.fired_t, [begin - ROUNDING, end - ROUNDING]).tolist()
-    report, offset = monitor.report(log.events[first:last]), units.more(here, begin)
+    report = monitor.report(log.events[first:last])
 
     def counted(firings: Sequence[Firing]) -> tuple[Firing, ...]:
         return tuple(replace(firing, unit=firing.unit + offset) for firing in firings)

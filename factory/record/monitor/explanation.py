@@ -67,7 +67,7 @@ class _Solver:
         factory, wip, counts = subject.factory, subject.wip, subject.counts
         self.net = marked(factory.net) if wip is None else with_wip(factory, wip)
         self.names = [t.name for t in factory.net.threaded.transitions]
-        self.weight = {
+        self.dwell = {
             o.place: max(0.0, o.dwell - observed.slack) for o in factory.operations if o.dwell
         }
         self.done = [counts.get(e, 0) for e in range(len(self.names))]
@@ -99,6 +99,11 @@ class _Solver:
         net = self.net
         return [(net.left[p], net.tokens[p], p) for p in net.net.preset[event]]
 
+    def _weight(self, place: int, unit: int) -> float:
+        """The least time between the two firings around a place in a unit [s]."""
+        subject, dwell = self.observed.subject, self.dwell.get(place, 0.0)
+        return dwell if dwell and subject.is_made(subject.factory.operations[place], unit) else 0.0
+
     def _order(self) -> list[tuple[int, int]]:
         """All firings, each after its preconditions."""
         order = token_free(self.net).order
@@ -113,21 +118,20 @@ class _Solver:
     def forward(self) -> list[Violation]:
         """The earliest time of every firing; a firing observed before it is a violation, and counts
         as observed afterwards, so that one fault gives one violation."""
-        violations = []
+        violations, subject = [], self.observed.subject
         seen_when_over = {
-            o.end
-            for o in self.observed.subject.factory.operations
-            if self.observed.subject.moves_parts[o.index]
+            o.end: o for o in subject.factory.operations if subject.moves_parts[o.index]
         }
         for event, unit in self.order:
             early, cause = self.begin, -1
             for before, tokens, place in self._needs(event):
-                ready = self.low.get((before, unit - tokens), -inf) + self.weight.get(place, 0.0)
+                ready = self.low.get((before, unit - tokens), -inf) + self._weight(place, unit)
                 if ready > early:
                     early, cause = ready, before
             noted = self.observed.seen.get((event, unit))
             if noted is None:
-                late = event in seen_when_over
+                over = seen_when_over.get(event)
+                late = over is not None and subject.is_made(over, unit)
                 self.low[event, unit] = self.end if late else min(early, self.end)
                 continue
             if early > noted.latest + self.observed.slack:
@@ -158,7 +162,7 @@ class _Solver:
             for before, tokens, place in self._needs(event):
                 key = before, unit - tokens
                 if key in self.high:
-                    bound = latest - self.weight.get(place, 0.0)
+                    bound = latest - self._weight(place, unit)
                     self.high[key] = max(min(self.high[key], bound), self.low[key])
 
     def firings(self) -> tuple[list[Firing], list[Firing]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from time import perf_counter
@@ -18,15 +18,11 @@ from factory.record.monitor.motion import AxisMotion, Lags
 from factory.record.monitor.report import Report, Violation
 from factory.record.monitor.subject import MonitorSubject
 from factory.record.monitor.transfers import Transfers
-from factory.record.state import Observation, State
+from factory.record.state import Observation
 from factory.support.collector import collector_paused
 
 MOST = 100
 """Number of violations that are kept, the first ones: a fault often causes others."""
-
-LOOK = 0.5
-"""Interval of full observations of a monitor that does not observe every tick [s]; in between it
-observes motion and grips where parts change hands."""
 
 KEPT = 64
 """Number of observations that are judged at a time."""
@@ -112,8 +108,14 @@ class Monitor:
         self._look_at_parts(seen)
         for actuator, since in self.lags.stuck(seen):
             self._stuck(actuator, since, seen)
-        if clock.now - clock.changed > self.subject.patience and not clock.stalled:
+        late = clock.now - self.subject.patience
+        if clock.changed < late and not clock.stalled and not self._waits(late):
             self._stalled()
+
+    def _waits(self, since: float) -> bool:
+        """Whether all is made that was ordered by a time [s]."""
+        made = sum(self.transfers.ended[o.index] for o in self.factory.dropoffs)
+        return self.subject.word is not None and self.subject.word.are_made(made, since)
 
     @collector_paused()
     def report(self, recorded: Recorded | None = None) -> Report:
@@ -172,14 +174,12 @@ class Monitor:
         """A robot leaves its place: the next operation with another goal has started, unless the
         robot may go ahead of it, and those before are over."""
         spot, ball = float(self.motion.spot[robot]), float(self.motion.ball[robot])
-        goals, first = self.subject.gear_goals[robot], self.turn[robot]
-        for turn in range(first, first + len(goals) + 1):
-            goal = goals[turn % len(goals)]
-            if abs(goal - spot) > ball:
-                operation, unit = self._at(robot, turn)
-                break
-        else:
-            operation, _ = self._at(robot, first)
+        goals = self.subject.gear_goals[robot]
+        coming = islice(self._coming(robot), len(goals) + 1)
+        away = (next_ for next_ in coming if abs(goals[next_[0] % len(goals)] - spot) > ball)
+        turn, operation, unit = next(away, (-1, None, 0))
+        if operation is None:
+            operation, _ = self._here(robot)
             words = "it moves, although its program has the same goal throughout"
             self._blame("Order", robot, operation.label, words)
             self.motion.spot[robot] = self.motion.now.s[robot]
@@ -187,7 +187,7 @@ class Monitor:
         begun = self.motion.begun(robot)
         self.clock.changed = self.clock.now
         self._over(robot, turn, begun)
-        self.motion.leave(robot, goal)
+        self.motion.leave(robot, goals[turn % len(goals)])
         if self.subject.goes_ahead(operation, robot):
             return  # it may leave before the operation starts
         name = self.factory.robots[robot].name
@@ -196,7 +196,7 @@ class Monitor:
 
     def _passed(self, robot: int) -> None:
         """A robot passes its goal without stopping: its operation ended before its arrival."""
-        operation, _ = self._at(robot, self.turn[robot])
+        operation, _ = self._here(robot)
         words = f"it passes its goal of {self.subject.name(operation)} without stopping"
         self._blame("Early", robot, operation.label, words)
         self.judged[operation.index] += 1
@@ -210,7 +210,8 @@ class Monitor:
         without a visible end are judged now."""
         for number in range(self.turn[robot], turn):
             operation, unit = self._at(robot, number)
-            if not self.subject.moves_parts[operation.index]:
+            moves_parts = self.subject.moves_parts[operation.index]
+            if not moves_parts and self.subject.is_made(operation, unit):
                 self._judge(operation, unit, t, robot)
         self.turn[robot] = max(self.turn[robot], turn)
 
@@ -252,7 +253,7 @@ class Monitor:
         when = f"nothing has happened for {self.clock.now - self.clock.changed:.1f} s"
         away = self.motion.way.nonzero()[0].tolist()
         for robot in away[:3]:
-            operation, _ = self._at(robot, self.turn[robot])
+            operation, _ = self._here(robot)
             words = f"{when} while it was on its way in {self.subject.name(operation)}"
             self._blame("Stalled", robot, operation.label, words, self.clock.changed)
         for operation in () if away else self._ready()[:3]:
@@ -263,7 +264,7 @@ class Monitor:
 
     def _ready(self) -> list[Operation]:
         """The operations at which all their robots have arrived, those without inputs first."""
-        at = [self._at(r, turn)[0].index for r, turn in enumerate(self.turn)]
+        at = [self._here(r)[0].index for r in range(len(self.turn))]
         ready = [o for o in self.factory.operations if all(at[r] == o.index for r in o.robots)]
         return sorted(ready, key=lambda o: not o.inputs)
 
@@ -279,7 +280,23 @@ class Monitor:
         """The label of the operation that a robot is at; of the dropoff for the outfeed."""
         if robot < 0:
             return self.factory.dropoff.label
-        return self._at(robot, self.turn[robot])[0].label
+        return self._here(robot)[0].label
+
+    def _coming(self, robot: int) -> Iterator[tuple[int, Operation, int]]:
+        """The operations of a robot from now on, but for those of units that are known not to be
+        made: how many come before, and the period of each."""
+        turn, word = self.turn[robot], self.subject.word
+        while True:
+            operation, period = self._at(robot, turn)
+            unit = self.factory.unit(operation, period)
+            if word is None or word.is_made(unit) or unit >= word.fixed:
+                yield turn, operation, period
+            turn += 1
+
+    def _here(self, robot: int) -> tuple[Operation, int]:
+        """The operation that a robot is at, and its period."""
+        _, operation, period = next(self._coming(robot))
+        return operation, period
 
     def _blame(
         self, code: str, robot: int, label: str, message: str, since: float | None = None
@@ -291,49 +308,3 @@ class Monitor:
         source = self.factory.by_label.get(label, at_fault)
         name, where = at_fault.name if at_fault else "", source.position if source else None
         self.violations.append(Violation(t, name, label, code, message, where))
-
-
-class EngineMonitor(Monitor):
-    """A monitor of a running engine, an observer of the run from before its start, called also
-    when operations end. Observations are judged KEPT at a time, which takes half as long as judging
-    each between steps of the engine."""
-
-    def __init__(self, subject: MonitorSubject, anatomy: Anatomy, first: Observation) -> None:
-        super().__init__(subject, anatomy, first.kept())
-        self._looked, self._welds = first.time, first.welds
-        self._kept: list[tuple[Observation, bool]] = []
-
-    def observe(self, state: State) -> None:
-        """Observe the engine after a tick, or where operations have ended and parts have changed
-        hands. Nothing else of the state is read."""
-        begin = perf_counter()
-        self._keep(state.observation)
-        self.time_s += perf_counter() - begin
-
-    def glance(self, state: State) -> None:
-        """Observe the engine only where a weld has been switched, or LOOK seconds have passed."""
-        begin, seen = perf_counter(), state.observation
-        due = seen.time - self._looked >= LOOK
-        if due or seen.welds is not self._welds:
-            self._keep(seen, thorough=due)
-        self.time_s += perf_counter() - begin
-
-    def report(self, recorded: Recorded | None = None) -> Report:
-        begin = perf_counter()
-        self._judge_all()
-        self.time_s += perf_counter() - begin
-        return super().report(recorded)
-
-    def _keep(self, seen: Observation, thorough: bool = True) -> None:
-        self._welds = seen.welds
-        if thorough and not seen.at_end:
-            self._looked = seen.time
-        self._kept.append((seen.kept(), thorough))
-        if len(self._kept) >= KEPT:
-            self._judge_all()
-
-    @collector_paused()
-    def _judge_all(self) -> None:
-        for seen, thorough in self._kept:
-            self.see(seen, thorough)
-        self._kept.clear()

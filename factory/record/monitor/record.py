@@ -12,6 +12,7 @@ import numpy as np
 from factory.compiler.taking_over import nets_after
 from factory.mjcf.weld_frames import SLIDE
 from factory.nets.replay import replay
+from factory.plant.demand import Demand, Word
 from factory.plant.factory import Factory
 from factory.plant.material import joins_of
 from factory.record.failures import Failures
@@ -28,6 +29,7 @@ from factory.record.project_table import factory_of, of_its_factory, settings_of
 from factory.record.state import Observation
 from factory.record.verdict import FAULTS, RunVerdict, judged
 from factory.support.errors import Diagnostic
+from factory.support.tables import value_of
 
 JUMP = 3e-4
 """Tolerance of the displacement of a joint in a tick against its speeds [m]; correct logs stay
@@ -48,6 +50,8 @@ def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
     m = model_of(log)
     with of_its_factory():
         subject = recorded_subject(log.header)
+        if word := word_of(log, subject.factory):
+            subject = replace(subject, word=word, wip=None)
         if log.failures is not None and log.failures != Failures():
             report = judge_calm(log, subject, m, partial(observations, log))
         else:
@@ -138,6 +142,19 @@ def _rows(log: Log, first: int, last: int | None) -> Iterator[tuple[Log | Ends, 
             ended += 1
         if row < len(log):
             yield log, row, False
+
+
+def word_of(log: Log, factory: Factory) -> Word | None:
+    """The word of a recorded run of a factory on demand; None for a fixed sequence."""
+    if log.units is None:
+        return None
+    demand = value_of(Demand, log.header["demand"])
+    *units, fixed = log.units
+    word = Word(factory.sequence, demand, log.header["units"], log.header["wip"], units, fixed)
+    for number, product in enumerate(word.products(0, len(units))):
+        if not demand.allows(number, product):
+            raise ValueError(f"unit {number + 1} is a {product}, which was not the next order")
+    return word
 
 
 @of_its_factory()

@@ -14,6 +14,7 @@ from factory.layout.layout import Layout
 from factory.layout.way import Bend, Ways
 from factory.nets.history import firings
 from factory.nets.petri import Marking
+from factory.plant.demand import Word
 from factory.plant.factory import Factory, Operation
 from factory.plant.fused_bodies import FusedBodies, bodies_of
 from factory.record.state import Recordable
@@ -39,7 +40,8 @@ class MonitorSubject:
     units inside; `patience` [s]: time without an event until a run counts as stalled; `early`:
     (operation, robot) where a robot goes ahead regardless of the settings, so that its hand is out
     of the way; `others`: the goals of operations (index) with other robots after a takeover;
-    `bends`: those of guidepaths, and their rounding [m], by robot (index).
+    `bends`: those of guidepaths, and their rounding [m], by robot (index); `word`: which units are
+    made, None for all.
     """
 
     factory: Factory
@@ -53,6 +55,7 @@ class MonitorSubject:
     early: frozenset[tuple[int, int]] = frozenset()
     others: Mapping[Manned, tuple[float, ...]] = field(default_factory=dict, repr=False)
     bends: Mapping[int, Bent] = field(default_factory=dict, repr=False)
+    word: Word | None = None
 
     def __post_init__(self) -> None:
         for name in ("places", "others", "bends"):
@@ -79,6 +82,19 @@ class MonitorSubject:
     def counts(self) -> Mapping[int, int]:
         """Number of firings of each transition at the start of the run."""
         return MappingProxyType(firings(self.factory.net, self.start))
+
+    def is_made(self, operation: Operation, period: int) -> bool:
+        """Whether the unit of an operation is made in a period, counted from 0."""
+        return self.word is None or self.word.is_made(self.factory.unit(operation, period))
+
+    def nth(self, operation: Operation, count: int) -> int:
+        """In which period an operation is for a unit that is made, after so many that are."""
+        return count if self.word is None else self.word.nth(operation.turn, count)
+
+    def before(self, operation: Operation) -> int:
+        """How often an operation has ended for a unit that is made where the run starts."""
+        ended = self.counts.get(operation.end, 0)
+        return ended if self.word is None else self.word.before(operation.turn, ended)
 
     @cached_property
     def slots(self) -> Mapping[tuple[int, int], int]:
@@ -203,15 +219,16 @@ def _with_others(subject: MonitorSubject, whole: Layout) -> MonitorSubject:
 
 def subject_of_run(simulation: Recordable) -> MonitorSubject:
     """The subject of a simulation, in either world."""
-    model = simulation.model
-    return subject_of(
+    model, demanded = simulation.model, simulation.request.demand is not None
+    subject = subject_of(
         simulation.layout,
         simulation.request.settings,
         simulation.request.jitter,
         simulation.start,
-        simulation.request.wip,
+        None if demanded else simulation.request.wip,
         model.carried if model else None,
     )
+    return replace(subject, word=simulation.word) if demanded else subject
 
 
 def subject_from(

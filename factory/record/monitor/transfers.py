@@ -18,15 +18,15 @@ Blame = Callable[[str, int, str, str], None]
 
 class Transfers:
     """The holder of each copy, its unit (the k-th copy that a feeder presents is for unit k), and
-    the number of ends of each operation that moves parts."""
+    the number of ends of each operation that moves parts. Units that are not made do not count."""
 
     def __init__(self, subject: MonitorSubject, anatomy: Anatomy, blame: Blame) -> None:
         self.subject, self.anatomy, self.blame = subject, anatomy, blame
-        factory, counts = subject.factory, subject.counts
+        factory = subject.factory
         self.at: list[Holder | None] = [None] * len(anatomy.copies)
         self.unit = [-1] * len(anatomy.copies)
-        self.ended = [counts.get(o.end, 0) for o in factory.operations]
-        self.presented = {o.label: counts.get(o.end, 0) for o in factory.leaves}
+        self.ended = [subject.before(o) for o in factory.operations]
+        self.presented = {o.label: subject.before(o) for o in factory.leaves}
         self.load: dict[Holder, set[int]] = {}
         contents = {label: frozenset(parts) for label, parts in factory.contents.items()}
         self.contents, self.inside = contents, [contents[label] for label in anatomy.label]
@@ -50,7 +50,7 @@ class Transfers:
             self._complete(robot.index, label, copies, "Start")
 
     def judge(self, switches: Sequence[Switch]) -> list[tuple[Operation, int]]:
-        """The operations that have ended, each with its unit."""
+        """The operations that have ended, each with its period."""
         passed: dict[int, list[int]] = {}
         for switch in self._fused(switches):
             holder, before = self._holder(switch), self.at[switch.copy]
@@ -226,7 +226,7 @@ class Transfers:
             )
             for copy in others:
                 self.unit[copy] = unit
-        return operation, unit
+        return operation, self.subject.nth(operation, unit)
 
     def _complete(self, robot: int, label: str, copies: set[int], code: str) -> None:
         """Blame missing and extra parts in a load that should be the sub-assembly `label`."""
@@ -252,6 +252,7 @@ class Transfers:
         done = sum(counts.get(o.end, 0) for o in gear)
         last = gear[done % len(gear) - 1]
         carries = last.carrier == robot and not factory.drops(last.index)
+        carries = carries and self.subject.is_made(last, counts.get(last.end, 0) - 1)
         return last if done and carries and last.after[last.robots.index(robot)] != NOPART else None
 
     def _named(self, holder: Holder | None) -> str:

@@ -89,8 +89,15 @@ class Feeders:
         those for which nothing was left, and has not come back since."""
         empty, returns = self._lines.keys() - self._holdings.holders, self._holdings.returns
         lines = [self._lines[code] for code in empty if self._spent.get(code) != returns]
-        rounds = self.supply.rounds() if any(len(line) > 1 for line in lines) else {}
-        return sorted(self._turn(line, rounds) if rounds else line[0] for line in lines)
+        return sorted(number for number in map(self._next, lines) if number is not None)
+
+    def _next(self, line: Sequence[int]) -> int | None:
+        """Whose turn it is in a line; None while it is not known which unit is made next."""
+        while True:
+            number = line[0] if len(line) == 1 else self._turn(line, self.supply.rounds())
+            label = self._stations[number].label
+            if not self.supply.skips(label):
+                return number if self.supply.is_known(label) else None
 
     def serves(self, label: str) -> bool:
         """Whether robots take such things from feeders."""

@@ -88,7 +88,7 @@ class Parts:
         for operation, unit in ended:
             if self.model.factory.drops(operation.index):
                 self.holdings.move(self.holdings.hand(operation.carrier).values(), self.tray)
-                self.feeders.supply.released += 1
+                self.feeders.supply.word.made += 1
             elif operation.inputs:
                 self._pass_on(operation)
             else:

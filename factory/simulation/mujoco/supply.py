@@ -6,22 +6,24 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from factory.mjcf.model import Model
+from factory.plant.demand import Word
 from factory.simulation.request import RunRequest
 
 
 class Supply:
     """Which units need a part of each label: as many as are requested beside those that have been
-    `released` to the outfeed, or were begun where the run starts, at most `wip` at once. The `next`
-    unit that needs one comes a `period` of units after the one before. `recovers`: the run goes on
-    where something fails."""
+    released to the outfeed, or were begun where the run starts, at most `wip` at once. The `next`
+    unit that needs one comes a `period` of units after the one before; `word`: which units are
+    made. `recovers`: the run goes on where something fails."""
 
     def __init__(self, model: Model, request: RunRequest, counts: Mapping[int, int]) -> None:
         factory, leaves = model.factory, model.factory.leaves
-        self.period = factory.period
+        self.period, before = factory.period, factory.units(counts)
+        asked = request.demand, before + request.units, request.wip
+        self.word = Word(factory.sequence, *asked, made=before)
         self.next = {o.label: factory.unit(o, counts.get(o.end, 0)) for o in leaves}
         self._begun = {o.label: factory.unit(o, counts.get(o.start, 0) - 1) + 1 for o in leaves}
-        self.released = factory.units(counts)
-        self._units, self._wip = self.released + request.units, request.wip
+        self._wip = request.wip
         self.recovers = request.recovers
 
     def rounds(self) -> dict[str, int]:
@@ -30,11 +32,23 @@ class Supply:
 
     def wants(self, label: str) -> bool:
         """Whether some unit has yet to get its part."""
-        return self.next[label] < max(self._units, self._begun[label])
+        if self.word.demand:
+            return bool(self.word.makes(self.next[label]))
+        return self.next[label] < max(self.word.most, self._begun[label])
+
+    def skips(self, label: str) -> bool:
+        """Whether the next unit is not made, so that it is the turn of the one after that."""
+        skipped = self.word.makes(self.next[label]) is False
+        self.next[label] += self.period * skipped
+        return skipped
+
+    def is_known(self, label: str) -> bool:
+        """Whether it is known if the next unit is made."""
+        return self.word.makes(self.next[label]) is not None
 
     def admits(self, unit: int) -> bool:
         """Whether a unit may be let in."""
-        return self._wip is None or unit < self.released + self._wip
+        return bool(self.word.demand) or self._wip is None or unit < self.word.made + self._wip
 
 
 @dataclass(slots=True)

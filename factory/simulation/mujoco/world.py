@@ -20,6 +20,7 @@ from factory.layout.layout import Layout
 from factory.mjcf.loading import load
 from factory.mjcf.model import Model
 from factory.nets.coordinated import Past
+from factory.plant.demand import Word
 from factory.plant.factory import Operation
 from factory.record.figures import PhysicsFigures
 from factory.record.state import EngineView, Observation
@@ -94,6 +95,11 @@ class MujocoWorld:
         return float(self.d.time)
 
     @property
+    def word(self) -> Word:
+        """Which units are made."""
+        return self.parts.feeders.supply.word
+
+    @property
     def physics_time(self) -> float:
         """Wall time spent in the engine's steps [s]."""
         return self.motion.stepping.seconds
@@ -112,10 +118,11 @@ class MujocoWorld:
         return self.parts.feeders.lacking
 
     def prepared(self, operation: Operation, unit: int) -> bool:
-        """A feeder presents the part of that unit; the outfeed has room for a product."""
+        """A feeder presents the part of that unit, if it is made; the outfeed has room for a
+        product."""
         if not self.hooks.admit(operation, unit):
             return False
-        if self.parts.feeders.serves(operation.label):
+        if self.parts.feeders.serves(operation.label) and self.word.is_made(unit):
             return self.parts.feeders.presents(operation.label, unit)
         if not self.model.factory.drops(operation.index):
             return True

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from factory.layout.layout import Layout
 from factory.nets.petri import Marking
 from factory.plant.factory import Factory, Operation
@@ -38,18 +40,24 @@ class Books:
         step = self.step_of(robot, marking)
         return self.factory.operations[self.factory.robots[robot].operations[step // 2]]
 
-    def holds(self, robot: int, marking: Marking | None = None) -> str:
-        """The label that a robot (index) holds, NOPART for nothing."""
+    def holds(
+        self, robot: int, marking: Marking | None = None, fired: Sequence[int] | None = None
+    ) -> str:
+        """The label that a robot (index) holds, NOPART for nothing; `fired`: how often each
+        transition has, in another marking."""
         if not self.factory.robots[robot].operations:
             return NOPART
-        operation = self.operation_of(robot, marking)
-        return operation.before[operation.robots.index(robot)]
+        operation, is_in_it = self.operation_of(robot, marking), self.step_of(robot, marking) % 2
+        counts = self.supervisor.fired if fired is None else fired
+        unit = self.factory.unit(operation, counts[operation.start] - is_in_it)
+        is_made = self.supervisor.word.is_made(unit)
+        return operation.before[operation.robots.index(robot)] if is_made else NOPART
 
     def place_of(self, robot: int, marking: Marking | None = None) -> tuple[int, bool]:
         """Which operation (index) a robot is in, or waits for, and whether it is in it."""
         return self.operation_of(robot, marking).index, bool(self.step_of(robot, marking) % 2)
 
-    def held(self, marking: Marking | None = None) -> list[str]:
+    def held(self, marking: Marking | None = None, fired: Sequence[int] | None = None) -> list[str]:
         """The label that each robot holds, NOPART for nothing."""
         marked = self.marking if marking is None else marking
-        return [self.holds(robot.index, marked) for robot in self.factory.robots]
+        return [self.holds(robot.index, marked, fired) for robot in self.factory.robots]

@@ -45,7 +45,8 @@ class IdealPlant:
     def fresh(self) -> Sequence[tuple[str, int]]:
         """The parts that feeders have begun to show since the last question: label and unit."""
         factory, fired = self._books.factory, self._books.supervisor.fired
-        now = {o.label: factory.unit(o, fired[o.end]) for o in factory.leaves}
+        upcoming = self._books.supervisor.word.upcoming
+        now = {o.label: upcoming(factory.unit(o, fired[o.end])) for o in factory.leaves}
         found = [part for part in now.items() if self._shown.get(part[0]) != part[1]]
         self._shown = now
         return found

@@ -3,6 +3,7 @@ what is done."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -117,7 +118,8 @@ class Recovery:
         self._take_notice(now)
         self.striking.tick(now)
         for label, unit in self.plant.fresh():
-            if fault := self.striking.shown(label, unit, now):
+            number = self.books.supervisor.word.number(unit)
+            if fault := self.striking.shown(label, number, now):
                 self.plant.spoil(label, fault)
         self.plant.tick()
         if not self._is_dark:
@@ -128,15 +130,18 @@ class Recovery:
         """Of what has fired since the last tick."""
         supervisor, factory = self.books.supervisor, self._factory
         fresh, self._seen = supervisor.events[self._seen :], len(supervisor.events)
-        for event in fresh:
-            if not isinstance(event, Event):
-                continue
-            number = factory.net.threaded.net.transition_index[event.transition]
+        firings = [event.transition for event in fresh if isinstance(event, Event)]
+        later = Counter(firings)
+        for transition in firings:
+            later[transition] -= 1
+            number = factory.net.threaded.net.transition_index[transition]
             operation = factory.operations[number // 2]
+            unit = factory.unit(operation, supervisor.fired[number] - 1 - later[transition])
+            if not supervisor.word.is_made(unit):
+                continue
             if number == operation.start:
-                unit = factory.unit(operation, supervisor.fired[number] - 1)
                 self.responding.standing.begun(operation, now)
-                self.striking.started(operation, unit, now)
+                self.striking.started(operation, supervisor.word.number(unit), now)
             for label in operation.inputs if number == operation.end else ():
                 self.responding.used(label)
 

@@ -195,7 +195,7 @@ class Responding:
         going = {r for r in stay if books.place_of(r, before) != after.place_of(r, marking)}
         self._plant.clear_out(robot, change.layout)
         self._plant.exchange(robot, change.layout)
-        scrap = {*self._plant.undone(after.held(marking), fired, going)}
+        scrap = {*self._plant.undone(after.held(marking, fired), fired, going)}
         self._exchange(change, fired, undone)
         over = [books.factory.operations[n] for n in under_way if n not in marking]
         self._wasting.waste(scrap, {robot: held[robot] for robot in scrap})
@@ -221,17 +221,32 @@ class Responding:
         """The net fires backwards, and robots go back."""
         books, supervisor, factory = self._books, self._books.supervisor, self._books.factory
         before, under_way = books.marking, supervisor.active.operations
-        fired = undo(factory.net, supervisor.fired, asked, joins_of(factory))
+        held, joins = books.held(), joins_of(factory)
+        fired = undo(factory.net, supervisor.fired, asked, joins)
+        while lacking := self._lacking(held, fired):
+            asked += lacking
+            fired = undo(factory.net, supervisor.fired, asked, joins)
         marking, robots = marking_after(factory.net, fired), factory.present
         going = {r for r in robots if books.step_of(r, before) != books.step_of(r, marking)}
         what = self._now, operation.label, reason
         undone = Undone.between(factory.net, what, asked, supervisor.fired, fired)
-        scrap = {*self._plant.undone(books.held(marking), fired, going)}
+        scrap = {*self._plant.undone(books.held(marking, fired), fired, going)}
         supervisor.undo(undone, fired, marking, self.standing.axes(going | scrap))
         over = [factory.operations[n] for n in under_way if n not in marking]
-        self._wasting.waste(scrap, {robot: books.holds(robot, before) for robot in scrap})
+        self._wasting.waste(scrap, {robot: held[robot] for robot in scrap})
         self._send_back(sorted(going | scrap), over, marking)
         self._plant.supplied()
+
+    def _lacking(self, held: Sequence[str], fired: Sequence[int]) -> tuple[int, ...]:
+        """The ends of what robots would hold after other counts, and do not, where they `held`
+        these labels: nothing was made for a unit that is skipped, so it cannot take the place of
+        what is lost."""
+        books, marking = self._books, marking_after(self._books.factory.net, fired)
+        if books.supervisor.word.demand is None:
+            return ()
+        pairs = zip(held, books.held(marking, fired), strict=True)
+        missing = (label for was, label in pairs if label not in (NOPART, was))
+        return tuple(books.factory.by_label[label].end for label in missing)
 
     def _send_back(
         self,

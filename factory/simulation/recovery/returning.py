@@ -117,6 +117,7 @@ class Returning:
         """The way of a robot to where it waits in a marking. Where the part that it takes next has
         to come down before it, it waits out of the way."""
         layout, gear = self._layout, self._layout.factory.net.gears[robot]
+        marking = self._without_skipped(robot, marking)
         step = next(i for i, place in enumerate(gear.places) if place in marking) // 2
         at, lift = start_positions(layout, marking), self._layout.factory.lift_axis.get(robot)
         goals = [(robot, _waiting(layout, robot, step))]
@@ -127,6 +128,18 @@ class Returning:
             return [*goals, rise]
         up = layout.visits[layout.factory.robots[robot].operations[step], robot].up
         return [rise, *goals] if rise[1] == up > 0 else goals
+
+    def _without_skipped(self, robot: int, marking: Marking) -> Marking:
+        """The marking with a robot that skips a unit at the beginning of its tour."""
+        factory, word = self._layout.factory, self._supervisor.word
+        gear, program = factory.net.gears[robot].places, factory.robots[robot].operations
+        step = next(i for i, place in enumerate(gear) if place in marking) // 2
+        operation = factory.operations[program[step]]
+        unit = factory.unit(operation, self._supervisor.fired[operation.start])
+        if word.upcoming(unit) == unit:
+            return marking
+        first = program.index(factory.tour_of(robot, operation.index)[0])
+        return marking.difference(gear) | {gear[2 * first]}
 
     def has_left(self, robot: int, marking: Marking) -> bool:
         """Whether a robot is away from where it waits in a marking, or would, if what it does had

@@ -114,7 +114,8 @@ class Striking:
         for number, fault in enumerate(self._faults):
             if fault.kind != kind or number in self._spent:
                 continue
-            if (fault.label and fault.label != label) or (fault.robot and fault.robot != robot):
+            written = label.partition("@")[0]
+            if fault.label not in ("", label, written) or fault.robot not in (None, "", robot):
                 continue
             if fault.rate is not None:
                 hit = bool(self._draw.random() < fault.rate)

@@ -177,7 +177,7 @@ class MujocoPlant:
         }
         for label, unit in self._world.parts.feeders.shown().items():
             leaf = factory.by_label[label]
-            for_units[held[label, unit]] = factory.unit(leaf, fired[leaf.end])
+            for_units[held[label, unit]] = self._upcoming(leaf, fired)
         held.assign(for_units)
         for number in joining:
             operation = factory.operations[number]
@@ -190,9 +190,9 @@ class MujocoPlant:
         down until it is there, and what has come goes up again; where with nothing, when it is out
         of the way."""
         factory, feeders = self._factory, self._world.parts.feeders
-        ends = {leaf.label: fired[leaf.end] for leaf in factory.leaves}
-        units = {leaf.label: factory.unit(leaf, ends[leaf.label]) for leaf in factory.leaves}
-        feeders.undone(units, ends, self._next_scrap(len(ends)))
+        units = {leaf.label: self._upcoming(leaf, fired) for leaf in factory.leaves}
+        rounds = {label: unit // factory.period for label, unit in units.items()}
+        feeders.undone(units, rounds, self._next_scrap(len(units)))
         for leaf in factory.leaves:
             bodies = self._holdings.hand(leaf.carrier)
             if not bodies:
@@ -203,6 +203,10 @@ class MujocoPlant:
                     feeders.back.awaited.add(label)
                     if label in feeders.shown():
                         self._take_back(label)
+
+    def _upcoming(self, leaf: Operation, fired: Sequence[int]) -> int:
+        """The unit that needs the next part, after so many firings."""
+        return self._world.word.upcoming(self._factory.unit(leaf, fired[leaf.end]))
 
     def let_go(self, robot: int, seconds: float, into: Bin | None = None) -> None:
         """A robot lets scrap fall, which lies for so long [s], into a bin where one is given."""

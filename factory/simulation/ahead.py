@@ -1,0 +1,48 @@
+"""Robots that go ahead while they wait, by the supervisor's numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from factory.control.mode import Array
+from factory.modes.staging import HeadStart
+from factory.plant.factory import Factory
+
+
+class Ahead:
+    """The stages of robots that go ahead while they wait, numbered after the operations: by the
+    operation that each is `of`, and by the one that it is `after`; `place`: where each is, and
+    which operation it `follows`; `then`: the one that follows another."""
+
+    def __init__(self, factory: Factory, stages: Sequence[HeadStart]) -> None:
+        count = len(factory.operations)
+        self.of: list[list[int]] = [[] for _ in range(count)]
+        self.after: list[list[int]] = [[] for _ in range(count)]
+        self.place, self.follows = dict[int, int](), dict[int, int]()
+        self.then: dict[int, int] = {}
+        self._stages = dict(enumerate(stages, start=count))
+        for number, stage in enumerate(stages, start=count):
+            gear = factory.robots[stage.robot].operations
+            step = gear.index(stage.operation)
+            self.of[stage.operation].append(number)
+            if stage.follows:
+                self.then[number - 1] = number
+            else:
+                self.after[gear[step - 1]].append(number)
+            self.follows[number] = gear[step - 1]
+            self.place[number] = factory.net.gears[stage.robot].places[2 * step]
+
+    def going(self, active: Iterable[int]) -> dict[int, HeadStart]:
+        """The stages among what is under way beside operations, by number."""
+        return {n: self._stages[n] for n in active if n in self._stages}
+
+    def waiting(self, marked: bytearray, x: Array) -> list[int]:
+        """Those of robots that wait where a run starts, with its axes at `x`, and have a way to
+        go."""
+        past = {n: stage.is_past(float(x[stage.axis])) for n, stage in self._stages.items()}
+        return [
+            number
+            for number, stage in self._stages.items()
+            if marked[self.place[number]] and not past[number]
+            if not stage.follows or past[number - 1]
+        ]
