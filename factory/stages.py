@@ -162,24 +162,26 @@ def lay_out(
     cycle: float | None = None,
     *,
     deputies: bool = False,
+    tile: float | None = None,
     settings: Settings | None = None,
 ) -> Layout:
     """The stretched tree of guidepaths (paper, section 5.1), sized by the parts' real geometry.
 
     `clearance` and `floor` (width, depth) in [m]. `relay`: several robots share guidepaths that
     set the pace, to reach a `cycle` time [s] or the least there can be; the layout's factory has
-    more robots then. `deputies`: robots can take over for others where there is room. With none of
-    these the layout is that of the product's plan.json, or the layout itself. Raises InputError for
-    a mesh that cannot be read, RunError where the factory does not fit the floor.
+    more robots then. `deputies`: robots can take over for others where there is room. `tile`: they
+    go over a platen of tiles of this size [m], on guidepaths that may bend. With none of these the
+    layout is that of the product's plan.json, or the layout itself. Raises InputError for a mesh
+    that cannot be read, RunError where the factory does not fit the floor.
     """
     from factory.layout.request import Ground
     from factory.simulation.options import check_together
 
-    check_together({"--relay": relay, "--deputies": deputies})
+    check_together({"--relay": relay, "--deputies": deputies, "--platen": tile is not None})
     project = project_of(product, settings)
     if clearance is not None:
         project = project.with_settings(replace(project.settings, clearance=clearance))
-    ground = Ground(floor, relay, cycle if relay else None, deputies)
+    ground = Ground(floor, relay, cycle if relay else None, deputies, tile)
     if ground != Ground() or settings is not None:
         project = project.with_ground(ground if ground != Ground() else project.ground)
     return project.layout

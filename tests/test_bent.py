@@ -10,7 +10,9 @@ import pytest
 import factory
 from factory.layout.bending import Detour, bent
 from factory.layout.certificate import MILLI
+from factory.layout.dimensions import up
 from factory.layout.embedding import certified
+from factory.layout.feeding import cleared
 from factory.layout.layout import Layout
 from factory.layout.way import Bend, Ways, rounding_for, way_of
 from factory.record.monitor import beside
@@ -33,7 +35,7 @@ def straight() -> Layout:
 def detour(layout: Layout, robot: int, further: float, at: float) -> Layout:
     """A robot goes 0.2 m to its right, and so much further besides."""
     travel = round(layout.guidepaths[robot].travel + 0.2 + further, 6)
-    return bent(layout, {robot: Detour(travel, (Bend(at, -0.2),))}, ROUND)
+    return bent(layout, {robot: Detour(travel, (Bend(at, -0.2),), ROUND)})
 
 
 @pytest.fixture(scope="module")
@@ -103,6 +105,18 @@ def test_a_factory_with_a_bend_runs(layout: Layout, tick: str) -> None:
         assert run.physics.unintended_contacts == 0
         assert run.physics.handoff_gap_max_mm < 0.1
         assert run.physics.product_error_max_mm < 0.01
+
+
+def test_a_guidepath_may_end_across_its_heading(straight: Layout) -> None:
+    """Its robot leaves the feeder sideways, and stands there between its stops."""
+    reach = straight.guidepaths[8].reach
+    corner = Bend(round(reach + 0.03, 3), -2.0)
+    travel = up(corner.at + 0.02 + cleared(straight, 8, 1.0) - reach)
+    layout = certified(bent(straight, {8: Detour(travel, (corner,), 0.02)}))
+    assert layout.guidepaths[8].sideways == 1.0
+    run = factory.run(layout, units=2)
+    assert run.succeeded and run.physics.unintended_contacts == 0
+    assert run.physics.handoff_gap_max_mm < 0.1
 
 
 def test_a_robot_on_a_bend_follows_its_reference(layout: Layout) -> None:

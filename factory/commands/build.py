@@ -105,6 +105,7 @@ def _printed(project: Project, built: Built, spent: float, wip: int | None) -> d
     from factory.layout.durations import Pace
     from factory.layout.gain import gain
     from factory.layout.hands.bores import bores
+    from factory.layout.platen import fill_of, tiles_of
     from factory.support.settings import AUTO
 
     layout, settings, model = project.layout, project.settings, built.model
@@ -127,10 +128,15 @@ def _printed(project: Project, built: Built, spent: float, wip: int | None) -> d
         "files": [str(path) for path in built.files],
         "warnings": [d.as_json() for d in project.warnings],
     }
+    ground = f"floor {layout.area:.2f} m²"
+    if layout.tile:
+        tiles = tiles_of(layout)
+        document |= {"tiles": len(tiles), "tile_m": layout.tile, "fill": fill_of(layout, tiles)}
+        ground += f", {len(tiles)} tiles of {layout.tile * 1000:g} mm"
     lines = [
         f"{root}: {robots} robots, {model.bodies} bodies of parts, {model.joints} joints, "
         f"{model.welds} welds",
-        f"floor {layout.area:.2f} m², guidepaths {layout.guidepath_length:.2f} m, "
+        f"{ground}, guidepaths {layout.guidepath_length:.2f} m, "
         f"clearance {settings.clearance * 1000:g} mm proved",
         f"timestep {1000 * model.settings.step:g} ms"
         + (", chosen automatically (--timestep)" if settings.timestep == AUTO else ""),

@@ -217,6 +217,8 @@ MOTION = options(
 FLOOR = options(
     click.option("--clearance", type=float, help="Minimum distance between moving bodies [m]."),
     click.option("--floor", help="Available floor, width x depth [m], for example 4x3."),
+    click.option("--platen", is_flag=True, help="Let guidepaths bend, over a floor of tiles."),
+    click.option("--tile", type=bounded("tile"), help="Size of a platen's tiles [m]."),
 )
 RELAY = options(
     click.option(

@@ -52,6 +52,8 @@ class ProjectOptions:
     clearance: float | None = None
     overlap: float | None = None
     floor: str | None = None
+    platen: bool = False
+    tile: float | None = None
     relay: bool = False
     cycle: float | None = None
     robots: int | Literal["least"] | None = None
@@ -77,7 +79,7 @@ class ProjectOptions:
 
     def ground(self) -> Ground:
         """The request of FLOOR and RELAY. Raises InputError (BadValue)."""
-        from factory.layout.request import WIDEST, Ground
+        from factory.layout.request import TILE, WIDEST, Ground
         from factory.support.user_defaults import defaults_for
 
         floor = None if self.floor is None else pair(self.floor, "--floor", "4x3", float, WIDEST)
@@ -87,10 +89,12 @@ class ProjectOptions:
                 "--cycle": self.cycle is not None,
                 "--robots": self.robots is not None,
                 "--deputies": self.deputies,
+                "--platen": self.platen or self.tile is not None,
                 "[lines]": bool(defaults_for(self.file).lines()),
             }
         )
-        return Ground(floor, self.relay, self.cycle, self.deputies)
+        tile = self.tile or (TILE if self.platen else None)
+        return Ground(floor, self.relay, self.cycle, self.deputies, tile)
 
     def _allowing(self, pag: PAG) -> PAG:
         """The PAG with the overlaps of --allow. Raises InputError (Usage) for unknown parts."""
@@ -212,6 +216,8 @@ PLANNED = {
     "limit": "--seconds",
     "parallel": "--parallel",
     "deputies": "--deputies",
+    "platen": "--platen",
+    "tile": "--tile",
     "allow": "--allow",
 }
 """The options that a plan already fixes, by their fields."""

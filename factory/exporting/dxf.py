@@ -21,7 +21,7 @@ VERSION, MILLIMETRES = "R2013", 4
 """Version of DXF; code of the unit in the header."""
 
 LAYERS = {
-    "FLOOR": (8, ("floor",)),
+    "FLOOR": (8, ("floor", "tile")),
     "OUTFEED": (9, ("belt",)),
     "SWEEPS": (30, ("uncoupled",)),
     "FEEDERS": (40, ("boom", "post", "housing")),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from factory.layout.dimensions import ARM_WIDTH, CARRIAGE
 from factory.layout.feeding import feeder_of
 from factory.layout.hands.limbs import limbs
 from factory.layout.layout import Box, Extent, Layout, Point2
+from factory.layout.platen import tiles_of
 from factory.layout.sweeps import piles, regions
 from factory.support.canvas import hexadecimal, hull
 
@@ -40,11 +42,12 @@ class Flat:
 
 
 def flat_shapes(layout: Layout) -> Iterator[Flat]:
-    """The shapes of a layout, from the ground up: `floor`, `coupled` and `uncoupled` sweeps,
-    `belt` with the `product` on it, `boom`, `post` and `housing` of feeders, `path` (where
+    """The shapes of a layout, from the ground up: `floor`, each `tile`, `coupled` and `uncoupled`
+    sweeps, `belt` with the `product` on it, `boom`, `post` and `housing` of feeders, `path` (where
     carriages go) and `last` (from there to A) of guidepaths, `finger`, `arm` and carriage (`dot`
     or `tool`) of robots at home, `part`, `junction`."""
     yield Flat.of_box("floor", layout.floor)
+    yield from (Flat.of_box("tile", tile) for tile in tiles_of(layout))
     yield from _sweeps(layout)
     yield Flat.of_box("belt", layout.outfeed)
     leaves = layout.factory.leaves
@@ -57,7 +60,9 @@ def flat_shapes(layout: Layout) -> Iterator[Flat]:
         yield Flat.of_box("housing", feeder.housing)
     for path in layout.guidepaths:
         stop = path.carriage(path.reach)
-        yield Flat("path", (path.carriage(path.length), stop))
+        turns = [*map(path.corner, reversed(path.corners))]
+        for leg in pairwise([path.carriage(path.length), *turns, stop]):
+            yield Flat("path", leg)
         yield Flat("last", (stop, path.a))
     for robot in layout.factory.robots:
         yield from _robot(layout, robot.index, "tool" if robot.type == "tool" else "dot")

@@ -23,7 +23,7 @@ RIM = 60.0
 """Width of the margin around the floor in which there are no labels [mm]."""
 
 GROUPS = {
-    "floor": ("floor",),
+    "floor": ("floor", "tile"),
     "sweeps": ("coupled", "uncoupled"),
     "outfeed": ("belt", "product"),
     "feeders": ("boom", "post", "housing"),
@@ -71,6 +71,9 @@ STYLE = """
 .line { stroke: #52606d; stroke-width: 2; fill: none; }
 """
 
+TILES = ".tile { fill: #eef1f4; stroke: #9aa5b1; stroke-width: 3; }\n"
+"""Besides, on a platen."""
+
 
 def write_svg(layout: Layout) -> str:
     """The floor plan: guidepaths, robots at home, junctions, feeders, outfeed, payload sweeps."""
@@ -101,7 +104,8 @@ class _Sheet:
         with self.canvas.group(id="sheet"):
             page = self._around()
         scale = min(max(1500 / (page[1] - page[0]), 0.25), 1.5)
-        return self.canvas.document(f"{self._name()}: floor plan", page, STYLE, scale)
+        style = STYLE + TILES if self.layout.tile else STYLE
+        return self.canvas.document(f"{self._name()}: floor plan", page, style, scale)
 
     def _name(self) -> str:
         pag = self.layout.factory.pag

@@ -16,20 +16,21 @@ from factory.layout.way import Bend
 
 @dataclass(frozen=True, slots=True)
 class Detour:
-    """How the guidepath of a robot is bent: its `bends`, and its new `travel` [m]."""
+    """How the guidepath of a robot is bent: its new `travel`, its `bends`, and their `rounding`
+    [m]."""
 
     travel: float
     bends: tuple[Bend, ...] = ()
+    rounding: float = 0.0
 
-    def of(self, path: Guidepath, rounding: float) -> Guidepath:
+    def of(self, path: Guidepath) -> Guidepath:
         """A guidepath with this travel and these bends."""
-        round_ = rounding if self.bends else 0.0
-        return replace(path, travel=self.travel, bends=self.bends, rounding=round_)
+        return replace(path, travel=self.travel, bends=self.bends, rounding=self.rounding)
 
 
-def bent(layout: Layout, detours: Mapping[int, Detour], rounding: float) -> Layout:
-    """A layout in which guidepaths, by robot (index), are bent, with corners of a rounding [m]; it
-    is not certified. The output robot, before which the outfeed stands, keeps its own."""
+def bent(layout: Layout, detours: Mapping[int, Detour]) -> Layout:
+    """A layout in which guidepaths, by robot (index), are bent; it is not certified. The output
+    robot, before which the outfeed stands, keeps its own."""
     on, paths = carriers(layout.factory), list(layout.guidepaths)
     moved, longer = list[Point2](), list[float]()
     for robot, path in enumerate(layout.guidepaths):
@@ -37,7 +38,7 @@ def bent(layout: Layout, detours: Mapping[int, Detour], rounding: float) -> Layo
         a = round(path.a[0] + x, 3), round(path.a[1] + y, 3)
         paths[robot] = path = replace(path, a=a)
         if robot in detours:
-            paths[robot] = detours[robot].of(path, rounding)
+            paths[robot] = detours[robot].of(path)
         begins, began = paths[robot].middle(paths[robot].length), path.middle(path.length)
         moved.append((x + begins[0] - began[0], y + begins[1] - began[1]))
         longer.append(paths[robot].length - path.length)

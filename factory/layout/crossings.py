@@ -49,7 +49,7 @@ def _grid(point: Point2) -> Grid:
 def _off_grid(layout: Layout, robot: int) -> Iterator[Fault]:
     factory, path = layout.factory, layout.guidepaths[robot]
     name = factory.robots[robot].name
-    corners = [at for bend in path.bends for at in (bend.at, bend.end)]
+    corners = path.corners
     within = (v for at in corners for v in path.corner(at))
     ends = *path.a, *path.carriage(path.reach), *path.carriage(path.length), *within
     if corners and not _rounded(corners, path):
@@ -138,7 +138,7 @@ def _crossings(layout: Layout) -> Iterator[Fault]:
 
 def _legs(path: Guidepath) -> Iterator[tuple[Grid, Grid]]:
     """The ends of the legs of a guidepath from where its robot delivers to where it receives."""
-    corners = [path.corner(at) for bend in path.bends for at in (bend.at, bend.end)]
+    corners = map(path.corner, path.corners)
     points = [_grid(p) for p in (path.carriage(path.reach), *corners, path.carriage(path.length))]
     yield from pairwise(points)
 

@@ -6,10 +6,11 @@ itself, from the modes; the tests hold the two together.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import sqrt
 
 from factory.control.profile import SpeedProfile
+from factory.layout.guidepath import Guidepath
 from factory.layout.layout import Layout
 from factory.nets.ways import train_ratio
 from factory.plant.factory import Operation
@@ -33,6 +34,11 @@ class Pace(SpeedProfile):
         lost, ahead = settings.tick + settings.settle, settings.settle if settings.stage else None
         return cls(settings.speed, settings.acceleration, settings.eps, lost, ahead)
 
+    def on(self, path: Guidepath) -> Pace:
+        """That of a robot on a guidepath, whose corners it goes round at its speed."""
+        fastest = path.fastest(self.speed, self.acceleration)
+        return self if fastest == self.speed else replace(self, speed=fastest)
+
     def goes_ahead(self, operation: Operation, slot: int) -> bool:
         """Whether the robot in a slot need not go its way within an operation."""
         return self.ahead is not None and operation.awaits_empty(slot)
@@ -53,7 +59,8 @@ def gear_times(layout: Layout, pace: Pace) -> list[float]:
         operation = operations[number]
         if pace.ahead is None or not operation.awaits_empty(operation.robots.index(robot)):
             return delays[number]
-        return max(delays[number], pace.rest(ways[number, robot]) + pace.ahead)
+        own = pace.on(layout.guidepaths[robot])
+        return max(delays[number], own.rest(ways[number, robot]) + pace.ahead)
 
     units = layout.factory.period
     return [
@@ -77,8 +84,9 @@ def slowest(layout: Layout, pace: Pace) -> tuple[float, list[int]]:
         robot = max(range(len(times)), key=times.__getitem__)
         return times[robot], [robot]
     delays, legs = operation_times(layout, pace), _ways(layout)
+    paces = [*map(pace.on, layout.guidepaths)]
     ahead = {
-        (robot, o.place): pace.rest(legs[o.index, robot]) + (pace.ahead or 0.0)
+        (robot, o.place): paces[robot].rest(legs[o.index, robot]) + (pace.ahead or 0.0)
         for o in layout.factory.operations
         for slot, robot in enumerate(o.robots)
         if pace.goes_ahead(o, slot)
@@ -107,8 +115,9 @@ def _operation_time(
     layout: Layout, operation: Operation, ways: dict[tuple[int, int], float], pace: Pace
 ) -> float:
     carrier = operation.template.carrier - 1
+    paces = [pace.on(layout.guidepaths[robot]) for robot in operation.robots]
     rested = [
-        0.0 if pace.goes_ahead(operation, slot) else pace.rest(ways[operation.index, robot])
+        0.0 if pace.goes_ahead(operation, slot) else paces[slot].rest(ways[operation.index, robot])
         for slot, robot in enumerate(operation.robots)
     ]
     lowered = operation.lowered
@@ -120,7 +129,7 @@ def _operation_time(
         if slot != gate and (slot == lowered or (brings and slot != carrier)):
             way = ways[operation.index, operation.robots[slot]]
             standoff = layout.standoff(operation, slot)
-            rested[slot] = pace.staged(way, standoff, pace.entered(rested[gate]))
+            rested[slot] = paces[slot].staged(way, standoff, pace.entered(rested[gate]))
     longest = max(rested)
     if lowered >= 0:
         visit = layout.visits[operation.index, operation.robots[lowered]]

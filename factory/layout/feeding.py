@@ -121,14 +121,23 @@ def passing(layout: Layout, leaf: Operation) -> float:
     """How far the robot of a feeder goes until all that it ever carries is clear of any part that
     comes down next [m]."""
     layout, leaf = _with_all(layout, leaf)
-    robot, factory = leaf.carrier, layout.factory
-    path = layout.guidepaths[robot]
-    rear = min(
-        path.frame(layout.held(robot, number, factory.operations[number].label))[0]
-        for number in factory.robots[robot].operations
-        if factory.operations[number].carrier == robot and not factory.drops(number)
+    return cleared(layout, leaf.carrier, layout.guidepaths[leaf.carrier].sideways)
+
+
+def cleared(layout: Layout, robot: int, sideways: float) -> float:
+    """The same of a robot that goes straight ahead from its feeder, or to its side t (+1) or to the
+    other (-1)."""
+    path, factory = layout.guidepaths[robot], layout.factory
+    rear, _, low, high = hull(
+        [
+            path.frame(layout.held(robot, number, factory.operations[number].label))
+            for number in factory.robots[robot].operations
+            if factory.operations[number].carrier == robot and not factory.drops(number)
+        ]
     )
-    return _shown(layout, robot)[1] - rear + layout.clearance
+    shown = _shown(layout, robot)
+    ways = {0.0: shown[1] - rear, 1.0: shown[3] - low, -1.0: high - shown[2]}
+    return ways[sideways] + layout.clearance
 
 
 def _with_all(layout: Layout, leaf: Operation) -> tuple[Layout, Operation]:

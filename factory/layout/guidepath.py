@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import sqrt
 
 import numpy as np
 
@@ -93,6 +94,23 @@ class Guidepath:
     def length(self) -> float:
         """B - A [m]."""
         return self.reach + self.travel
+
+    def fastest(self, speed: float, acceleration: float) -> float:
+        """The greatest speed [m/s] of a robot with these limits, for which all corners are round
+        enough."""
+        return min(speed, sqrt(2 * acceleration * self.rounding)) if self.bends else speed
+
+    @property
+    def corners(self) -> list[float]:
+        """The arc lengths of its corners, were they not round."""
+        every = (at for bend in self.bends for at in (bend.at, bend.end))
+        return [at for at in every if at < self.length]
+
+    @property
+    def sideways(self) -> float:
+        """+1 where it leads from B to the side t, -1 to the other side, 0 straight ahead."""
+        odd = len(self.corners) % 2
+        return -float(np.sign(self.bends[-1].across)) if odd else 0.0
 
     @property
     def r(self) -> float:

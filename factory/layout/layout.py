@@ -41,7 +41,8 @@ class Layout(Pictured):
     the conveyor in the world; `hands`: those of the robots, None for tools, nothing where they are
     not chosen;
     `plain`: the layout without relays, None where this is one; `standby`: that of all tours that
-    its robots may do, of which this is a part, None where this is all.
+    its robots may do, of which this is a part, None where this is all; `tile`: the size of the
+    tiles of the platen over which robots go [m], 0 where they go on rails.
     """
 
     factory: Factory
@@ -56,6 +57,7 @@ class Layout(Pictured):
     certificate: Certificate | None = field(default=None, repr=False, compare=False)
     plain: Layout | None = field(default=None, repr=False, compare=False)
     standby: Layout | None = field(default=None, repr=False, compare=False)
+    tile: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("visits", "payloads"):

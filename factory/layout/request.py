@@ -23,6 +23,9 @@ SEVERAL_TOURS = Diagnostic(
     hint="leave out --relay, or what shares robots: --robots, --parallel, [lines] in factory.toml",
 )
 
+TILE = 0.24
+"""The usual size of the tiles of a platen [m]."""
+
 WIDEST = 10**5
 """Upper bound on the width and depth of a floor [m]."""
 
@@ -32,15 +35,17 @@ class Ground:
     """What a layout is made for, beside settings: width and depth of the floor [m], None for as
     much as it takes; whether guidepaths are shared among `relay` robots, or the `cycle` time [s]
     that those are to reach, None for the shortest; `deputies`: whether robots can take over for
-    others. Raises InputError: BadValue for a wrong floor, Usage for a wrong time."""
+    others; `tile`: the size of the tiles of a platen [m], None for rails. Raises InputError:
+    BadValue for a wrong floor, Usage for a wrong time or tile."""
 
     floor: tuple[float, float] | None = None
     relay: bool = False
     cycle: float | None = None
     deputies: bool = False
+    tile: float | None = None
 
     def __post_init__(self) -> None:
-        check_values({"cycle": self.cycle})
+        check_values({"cycle": self.cycle, "tile": self.tile})
         if self.floor is not None and not all(0 < side <= WIDEST for side in self.floor):
             message = f"floor = {self.floor} is not two positive lengths up to {WIDEST} m"
             raise InputError(Diagnostic("BadValue", message, None, "for example (4.0, 3.0)"))
@@ -73,7 +78,12 @@ class Ground:
             return self._with_deputies(factory, product, settings, hands, catalogue)
         if settings.hands and hands is None:
             hands = hands_of(factory, product, settings)
-        layout = lay_out(factory, product, settings.clearance, self.floor, pace, hands, draft)
+        floor = None if self.tile else self.floor
+        layout = lay_out(factory, product, settings.clearance, floor, pace, hands, draft)
+        if self.tile:
+            from factory.layout.platen import on_platen
+
+            return layout if draft else on_platen(layout, pace, self.tile, self.floor)
         if self.relays:
             from factory.layout.relaying import relayed
 

@@ -33,7 +33,8 @@ class LayoutTable:
     of its robots. `standby`: where deputies can take over, who does the tours of each robot in each
     turn of the layout of all that robots may do (`Layout.standby`), whose values the others are;
     nothing where none may. `plain`: the layout without relays, None where this is one. `frame`: the
-    box (low, high) about the product's middle, None where that is the product's own."""
+    box (low, high) about the product's middle, None where that is the product's own; `tile`: the
+    size of the tiles of a platen [m], 0 without one."""
 
     clearance: float
     guidepaths: tuple[Guidepath, ...]
@@ -43,6 +44,7 @@ class LayoutTable:
     standby: tuple[tuple[int, ...], ...] = ()
     plain: LayoutTable | None = None
     frame: tuple[Point3, Point3] | None = None
+    tile: float = 0.0
 
     def __post_init__(self) -> None:
         if not self.clearance > 0:
@@ -75,6 +77,7 @@ class LayoutTable:
             _turns(layout.factory, whole.factory) if layout.standby else (),
             None if layout.plain is None else cls.of(layout.plain),
             frame_of(layout.product),
+            whole.tile,
         )
 
     def laid_out(self, factory: Factory, product: Product, plain: Factory) -> Layout:
@@ -94,6 +97,7 @@ class LayoutTable:
             payload_boxes(whole, solids),
             self.outfeed,
             self.hands,
+            tile=self.tile,
         )
         try:
             laid = certified(laid)

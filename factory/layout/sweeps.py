@@ -111,10 +111,24 @@ def regions(layout: Layout, found: Mapping[str, Pile]) -> list[Region]:
     for leaf in layout.factory.leaves:
         if leaf.label == layout.magazine(leaf.carrier)[0]:
             result.extend(_feeder(layout, leaf.label, leaf.carrier))
-    top = max(pile.z[1] for pile in found.values())
-    result.extend(_upright(0, OUTFEED, layout.outfeed, top, ""))
-    result.extend(_upright(0, SHED, layout.shed, top + layout.shutter_stroke + 2 * SIDE, ""))
+    result.extend(_outfeed(layout, found))
     return result
+
+
+def regions_of(layout: Layout, robot: int, found: Mapping[str, Pile]) -> Iterator[Region]:
+    """The regions of one robot, with its feeder, or with the outfeed."""
+    yield from _bodies(layout, robot)
+    yield from _payloads(layout, robot, found)
+    if shown := layout.magazine(robot):
+        yield from _feeder(layout, shown[0], robot)
+    if not robot:
+        yield from _outfeed(layout, found)
+
+
+def _outfeed(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Region]:
+    top = max(pile.z[1] for pile in found.values())
+    yield from _upright(0, OUTFEED, layout.outfeed, top, "")
+    yield from _upright(0, SHED, layout.shed, top + layout.shutter_stroke + 2 * SIDE, "")
 
 
 def _bodies(layout: Layout, robot: int) -> Iterator[Region]:

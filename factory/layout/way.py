@@ -32,7 +32,7 @@ NEWTON = 4
 @dataclass(frozen=True, slots=True)
 class Bend:
     """Two corners of a way: at the coordinate `at` it leaves its line, and goes on beside it,
-    `across` further along the second axis [m]."""
+    `across` further along the second axis [m]; but where it ends before."""
 
     at: float
     across: float

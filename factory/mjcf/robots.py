@@ -10,6 +10,8 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
+import numpy as np
+
 from factory.layout.dimensions import FINGER_TOP, MAST, PAYLOAD
 from factory.layout.hands.limbs import Limb
 from factory.layout.layout import Guidepath, Point2
@@ -215,14 +217,13 @@ def _bend(
     across.set("name", slide_across(robot))
     across.set("axis", numbers((0.0, path.left, 0.0)))
     body.insert([*body].index(slide) + 1, across)
-    ends = [place for piece in path.framed(stops.low, stops.high) for place in piece.tolist()]
-    b_end = path.framed(path.length, path.length + 1e-6)[0][0]
     beyond = stops.high - path.length
-    for joint, values, at, more in zip(
-        (slide, across), zip(*ends, strict=True), b_end.tolist(), (0.0, beyond), strict=True
-    ):
+    pieces = path.framed(stops.low + beyond, stops.high - beyond)
+    ends = np.concatenate(pieces).T.tolist()
+    b_end = path.framed(path.length, path.length)[0][0].tolist()
+    for joint, values, at in zip((slide, across), ends, b_end, strict=True):
         joint.set("ref", number(at))
-        Stops(min(values) - more, max(values) + more, stops.buffers).limit(joint)
+        Stops(min(values) - beyond, max(values) + beyond, stops.buffers).limit(joint)
     second = deepcopy(actuator)
     second.attrib.update(name=drive_across(robot), joint=slide_across(robot))
     return second

@@ -11,6 +11,7 @@ import numpy as np
 from factory.geometry.sight import Array, Framing, View, fit, towards
 from factory.layout.dimensions import CARRIAGE, PAYLOAD
 from factory.layout.layout import Layout
+from factory.layout.platen import tiles_of
 from factory.mjcf.elements import add, add_shown, add_station, fill, numbers
 from factory.mjcf.names import COMPASS
 from factory.mjcf.robots import heading_quaternion
@@ -22,6 +23,12 @@ camera's is the same (skeleton.xml)."""
 
 SHOE = 0.026
 """Half the length of the shoe of a carriage on its rail (mjcf/*.xml) [m]."""
+
+TILE_TOP = 0.005
+"""How high the top of a platen's tiles is [m]: below the shoes of carriages."""
+
+SEAM = 0.002
+"""Half the seam between two tiles [m]."""
 
 FAR = 1e5
 """How far away the ends of the compass are [m]."""
@@ -47,8 +54,22 @@ def add_scene(world: Element, statistic: Element, layout: Layout) -> None:
     fill(statistic, center=tuple(center.tolist()), extent=overview.distance / 1.5)
     _floor_and_light(world, layout)
     for robot, path in enumerate(layout.guidepaths):
-        if not path.fixed:
+        if not (path.fixed or layout.tile):
             _rail(world, layout, robot)
+    _tiles(world, layout)
+
+
+def _tiles(world: Element, layout: Layout) -> None:
+    """The tiles of a platen, below all that floats over them."""
+    for number, (xlo, xhi, ylo, yhi) in enumerate(tiles_of(layout), start=1):
+        add_shown(
+            world,
+            f"tile/{number}",
+            "box",
+            pos=((xlo + xhi) / 2, (ylo + yhi) / 2, TILE_TOP / 2),
+            size=((xhi - xlo) / 2 - SEAM, (yhi - ylo) / 2 - SEAM, TILE_TOP / 2),
+            rgba="0.50 0.55 0.61 1",
+        )
 
 
 def _rail(world: Element, layout: Layout, robot: int) -> None:

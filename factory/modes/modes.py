@@ -193,10 +193,12 @@ def robot_limits(
 ) -> tuple[Limits, np.ndarray]:
     """Each axis's speed and acceleration, and the factor on its controller's gain: drawn for each
     robot within ± jitter by the seed, and the same for its lift. One that turns goes along at the
-    end of its lever."""
+    end of its lever; round a corner no carriage is too fast for its acceleration."""
     count = len(layout.guidepaths)
     draw = np.random.default_rng(seed).uniform(1 - jitter, 1 + jitter, size=(2, count))
     robots = [*range(count), *layout.strokes]
     levers = np.array([path.lever for path in layout.guidepaths] + [1.0] * len(layout.strokes))
     speed = settings.speed * draw[0, robots] / levers
+    for robot in layout.bent[0]:
+        speed[robot] = layout.guidepaths[robot].fastest(speed[robot], settings.acceleration)
     return Limits(speed, settings.acceleration / levers), draw[1, robots]

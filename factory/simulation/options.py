@@ -30,6 +30,11 @@ APART = (
         ("--faults", "--spares", "--deputies"),
         "robots that run their own programs do not recover",
     ),
+    (
+        "--platen",
+        ("--relay", "--cycle", "--deputies"),
+        "what they change has no room on guidepaths that bend",
+    ),
 )
 """Options that exclude others, with the reason. All other pairs can be combined, except --relay and
 robots with several tours, which is refused at the layout."""

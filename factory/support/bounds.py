@@ -25,6 +25,7 @@ BOUNDS: Mapping[str, Bounds] = MappingProxyType(
         "seconds": (0.0, LONGEST),
         "effort": (1, 10**6),
         "robots": (1, 10**9),
+        "tile": (0.02, 10**3),
         "jobs": (1, 1024),
         "fps": (1, 120),
     }

@@ -28,6 +28,8 @@ OPTIONS: Mapping[str, object] = {
     "robots": 12,
     "cycle": 4.0,
     "deputies": True,
+    "platen": True,
+    "tile": 0.24,
     "templates": ["mine"],
     "size": "1280x720",
     "fps": 30,

@@ -64,6 +64,7 @@ class Recipe:
             "floor": list(self.ground.floor) if self.ground.floor else None,
             "relay": self.ground.relay,
             "cycle": self.ground.cycle,
+            **({"tile": self.ground.tile} if self.ground.tile else {}),
             "plan": table_of(self.factory.plan),
             "fuse": self.fuse,
             **({"layout": table_of(LayoutTable.of(self.laid))} if self.laid else {}),
