@@ -152,7 +152,7 @@ def test_random_branches(seed: int) -> None:
     try:
         found = in_parallel(factory, chosen)
     except InputError as error:
-        assert "one robot brings" in str(error) or "room for one" in str(error)
+        assert "one robot brings" in str(error) or "room for 2" in str(error)
         return
     verdict = verify(found.net)
     assert verdict.holds and not verdict.faults
@@ -216,9 +216,9 @@ def test_what_has_no_branch_of_its_own(label: str, words: str, hint: str) -> Non
     assert hint in diagnostic.hint
 
 
-def test_a_mate_has_one_junction() -> None:
-    with pytest.raises(InputError, match="room for one"):
-        in_parallel(plain(paper()), (("sub2", 2),))
+def test_a_mate_has_room_for_two_on_a_side() -> None:
+    with pytest.raises(InputError, match="room for 2 branches"):
+        in_parallel(plain(paper()), (("sub2", 3),))
 
 
 # --- layout and runs -----------------------------------------------------------------------------

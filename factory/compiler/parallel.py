@@ -3,7 +3,8 @@
 The product is unrolled: a *period* has k units, each with operations of its own, `x` for the first,
 `x@2`, `x@3` for the next. A robot outside the branch does its program for one unit after the other;
 the branch that makes and brings a label is there k times, the j-th for the j-th unit of each
-period. It delivers to the same robot, at a station of its own.
+period. It delivers to the same robot, at a station of its own; or two of them at the station where
+that robot begins, over a tee (`tees`).
 
 This is a fold of k units (`folding`): the tours of a period are assigned to lines, and each robot
 does them in the order in which its carrier asks for them. So the net is a gear train, live, safe
@@ -15,16 +16,19 @@ Guarantees: so, or it is refused (Parallel).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import lcm
 
 from factory.compiler.assigning import assigned
 from factory.compiler.folding import delivery
+from factory.compiler.tees import is_empty
 from factory.plant.factory import Factory
-from factory.problem.pag import NOPART
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 from factory.support.settings import MOST_BRANCHES
+
+MOST_ARMS = 2
+"""Branches that can come to one place from one side: over a tee (`tees`)."""
 
 Branches = Sequence[tuple[str, int]]
 """Labels, and how often the branch that brings each is to be there."""
@@ -85,11 +89,25 @@ def _faults(factory: Factory, branches: Branches) -> Iterator[Diagnostic]:
             message = f"one robot brings both '{other}' ({number} branches) and '{label}' ({k})"
             yield _fault(message, factory.robots[robot].position, "name one of the two")
         if k > 1:
-            yield from _not_inserted(factory, robot)
+            yield from _not_inserted(factory, robot, k)
+    yield from _within_tees(factory, {r: label for r, (label, k) in times.items() if k > 1})
     if taken and any(k > 1 for _, k in branches):
         message = f"the label '{taken[0]}' is reserved for further units"
         position = factory.by_label[taken[0]].position
         yield _fault(message, position, "give it a name without '@'")
+
+
+def _within_tees(factory: Factory, several: Mapping[int, str]) -> Iterator[Diagnostic]:
+    """Robots that are to be there `several` times, by the label that each brings, in a branch that
+    comes over a tee."""
+    for robot, label in several.items():
+        above = robot
+        while above and (above := delivery(factory, above).carrier) not in several:
+            pass
+        if above in several and is_empty(delivery(factory, above)):
+            message = f"'{label}' is in the branch of '{several[above]}', which comes over a tee"
+            position = factory.robots[robot].position
+            yield _fault(message, position, "take more branches of one of the two")
 
 
 def _not_brought(factory: Factory, label: str) -> Diagnostic:
@@ -108,20 +126,19 @@ def _not_brought(factory: Factory, label: str) -> Diagnostic:
     return _fault(message, made.position, f"name '{brought}'")
 
 
-def _not_inserted(factory: Factory, robot: int) -> Iterator[Diagnostic]:
-    """Deliveries of a robot that admit one station only."""
+def _not_inserted(factory: Factory, robot: int, k: int) -> Iterator[Diagnostic]:
+    """Deliveries of a robot that do not admit k branches."""
     for tour in factory.tours[robot]:
         o = factory.operations[tour[-1]]
-        carrier = o.template.carrier - 1
         label = o.before[o.robots.index(robot)]
         hint = f"write it with `insert`, '{label}' last: then there is a station for each branch"
-        if o.before[carrier] == NOPART:
+        if is_empty(o) and k > MOST_ARMS:
             message = (
                 f"'{label}' comes to the start of a robot's path in '{o.label}', where there is"
-                " room for one"
+                f" room for {MOST_ARMS} branches, on a tee"
             )
             yield _fault(message, o.position, hint)
-        elif len(o.robots) > 2:
+        elif not is_empty(o) and len(o.robots) > 2:
             message = f"'{o.label}' takes '{label}' and other inputs at the same place"
             yield _fault(message, o.position, hint)
 

@@ -128,7 +128,7 @@ def _crossings(layout: Layout) -> Iterator[Fault]:
     low, high = points.min(axis=1), points.max(axis=1)
     for first, second in touching(low, high):
         (i, _), (j, _) = legs[first], legs[second]
-        if i == j:
+        if i == j or layout.share_stem(i, j):
             continue
         x, y = (int(v) / 1000 for v in np.maximum(low[first], low[second]))
         names = [layout.factory.robots[robot].name for robot in (i, j)]

@@ -12,16 +12,19 @@ from itertools import permutations
 from math import ceil
 
 from factory.compiler.mating.mating import judged
+from factory.compiler.tees import on_stems
 from factory.geometry.solids import Product
 from factory.layout.certificate import ALWAYS, LOADS, Certificate, Region
 from factory.layout.clearance import certify
 from factory.layout.dimensions import Clearance, up
 from factory.layout.durations import Pace
 from factory.layout.exclusions import crowded
+from factory.layout.fork import forked
 from factory.layout.guidepath import Point2, hull
 from factory.layout.hands.choosing import Hands
 from factory.layout.layout import Layout
 from factory.layout.optimising import bounds, optimised
+from factory.layout.way import rounding_for
 from factory.plant.factory import Factory
 from factory.support.errors import Diagnostic, RunError
 
@@ -39,22 +42,39 @@ def lay_out(
     draft: Layout | None = None,
 ) -> Layout:
     """The layout of a factory with its clearance certificate, the best found for robots of a
-    `pace`, with those of `hands` that suit it, if any; `draft`: what `optimised` found of it, if
+    `pace`, with those of `hands` that suit it, if any; `draft`: what `drafted` gave of it, if
     that is known. Raises RunError (Layout) where it does not fit a floor of the given width and
     depth, saying by how much and where, or where an operation's template asks for what cannot be
     kept clear."""
     known, c, pace = judged(factory, product), Clearance(clearance), pace or Pace()
-    layout = draft or optimised(known, product, c, pace, floor, (), hands)
-    certificate = None
+    layout = draft or drafted(known, product, c, pace, floor, hands)
+    place, certificate = on_stems(known)[1], None
     for _ in range(AGAIN if hands else 0):
         certificate = certify(layout)
         further = crowded(layout, certificate) or _parted(layout, certificate)
         if not further:
             break
         assert hands is not None
-        hands.travels |= further
-        layout, certificate = optimised(known, product, c, pace, floor, (), hands), None
+        hands.travels |= {place[robot]: travel for robot, travel in further.items()}
+        layout, certificate = drafted(known, product, c, pace, floor, hands), None
     return certified(layout, floor, certificate)
+
+
+def drafted(
+    factory: Factory,
+    product: Product,
+    c: Clearance,
+    pace: Pace,
+    floor: Point2 | None,
+    hands: Hands | None,
+) -> Layout:
+    """The best layout found of a factory whose inputs can come together, before it is certified.
+    Raises RunError (Layout) where there is no room for a tee."""
+    stems, place = on_stems(factory)
+    layout = optimised(stems, product, c, pace, floor, (), hands)
+    if stems is factory:
+        return layout
+    return forked(layout, factory, place, rounding_for(pace.speed, pace.acceleration))
 
 
 def _parted(layout: Layout, certificate: Certificate) -> dict[int, float]:
@@ -65,7 +85,8 @@ def _parted(layout: Layout, certificate: Certificate) -> dict[int, float]:
     for fault in {*certificate.faults, *certificate.crossing}:
         pair = [r.index for r in layout.factory.robots if r.name in fault.robots]
         ways = list[tuple[float, int]]()
-        for robot, other in permutations(pair) if len(pair) == 2 else ():
+        stem = len(pair) == 2 and layout.share_stem(*pair)
+        for robot, other in permutations(pair) if len(pair) == 2 and not stem else ():
             path = layout.guidepaths[robot]
             own = [r.box for r in carried if r.robot == robot and r.mode == ALWAYS]
             passing = [r.box for r in carried if r.robot == other]

@@ -115,7 +115,7 @@ def exclusions(layout: Layout, further: Presences | None = None) -> Exclusions:
         needed = {
             n: pair
             for n, boxed in enumerate(pairs)
-            if n not in circuits and (pair := nearer(boxed, layout.clearance)) is not None
+            if n not in circuits and (pair := _nearer(layout, boxed)) is not None
         }
         cuts = _cuts(layout, net.net, sequence, needed.values()) if rounds else []
         if passes.keys() >= {*cuts}:
@@ -138,6 +138,16 @@ def exclusions(layout: Layout, further: Presences | None = None) -> Exclusions:
             *_met(layout, Staying(layout, net, backs)),
         ),
     )
+
+
+def _nearer(layout: Layout, pair: Near) -> Near | None:
+    """A pair whose boxes are near, judged by bodies; of robots that go along one stem, which are
+    alike, by the boxes of bodies."""
+    robots = [side.robot for side in (pair.one, pair.other) if not side.bears]
+    if len({*robots}) == 2 and layout.share_stem(*robots):
+        one, other = (replace(p, bodies=p.bodies.as_boxes) for p in (pair.one, pair.other))
+        pair = replace(pair, one=one, other=other)
+    return nearer(pair, layout.clearance)
 
 
 def _met(layout: Layout, robots: Staying) -> Iterator[Fault]:
@@ -195,7 +205,7 @@ def _cut(layout: Layout, own: Presence, other: Presence) -> Past | None:
     def clear(at: float) -> bool:
         there = replace(own, sweeps=(((at, home), (low, max(heights))),))
         pair = nearest(there, other, layout.clearance)
-        return pair is None or nearer(pair, layout.clearance) is None
+        return pair is None or _nearer(layout, pair) is None
 
     short, far = begin, home - SPARE
     if begin >= home or not clear(far) or clear(short):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -119,6 +120,18 @@ class Layout(Pictured):
         robots = tuple(n for n, path in enumerate(self.guidepaths) if path.bends)
         paths = [self.guidepaths[robot] for robot in robots]
         return robots, Ways.of([p.bends for p in paths], [p.rounding for p in paths])
+
+    @cached_property
+    def stems(self) -> frozenset[int]:
+        """The robots (index) whose guidepaths end as that of another one."""
+        ends = [(path.a, path.heading) for path in self.guidepaths]
+        several = {end for end, count in Counter(ends).items() if count > 1}
+        return frozenset(robot for robot, end in enumerate(ends) if end in several)
+
+    def share_stem(self, one: int, other: int) -> bool:
+        """Whether the guidepaths of two robots end as one."""
+        first, second = self.guidepaths[one], self.guidepaths[other]
+        return (first.a, first.heading) == (second.a, second.heading)
 
     @property
     def area(self) -> float:

@@ -91,6 +91,12 @@ class MachineBodies:
             place = np.append(self.bent.pieces(first, first + ROUNDING)[0][0], 0.0)
         return self.moved(place + UP * second)
 
+    @property
+    def as_boxes(self) -> MachineBodies:
+        """The same, each body the whole of its box."""
+        ends = self.boxes - self.origins[:, None]
+        return replace(self, corners=corners_of(ends))
+
     def moved(self, by: Array) -> MachineBodies:
         """The same, elsewhere."""
         return replace(self, boxes=self.boxes + by, origins=self.origins + by)

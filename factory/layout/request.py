@@ -101,12 +101,12 @@ class Ground:
         from factory.compiler.mating.mating import judged
         from factory.layout.dimensions import Clearance
         from factory.layout.durations import Pace
-        from factory.layout.optimising import optimised
+        from factory.layout.embedding import drafted
         from factory.layout.repeated import repeated
 
         factory, product = judged(factory, product), repeated(product, factory)
         c, pace = Clearance(settings.clearance), Pace.of(settings)
-        return optimised(factory, product, c, pace, self.floor, (), hands)
+        return drafted(factory, product, c, pace, self.floor, hands)
 
     def _with_deputies(
         self,
@@ -138,7 +138,9 @@ class Ground:
 def hands_of(factory: Factory, product: Product, settings: Settings) -> Hands:
     """The hands to choose from for a compiled factory."""
     from factory.compiler.mating.mating import judged
+    from factory.compiler.tees import on_stems
     from factory.layout.hands.choosing import Hands
     from factory.layout.repeated import repeated
 
-    return Hands(judged(factory, product), repeated(product, factory), settings.acceleration)
+    stems, _ = on_stems(judged(factory, product))
+    return Hands(stems, repeated(product, factory), settings.acceleration)

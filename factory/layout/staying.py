@@ -326,9 +326,12 @@ def _way(layout: Layout, robot: int) -> tuple[Array, Guidepath | None]:
 
 
 def _partners(layout: Layout) -> list[frozenset[int]]:
-    """For each robot the carriers that it works with, itself among them."""
+    """For each robot the carriers that it works with, itself among them; for those on one stem
+    themselves, since they are no partners of each other."""
     found = [{robot} for robot in range(len(layout.guidepaths))]
     for operation in layout.factory.operations:
+        on_stem = (robot for robot in operation.robots if robot in layout.stems)
+        met = next(on_stem, operation.carrier)
         for robot in operation.robots:
-            found[robot].add(operation.carrier)
+            found[robot].add(met)
     return [*map(frozenset, found)]

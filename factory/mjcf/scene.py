@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from itertools import product
-from math import hypot
+from itertools import pairwise, product
+from math import atan2, cos, dist, hypot, sin
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
 from factory.geometry.sight import Array, Framing, View, fit, towards
 from factory.layout.dimensions import CARRIAGE, PAYLOAD
+from factory.layout.guidepath import Guidepath
 from factory.layout.layout import Layout
 from factory.layout.platen import tiles_of
 from factory.mjcf.elements import add, add_shown, add_station, fill, numbers
@@ -29,6 +30,15 @@ TILE_TOP = 0.005
 
 SEAM = 0.002
 """Half the seam between two tiles [m]."""
+
+RAIL = 0.010, 0.008
+"""Half the width of a rail, and its height [m]."""
+
+CORNER = 8
+"""Straight pieces in which the corner of a rail is drawn, each as much longer at its ends as `LAP`
+[m]."""
+
+LAP = 0.001
 
 FAR = 1e5
 """How far away the ends of the compass are [m]."""
@@ -82,11 +92,13 @@ def _rail(world: Element, layout: Layout, robot: int) -> None:
     )
     (low, high), over = layout.ends(robot), CARRIAGE / 2 + room.stop
     face = SHOE + room.play
+    if path.bends:
+        _bent_rail(world, name, path, (low - over, high + over))
     for kind, start, end, (side, bottom, top) in (
-        ("rail", low - over, high + over, (0.010, 0.0, 0.008)),
+        ("rail", low - over, high + over, (RAIL[0], 0.0, RAIL[1])),
         ("buffer/A", low - over, low - face, (0.009, 0.008, 0.014)),
         ("buffer/B", high + face, high + over, (0.009, 0.008, 0.014)),
-    ):
+    )[bool(path.bends) :]:
         add_shown(
             world,
             f"{name}/{kind}",
@@ -95,6 +107,24 @@ def _rail(world: Element, layout: Layout, robot: int) -> None:
             quat=heading_quaternion(path),
             size=((end - start) / 2, side, (top - bottom) / 2),
             material="rail" if kind == "rail" else "buffer",
+        )
+
+
+def _bent_rail(world: Element, name: str, path: Guidepath, span: tuple[float, float]) -> None:
+    """The rail of a guidepath with bends, in straight pieces."""
+    (side, top), round_ = RAIL, np.linspace(-path.rounding, path.rounding, CORNER + 1)
+    corners = [at + off for bend in path.bends for at in (bend.at, bend.end) for off in round_]
+    ends = [path.carriage(x) for x in (span[0], *corners, span[1])]
+    for number, ((x, y), (z, w)) in enumerate(pairwise(ends), start=1):
+        half = atan2(w - y, z - x) / 2
+        add_shown(
+            world,
+            f"{name}/rail/{number}",
+            "box",
+            pos=((x + z) / 2, (y + w) / 2, top / 2),
+            quat=(cos(half), 0.0, 0.0, sin(half)),
+            size=(dist((x, y), (z, w)) / 2 + LAP, side, top / 2),
+            material="rail",
         )
 
 

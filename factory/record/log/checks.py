@@ -29,6 +29,7 @@ class MonitorTable:
     patience: float
     early: tuple[tuple[int, int], ...]
     others: tuple[tuple[int, tuple[int, ...], tuple[float, ...]], ...] = ()
+    bends: tuple[tuple[int, float, tuple[tuple[float, float], ...]], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

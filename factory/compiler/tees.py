@@ -1,0 +1,82 @@
+"""Tees: two robots that bring the same to one place, in turns, from one side.
+
+Where the guidepath of a carrier begins, it has one station, and a station has room for one robot on
+each side. Two robots that deliver there from the same side share the last stretch of their
+guidepaths, the *stem*; each has an *arm* of its own, with a branch of its own behind. In everything
+but who does which tour, the two are one robot that does the tours of both: the factory *on stems*,
+whose layout is that of the tee with both arms in one.
+
+Guarantees: the net of a tee is that of any branch that is there twice, live, safe and reversible
+(`parallel`). Both robots are never at the end of the stem at once: what they deliver there is in
+operations of one carrier, whose gear has one token.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from factory.compiler.assigning import gear_net
+from factory.plant.factory import Factory, Operation
+from factory.problem.pag import NOPART
+
+
+def heads(factory: Factory) -> tuple[int, ...]:
+    """For each robot the first of those that bring, or help to bring, the same over one stem as it
+    does; itself for all that share none. Linear."""
+    head, alike = [*range(len(factory.robots))], dict[str, list[Operation]]()
+    for o in factory.making:
+        alike.setdefault(o.written, []).append(o)
+    for same in alike.values():  # carriers come before those that deliver to them
+        begins = len(same[0].robots) > 1 and is_empty(same[0])
+        firsts = dict[int, Operation]()
+        for o in same:
+            first = firsts.setdefault(head[o.carrier], o)
+            if begins or o.carrier != first.carrier:
+                for robot, other in zip(first.robots, o.robots, strict=True):
+                    head[other] = head[robot]
+    return tuple(head)
+
+
+def is_empty(operation: Operation) -> bool:
+    """Whether the carrier of an operation holds nothing before it."""
+    return operation.before[operation.template.carrier - 1] == NOPART
+
+
+def on_stems(factory: Factory) -> tuple[Factory, tuple[int, ...]]:
+    """The factory in which the robots of each tee are one, and those of their branches too; and for
+    each robot the one there that does its tours. The same factory where there is no tee."""
+    head = heads(factory)
+    if head == (every := tuple(range(len(head)))):
+        return factory, every
+    kept = sorted({*head})
+    number = {robot: n for n, robot in enumerate(kept)}
+    place = tuple(number[robot] for robot in head)
+    programs: list[list[tuple[int, ...]]] = [[] for _ in kept]
+    for robot, tours in enumerate(factory.tours):
+        programs[place[robot]] += tours
+    when, operations = factory.postorder, factory.operations
+    robots = tuple(
+        replace(
+            factory.robots[robot],
+            index=n,
+            name=f"r{n + 1}",
+            operations=_in_turn(programs[n], operations, when),
+        )
+        for robot, n in number.items()
+    )
+    made = tuple(replace(o, robots=tuple(place[r] for r in o.robots)) for o in operations)
+    turns = tuple(tuple(place[robot] for robot in turn) for turn in factory.plan.turns)
+    plan = replace(factory.plan, turns=turns, names=())
+    stemmed = replace(
+        factory, robots=robots, operations=made, net=gear_net(robots, made), plan=plan
+    )
+    return stemmed, place
+
+
+def _in_turn(
+    tours: Sequence[tuple[int, ...]], operations: Sequence[Operation], when: Sequence[int]
+) -> tuple[int, ...]:
+    """The operations of tours unit by unit, in the order in which one is made."""
+    ordered = sorted(tours, key=lambda tour: (operations[tour[-1]].turn, when[tour[-1]]))
+    return tuple(number for tour in ordered for number in tour)

@@ -1,0 +1,173 @@
+"""Forks: the guidepaths of tees, made of those of a layout in which the robots of each tee are one.
+
+The first robot of a tee goes straight, and a bit further than that one did; the second leaves its
+line where that one received, goes across it, and on beside the first. So their arms point the same
+way, and their branches lie beside each other, each as the one branch lay. Arms are so long that
+a robot and what is behind it are clear of the other's way. What lies beyond a fork may be in the
+way of others: then it is further out, or to the other side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+from factory.layout.bending import Detour, bent
+from factory.layout.certificate import ALWAYS, ARM_BODY, CARRIAGE_BODY, LOADS, MAST_BODY
+from factory.layout.clearance import TOLERANCE, ClearanceSearch, searched, separation
+from factory.layout.dimensions import ARMS, CARRIAGE, CARRIAGES, MAST, up
+from factory.layout.guidepath import Extent
+from factory.layout.layout import Layout, carriers
+from factory.layout.sweeps import piles, regions
+from factory.layout.way import Bend
+from factory.plant.factory import Factory
+from factory.support.errors import Diagnostic, RunError
+
+OUT = 0.02
+"""Step by which a fork is moved outwards where something is in its way [m]."""
+
+MOST = 40
+"""Most such steps."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fork:
+    """The fork of a robot on a stem: how much further it is to go out, the length of its arms
+    `back`, and how far the second arm is `aside` of the first, to the robot's side t; all [m]."""
+
+    robot: int
+    out: float
+    back: float
+    aside: float
+
+    def detours(self, layout: Layout) -> tuple[Detour, Detour]:
+        """The guidepaths of both robots."""
+        travel = round(layout.guidepaths[self.robot].travel + self.out, 3)
+        corner = round(layout.guidepaths[self.robot].reach + travel, 3)
+        straight = round(travel + self.back, 3)
+        bend = Bend(corner, self.aside)
+        return Detour(straight), Detour(round(straight + abs(self.aside), 3), (bend,))
+
+
+def forked(stems: Layout, factory: Factory, place: tuple[int, ...], rounding: float) -> Layout:
+    """The layout of a factory with tees, from that of the factory on stems; `place`: the robot
+    there of each robot; `rounding`: that of corners [m]. It is not certified. Raises RunError
+    (Layout) where there is no room for a second arm."""
+    on, made = carriers(stems.factory), _Making(stems, factory, place, rounding)
+    twice = {robot for robot in place if place.count(robot) > 1}
+    tees = sorted(robot for robot in twice if on[robot] not in twice)
+    forks, pairs = dict[int, Fork](), list[set[str]]()
+    for number, robot in enumerate(tees):
+        later = {member for tee in tees[number + 1 :] for member in _branch(stems, tee)}
+        names = {factory.robots[r].name for r, at in enumerate(place) if at in later}
+        pairs.append({factory.robots[r].name for r, at in enumerate(place) if at == robot})
+        for fork in _forks(stems, robot, rounding):
+            search, faults = searched(made.layout({**forks, robot: fork}))
+            shared = [fault for fault in search.crossing if {*fault.robots} in pairs]
+            faults = [f for f in faults if names.isdisjoint(f.robots) and f not in shared]
+            faults += shared if _is_passed_near(search, pairs[-1]) else []
+            if faults:
+                continue
+            forks[robot] = fork
+            break
+        else:
+            message = f"there is no room for a second arm: {faults[0].message}"
+            position = stems.factory.robots[robot].position
+            raise RunError(Diagnostic("Layout", message, position, "leave it at one branch here"))
+    return made.layout(forks)
+
+
+@dataclass(frozen=True, slots=True)
+class _Making:
+    """What the layout of a factory with tees is made of, but for the forks; see `forked`."""
+
+    stems: Layout
+    factory: Factory
+    place: tuple[int, ...]
+    rounding: float
+
+    def layout(self, forks: Mapping[int, Fork]) -> Layout:
+        """The layout with some forks."""
+        both = {robot: fork.detours(self.stems) for robot, fork in forks.items()}
+        arms = [
+            bent(
+                self.stems, {robot: detours[arm] for robot, detours in both.items()}, self.rounding
+            )
+            for arm in (0, 1)
+        ]
+        of = [arms[self.place.index(at) != robot] for robot, at in enumerate(self.place)]
+        hands = self.stems.hands
+        return replace(
+            self.stems,
+            factory=self.factory,
+            guidepaths=tuple(on.guidepaths[at] for on, at in zip(of, self.place, strict=True)),
+            visits={
+                (o.index, robot): of[robot].visits[o.index, self.place[robot]]
+                for o in self.factory.operations
+                for robot in o.robots
+            },
+            hands=tuple(hands[at] for at in self.place) if hands else (),
+            certificate=None,
+        )
+
+
+def _is_passed_near(search: ClearanceSearch, pair: set[str]) -> bool:
+    """Whether what a robot of a pair, by names, holds where it waits is in the other one's way."""
+    robots, least = search.layout.factory.robots, search.layout.clearance - TOLERANCE
+    loads = [r for r in search.swept if r.kind in LOADS and robots[r.robot].name in pair]
+    return any(
+        separation(one.box, other.box) < least
+        for one in loads
+        for other in loads
+        if one.mode == ALWAYS and one.robot != other.robot
+    )
+
+
+def _branch(layout: Layout, robot: int) -> set[int]:
+    """A robot and all that bring it something."""
+    branch = {robot}
+    for other, carrier in enumerate(carriers(layout.factory)):  # carriers come first
+        if carrier in branch:
+            branch.add(other)
+    return branch
+
+
+def _forks(layout: Layout, robot: int, rounding: float) -> Iterator[Fork]:
+    """The forks of a robot on a stem, the nearest first, to either side."""
+    path, c = layout.guidepaths[robot], layout.clearance
+    takes = [*_beside(layout, robot)]
+    low, high = min(t for _, (_, _, t, _) in takes), max(t for _, (_, _, _, t) in takes)
+    aside = max(up(high - low + c), 2 * rounding)
+    rears = _behind(layout, robot)
+    ahead = max(front - rears[layer] for layer, (_, front, _, _) in takes)
+    back, least = max(up(ahead + c), rounding), max(up(rounding - path.travel), 0.0)
+    for step in range(MOST):
+        out = round(least + step * OUT, 3)
+        for more, far in ((0.0, 0.0), (0.0, rounding), (rounding, 0.0)):  # for boxes of corners
+            arm, across = round(back + more, 3), round(aside + far, 3)
+            yield from (Fork(robot, out, arm, side * across) for side in (-1, +1))
+
+
+def _beside(layout: Layout, robot: int) -> Iterator[tuple[int, Extent]]:
+    """What a robot where it receives, and its branch, take of the floor, by layer, about the
+    product's middle there."""
+    path, branch = layout.guidepaths[robot], _branch(layout, robot)
+    x, y = path.middle(path.length)
+    lane = path.offset
+    half = CARRIAGE / 2
+    yield CARRIAGES, (half - path.reach - CARRIAGE, half - path.reach, lane - half, lane + half)
+    yield ARMS, (-path.reach - MAST / 2, -path.arm, lane - MAST / 2, lane + MAST / 2)
+    for region in regions(layout, piles(layout.factory, layout.product)):
+        own = region.robot == robot and region.kind in (CARRIAGE_BODY, MAST_BODY, ARM_BODY)
+        if region.robot in branch and not own and (region.robot != robot or region.mode == ALWAYS):
+            xlo, xhi, ylo, yhi = region.box
+            yield region.layer, path.frame((xlo - x, xhi - x, ylo - y, yhi - y))
+
+
+def _behind(layout: Layout, robot: int) -> tuple[float, ...]:
+    """How far behind the product's middle a robot on its way reaches with what it brings, by
+    layer."""
+    path, grip = layout.guidepaths[robot], layout.grip(robot)
+    brought = [path.frame(layout.payloads[label])[0] for label in layout.factory.deliveries(robot)]
+    loads = min([*brought, *(grip[:1] if grip else ())])
+    return -path.reach - CARRIAGE / 2, -path.reach - MAST / 2, loads
