@@ -161,7 +161,7 @@ def test_forks_are_the_nearest_to_either_side() -> None:
     """Half a metre aside leaves the straight arm as it is."""
     layout = project(1).layout
     fork = Fork(1, 0.1, 0.2, -0.5)
-    straight, bent = fork.detours(layout)
+    straight, bent = fork.detours(layout, 0.02)
     travel = layout.guidepaths[1].travel
     assert straight.travel == pytest.approx(travel + 0.3)
     assert bent.travel == pytest.approx(travel + 0.8)

@@ -40,13 +40,13 @@ class Fork:
     back: float
     aside: float
 
-    def detours(self, layout: Layout) -> tuple[Detour, Detour]:
+    def detours(self, layout: Layout, rounding: float) -> tuple[Detour, Detour]:
         """The guidepaths of both robots."""
         travel = round(layout.guidepaths[self.robot].travel + self.out, 3)
         corner = round(layout.guidepaths[self.robot].reach + travel, 3)
         straight = round(travel + self.back, 3)
         bend = Bend(corner, self.aside)
-        return Detour(straight), Detour(round(straight + abs(self.aside), 3), (bend,))
+        return Detour(straight), Detour(round(straight + abs(self.aside), 3), (bend,), rounding)
 
 
 def forked(stems: Layout, factory: Factory, place: tuple[int, ...], rounding: float) -> Layout:
@@ -88,11 +88,9 @@ class _Making:
 
     def layout(self, forks: Mapping[int, Fork]) -> Layout:
         """The layout with some forks."""
-        both = {robot: fork.detours(self.stems) for robot, fork in forks.items()}
+        both = {robot: fork.detours(self.stems, self.rounding) for robot, fork in forks.items()}
         arms = [
-            bent(
-                self.stems, {robot: detours[arm] for robot, detours in both.items()}, self.rounding
-            )
+            bent(self.stems, {robot: detours[arm] for robot, detours in both.items()})
             for arm in (0, 1)
         ]
         of = [arms[self.place.index(at) != robot] for robot, at in enumerate(self.place)]
