@@ -216,6 +216,33 @@ def test_what_is_lost_is_made_again_for_its_unit(world: str) -> None:
     assert run.word == tuple("babab")
 
 
+def test_a_product_is_revised_during_a_run(run: Terminal, tmp_path: Path) -> None:
+    """Theorem 13: after the order at most wip - 1 old units are made; a robot that only they need
+    does not move any more."""
+    old, new = tmp_path / "a.pag", tmp_path / "b.pag"
+    parts = "p = atomic(); q = atomic(); r = atomic()"
+    old.write_text(f"root = a; a = mate ( p, q, r ); {parts}")
+    new.write_text("root = b; b = mate ( p, q ); p = atomic(); q = atomic()")
+    done = run("revise", old, new, "--live", "-o", tmp_path / "out", "--json")
+    assert done.status == 0, done.err
+    (idle,) = done.json["live"]["idle"]
+    both, orders = tmp_path / "out" / "family.pag", tmp_path / "out" / "live.csv"
+    assert read_demand(orders, read(both).pag).changes == (("a", 0), ("b", 6), ("a", 12))
+    made = Simulation(
+        read(both).layout,
+        RunRequest(units=18, wip=4, demand=Demand(changes=(("a", 0), ("b", 6)))),
+    )
+    robot = next(r.index for r in made.layout.factory.robots if r.name == idle)
+    seen = list[tuple[float, float]]()
+    record = watched(made, [lambda state: seen.append((state.time, made.world.sense()[0][robot]))])
+    assert record.succeeded, record.verdict
+    count = record.word.index("b")
+    assert 6 <= count <= 9
+    assert {*record.word[count:]} == {"b"}
+    at = [x for t, x in seen if t > record.dropoffs[count]]
+    assert max(at) - min(at) < 1e-6
+
+
 # Planted faults
 
 

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     help="What of OLD's layout is kept where that can be.",
 )
 @click.option("--afresh", is_flag=True, help="Also say the cycle time of a layout made afresh.")
+@click.option("--live", is_flag=True, help="Also lay out a floor for both, to change during a run.")
 @click.option("--picture", type=PATH, help="Draw what stays on NEW's floor: OUT.svg.")
 @OUTPUT
 def revise(
@@ -39,12 +40,17 @@ def revise(
     output: Path | None,
     pin: Pin,
     afresh: bool,
+    live: bool,
     picture: Path | None,
     out: OutputOptions,
 ) -> int:
     """Say what stays of the factory of OLD.pag in that of NEW.pag, and lay it out so that most
-    does. OLD may be a plan.json."""
+    does. OLD may be a plan.json.
+
+    With --live, -o DIR also writes DIR/family.pag, the mix of both, and DIR/live.csv, orders for a
+    change: factory run DIR/family.pag --demand DIR/live.csv --units 18 --wip 4"""
     from factory.nets.verify import proved
+    from factory.study.live import LiveChange
     from factory.study.revision import revised
     from factory.support.files import write_all
     from factory.timing.prediction import pace
@@ -58,6 +64,7 @@ def revise(
         found = revised(before, after, pin)
         verdict = proved(found.new.layout.factory.net)
         seconds = pace(after.layout, after.settings)[0].seconds if afresh else None
+        change = LiveChange.of(before, after, output or Path()) if live else None
     files: list[str] = []
     if output is not None:
         from factory.exporting.build import BuildRequest, build
@@ -65,14 +72,21 @@ def revise(
         with Waiting("compiling the model", out.silent):
             built = build(found.new, verdict, BuildRequest(None, output))
         files += map(str, built.files)
+    if output is not None and change is not None:
+        texts = {output / name: text.encode() for name, text in change.files.items()}
+        write_all(texts)
+        files += map(str, texts)
     if picture is not None:
         from factory.exporting.revision_picture import draw_revision
 
         write_all({picture: draw_revision((before.layout, found.new.layout), found.kept).encode()})
         files.append(str(picture))
     if out.as_json:
-        emit({**found.as_json(seconds), "files": files})
+        also = {"live": change.as_json()} if change else {}
+        emit({**found.as_json(seconds), **also, "files": files})
     else:
-        for line in (*found.words(seconds), *(f"  {file}" for file in files if out.verbose)):
+        in_words = change.words() if change else ()
+        listed = (f"  {file}" for file in files if out.verbose)
+        for line in (*found.words(seconds), *in_words, *listed):
             say(line)
     return 0

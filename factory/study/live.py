@@ -1,0 +1,64 @@
+"""A revision while the factory runs: on a floor that has the lines of both products, units are old
+ones until the change is ordered, and then new ones. It is a word of their mix (Theorem 13)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from factory.lang.writer import write_pag
+from factory.layout.resting import on_demand
+from factory.pipeline import Project
+from factory.plant.family import family
+
+FAMILY, ORDERS, OLD_UNITS = "family.pag", "live.csv", 6
+"""The files of a change, and after how many old units it is ordered there."""
+
+
+@dataclass(frozen=True)
+class LiveChange:
+    """The mix of an `old` and a `new` product, by label, on one floor: `both`."""
+
+    both: Project = field(repr=False)
+    old: str
+    new: str
+
+    @classmethod
+    def of(cls, old: Project, new: Project, folder: Path) -> LiveChange:
+        """The change from one project to another, with its files in a folder. Raises InputError
+        where the two cannot be one family, or a machine at rest is in the way."""
+        made = family(old.pag, new.pag, (1, 1), folder)
+        both = replace(old.with_pag(made.pag), laid=None)
+        on_demand(both.layout)
+        return cls(both, *made.pag.products)
+
+    @cached_property
+    def idle(self) -> list[str]:
+        """The robots that have nothing to do any more when the last old unit has left."""
+        factory = self.both.layout.factory
+        turn = factory.sequence.index(self.new)
+        busy = {robot for o in factory.operations if o.turn == turn for robot in o.robots}
+        return [robot.name for robot in factory.robots if robot.index not in busy]
+
+    @property
+    def files(self) -> dict[str, str]:
+        """The texts of the family, and of the orders of a change and one back, by their names."""
+        changes = (self.old, 0), (self.new, OLD_UNITS), (self.old, 2 * OLD_UNITS)
+        rows = "".join(f"{product},{made}\n" for product, made in changes)
+        return {FAMILY: write_pag(self.both.pag), ORDERS: f"product,made\n{rows}"}
+
+    def as_json(self) -> dict[str, Any]:
+        """The key `live` of `revise --json`."""
+        robots = len(self.both.layout.factory.robots)
+        return {"robots": robots, "products": [self.old, self.new], "idle": self.idle}
+
+    def words(self) -> Iterator[str]:
+        """The same for people."""
+        robots, idle = len(self.both.layout.factory.robots), ", ".join(self.idle) or "none"
+        yield (
+            f"live: {robots} robots make both; with --wip W at most W - 1 more {self.old} are made"
+            f" after the order, and then these are idle: {idle}"
+        )
