@@ -83,7 +83,7 @@ class Ground:
         if self.tile:
             from factory.layout.platen import on_platen
 
-            return layout if draft else on_platen(layout, pace, self.tile, self.floor)
+            return on_platen(layout, pace, self.tile, self.floor)
         if self.relays:
             from factory.layout.relaying import relayed
 
