@@ -144,6 +144,15 @@ def test_no_word_stops_the_net(seed: int, wip: int | None) -> None:
 # Runs
 
 
+def test_the_sequence_can_be_given(run: Terminal, tmp_path: Path) -> None:
+    file = tmp_path / "little.pag"
+    file.write_text(LITTLE)
+    assert run("check", file, "--order", "b,a,b", "--json").json["sequence"] == ["b", "a", "b"]
+    for words in ("a,c", "a,a", ",".join("ab" * 31)):
+        refused = run("check", file, "--order", words, "--json")
+        assert (refused.status, refused.codes) == (2, ["BadMix"])
+
+
 @pytest.mark.parametrize("world", ["ideal", "mujoco"])
 @pytest.mark.parametrize("word", WORDS)
 def test_products_leave_in_the_order_asked_for(word: str, world: str) -> None:

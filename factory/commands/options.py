@@ -242,6 +242,7 @@ RELAY = options(
         multiple=True,
         help="Number of branches that make a label in turn, for example sub2=3 (repeatable).",
     ),
+    click.option("--order", metavar="PRODUCT,...", help="Sequence of a mix: truck,truck,van."),
     click.option(
         "--deputies", is_flag=True, help="Let robots take over for others where there is room."
     ),

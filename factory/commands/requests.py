@@ -61,6 +61,7 @@ class ProjectOptions:
     limit: float | None = None
     parallel: tuple[tuple[str, int], ...] = ()
     deputies: bool = False
+    order: str | None = None
     allow: tuple[AllowedOverlap, ...] = ()
 
     def settings(self) -> Settings:
@@ -122,6 +123,8 @@ class ProjectOptions:
         project = read(self.file, self.folders, settings or self.settings(), self.ground())
         if self.allow:
             project = project.with_pag(self._allowing(project.pag))
+        if self.order is not None:
+            project = project.with_pag(project.pag.in_order(self.order.split(",")))
         kept = defaults_for(self.file)
         if self.robots is not None or self.cycle is not None:
             return self._with_few_robots(project, silent)
@@ -216,6 +219,7 @@ PLANNED = {
     "limit": "--seconds",
     "parallel": "--parallel",
     "deputies": "--deputies",
+    "order": "--order",
     "platen": "--platen",
     "tile": "--tile",
     "allow": "--allow",

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
 
 from factory.support.errors import Diagnostic, InputError, Position
+from factory.support.settings import MOST_UNITS
 from factory.support.showing import Pictured
 
 NOPART = "nopart"
@@ -116,6 +117,23 @@ class PAG(Pictured):
     def products(self) -> tuple[str, ...]:
         """The labels of the products, one unless there is a mix."""
         return (self.root,) if self.mix is None else tuple(label for label, _ in self.mix.counts)
+
+    def in_order(self, sequence: Sequence[str]) -> PAG:
+        """The same with another sequence of its mix. Raises InputError (BadMix)."""
+        faults = [f"'{word}' is no product" for word in sequence if word not in self.products]
+        faults += [
+            f"'{product}' is not in it" for product in self.products if product not in sequence
+        ]
+        if self.mix is None:
+            faults = [f"'{self.root}' is the only product"]
+        elif len(sequence) > MOST_UNITS:
+            faults.append(f"a period of {len(sequence)} units; {MOST_UNITS} are the most")
+        if faults:
+            message = f"the sequence {', '.join(sequence)}: {faults[0]}"
+            hint = f"--order takes the products {', '.join(self.products)}, each at least once"
+            raise InputError(Diagnostic("BadMix", message, None, hint))
+        counts = tuple((product, sequence.count(product)) for product in self.products)
+        return replace(self, mix=Mix(counts, tuple(sequence)))
 
     @property
     def title(self) -> str:

@@ -123,9 +123,14 @@ def check_names(campaign: Campaign, factory: Factory) -> None:
     """Raises InputError (BadFault) where a fault names a robot or label that the factory has not,
     or a label that no such fault can concern."""
     robots = [robot.name for robot in factory.robots]
-    parts = [leaf.label for leaf in factory.leaves]
-    joined = [o.label for o in factory.making if len(o.inputs) > 1]
-    every = [o.label for o in factory.making]
+    parts, joined, every = (
+        [*dict.fromkeys(name for o in some for name in (o.label, o.written))]
+        for some in (
+            factory.leaves,
+            [o for o in factory.making if len(o.inputs) > 1],
+            factory.making,
+        )
+    )
     wrong = list[Diagnostic]()
     for fault in campaign.faults:
         labels, what = every, "labels"
