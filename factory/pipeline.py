@@ -17,7 +17,7 @@ from factory.compiler.compiler import compile_pag
 from factory.compiler.expanding import expand
 from factory.compiler.turning import check_shapes, placed
 from factory.lang.pag_reader import load_pag
-from factory.lang.template_reader import load_templates
+from factory.lang.template_reader import all_templates as all_templates
 from factory.layout.request import Ground, hands_of
 from factory.plant.approaches import Approach
 from factory.plant.factory import Factory
@@ -27,7 +27,6 @@ from factory.problem.robot_types import Catalogue, load_catalogue
 from factory.problem.shapes import is_plain, is_shaped
 from factory.problem.template import Template
 from factory.support.errors import Diagnostic, InputError
-from factory.support.extensions import extension_folders
 from factory.support.resources import templates_folder
 from factory.support.settings import Settings
 
@@ -117,6 +116,13 @@ class Project:
         from factory.compiler.parallel import in_parallel
 
         return self.with_plan(in_parallel(self.planned, branches).plan)
+
+    def with_tees(self, stems: Sequence[Sequence[str]]) -> Project:
+        """The project in which two robots share a stem, by the labels that they bring. Raises
+        InputError (BadTee)."""
+        from factory.compiler.tees import with_tees
+
+        return self.with_plan(with_tees(self.planned, stems, self.catalogue))
 
     def _changed(self, known: Collection[str], **values: Any) -> Project:
         """With other values, and what is `known` of it already."""
@@ -238,7 +244,7 @@ class Project:
     @cached_property
     def planned(self) -> Factory:
         """The same, but for lifts of robots with several tours."""
-        if self.plan.turns or self.plan.names:
+        if self.plan.turns or self.plan.names or self.plan.tees:
             return self._shared(self.plan)
         if self.pag.mix is None:
             return self.compiled
@@ -326,19 +332,6 @@ def _is_shipped(template: Template) -> bool:
     """Whether a template is known to have a mode in every layout."""
     at = template.position
     return at is not None and Path(at.file).parent == templates_folder()
-
-
-def all_templates(folders: Sequence[str | PathLike[str]] = ()) -> Mapping[str, Template]:
-    """The templates of the user's folders, of entry points and the shipped ones. Raises
-    InputError."""
-    for folder in folders:
-        if not Path(folder).is_dir():
-            message = f"the templates folder '{folder}' is no directory"
-            raise InputError(
-                Diagnostic("BadTemplate", message, None, "--templates takes a directory")
-            )
-    every = *map(Path, folders), *extension_folders("templates"), templates_folder()
-    return load_templates(every)
 
 
 def read(

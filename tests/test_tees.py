@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -208,6 +209,56 @@ def test_both_inputs_of_a_mate_may_come_over_tees() -> None:
 def test_a_branch_of_a_tee_is_not_replicated_itself() -> None:
     with pytest.raises(InputError, match="is in the branch of 'sub2', which comes over a tee"):
         in_parallel(plain(paper()), (("sub2", 2), ("part1", 2)))
+
+
+STEMMED = (
+    ("sub2", "insert", ("sub1", "part3")),
+    ("sub1", "insert", ("part1", "part2")),
+    ("part1", "atomic", ()),
+    ("part2", "atomic", ()),
+    ("part3", "atomic", ()),
+)
+
+
+def inserted() -> Project:
+    """A pile into which two parts are inserted from one side."""
+    return Project(table_of(STEMMED), all_templates(), load_catalogue(), Settings())
+
+
+def test_two_labels_share_a_stem() -> None:
+    """With a robot each, whose guidepaths end as one."""
+    made = inserted().with_tees([("part2", "part3")])
+    assert len(made.plain.robots) == len(inserted().plain.robots)
+    layout = made.layout
+    assert len(layout.stems) == 2
+    assert carried_out(layout, 4).succeeded
+
+
+@pytest.mark.parametrize(
+    ("labels", "words"),
+    [
+        (("part1", "part2"), "'part1' and 'part2' are both needed in 'sub1'"),
+        (("part3", "part1"), "cannot share a stem: they deliver to different robots"),
+        (("part1", "part2", "part3"), "has room for 2 robots"),
+    ],
+)
+def test_bad_tees(labels: tuple[str, ...], words: str) -> None:
+    made = Project(paper(), all_templates(), load_catalogue(), Settings())
+    with pytest.raises(InputError, match=words) as error:
+        made.with_tees([labels])
+    assert error.value.diagnostics[0].code == "BadTee"
+
+
+def test_the_table_is_read(run: Terminal, tmp_path: Path) -> None:
+    """And does not go with a search for robots."""
+    text = "root = t; t = insert ( s, c ); s = insert ( a, b ); a = atomic(); b = atomic();"
+    pag = tmp_path / "own.pag"
+    pag.write_text(f"{text} c = atomic();")
+    pag.with_name("factory.toml").write_text('[tees]\nstem = ["b", "c"]\n')
+    run("build", pag, "-o", tmp_path / "made", "-q")
+    plan = json.loads((tmp_path / "made" / "plan.json").read_text())
+    assert len(plan["plan"]["tees"]) == 1
+    assert run("check", pag, "--robots", "least").codes == ["BadValue"]
 
 
 def check_jitter(seeds: range, units: int) -> None:

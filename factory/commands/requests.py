@@ -92,6 +92,7 @@ class ProjectOptions:
                 "--deputies": self.deputies,
                 "--platen": self.platen or self.tile is not None,
                 "[lines]": bool(defaults_for(self.file).lines()),
+                "[tees]": bool(defaults_for(self.file).tees()),
             }
         )
         tile = self.tile or (TILE if self.platen else None)
@@ -130,8 +131,9 @@ class ProjectOptions:
             return self._with_few_robots(project, silent)
         if lines := kept.lines():
             project = project.with_lines(lines)
-        several = self.branches()
-        return project.with_branches(several) if several else project
+        if several := self.branches():
+            project = project.with_branches(several)
+        return project.with_tees(kept.tees()) if kept.tees() else project
 
     def branches(self) -> tuple[tuple[str, int], ...]:
         """The labels that are made in parallel branches, with the number of branches."""

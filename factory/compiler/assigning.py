@@ -170,7 +170,9 @@ def shared(base: Factory, plan: Plan, catalogue: Catalogue) -> Factory:
     """The factory of a plan, made from that with a robot for each tour. The type of each robot fits
     all its tours. Raises InputError (BadPlan) if the plan does not have these tours or robots."""
     if not plan.turns:
-        return named(base, plan.names)
+        if any(robot >= len(base.robots) for tee in plan.tees for robot in tee):
+            raise _bad(f"its tees name more than {len(base.robots)} robots")
+        return named(replace(base, plan=replace(base.plan, tees=plan.tees)), plan.names)
     tours = range(len(base.robots))
     if any(len(turn) != len(tours) for turn in plan.turns):
         raise _bad(f"each turn must name a robot for each of {len(tours)} tours")

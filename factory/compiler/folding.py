@@ -36,7 +36,7 @@ def fold(factory: Factory, lines: Iterable[Line], catalogue: Catalogue) -> Facto
     """The factory with one robot for each of the `lines`, and for each robot on no line. Raises
     InputError (BadLine) with every reason why the lines are not a fold."""
     shared = [line for line in lines if len(line) > 1]
-    faults = [fault for line in shared for fault in _faults(factory, line, shared, catalogue)]
+    faults = [fault for line in shared for fault in line_faults(factory, line, shared, catalogue)]
     if faults:
         raise InputError(faults)
     if shared:
@@ -135,7 +135,7 @@ def _type(factory: Factory, line: Sequence[int], catalogue: Catalogue) -> str:
     return kind
 
 
-def _faults(
+def line_faults(
     factory: Factory, line: Line, lines: Sequence[Line], catalogue: Catalogue
 ) -> Iterator[Diagnostic]:
     """The reasons why tours cannot be on one line, pair by pair with its first tour."""

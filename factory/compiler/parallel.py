@@ -22,13 +22,10 @@ from math import lcm
 
 from factory.compiler.assigning import assigned
 from factory.compiler.folding import delivery
-from factory.compiler.tees import is_empty
+from factory.compiler.tees import ROOM, is_empty
 from factory.plant.factory import Factory
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 from factory.support.settings import MOST_BRANCHES
-
-MOST_ARMS = 2
-"""Branches that can come to one place from one side: over a tee (`tees`)."""
 
 Branches = Sequence[tuple[str, int]]
 """Labels, and how often the branch that brings each is to be there."""
@@ -132,10 +129,10 @@ def _not_inserted(factory: Factory, robot: int, k: int) -> Iterator[Diagnostic]:
         o = factory.operations[tour[-1]]
         label = o.before[o.robots.index(robot)]
         hint = f"write it with `insert`, '{label}' last: then there is a station for each branch"
-        if is_empty(o) and k > MOST_ARMS:
+        if is_empty(o) and k > ROOM:
             message = (
                 f"'{label}' comes to the start of a robot's path in '{o.label}', where there is"
-                f" room for {MOST_ARMS} branches, on a tee"
+                f" room for {ROOM} branches, on a tee"
             )
             yield _fault(message, o.position, hint)
         elif not is_empty(o) and len(o.robots) > 2:

@@ -19,6 +19,8 @@ from factory.lang.template_syntax import read_clauses
 from factory.problem.pag import NOPART
 from factory.problem.template import Template
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
+from factory.support.extensions import extension_folders
+from factory.support.resources import templates_folder
 
 Folder = str | os.PathLike[str]
 
@@ -34,6 +36,19 @@ def read_template(text: str, file: str = "<text>") -> Template:
     if template is None:
         raise AssertionError("a draft without errors gives a template")
     return template
+
+
+def all_templates(folders: Sequence[Folder] = ()) -> Mapping[str, Template]:
+    """The templates of the user's folders, of entry points and the shipped ones. Raises
+    InputError."""
+    for folder in folders:
+        if not Path(folder).is_dir():
+            message = f"the templates folder '{folder}' is no directory"
+            raise InputError(
+                Diagnostic("BadTemplate", message, None, "--templates takes a directory")
+            )
+    every = *map(Path, folders), *extension_folders("templates"), templates_folder()
+    return load_templates(every)
 
 
 def load_templates(folders: Sequence[Folder]) -> Mapping[str, Template]:

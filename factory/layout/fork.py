@@ -93,7 +93,11 @@ class _Making:
             bent(self.stems, {robot: detours[arm] for robot, detours in both.items()})
             for arm in (0, 1)
         ]
-        of = [arms[self.place.index(at) != robot] for robot, at in enumerate(self.place)]
+        second = list[bool]()
+        for robot, carrier in enumerate(carriers(self.factory)):  # carriers come first
+            twin = self.place.index(self.place[robot]) != robot
+            second.append(twin or (carrier >= 0 and second[carrier]))
+        of = [arms[arm] for arm in second]
         hands = self.stems.hands
         return replace(
             self.stems,

@@ -45,7 +45,8 @@ class Plan:
     who does which tour (`Turns`), empty for one robot for each tour. `lifts`: the robots (index)
     whose lift is set for each of their tours, None where the hands have not been chosen yet.
     `names`: those of the robots, as `r9`, where they are not r1, r2 and so on: a robot that stays
-    in the next revision of a product keeps its name.
+    in the next revision of a product keeps its name. `tees`: pairs of robots (index) that share the
+    last stretch of their guidepaths, though they bring different labels.
     """
 
     forms: Mapping[str, int] = field(default_factory=dict)
@@ -53,6 +54,7 @@ class Plan:
     turns: tuple[tuple[int, ...], ...] = ()
     lifts: frozenset[int] | None = None
     names: tuple[str, ...] = ()
+    tees: tuple[tuple[int, int], ...] = ()
 
     def __post_init__(self) -> None:
         for name, values, least, most in (
@@ -60,6 +62,7 @@ class Plan:
             ("relays", self.relays.values(), 1, MOST_RELAYS),
             ("turns", chain.from_iterable(self.turns), NOBODY, MOST_ROBOTS),
             ("lifts", self.lifts or (), 0, MOST_ROBOTS),
+            ("tees", chain.from_iterable(self.tees), 0, MOST_ROBOTS),
         ):
             if wrong := [value for value in values if not least <= value <= most]:
                 words = f"whole numbers from {least} to {most}, not {wrong[0]}"
@@ -83,7 +86,7 @@ class Plan:
             for unit in first
         )
         alone = len(every) == 1 and every[0] == tuple(range(len(every[0])))
-        return replace(self, turns=() if alone else every, lifts=None, names=())
+        return replace(self, turns=() if alone else every, lifts=None, names=(), tees=())
 
 
 AS_WRITTEN = Plan()

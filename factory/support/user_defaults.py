@@ -37,7 +37,10 @@ OPTIONS: Mapping[str, object] = {
     "lenient": True,
 }
 """The keys that are options of commands, each with an example; the others are those of Settings,
-LINES and PARALLEL."""
+LINES, TEES and PARALLEL."""
+
+TEES = "tees"
+"""A table of lists of two labels each: their robots share the last stretch of their ways."""
 
 LINES = "lines"
 """A table of lists of labels: those of one list share a robot."""
@@ -80,6 +83,10 @@ class Defaults:
         """The labels that share a robot, line by line."""
         return tuple(map(tuple, self.values.get(LINES, {}).values()))
 
+    def tees(self) -> tuple[tuple[str, ...], ...]:
+        """The labels whose robots share a stem, tee by tee."""
+        return tuple(map(tuple, self.values.get(TEES, {}).values()))
+
     def parallel(self) -> dict[str, int]:
         """The number of parallel branches of each label."""
         return dict(self.values.get(PARALLEL, {}))
@@ -118,14 +125,14 @@ def _fault(key: str, value: object) -> Diagnostic | None:
     """What is wrong with a key and its value."""
     if key in RANGES:
         return wrong_type(key, value)
-    if key == LINES:
-        example = 'side = ["part2", "part3"]'
+    if key in (LINES, TEES):
+        example = f'{"side" if key == LINES else "stem"} = ["part2", "part3"]'
         return _fault_of_table(key, value, _is_line, "lists of labels", example)
     if key == PARALLEL:
         what = f"labels with whole numbers from 1 to {MOST_BRANCHES}"
         return _fault_of_table(key, value, _is_number, what, "sub2 = 3")
     if key not in OPTIONS:
-        hint = did_you_mean(key, [*RANGES, *OPTIONS, LINES, PARALLEL], "keys")
+        hint = did_you_mean(key, [*RANGES, *OPTIONS, LINES, TEES, PARALLEL], "keys")
         return Diagnostic("UnknownParameter", f"unknown key '{key}'", None, hint)
     kind = type(OPTIONS[key])
     right = isinstance(value, int | float if kind is float else kind)
