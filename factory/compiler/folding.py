@@ -19,10 +19,11 @@ Guarantees: the net is a gear train, live, safe and reversible. What is no fold 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 from factory.compiler.assigning import assigned
-from factory.plant.factory import Factory, Operation, Robot
+from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
 from factory.problem.plan import Plan
 from factory.problem.robot_types import Catalogue
@@ -54,7 +55,13 @@ def folded(factory: Factory, lines: Iterable[Line], catalogue: Catalogue) -> Fac
     for robot, head in enumerate(on):
         tours[number[head]].append(robot)
     robots = [
-        Robot(n, f"r{n + 1}", _type(factory, line, catalogue), (), factory.robots[head].position)
+        replace(
+            factory.robots[head],
+            index=n,
+            name=f"r{n + 1}",
+            type=_type(factory, line, catalogue),
+            operations=(),
+        )
         for n, (head, line) in enumerate(zip(heads, tours, strict=True))
     ]
     return assigned(factory, robots, [[number[head] for head in on]])

@@ -17,7 +17,7 @@ import numpy as np
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product, Solid
 
-STEP = radians(5.0)
+STEP = radians(10.0)
 """A turn is looked at in steps no larger than this [rad]."""
 
 Quaternion = tuple[float, float, float, float]

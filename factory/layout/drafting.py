@@ -96,7 +96,7 @@ class LayoutDraft:
         """How far a fixed robot turns what it takes back to where that belongs [rad]."""
         if not self.factory.robots[robot].fixed:
             return None
-        (label,) = self.factory.deliveries(robot)
+        label, *_ = self.factory.deliveries(robot)  # the same for each unit of a period
         return -fed_of(self.product, self.factory.contents[label]) + 0.0
 
 

@@ -208,7 +208,7 @@ def _cut(layout: Layout, own: Presence, other: Presence) -> Past | None:
         return pair is None or _nearer(layout, pair) is None
 
     short, far = begin, home - SPARE
-    if begin >= home or not clear(far) or clear(short):
+    if layout.guidepaths[robot].fixed or begin >= home or not clear(far) or clear(short):
         return None
     for _ in range(BISECTIONS):
         middle = (short + far) / 2

@@ -111,8 +111,8 @@ class Layout(Pictured):
 
     @cached_property
     def guidepath_length(self) -> float:
-        """Total length of the guidepaths [m]."""
-        return float(sum(g.length for g in self.guidepaths))
+        """Total length of the guidepaths [m]; what is fixed has none."""
+        return float(sum(g.length for g in self.guidepaths if not g.fixed))
 
     @cached_property
     def bent(self) -> tuple[tuple[int, ...], Ways]:

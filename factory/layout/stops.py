@@ -114,9 +114,9 @@ def guests_of(factory: Factory, operation: Operation) -> tuple[int, ...]:
     goals = operation.template.law.goals
     away = any(goals[operation.robots.index(guest)].end != "A" for guest in guests)
     for guest in [robot for robot in guests if factory.robots[robot].fixed]:
-        numbers = factory.robots[guest].operations
-        taking = (factory.operations[n] for n in numbers if factory.operations[n] != operation)
-        guests += dict.fromkeys(robot for o in taking for robot in o.robots if robot != guest)
+        gear = (factory.operations[number] for number in factory.robots[guest].operations)
+        bringing = (r for o in gear if o.carrier == guest for r in o.robots if r != guest)
+        guests += dict.fromkeys(bringing)
     if len(guests) <= 2 and not away:
         return tuple(guests)
     message, hint = (

@@ -58,7 +58,7 @@ def mount_tool(body: Element, joint: Element, turn: float, limbs: Iterable[Limb]
 
 def gyration(layout: Layout, robot: int) -> float:
     """Radius of gyration [m] of what a fixed robot holds, about the axis of its tool."""
-    (label,) = layout.factory.deliveries(robot)
+    label, *_ = layout.factory.deliveries(robot)
     hand, parts = layout.hand(robot), layout.factory.contents[label]
     assert hand is not None, "a fixed robot holds what it turns"
     solids = [layout.product.solids[part] for part in parts]
