@@ -258,7 +258,7 @@ def test_the_table_is_read(run: Terminal, tmp_path: Path) -> None:
     run("build", pag, "-o", tmp_path / "made", "-q")
     plan = json.loads((tmp_path / "made" / "plan.json").read_text())
     assert len(plan["plan"]["tees"]) == 1
-    assert run("check", pag, "--robots", "least").codes == ["BadValue"]
+    assert run("check", pag, "--robots", "least", "--json").codes == ["BadValue"]
 
 
 def check_jitter(seeds: range, units: int) -> None:

@@ -7,6 +7,7 @@ written model loses nothing.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import permutations
 from math import ceil
@@ -19,7 +20,7 @@ from factory.layout.clearance import certify
 from factory.layout.dimensions import Clearance, up
 from factory.layout.durations import Pace
 from factory.layout.exclusions import crowded
-from factory.layout.fork import forked
+from factory.layout.fork import NO_ARMS, forked
 from factory.layout.guidepath import Point2, hull
 from factory.layout.hands.choosing import Hands
 from factory.layout.layout import Layout
@@ -48,15 +49,22 @@ def lay_out(
     kept clear."""
     known, c, pace = judged(factory, product), Clearance(clearance), pace or Pace()
     layout = draft or drafted(known, product, c, pace, floor, hands)
-    place, certificate = on_stems(known)[1], None
+    place, certificate, arms = on_stems(known)[1], None, dict[int, float]()
     for _ in range(AGAIN if hands else 0):
         certificate = certify(layout)
         further = crowded(layout, certificate) or _parted(layout, certificate)
         if not further:
             break
         assert hands is not None
-        hands.travels |= {place[robot]: travel for robot, travel in further.items()}
-        layout, certificate = drafted(known, product, c, pace, floor, hands), None
+        longer = dict(arms)
+        for robot, travel in further.items():
+            at, more = place[robot], travel - layout.guidepaths[robot].travel
+            if robot in layout.stems:  # its arm gets longer, not the stem
+                longer[at] = max(longer.get(at, 0.0), arms.get(at, 0.0) + more)
+            else:
+                hands.travels[at] = travel
+        arms = longer
+        layout, certificate = drafted(known, product, c, pace, floor, hands, arms), None
     return certified(layout, floor, certificate)
 
 
@@ -67,14 +75,15 @@ def drafted(
     pace: Pace,
     floor: Point2 | None,
     hands: Hands | None,
+    arms: Mapping[int, float] = NO_ARMS,
 ) -> Layout:
-    """The best layout found of a factory whose inputs can come together, before it is certified.
-    Raises RunError (Layout) where there is no room for a tee."""
+    """The best layout found of a factory whose inputs can come together, before it is certified;
+    `arms` as in `forked`. Raises RunError (Layout) where there is no room for a tee."""
     stems, place = on_stems(factory)
     layout = optimised(stems, product, c, pace, floor, (), hands)
     if stems is factory:
         return layout
-    return forked(layout, factory, place, rounding_for(pace.speed, pace.acceleration))
+    return forked(layout, factory, place, rounding_for(pace.speed, pace.acceleration), arms)
 
 
 def _parted(layout: Layout, certificate: Certificate) -> dict[int, float]:

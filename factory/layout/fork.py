@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 from factory.layout.bending import Detour, bent
 from factory.layout.certificate import ALWAYS, ARM_BODY, CARRIAGE_BODY, LOADS, MAST_BODY
@@ -28,6 +29,10 @@ OUT = 0.02
 
 MOST = 40
 """Most such steps."""
+
+
+NO_ARMS: Mapping[int, float] = MappingProxyType({})
+"""No arm is longer than it needs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,10 +54,17 @@ class Fork:
         return Detour(straight), Detour(round(straight + abs(self.aside), 3), (bend,), rounding)
 
 
-def forked(stems: Layout, factory: Factory, place: tuple[int, ...], rounding: float) -> Layout:
+def forked(
+    stems: Layout,
+    factory: Factory,
+    place: tuple[int, ...],
+    rounding: float,
+    arms: Mapping[int, float] = NO_ARMS,
+) -> Layout:
     """The layout of a factory with tees, from that of the factory on stems; `place`: the robot
-    there of each robot; `rounding`: that of corners [m]. It is not certified. Raises RunError
-    (Layout) where there is no room for a second arm."""
+    there of each robot; `rounding`: that of corners [m]; `arms`: how much longer the arms of a
+    robot there are to be than they need for what stands on them [m]. It is not certified. Raises
+    RunError (Layout) where there is no room for a second arm."""
     on, made = carriers(stems.factory), _Making(stems, factory, place, rounding)
     twice = {robot for robot in place if place.count(robot) > 1}
     tees = sorted(robot for robot in twice if on[robot] not in twice)
@@ -61,7 +73,7 @@ def forked(stems: Layout, factory: Factory, place: tuple[int, ...], rounding: fl
         later = {member for tee in tees[number + 1 :] for member in _branch(stems, tee)}
         names = {factory.robots[r].name for r, at in enumerate(place) if at in later}
         pairs.append({factory.robots[r].name for r, at in enumerate(place) if at == robot})
-        for fork in _forks(stems, robot, rounding):
+        for fork in _forks(stems, robot, rounding, arms.get(robot, 0.0)):
             search, faults = searched(made.layout({**forks, robot: fork}))
             shared = [fault for fault in search.crossing if {*fault.robots} in pairs]
             faults = [f for f in faults if names.isdisjoint(f.robots) and f not in shared]
@@ -134,15 +146,16 @@ def _branch(layout: Layout, robot: int) -> set[int]:
     return branch
 
 
-def _forks(layout: Layout, robot: int, rounding: float) -> Iterator[Fork]:
-    """The forks of a robot on a stem, the nearest first, to either side."""
+def _forks(layout: Layout, robot: int, rounding: float, longer: float) -> Iterator[Fork]:
+    """The forks of a robot on a stem, the nearest first, to either side; arms are `longer` than
+    they need [m]."""
     path, c = layout.guidepaths[robot], layout.clearance
     takes = [*_beside(layout, robot)]
     low, high = min(t for _, (_, _, t, _) in takes), max(t for _, (_, _, _, t) in takes)
     aside = max(up(high - low + c), 2 * rounding)
     rears = _behind(layout, robot)
     ahead = max(front - rears[layer] for layer, (_, front, _, _) in takes)
-    back, least = max(up(ahead + c), rounding), max(up(rounding - path.travel), 0.0)
+    back, least = up(max(up(ahead + c), rounding) + longer), max(up(rounding - path.travel), 0.0)
     for step in range(MOST):
         out = round(least + step * OUT, 3)
         for more, far in ((0.0, 0.0), (0.0, rounding), (rounding, 0.0)):  # for boxes of corners
