@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -15,7 +17,9 @@ from factory.layout.embedding import certified
 from factory.layout.feeding import cleared
 from factory.layout.layout import Layout
 from factory.layout.way import Bend, Ways, rounding_for, way_of
+from factory.mjcf.loading import load
 from factory.record.monitor import beside
+from factory.simulation.modelling import physical_model
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.study.fidelity.measuring import Measurement
@@ -148,3 +152,18 @@ def test_a_monitor_sees_where_a_robot_on_a_bend_is(layout: Layout) -> None:
     blind.anatomy.bent.ways.start[0, 1:] += 0.05
     run = moved.run([blind.observe])
     assert blind.report(run.lasting).violations
+
+
+def test_a_urdf_has_both_slides_of_a_robot_on_a_bend(layout: Layout, tmp_path: Path) -> None:
+    """MuJoCo reads it, and puts all bodies where they are in the model."""
+    file = tmp_path / "lamp.urdf"
+    factory.export(layout, "urdf", file)
+    one = load(physical_model(layout, 1, Settings(hands=0)))
+    other = mujoco.MjModel.from_xml_path(str(file))
+    here, there = mujoco.MjData(one), mujoco.MjData(other)
+    for name, value in (("r9/slide", 0.3), ("r9/slide_across", -0.07)):
+        here.joint(name).qpos[0] = there.joint(name).qpos[0] = value
+    for m, d in ((one, here), (other, there)):
+        mujoco.mj_kinematics(m, d)
+    for name in ("r9/carriage", "r9/shell"):
+        assert np.allclose(here.body(name).xpos, there.body(name).xpos, atol=1e-9)

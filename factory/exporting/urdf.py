@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 
 FORMAT, TAKES = "urdf", "pag"
 
+GRAM = 1e-3
+"""[kg]"""
+
 
 def export(subject: Subject) -> str | Mapping[str, bytes]:
     """The URDF; with its meshes, where there are any."""
@@ -106,13 +109,34 @@ class _Writer:
             w, z = turn[0] * w - turn[3] * z, turn[0] * z + turn[3] * w
             turn, speed = np.array([w, 0.0, 0.0, z]), speed / LEVER
         _origin(element, at, turn)
-        add(element, "parent", link=m.body(m.body_parentid[body]).name)
-        add(element, "child", link=name)
+        parent = m.body(m.body_parentid[body]).name
+        child = name if m.body_jntnum[body] < 2 else m.joint(joint + 1).name
+        add(element, "parent", link=parent)
+        add(element, "child", link=child)
         if kind in ("prismatic", "revolute"):
-            add(element, "axis", xyz=numbers(m.jnt_axis[joint]))
-            low, high, most = (numbers([value]) for value in (*m.jnt_range[joint], speed))
-            effort = exact([self.force.get(int(joint), 0.0)])
-            add(element, "limit", lower=low, upper=high, effort=effort, velocity=most)
+            self._limit(element, joint, speed)
+        if child != name:
+            self._across(root, joint + 1, child, name)
+
+    def _across(self, root: Element, joint: int, parent: str, child: str) -> None:
+        """The second slide of a body, on a link of its own of a gram: a joint has one axis."""
+        m, inertial = self.m, add(add(root, "link", name=parent), "inertial")
+        add(inertial, "mass", value=exact([GRAM]))
+        moments = dict.fromkeys(("ixx", "iyy", "izz"), exact([GRAM * GRAM]))
+        add(inertial, "inertia", **moments, ixy="0", ixz="0", iyz="0")
+        element = add(root, "joint", name=m.joint(joint).name, type="prismatic")
+        at = -m.jnt_axis[joint] * m.qpos0[m.jnt_qposadr[joint]]
+        _origin(element, at, np.array([1.0, 0.0, 0.0, 0.0]))
+        add(element, "parent", link=parent)
+        add(element, "child", link=child)
+        self._limit(element, joint, self.speed)
+
+    def _limit(self, element: Element, joint: int, speed: float) -> None:
+        m = self.m
+        add(element, "axis", xyz=numbers(m.jnt_axis[joint]))
+        low, high, most = (numbers([value]) for value in (*m.jnt_range[joint], speed))
+        effort = exact([self.force.get(int(joint), 0.0)])
+        add(element, "limit", lower=low, upper=high, effort=effort, velocity=most)
 
     def _shapes(self, link: Element, tag: str, geom: int) -> list[Element]:
         """The elements of a geom's shape; a capsule has three. A mesh is a file: of one that
