@@ -374,6 +374,16 @@ def branches_of(name: str) -> list[str]:
     return found
 
 
+@pytest.mark.parametrize(("name", "label", "most"), [("truck", "log2", 1.03), ("shelf", "back", 1)])
+def test_a_second_branch_is_placed_for_all_units_together(
+    name: str, label: str, most: float
+) -> None:
+    """The carrier stops at one of the branches in each unit, and goes past the other."""
+    project = read(f"examples/{name}.pag")
+    once, twice = project.draft, project.with_branches([(label, 2)]).draft
+    assert cycle_of(twice, Pace()) <= most * cycle_of(once, Pace())
+
+
 EXAMPLES = ["chair", "chest", "gearbox", "lamp", "shelf", "stool", "truck"]
 
 
@@ -425,6 +435,14 @@ def test_the_option_and_the_table_say_the_same(run: Terminal, file: Path) -> Non
     file.with_name("factory.toml").write_text("[parallel]\nsub2 = 2\n")
     assert run("check", file, "--no-hands", "--json").json == two
     assert run("check", file, "--no-hands", "--parallel", "sub2=1", "--json").json == one
+
+
+def test_a_branch_that_gains_nothing_is_named(run: Terminal, file: Path) -> None:
+    """`analyze` says so where one branch would keep the pace, and only there."""
+    truck = run("analyze", "examples/truck.pag", "--parallel", "log2=2").out
+    assert "one branch for log2 would do: its robots take 1.674 s a unit" in truck
+    file.write_text(TEXT.replace("dwell = 2", f"dwell = {DWELL}"))
+    assert "would do" not in run("analyze", file, "--no-hands", "--parallel", "sub2=2").out
 
 
 def test_a_unit_waits_for_none_that_comes_after_it() -> None:

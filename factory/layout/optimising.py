@@ -25,7 +25,7 @@ from factory.layout.guidepath import Box, Point2, hull
 from factory.layout.hands.choosing import Hands
 from factory.layout.layout import Layout, carriers
 from factory.layout.outline import Outline
-from factory.layout.packing import Packing, Task, bare
+from factory.layout.packing import WIDTHS, Packing, Task, bare
 from factory.layout.shapes import (
     OUTPUT,
     Frame,
@@ -87,7 +87,8 @@ def optimised(
     `hands`: those to choose from. Near linear, deterministic."""
     payloads = payload_boxes(factory, product)
     count = len(factory.robots)
-    task = Task(factory, c, pace, [1.0] * count, wide=wide, hands=hands)
+    width = WIDTHS[factory.period > 1]
+    task = Task(factory, c, pace, [1.0] * count, width=width, wide=wide, hands=hands)
     if count > LARGE:
         sides = _first_sides(factory, payloads, c)
         return _packed(replace(task, width=1), product, payloads, sides)

@@ -38,6 +38,10 @@ BARE = 5.0
 """How bad it is that a robot has no hand for what is on its line, where it could lie another way
 [s]."""
 
+WIDTHS = 6, 24
+"""How many ways to place the stops so far are kept, where one unit is made in a period, or several:
+there the best way for each unit alone is often not the best one for all."""
+
 PATH = 0.025
 """What guidepath costs, as a share of the time to go along it: where times are the same, the
 shorter is taken."""
@@ -59,7 +63,7 @@ class Task:
     pace: Pace
     weights: Sequence[float]
     breadth: float = 1.0
-    width: int = 6
+    width: int = WIDTHS[0]
     corridor: bool = True
     wide: Collection[int] = ()
     hands: Hands | None = None
@@ -207,11 +211,33 @@ class Packing:
         return self.own.further(stop, ((guest.robot, guest.outline.shape) for guest in guests))
 
     def _time(self, way: _Way, stop: Stop, station: float, guests: Sequence[Guest]) -> float:
-        """How long the operations at a stop take [s]. The carrier goes further for the first of
-        them, but at the first stop, which it goes back for; for each other it stands there while
-        robots come again."""
+        """How long the operations at a stop take in each unit [s]. The carrier goes further for the
+        first of them, but at the first stop, which it goes back for; for each other it stands there
+        while robots come again."""
         pace, operation = self.task.pace, stop.first
-        longest = rested = pace.rest(station - way.station)
+        ways = self._ways(way, stop, station)
+        longest = sum(self._longest(way, operation, move, guests) for move in ways) / len(ways)
+        again = max((2 * pace.rest(guest.travel) for guest in guests), default=0.0)
+        others = sum(o.dwell + pace.lost + again for o in stop.unlike[1:])
+        if len(way.piles) > 1:  # it comes from the stop before, or goes on to one that is further
+            others += 2 * (stop.visits - 1) * pace.rest(station - way.station)
+        share = len(ways) / self.task.factory.period
+        return share * (longest + operation.dwell + pace.lost + others)
+
+    def _ways(self, way: _Way, stop: Stop, station: float) -> list[float]:
+        """How far it goes to a stop in each unit of a period in which it comes there, from where it
+        stops before in that unit [m]."""
+        stations = dict.fromkeys((o.turn for o in stop.operations), 0.0)
+        for before, at in zip(self.own.stops, way.stations, strict=False):
+            stations |= {o.turn: at for o in before.operations if o.turn in stations}
+        return [station - at for at in stations.values()]
+
+    def _longest(
+        self, way: _Way, operation: Operation, move: float, guests: Sequence[Guest]
+    ) -> float:
+        """How long all that come to a stop are on their ways [s]."""
+        pace = self.task.pace
+        longest = rested = pace.rest(move)
         for guest in guests:
             if guest.outline.shape.tool or guest.robot not in operation.robots:
                 continue
@@ -220,12 +246,7 @@ class Packing:
                 continue
             standoff = self._standoff(operation, way.piles[-1][1], guest)
             longest = max(longest, pace.staged(guest.travel, standoff, pace.entered(rested)))
-        again = max((2 * pace.rest(guest.travel) for guest in guests), default=0.0)
-        others = sum(o.dwell + pace.lost + again for o in stop.unlike[1:])
-        if len(way.piles) > 1:  # it comes from the stop before, or goes on to one that is further
-            others += 2 * (stop.visits - 1) * pace.rest(station - way.station)
-        share = len({o.turn for o in stop.operations}) / self.task.factory.period
-        return share * (longest + operation.dwell + pace.lost + others)
+        return longest
 
     def _standoff(self, operation: Operation, pile: Extent, guest: Guest) -> float:
         if operation.robots.index(guest.robot) == operation.lowered:
