@@ -13,6 +13,7 @@ from factory.exporting.ways import ways
 from factory.geometry.solids import rotation
 from factory.geometry.turning import axis_of, presented, turning_box, turning_pieces
 from factory.layout.layout import Layout, carriers, delivery
+from factory.layout.stops import stops_of
 from factory.mjcf import stock
 from factory.mjcf.loading import load
 from factory.mjcf.model import build_model
@@ -38,6 +39,9 @@ base = atomic ( box = (0.12, 0.08, 0.02), pos = (0, 0, 0.01) );
 peg = atomic ( box = (0.04, 0.02, 0.03), pos = (-0.03, 0, 0.0351), fed = -0.4 );
 key = atomic ( box = (0.02, 0.03, 0.02), pos = (0.03, 0.01, 0.0301), fed = 0.8 )"""
 """Two manipulators, one after the other on the way of one robot; the first turns the other way."""
+
+
+MIX = "mix = 2 one, 1 other; one = place ( base, peg ); other = place ( base, key )"
 
 
 @pytest.fixture(scope="module")
@@ -97,6 +101,17 @@ def test_what_is_placed_comes_from_above(tmp_path: Path) -> None:
         with pytest.raises(InputError, match="cannot be lowered") as refused:
             _ = read(written(tmp_path, text)).factory
         assert [d.code for d in refused.value.diagnostics] == ["Blocked"]
+
+
+def test_a_mix_shares_its_manipulators(tmp_path: Path) -> None:
+    """What is made twice in a period has one, fixed still, at a station with two guests."""
+    text = TWO.replace("root = cell; cell = place ( base, peg, key )", MIX)
+    made = read(written(tmp_path, text)).factory
+    assert [robot.type for robot in made.robots].count("manipulator") == 2
+    assert [robot.fixed for robot in made.robots] == [r.type == "manipulator" for r in made.robots]
+    guests = [stop.guests for stop in stops_of(made, 0)[0] if stop.joins]
+    assert sorted(map(len, guests)) == [2, 2]
+    assert len({robot for pair in guests for robot in pair}) == 4
 
 
 # --- the turned part ------------------------------------------------------------------------------
