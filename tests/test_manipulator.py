@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from factory.compiler.folding import folded
 from factory.exporting.ways import ways
 from factory.geometry.solids import rotation
 from factory.geometry.turning import axis_of, presented, turning_box, turning_pieces
@@ -112,6 +113,13 @@ def test_a_mix_shares_its_manipulators(tmp_path: Path) -> None:
     guests = [stop.guests for stop in stops_of(made, 0)[0] if stop.joins]
     assert sorted(map(len, guests)) == [2, 2]
     assert len({robot for pair in guests for robot in pair}) == 4
+
+
+def test_a_fold_keeps_robots_fixed(tmp_path: Path) -> None:
+    made = read(written(tmp_path, TWO)).factory
+    again = folded(made, [], load_catalogue())
+    assert [r.fixed for r in again.robots] == [r.fixed for r in made.robots]
+    assert sum(r.fixed for r in again.robots) == 2
 
 
 # --- the turned part ------------------------------------------------------------------------------
