@@ -38,7 +38,7 @@ CORNER = 8
 """Straight pieces in which the corner of a rail is drawn, each as much longer at its ends as `LAP`
 [m]."""
 
-LAP = 0.001
+LAP = 0.002
 
 FAR = 1e5
 """How far away the ends of the compass are [m]."""
