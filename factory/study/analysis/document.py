@@ -22,6 +22,7 @@ def document(analysis: Analysis) -> dict[str, Any]:
         "cycle_time_s": net.pace,
         "products_per_hour": 3600 / net.pace if net.pace else None,
         "bottlenecks": list(analysis.bottlenecks),
+        "by_product_s": analysis.by_product,
         "first_product_s": flow.first,
         "last_product_s": flow.last,
         "circuits": _circuits(analysis),

@@ -40,6 +40,9 @@ def summary(analysis: Analysis) -> Iterator[str]:
         f"{listed(list(analysis.bottlenecks))} {does} the pace"
     )
     yield f"  {critical_words(analysis)}"
+    if spent := analysis.by_product:
+        each = listed([f"{seconds:.3f} s for a {product}" for product, seconds in spent.items()])
+        yield f"  {analysis.bottlenecks[0]} takes {each}"
     yield (
         f"first product after {flow.first:.2f} s, {flow.units} after {flow.last:.2f} s; "
         f"--wip {analysis.least_wip} or more keeps the full pace"
