@@ -56,7 +56,7 @@ def stages_once() -> Iterator[Stages]:
 
     def of_ground(ground, factory, product, settings, hands=None, catalogue=None, draft=None):
         """Hands are those of the factory, unless layouts have made them others, or a draft has."""
-        others = hands is not None and (hands.factory is not factory or hands.travels)
+        others = hands is not None and (hands.factory.robots != factory.robots or hands.travels)
         if draft is not None or others:
             return lay_out(ground, factory, product, settings, hands, catalogue, draft)
         return laid_out(ground, factory, product, settings, hands is not None, catalogue)

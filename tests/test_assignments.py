@@ -14,6 +14,7 @@ from factory.compiler.folding import fold
 from factory.compiler.mating.mating import judged
 from factory.compiler.parallel import in_parallel
 from factory.compiler.taking_over import taken_over
+from factory.compiler.tees import on_stems
 from factory.layout.durations import Pace
 from factory.layout.shapes import payload_boxes
 from factory.nets.verify import verify
@@ -60,6 +61,8 @@ def variants(file: Path) -> Iterator[tuple[str, Factory]]:
                     try:
                         made = in_parallel(factory, [(label, k)])
                     except InputError:
+                        continue
+                    if on_stems(made)[0] is not made:  # tees have tests of their own
                         continue
                     yield f"{name}, {label} = {k}", made
                     yield from takeovers(f"{name}, {label} = {k}", made, catalogue)

@@ -22,7 +22,7 @@ def test_the_finished_chest_would_hit_a_post() -> None:
     assert not_carried_back(layout) == {(0, "chest")}
     path, label = layout.guidepaths[0], "chest"
     pile = piles(layout.factory, layout.product)[label]
-    way = path.sweep(pile.box, path.length, layout.stops(0)[-2])
+    (way,) = path.sweeps(pile.box, path.length, layout.stops(0)[-2])
     posts = [r for r in layout.certificate.regions if r.robot == 7 and r.label == "front1"]
     assert min(separation(way, post.box) for post in posts) < layout.clearance
 
