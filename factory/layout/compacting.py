@@ -17,7 +17,7 @@ from factory.layout.bending import Detour, bent
 from factory.layout.dimensions import up
 from factory.layout.durations import Pace, cycle_of
 from factory.layout.feeding import cleared
-from factory.layout.layout import Layout
+from factory.layout.layout import Layout, branch_of
 from factory.layout.placing import Floor, Placing
 from factory.layout.presence import ROUNDING
 from factory.layout.way import Bend, rounding_for
@@ -93,7 +93,8 @@ class _Search:
         self.rng = np.random.default_rng(seed)
         goes = [r for r, path in enumerate(layout.guidepaths) if r and not path.fixed]
         self.reach = {robot: Reach.of(layout, robot) for robot in goes}
-        self.under = [self._under(robot) for robot in range(len(layout.guidepaths))]
+        on = self.ground.on
+        self.under = [branch_of(on, robot) for robot in range(len(on))]
         self.begin = Placing(self.ground, {})
         low, high, lowest, highest = self.begin.hulls[0]
         self.middle = np.array([(low + high) / 2, (lowest + highest) / 2])
@@ -168,10 +169,3 @@ class _Search:
         across = round(float(np.copysign(max(abs(across), 2 * rounding), across)), 3)
         travel = round(at + abs(across) + tail - path.reach, 3)
         return Detour(travel, (Bend(at, across),), rounding)
-
-    def _under(self, robot: int) -> list[int]:
-        found = [robot]
-        for number, carrier in enumerate(self.ground.on):
-            if carrier in found:
-                found.append(number)
-        return found

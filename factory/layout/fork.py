@@ -18,7 +18,7 @@ from factory.layout.certificate import ALWAYS, ARM_BODY, CARRIAGE_BODY, LOADS, M
 from factory.layout.clearance import TOLERANCE, ClearanceSearch, searched, separation
 from factory.layout.dimensions import ARMS, CARRIAGE, CARRIAGES, MAST, up
 from factory.layout.guidepath import Extent
-from factory.layout.layout import Layout, carriers
+from factory.layout.layout import Layout, branch_of, carriers
 from factory.layout.sweeps import piles, regions
 from factory.layout.way import Bend
 from factory.plant.factory import Factory
@@ -70,7 +70,7 @@ def forked(
     tees = sorted(robot for robot in twice if on[robot] not in twice)
     forks, pairs = dict[int, Fork](), list[set[str]]()
     for number, robot in enumerate(tees):
-        later = {member for tee in tees[number + 1 :] for member in _branch(stems, tee)}
+        later = {member for tee in tees[number + 1 :] for member in branch_of(on, tee)}
         names = {factory.robots[r].name for r, at in enumerate(place) if at in later}
         pairs.append({factory.robots[r].name for r, at in enumerate(place) if at == robot})
         for fork in _forks(stems, robot, rounding, arms.get(robot, 0.0)):
@@ -137,15 +137,6 @@ def _is_passed_near(search: ClearanceSearch, pair: set[str]) -> bool:
     )
 
 
-def _branch(layout: Layout, robot: int) -> set[int]:
-    """A robot and all that bring it something."""
-    branch = {robot}
-    for other, carrier in enumerate(carriers(layout.factory)):  # carriers come first
-        if carrier in branch:
-            branch.add(other)
-    return branch
-
-
 def _forks(layout: Layout, robot: int, rounding: float, longer: float) -> Iterator[Fork]:
     """The forks of a robot on a stem, the nearest first, to either side; arms are `longer` than
     they need [m]."""
@@ -166,7 +157,7 @@ def _forks(layout: Layout, robot: int, rounding: float, longer: float) -> Iterat
 def _beside(layout: Layout, robot: int) -> Iterator[tuple[int, Extent]]:
     """What a robot where it receives, and its branch, take of the floor, by layer, about the
     product's middle there."""
-    path, branch = layout.guidepaths[robot], _branch(layout, robot)
+    path, branch = layout.guidepaths[robot], branch_of(carriers(layout.factory), robot)
     x, y = path.middle(path.length)
     lane = path.offset
     half = CARRIAGE / 2

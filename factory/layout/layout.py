@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
@@ -325,6 +325,15 @@ def carriers(factory: Factory) -> list[int]:
     of a fixed robot which takes what it brings; -1 for the output robot, and one that is gone."""
     ends = (delivery(factory, robot.index) for robot in factory.robots)
     return [-1 if o is None or factory.drops(o.index) else o.carrier for o in ends]
+
+
+def branch_of(on: Sequence[int], robot: int) -> list[int]:
+    """A robot (index), and all that bring it something, carriers first; `on`: the `carriers`."""
+    branch = [robot]
+    for other, carrier in enumerate(on):  # carriers come first
+        if carrier in branch:
+            branch.append(other)
+    return branch
 
 
 def delivery(factory: Factory, robot: int) -> Operation | None:

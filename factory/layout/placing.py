@@ -105,7 +105,7 @@ class Placing:
         for robot in range(count):
             self.swept.append(ground.swept(robot, bends.get(robot)))
             self._place(robot)
-        self._look([*range(count)])
+        self.look([*range(count)])
 
     def changed(self, robot: int, detour: Detour | None, under: list[int]) -> Placing:
         """The same with another detour of a robot, with all robots that are `under` it."""
@@ -120,10 +120,6 @@ class Placing:
             made._place(number)
         return made
 
-    def look(self, under: list[int]) -> None:
-        """Compare the regions of some robots, the first of which is changed, with all others."""
-        self._look(under)
-
     def _place(self, robot: int) -> None:
         carrier = self.ground.on[robot]
         if carrier >= 0:
@@ -132,7 +128,8 @@ class Placing:
         low, high = boxes[:, [0, 2]].min(axis=0), boxes[:, [1, 3]].max(axis=0)
         self.hulls[robot] = by + np.stack([low, high], axis=1).ravel()
 
-    def _look(self, robots: list[int]) -> None:
+    def look(self, robots: list[int]) -> None:
+        """Compare the regions of some robots, the first of which is changed, with all others."""
         c = self.ground.layout.clearance
         a, b = self.hulls[robots][:, None], self.hulls[None]
         close = (a[..., 0] < b[..., 1] + c) & (b[..., 0] < a[..., 1] + c)

@@ -15,14 +15,12 @@ from factory.layout.durations import Pace
 from factory.layout.embedding import certified
 from factory.layout.guidepath import Box, Point2
 from factory.layout.layout import Layout
+from factory.layout.presence import ROUNDING
 from factory.layout.sweeps import piles, regions
 from factory.support.errors import RunError
 
 SHIFTS = 12
 """So many places of the tiles' edges are tried along each axis."""
-
-ROUNDING = 1e-6
-"""Lengths that differ by less are the same [m]."""
 
 
 def on_platen(layout: Layout, pace: Pace, tile: float, wanted: Point2 | None = None) -> Layout:
