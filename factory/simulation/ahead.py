@@ -1,4 +1,5 @@
-"""Robots that go ahead while they wait, by the supervisor's numbers."""
+"""Stages: moves of waiting robots towards their next operation, by the supervisor's mode
+numbers."""
 
 from __future__ import annotations
 
@@ -10,9 +11,9 @@ from factory.plant.factory import Factory
 
 
 class Ahead:
-    """The stages of robots that go ahead while they wait, numbered after the operations: by the
-    operation that each is `of`, and by the one that it is `after`; `place`: where each is, and
-    which operation it `follows`; `then`: the one that follows another."""
+    """The stages of waiting robots, numbered after the operations. For each stage: the operation
+    that it is `of`, and the one that it comes `after`; its `place` and the operation that it
+    `follows`; the stage that comes `then`."""
 
     def __init__(self, factory: Factory, stages: Sequence[HeadStart]) -> None:
         count = len(factory.operations)
@@ -33,12 +34,12 @@ class Ahead:
             self.place[number] = factory.net.gears[stage.robot].places[2 * step]
 
     def going(self, active: Iterable[int]) -> dict[int, HeadStart]:
-        """The stages among what is under way beside operations, by number."""
+        """The stages among the active modes, by number."""
         return {n: self._stages[n] for n in active if n in self._stages}
 
     def waiting(self, marked: bytearray, x: Array) -> list[int]:
-        """Those of robots that wait where a run starts, with its axes at `x`, and have a way to
-        go."""
+        """The stages of robots that wait at the start of a run, with axes at `x`, away from where
+        they are needed."""
         past = {n: stage.is_past(float(x[stage.axis])) for n, stage in self._stages.items()}
         return [
             number

@@ -1,4 +1,4 @@
-"""The bundles of modes that are active together, made once each."""
+"""Bundles of modes that are active together, cached."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ KEPT = 500
 
 
 class Bundles:
-    """Bundles of `modes`, each on the axes that `axes_of` has for it, under the limits of axes."""
+    """Bundles of `modes`, each on its axes in `axes_of`, under the limits of the axes."""
 
     def __init__(
         self, modes: Sequence[Mode], axes_of: Sequence[tuple[int, ...]], limits: Limits
@@ -26,17 +26,17 @@ class Bundles:
         self.limit(limits)
 
     def with_more(self, modes: Sequence[Mode], axes_of: Sequence[tuple[int, ...]]) -> Bundles:
-        """Those, and then these."""
+        """The bundles with additional modes."""
         return Bundles((*self.modes, *modes), (*self.axes_of, *axes_of), self.limits)
 
     def limit(self, limits: Limits) -> None:
-        """From now on axes have these limits."""
+        """Set the limits of the axes."""
         self.limits = limits
         self._all = Bundle.of(self.modes, [limits.of(axes) for axes in self.axes_of])
         self._kept.clear()
 
     def of(self, numbers: tuple[int, ...]) -> tuple[Bundle, Index]:
-        """The bundle of some modes, by number, and their axes, a mode after the other."""
+        """The bundle of modes, by number, and their axes, mode by mode."""
         if numbers not in self._kept:
             if len(self._kept) == KEPT:
                 self._kept.clear()

@@ -1,4 +1,5 @@
-"""What robots that run their own programs share: a cell each, and the state of their mode."""
+"""The state that robots with programs of their own share: a cell each, and the state of their
+mode."""
 
 from __future__ import annotations
 
@@ -12,8 +13,8 @@ from factory.simulation.world import World
 
 @dataclass(slots=True)
 class Cell:
-    """What a robot shows to those of its mode: the label it carries, how many operations it has
-    finished, and how many it has entered."""
+    """What a robot shows to the others of its mode: the label that it carries, the number of
+    operations finished, and the number entered."""
 
     label: str
     turn: int = 0
@@ -21,7 +22,7 @@ class Cell:
 
 
 class Cells:
-    """The cells of all robots: of each, by number, the label that it begins with."""
+    """The cells of all robots; each begins with the label of its robot."""
 
     def __init__(self, factory: Factory, labels: Sequence[str]) -> None:
         self._cells = [Cell(label) for label in labels]
@@ -37,26 +38,28 @@ class Cells:
         return self._cells[robot]
 
     def turn(self, robot: int, operation: Operation, unit: int) -> int:
-        """How many operations a robot has finished when it comes to this one for that unit."""
+        """The number of operations that a robot has finished when it reaches this one for a
+        unit."""
         return unit * self._length[robot] + self._place[robot, operation.index]
 
     def fired(self, transition: int) -> int:
-        """How often an operation has been ended by its carrier, or entered by its first robot."""
+        """Number of times that an operation has been ended by its carrier, or entered by its first
+        robot."""
         operation = self._operations[transition // 2]
         if transition == operation.end:
             return self._past(operation.carrier, self[operation.carrier].turn, operation)
         return max(self._past(r, self[r].entered, operation) for r in operation.robots)
 
     def _past(self, robot: int, turn: int, operation: Operation) -> int:
-        """How often a robot that has come so far has come past an operation."""
+        """Number of times that a robot with a given count has passed an operation."""
         length = self._length[robot]
         return (turn - self._place[robot, operation.index] + length - 1) // length
 
 
 class Link:
-    """All that the program of a robot (index) reads and writes, while it is `at` an operation for a
-    unit: its own cell, and the cells and the continuous state of the robots of that operation.
-    Reading any other robot is an error."""
+    """Everything that the program of a robot (index) may read and write while it is `at` an
+    operation for a unit: its cell, the cells of that operation's robots, and their continuous
+    state. Reading any other robot is an error."""
 
     def __init__(
         self, robot: int, cells: Cells, world: World, axes: Sequence[tuple[int, ...]]
@@ -64,13 +67,13 @@ class Link:
         self._robot, self._cells, self._world, self._axes = robot, cells, world, axes
 
     def at(self, operation: Operation, unit: int) -> None:
-        """From now on the robot waits for an operation, or takes part in it."""
+        """Let the robot wait for an operation, or take part in it."""
         if self._robot not in operation.robots:
             raise AssertionError(f"robot {self._robot} is not in the mode of {operation.label}")
         self._operation, self._unit = operation, unit
 
     def waits(self, robot: int, label: str) -> bool:
-        """Whether a robot has done all that it does before the operation, and brings its label."""
+        """Whether a robot has finished everything before the operation, and brings its label."""
         cell, wanted = self._cell(robot), self._turn(robot)
         return cell.turn > wanted or (cell.turn == wanted and cell.label == label)
 

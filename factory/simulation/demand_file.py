@@ -1,4 +1,4 @@
-"""Demands: a CSV file of orders, or orders that are drawn by a seed."""
+"""Demands: orders from a CSV file, or drawn by a seed."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ HINT = (
 
 
 def demand_of(asked: str, pag: PAG, units: int) -> Demand:
-    """The demand in a file, or as many orders as `units` drawn by a seed, with the frequencies of a
-    mix. Raises InputError with every fault of the file: BadDemand, BadFile."""
+    """The demand in a file, or `units` orders drawn by a seed with the frequencies of a mix. Raises
+    InputError with every error of the file: BadDemand, BadFile."""
     if pag.mix is None:
         message = f"--demand is for a mix of products, and '{pag.file}' makes {pag.root} alone"
         raise InputError(Diagnostic("BadDemand", message, None, "write mix = 3 truck, 1 van;"))
@@ -79,7 +79,7 @@ def read_demand(path: Path, pag: PAG) -> Demand:
 
 
 def _number(text: str) -> float | None:
-    """A number from 0 on, None for anything else."""
+    """A non-negative number; None for anything else."""
     try:
         number = float(text)
     except ValueError:

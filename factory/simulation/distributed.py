@@ -34,9 +34,9 @@ PERIODS = (0.006, 0.02)
 
 @dataclass(slots=True)
 class Process:
-    """One robot executing its program: its `link` to others; the step it is at and its phase in it,
-    `wait`, `run` or `leave`; the `reference` and `speed` of each of its `axes`, its lift's after
-    its carriage's; whether it `goes_ahead` while it waits."""
+    """A robot that executes its program: its `link` to others; its current step and phase, `wait`,
+    `run` or `leave`; `reference` and `speed` of its `axes`, carriage first; whether it `goes_ahead`
+    while it waits."""
 
     program: Program
     link: Link
@@ -52,13 +52,13 @@ class Process:
 
     @property
     def step(self) -> ProgramStep:
-        """The step it is at."""
+        """The current step."""
         return self.program.steps[self.turns % len(self.program.steps)]
 
     @property
     def unit(self) -> int:
-        """Which time round its loop a robot is: the number of the unit it works on, or of the
-        period of units."""
+        """The number of the unit that a robot works on, or of the period of units: how often it has
+        gone round its loop."""
         return self.turns // len(self.program.steps)
 
     def go_on(self) -> None:
@@ -105,8 +105,8 @@ class Record:
 
 
 class DistributedSupervisor:
-    """No supervisor at all: it only lets the robots' processes tick, each at its own rate and
-    phase, in steps of the world of `timestep` [s], `ticks` of which are one step here."""
+    """Stands in for a supervisor, and decides nothing: it lets the robots' processes tick, each at
+    its own rate and phase, in timesteps [s] of the world. Its step is `ticks` of these."""
 
     def __init__(
         self,
@@ -170,7 +170,7 @@ class DistributedSupervisor:
         return []
 
     def limit(self, limits: Limits) -> None:
-        """From now on axes have these limits."""
+        """Set the limits of the axes."""
         self.bundles.limit(limits)
 
     def step(self, ticks: int = 1) -> None:
@@ -184,8 +184,8 @@ class DistributedSupervisor:
         self.world.settle()
 
     def coast(self, ticks: int = 1) -> None:
-        """Let the world go on for as many timesteps as `step`, in which no robot ticks: each stops
-        where its last setpoint leads to."""
+        """Advance the world by one step in which no robot ticks: each stops where its last setpoint
+        leads."""
         self.world.advance(self.ticks)
         self.world.settle()
 

@@ -1,8 +1,6 @@
-"""A plant that a controller drives by signals, as a PLC does: targets of axes, grips and jobs in,
-positions and sensors out.
-
-The controller decides all that the net leaves open; the plant's interlock refuses what may not be.
-"""
+"""A plant driven by a controller through signals, as by a PLC: axis targets, grips and jobs in;
+positions and sensors out. The controller decides what the net leaves open; the plant's interlock
+refuses forbidden commands."""
 
 from __future__ import annotations
 
@@ -17,8 +15,8 @@ from factory.support.settings import Settings
 
 
 class DrivenSupervisor:
-    """Lets a `controller` drive a plant, past its `interlock`: it is asked every `scan` [s], in
-    whole timesteps."""
+    """Lets a `controller` drive a plant through its `interlock`, asking it every `scan` [s],
+    rounded to whole timesteps."""
 
     def __init__(
         self,
@@ -35,12 +33,12 @@ class DrivenSupervisor:
 
     @property
     def factory(self) -> Factory:
-        """The factory that is driven."""
+        """The driven factory."""
         return self.interlock.factory
 
     @property
     def ordering(self) -> Ordering:
-        """The order places that are kept."""
+        """The order places that are enforced."""
         return self.interlock.ordering
 
     @property
@@ -69,11 +67,11 @@ class DrivenSupervisor:
         return [self.factory.operations[event // 2] for event in sorted(possible)]
 
     def limit(self, limits: Limits) -> None:
-        """From now on axes have these limits."""
+        """Set the limits of the axes."""
         self.drives.limits = limits
 
     def step(self, ticks: int = 1) -> None:
-        """A tick of the world; the controller is asked in between, once in a scan."""
+        """Advance the world by a tick, with a scan of the controller at each of its times."""
         world, end = self.interlock.world, self._count + self._steps
         while self._count < end:
             if self._count % self._period == 0:
@@ -84,7 +82,7 @@ class DrivenSupervisor:
         world.settle()
 
     def coast(self, ticks: int = 1) -> None:
-        """A tick in which nobody is asked."""
+        """Advance by a tick without scans."""
         self.interlock.world.advance(self._steps)
         self.interlock.world.settle()
 
@@ -97,8 +95,8 @@ class DrivenSupervisor:
         return Sensed(interlock.world.time, *interlock.world.sense(), held, (*leaves, outfeed))
 
     def _scan(self) -> None:
-        """Ask the controller, carry out what it may command, and let the drives go on: those of
-        robots that are held back stand where they are."""
+        """Scan the controller, carry out its permitted commands, and move the drives; robots that
+        the interlock holds stand."""
         commands = self._controller.scan(self.sensed())
         self.interlock.carry_out(commands)
         drives, back, stops = self.drives, self.interlock.held_back, self.drives.stops

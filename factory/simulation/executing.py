@@ -1,4 +1,4 @@
-"""Carry out a run: with its recorders, its progress, its monitor and its verdict."""
+"""Carries out a run with its recorders, progress bar, monitor and verdict."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ def run_project(
     monitor: bool | None = None,
     progress: Tell | None = None,
 ) -> Run:
-    """One run of a project as `asked`, with a `log` and a `film` where these are given. `silent`:
-    without a progress bar; `monitor`: True for one that observes every tick, False for none, None
-    for one that observes events; `progress` is told after some ticks. Raises InputError, RunError
-    (NotProved), StoppedError as `carry_out`."""
+    """One run of a project as `asked`, with a `log` and a `film` where given. `silent`: no progress
+    bar; `monitor`: True to observe every tick, False for none, None to observe events; `progress`
+    is called from time to time. Raises InputError, RunError (NotProved), and StoppedError as
+    `carry_out`."""
     proved(project.factory.net)
     seen = log is not None or film is not None
     with Waiting("compiling the model", silent):
@@ -73,8 +73,8 @@ def carry_on(
     monitor: bool | None,
     progress: Tell | None = None,
 ) -> Run:
-    """A simulation carried out, from where it is, as `run_project` does, and judged: a run that
-    goes on where something failed is judged from its log."""
+    """Carry a simulation out from its present state, as `run_project` does, and judge it; a run
+    with recovery is judged from its log."""
     record = carry_out(made, silent, asked.max_time, recorders, monitor, log, progress)
     account = made.world.hooks.account
     failures = None if account is None else account.report()
@@ -96,10 +96,10 @@ def carry_out(
     log: Path | None = None,
     progress: Tell | None = None,
 ) -> Run:
-    """A run, with a progress bar unless `silent`; `progress` is told after some ticks. A signal
-    stops it at the end of a tick, so that the recorders' files are complete; StoppedError then says
-    how far it came and how to continue the run in a `log`. Recorders see every tick only from their
-    `since` on."""
+    """Run, with a progress bar unless `silent`; `progress` is called from time to time. A signal
+    stops the run at the end of a tick, so that the recorders' files are complete; StoppedError then
+    says how far it came and how to continue it from a `log`. Recorders observe every tick only from
+    their `since` on."""
     since = 0.0
     try:
         with Interruption() as stop, ExitStack() as stack:

@@ -1,8 +1,6 @@
-"""The interlock of a plant that a controller drives: it carries out commands that the marking, the
-order places and the reach of grips allow, and refuses all others, by name.
-
-It trusts the controller in nothing, and knows nothing of how it decides.
-"""
+"""The interlock of a driven plant: it carries out the commands that the marking, the order places
+and the reach of grips allow, and refuses all others by name. It does not trust the controller or
+know how it decides."""
 
 from __future__ import annotations
 
@@ -24,10 +22,9 @@ REACH = 1e-3
 
 
 class PlantInterlock:
-    """What a plant does of what it is commanded, in a `world`. It fires X_s when the carrier of X
-    takes it up as its job, and X_e when it gives it up. `fired`: how often each transition has
-    fired; `held_back`: robots that stand, since what they were told last is refused; `refusals`:
-    all that was."""
+    """Carries out commands in a `world`. It fires X_s when the carrier of X takes the job up, and
+    X_e when it gives it up. `fired`: firing counts of the transitions; `held_back`: robots that
+    stand because their last command is refused; `refusals`: all refused commands."""
 
     def __init__(
         self,
@@ -53,7 +50,7 @@ class PlantInterlock:
         return self.threads.marked
 
     def held(self, robot: int) -> bool:
-        """The sensor of a robot's grip."""
+        """Whether the sensor of a robot's grip reports a payload."""
         return self.grips.held(robot, self.commands.grip[robot])
 
     def ready(self, operation: Operation) -> bool:
@@ -64,8 +61,8 @@ class PlantInterlock:
         return self.world.prepared(operation, unit)
 
     def carry_out(self, now: Commands) -> None:
-        """Compare commands with the last ones: jobs that are given up, grips that open, jobs that
-        are taken up, by carriers first, and grips that close. A controller may scan more often."""
+        """Apply the changes between the last commands and these: jobs given up, grips opened, jobs
+        taken up (carriers first), grips closed. A controller may scan more often."""
         before, self.commands = self.commands, now
         robots = self.factory.present
         jobs = [robot for robot in robots if now.job[robot] != before.job[robot]]
@@ -87,17 +84,17 @@ class PlantInterlock:
     # jobs
 
     def _operation(self, job: int) -> Operation | None:
-        """The operation of a job, None where there is none."""
+        """The operation of a job; None for no job."""
         operations = self.factory.operations
         return operations[job - 1] if 1 <= job <= len(operations) else None
 
     def _follows(self, robot: int) -> bool:
-        """Whether a robot is not the carrier of its job: carriers begin."""
+        """Whether a robot is not the carrier of its job: carriers start first."""
         operation = self._operation(self.commands.job[robot])
         return operation is None or operation.carrier != robot
 
     def _enter(self, robot: int, job: int) -> None:
-        """A robot takes up a job; if it is the carrier, the operation starts."""
+        """A robot takes a job up. If it is the carrier, the operation starts."""
         name, operation = self.factory.robots[robot].name, self._operation(job)
         if operation is None:
             self._refuse(robot, f"{name} takes up job {job}: there is no such operation")
@@ -116,7 +113,7 @@ class PlantInterlock:
             self._fire(operation, operation.start)
 
     def _obstacle(self, operation: Operation) -> str:
-        """Why an operation cannot start, "" where it can."""
+        """Why an operation cannot start; "" if it can."""
         if operation.start not in self.threads.possible:
             places = self.factory.net.threaded.net.preset[operation.start]
             absent = [
@@ -139,7 +136,7 @@ class PlantInterlock:
         return ""
 
     def _leave(self, robot: int, operation: Operation) -> None:
-        """A robot gives up a job; if it is the carrier, the operation ends and parts change
+        """A robot gives a job up. If it is the carrier, the operation ends and parts change
         hands."""
         name = self.factory.robots[robot].name
         if robot in self.grips.closed:
@@ -170,7 +167,7 @@ class PlantInterlock:
     # grips
 
     def _close(self, robot: int) -> None:
-        """A grip closes: it takes what its robot's operation gives it, if that is within reach."""
+        """A grip closes. It takes what its robot's operation gives it, if that is within reach."""
         name, operation = self.factory.robots[robot].name, self._under_way(robot)
         if operation is None or operation.carrier != robot:
             if self.grips.label[robot] == NOPART:
@@ -181,7 +178,7 @@ class PlantInterlock:
             self.grips.taken.add(robot)
 
     def _open(self, robot: int) -> None:
-        """A grip opens: it lets go of what has been taken from it, or drops it off."""
+        """A grip opens. It releases what has been taken over from it, or drops the product off."""
         label, operation = self.grips.label[robot], self._under_way(robot)
         self.grips.closed.discard(robot)
         self.grips.taken.discard(robot)
@@ -196,14 +193,14 @@ class PlantInterlock:
             self.grips.freed.add(robot)
 
     def _under_way(self, robot: int) -> Operation | None:
-        """The operation that a robot has as its job, if that has started."""
+        """The started operation that is a robot's job."""
         operation = self._operation(self.commands.job[robot])
         if operation is None or robot not in operation.robots:
             return None
         return operation if self.marked[operation.place] else None
 
     def _far(self, operation: Operation) -> str:
-        """Which axis is further than a grip reaches from where parts change hands, "" for none."""
+        """The axis that is out of a grip's reach from where parts change hands; "" for none."""
         axes = self.factory.axes[operation.index]
         away = np.abs(self.world.sense()[0][list(axes)] - self._goals[operation.index])
         worst = int(away.argmax())
@@ -214,7 +211,7 @@ class PlantInterlock:
         return f"{robot} is {far:.1f} mm from where it has to be, and a grip reaches {reach:g} mm"
 
     def _refuse(self, robot: int, message: str) -> None:
-        """Keep a command back: the robot stands until its job or its grip changes."""
+        """Refuse a command: the robot stands until its job or grip command changes."""
         self.refusals.append(Refusal(self.world.time, robot, message))
         self.held_back.add(robot)
 

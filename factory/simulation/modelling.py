@@ -42,8 +42,8 @@ def modelled(layout: Layout, request: RunRequest, under_way: Mapping[str, int]) 
 
 
 def _overlaps(layout: Layout) -> tuple[Diagnostic, ...]:
-    """What overlaps in a product, or passes through each other on the way to its place in it, and
-    is not allowed. Units of one product are alike: one of each product is looked at."""
+    """Overlaps in a product, and collisions on the way to it, that are not allowed. Units of one
+    product are alike, so one of each is examined."""
     factory = layout.factory
     if not is_shaped(factory.pag):
         return ()
@@ -88,7 +88,7 @@ def _copies(
     wip: int | None,
     under_way: Mapping[str, int],
 ) -> tuple[dict[str, int], int | None]:
-    """How many copies of each body are needed, and for how many units inside at once at most."""
+    """Number of copies of each body, and the largest number of units inside at once."""
     from factory.mjcf.model import fitting_wip, part_copies
 
     if bodies.wholes:

@@ -1,8 +1,8 @@
-"""Order places in a run: an operation starts when the machines that it waits for are past.
+"""Order places in a run: an operation starts when the machines that it waits for have passed.
 
-Nothing is kept of them. Which of the two places before and after a pass is marked follows from how
-often the transitions of the compiled net have fired, and where its robot is on its way, from where
-the axis is: so it is after an undo too, and where a run begins in any marking.
+No state is kept. Which of the two places before and after a pass is marked follows from the firing
+counts of the compiled net, and for a robot on its way from the position of its axis. So it holds
+after an undo too, and in any initial marking.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from factory.nets.coordinated import Order, Past
 
 
 class Ordering:
-    """The order places of a coordinated net, by the transition that waits; of one that begins with
-    a pass also the transition that the pass follows is waited for. `held`: the passes that
-    transitions have been found to wait for; `lacking`: the transitions that they have."""
+    """The order places of a coordinated net, by the waiting transition. For a place that begins
+    with a pass, the transition before the pass is waited for too. `held`: the passes that
+    transitions were found to wait for; `lacking`: the transitions that they wait for."""
 
     def __init__(self, orders: Iterable[Order] = ()) -> None:
         self.held, self.lacking = set[Past](), set[int]()
@@ -27,13 +27,13 @@ class Ordering:
             self._by_start.setdefault(order.start, []).extend([*before, order])
 
     def ask_anew(self) -> None:
-        """Nothing has been found yet."""
+        """Forget what transitions were found to wait for."""
         self.held.clear()
         self.lacking.clear()
 
     def hold_up(self, start: int, fired: Callable[[int], int], sense: Callable[[], Array]) -> bool:
-        """Whether a transition still waits for another, or for a pass, where `fired` says how often
-        others have and axes are where `sense` says [m]; which is noted then."""
+        """Whether a transition still waits for another or for a pass, with firing counts `fired`
+        and axes where `sense` says [m]. Notes which."""
         if start not in self._by_start:
             return False
         x, waits = sense(), False
@@ -50,16 +50,16 @@ class Ordering:
         return waits
 
     def goes_on(self, x: Array) -> bool:
-        """Whether a pass that is held has come, with axes at `x` [m]."""
+        """Whether an awaited pass has come, with axes at `x` [m]."""
         return any(past.holds(float(x[past.axis])) for past in self.held)
 
     def keep_passes(self) -> None:
-        """From now on transitions wait for passes alone: those come by themselves, in a marking
-        too which the net does not come to from where it begins."""
+        """Let transitions wait for passes only: those come by themselves, also in a marking that is
+        not reachable from the initial one."""
         for orders in self._by_start.values():
             orders[:] = [order for order in orders if order.past is not None]
 
     def axes(self, starts: Iterable[int]) -> set[int]:
-        """The axes that transitions wait for."""
+        """The axes of awaited passes."""
         asked = (order.past for start in starts for order in self._by_start.get(start, ()))
         return {past.axis for past in asked if past is not None}

@@ -1,4 +1,4 @@
-"""The model of the run in a log, made again from its PAG: that in the log may be anyone's."""
+"""The model of a logged run, built again from its PAG: the model in a log is not trusted."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ WIDTH = 120
 
 
 def request_of(header: Mapping[str, Any]) -> RunRequest:
-    """What was asked of a recorded run."""
+    """The request of a recorded run."""
     return RunRequest(
         header["world"],
         header["units"],
@@ -53,9 +53,9 @@ def request_of(header: Mapping[str, Any]) -> RunRequest:
 def model_faults(
     log: Log, beside: Path, layout: Layout | None = None
 ) -> tuple[tuple[Diagnostic, ...], str]:
-    """What is wrong with the model in a log of a run in MuJoCo in the folder `beside`, where it is
-    not the one that its PAG gives (Record), and what is wrong with its product that the log does
-    not say; and why the two cannot be compared, "" where they can. `layout`: where it is known."""
+    """Defects of the model in a log of a MuJoCo run in the folder `beside`: it differs from what
+    its PAG gives (Record), or its product has faults that the log does not mention; and the reason
+    why the two cannot be compared, "" if they can. `layout`: if known."""
     try:
         if log.header["versions"] != {**log.header["versions"], **versions()}:
             return (), "the log was kept with other versions"
@@ -85,7 +85,7 @@ def model_faults(
 
 
 def _difference(wanted: Mapping[str, bytes], kept: Mapping[str, bytes]) -> str:
-    """How a model that was kept differs first, in words; "" where it does not."""
+    """The first difference of a kept model, in words; "" for none."""
     for name in sorted({*wanted, *kept}, key=lambda name: name != "xml"):
         if wanted.get(name) == kept.get(name):
             continue

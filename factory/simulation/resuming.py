@@ -1,5 +1,5 @@
-"""Going on with a run that was cut off, from its log: the simulation is made again from the header.
-It comes to where the log ends in the same way, to the last bit, and goes on from there."""
+"""Resuming an interrupted run from its log: the simulation is built from the log's header, repeats
+the logged part to the last bit, and goes on from there."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ IN_ITSELF = ("Stalled", "Dropped", "Unstable", "Failed")
 
 @dataclass(frozen=True)
 class Resumed:
-    """A run that goes on: its `simulation`, which has not begun, and its `log`, claimed as `file`;
-    up to its byte `end`, which is of the time `since` [s], it stays as it is."""
+    """A resumed run: its `simulation`, not yet started, and its `log`, locked as `file`. The log is
+    kept up to the byte `end`, at time `since` [s]."""
 
     path: Path
     simulation: Simulation = field(repr=False)
@@ -42,13 +42,13 @@ class Resumed:
 
     @property
     def came(self) -> CutOff:
-        """How far the run has come."""
+        """How far the logged run had come."""
         log, row = self.log, self.log.row_at(self.since)
         made = int(log.delivered[row]) if row < len(log) else 0
         return CutOff(self.since, made, log.header["units"])
 
     def recorder(self) -> Continued:
-        """Compares the simulation with the log, and writes that on."""
+        """Compares the simulation with the log, then appends to it."""
         return Continued(self.simulation, self.log, self.file, self.end, self.since)
 
 
@@ -84,8 +84,8 @@ def resume(path: Path, max_time: float | None = None) -> Resumed | CutOff:
 
 
 def _done(path: Path, log: Log) -> CutOff | None:
-    """How far a run came that is at its end, None for others. Raises InputError where it ended by
-    itself before its units were made."""
+    """How far a completed run came; None for others. Raises InputError if it ended by itself before
+    its units were made."""
     if not log.complete:
         return None
     cut = log.cut_off
@@ -98,7 +98,7 @@ def _done(path: Path, log: Log) -> CutOff | None:
 
 
 def _check(path: Path, log: Log, max_time: float | None) -> None:
-    """Raises InputError where a run cannot be gone on with."""
+    """Raises InputError if a run cannot be resumed."""
     header, now, last = log.header, versions(), float(log.time[-1]) if len(log) else 0.0
     for package in ("klavins-factory", "mujoco"):
         then, here = header["versions"].get(package, ""), now.get(package, "")
@@ -113,13 +113,13 @@ def _check(path: Path, log: Log, max_time: float | None) -> None:
 
 
 def _asked(request: RunRequest, timestep: bool, wip: bool) -> RunRequest:
-    """The request as it was before timestep and wip were chosen for it, where they were."""
+    """The request before timestep and wip were chosen for it."""
     settings = replace(request.settings, timestep=AUTO) if timestep else request.settings
     return replace(request, settings=settings, wip=None if wip else request.wip)
 
 
 def _made(path: Path, log: Log, project: Project, request: RunRequest) -> Simulation:
-    """The simulation at the beginning. Raises InputError where it is not that of the log."""
+    """The simulation at its start. Raises InputError if it is not that of the log."""
     header = log.header
     with of_its_factory():
         made = Simulation(project.layout, request)

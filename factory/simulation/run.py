@@ -1,4 +1,4 @@
-"""What a run leaves behind: its events and its figures, the same for either world."""
+"""The record of a run: events and figures, for either world."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from factory.support.showing import drawn
 
 
 def entries_of(events: Iterable[Event | Undone]) -> Iterator[Entry]:
-    """The events as a replay takes them: firings by their names."""
+    """The events for a replay: firings by name."""
     return (event.transition if isinstance(event, Event) else event for event in events)
 
 
@@ -29,8 +29,8 @@ STEADY = 4
 
 
 def mean_interval(left: Sequence[float], period: int = 1) -> float | None:
-    """The mean interval [s] over the last half of the products that left at these times, or over so
-    much of it as is whole periods of units, if any; None for fewer than STEADY."""
+    """Mean interval [s] between these times of departure over their last half, rounded to whole
+    periods of units if any; None for fewer than STEADY."""
     if len(left) < STEADY:
         return None
     tail = left[len(left) // 2 - 1 :]
@@ -42,9 +42,8 @@ def mean_interval(left: Sequence[float], period: int = 1) -> float | None:
 def busy_times(
     factory: Factory, events: Iterable[Event | Undone], after: Iterable[Factory] = ()
 ) -> tuple[float, ...]:
-    """How long each robot was in operations that have ended [s]; one without a start among the
-    events was under way from the beginning, time 0. `after`: the factories in which the run went on
-    where robots were exchanged."""
+    """Time that each robot spent in completed operations [s]. An operation without a start event
+    was under way at time 0. `after`: the factories that took over when robots were exchanged."""
     numbers = {t.name: number for number, t in enumerate(factory.net.threaded.transitions)}
     begun, spent = dict[int, float](), [0.0] * len(factory.robots)
     onward = iter(after)
@@ -110,34 +109,34 @@ class Run:
 
     @property
     def fired(self) -> int:
-        """How many transitions fired, those that were undone included."""
+        """Number of firings, including those undone."""
         return sum(isinstance(event, Event) for event in self.events)
 
     @cached_property
     def lasting(self) -> tuple[Event, ...]:
-        """The firings that were not undone; they are a run of the net too."""
+        """The firings that were not undone; they too are a run of the net."""
         kept = lasting(entries_of(self.events))
         return tuple(e for e in (self.events[at] for at in kept) if isinstance(e, Event))
 
     @property
     def refines_net(self) -> bool:
-        """Whether its events are a run of the net, and what a monitor saw, if one did."""
+        """Whether the events are a run of the net and agree with the monitor, if there was one."""
         return self.replays and (self.monitor is None or self.monitor.refines_net)
 
     @cached_property
     def verdict(self) -> RunVerdict:
-        """Whether it made its units, as a run of the net, and its bodies agree."""
+        """Whether the run made its units, is a run of the net, and its bodies agree."""
         figures = None if self.physics is None else kept_figures(self.physics)
         return judged(self.trouble, self.replays, figures, self.monitor, self.lenient)
 
     @property
     def succeeded(self) -> bool:
-        """Whether nothing is wrong with it that counts."""
+        """Whether the run has no fault that counts."""
         return self.verdict.succeeded
 
     @property
     def cut_off(self) -> CutOff | None:
-        """How far a run came that did not reach its end."""
+        """How far an incomplete run came."""
         if self.trouble is None:
             return None
         why = self.trouble.code, self.trouble.message
@@ -155,12 +154,12 @@ class Run:
 
     @property
     def utilisation(self) -> tuple[float, ...]:
-        """For each robot the share of the time it was in an operation."""
+        """Share of the time that each robot spent in operations."""
         total = self.sim_time_s or 1.0
         return tuple(b / total for b in self.busy)
 
     def as_json(self) -> dict[str, object]:
-        """The document that `run --json` prints."""
+        """The document printed by `run --json`."""
         physics, monitor, cut = self.physics, self.monitor, self.cut_off
         watched = {"monitor_time_s": monitor.time_s} if monitor else {}
         keys = (
@@ -219,7 +218,7 @@ class Run:
 
 
 def require(run: Run) -> Run:
-    """The run itself, or RunError with what troubled it."""
+    """The run, or RunError with its trouble."""
     if run.trouble is not None:
         raise RunError(run.trouble)
     return run

@@ -1,6 +1,5 @@
-"""Signals between a controller and a plant: what each reads and writes, and what the plant does of
-itself, drives that go to their targets and grips with a sensor each.
-"""
+"""Signals between controller and plant, and the plant's own reactions: drives that go to their
+targets, grips with a sensor each."""
 
 from __future__ import annotations
 
@@ -18,9 +17,9 @@ from factory.simulation.world import World
 
 @dataclass(frozen=True, slots=True)
 class Sensed:
-    """What a controller reads: the time [s]; positions [m] and speeds [m/s] of all axes; of each
-    robot whether its grip is closed on something; of each station, the feeders in the order of
-    their operations and then the outfeed, whether it is ready."""
+    """Controller inputs: time [s]; positions [m] and speeds [m/s] of all axes; for each robot
+    whether its grip holds something; for each station, feeders in the order of their operations and
+    then the outfeed, whether it is ready."""
 
     time: float
     position: Array
@@ -31,9 +30,8 @@ class Sensed:
 
 @dataclass(frozen=True, slots=True)
 class Commands:
-    """What a controller writes: where each axis is to go and stay [m]; of each robot whether its
-    grip is to be closed, and its job, the number of the operation that it is in, from 1, 0 for
-    none; whether to `stop`, so that all axes stand."""
+    """Controller outputs: target of each axis [m]; for each robot whether its grip is closed, and
+    its job, the number of its operation from 1, 0 for none; `stop`: stop all axes."""
 
     target: Array
     grip: tuple[bool, ...]
@@ -42,15 +40,15 @@ class Commands:
 
 
 class Controller(Protocol):
-    """A controller, which is asked once in a scan."""
+    """A controller, called once in a scan."""
 
     def scan(self, sensed: Sensed) -> Commands:
-        """From what it reads to what it writes."""
+        """The outputs for given inputs."""
 
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """A command that the plant does not carry out: the time [s], the robot (index), and why."""
+    """A refused command: time [s], robot (index) and reason."""
 
     time: float
     robot: int
@@ -58,8 +56,8 @@ class Refusal:
 
 
 class AxisDrives:
-    """Drives that go to a target as fast as the limits of their axes allow, and rest there. `x` [m]
-    and `v` [m/s] (axes,): the references."""
+    """Drives that go to their targets as fast as the axis limits allow. `x` [m] and `v` [m/s]
+    (axes,): the references."""
 
     def __init__(self, x: Array, limits: Limits, period: float) -> None:
         self.x, self.v, self.target = np.array(x), np.zeros(len(x)), np.array(x)
@@ -68,11 +66,11 @@ class AxisDrives:
 
     @property
     def stops(self) -> Array:
-        """Where axes come to stand that begin to brake now [m]."""
+        """Where axes stop that begin to brake now [m]."""
         return self.x + self.v * np.abs(self.v) / (2 * self.limits.acceleration)
 
     def go(self, world: World) -> None:
-        """The next period [s] of all axes that have a way to go."""
+        """Advance all moving axes by a period [s]."""
         limits = self.limits.speed, self.limits.acceleration
         x, v, a = towards(self.target, self.x, self.v, limits, self._period)
         moves = (a != 0.0) | (self.v != 0.0)
@@ -87,23 +85,22 @@ class AxisDrives:
 
 
 class GripStates:
-    """The grips of robots, as the plant sees them. `label`: what each robot holds; `taken`: the
-    empty ones that have closed where they may take; `freed`: those that have let go of what they
-    hold where they may; `closed`: those from which something has been taken, and that have not
-    opened since."""
+    """The grips of robots, as the plant sees them. `label`: each robot's payload; `taken`: empty
+    grips that have closed where they may take; `freed`: grips that have opened where they may
+    release; `closed`: grips from which the payload was taken over, not yet opened."""
 
     def __init__(self, robots: int) -> None:
         self.label = [NOPART] * robots
         self.taken, self.freed, self.closed = set[int](), set[int](), set[int]()
 
     def held(self, robot: int, closed: bool) -> bool:
-        """The sensor of a grip that is told to be `closed`, or open."""
+        """Whether the sensor of a grip commanded `closed` reports a payload."""
         if self.label[robot] != NOPART:
             return robot not in self.freed
         return closed and (robot in self.taken or robot in self.closed)
 
     def hand_over(self, operation: Operation) -> None:
-        """What robots bring is taken from them, and what comes out is held by the carrier."""
+        """Take what robots bring, and give the result to the carrier."""
         for robot, before, after in zip(
             operation.robots, operation.before, operation.after, strict=True
         ):

@@ -1,4 +1,4 @@
-"""Run a laid-out factory in one of the two worlds until its products are dropped off."""
+"""Runs a laid-out factory in one of the two worlds until its products are dropped off."""
 
 from __future__ import annotations
 
@@ -118,28 +118,28 @@ class Simulation:
 
     @cached_property
     def patience(self) -> float:
-        """A run has stalled when nothing has fired for so long [s]."""
+        """A run has stalled if nothing fires for this time [s]."""
         return PATIENCE * max(self.delays)
 
     @property
     def silent(self) -> float:
-        """How long nothing has fired since the last event, or since time 0 [s]."""
+        """Time since the last event, or since the start [s]."""
         events = self.supervisor.events
         return self.world.time - (events[-1].t if events else 0.0)
 
     @cached_property
     def cycle(self) -> CycleTime:
-        """The predicted cycle time, and what allows no less."""
+        """The predicted cycle time, and what bounds it."""
         return cycle_of(self.timing, self.word, self.request.wip)
 
     @property
     def duration(self) -> float:
-        """At most how long the run is expected to take [s]."""
+        """Upper estimate of the length of the run [s]."""
         return duration(self.timing, self.cycle.seconds, self.request.units)
 
     @property
     def start(self) -> Marking:
-        """The marking that the run begins from."""
+        """The initial marking."""
         start = self.request.start
         return self.layout.factory.net.initial_marking if start is None else start
 
@@ -172,7 +172,7 @@ class Simulation:
         )
 
     def drive(self, controller: Controller, scan: float) -> DrivenSupervisor:
-        """From the beginning on a controller drives the plant, asked every `scan` [s]."""
+        """Let a controller drive the plant from the start, asked every `scan` [s]."""
         ordering, settings = self.supervisor.ordering, self.request.settings
         interlock = PlantInterlock(self.layout.factory, self.modes, self.world, ordering)
         self.supervisor = DrivenSupervisor(interlock, self.limits, settings, controller, scan)
@@ -180,7 +180,7 @@ class Simulation:
 
     @property
     def physical(self) -> MujocoWorld:
-        """The world, where it is MuJoCo's; asked for in the ideal one, an AssertionError."""
+        """The MuJoCo world. Raises AssertionError in the ideal world."""
         from factory.simulation.mujoco.world import MujocoWorld
 
         assert isinstance(self.world, MujocoWorld), "the ideal world has no bodies"
@@ -198,11 +198,11 @@ class Simulation:
 
     @property
     def at_ends(self) -> list[Observer]:
-        """Observers that are shown the state in which operations have ended."""
+        """Observers of the state at ends of operations."""
         return self.world.hooks.ended
 
     def state(self, at_end: bool = False) -> State:
-        """The state of now; `at_end`: as operations have ended."""
+        """The current state; `at_end`: at ends of operations."""
         world, supervisor = self.world, self.supervisor
         made, seen = world.delivered() - self.before, world.observe(at_end)
         return State(seen, supervisor.marked, made, supervisor.events, world.hooks.account)
@@ -212,13 +212,13 @@ class Simulation:
         return self.world.figures()
 
     def limit(self, limits: Limits) -> None:
-        """From now on axes have these limits."""
+        """Set the limits of the axes."""
         self.limits = limits
         self.supervisor.limit(limits)
 
     def under_way(self) -> dict[str, int]:
-        """How many copies of each part are in the factory in the marking where the run starts,
-        those included that are being taken."""
+        """Number of copies of each part in the factory in the initial marking, including those
+        being taken."""
         factory, counts = self.layout.factory, self.counts
         gone = [counts.get(dropoff.end, 0) for dropoff in factory.dropoffs]
         return {o.label: counts.get(o.start, 0) - gone[o.turn] for o in factory.leaves}
@@ -259,7 +259,7 @@ class Simulation:
         return self._record(perf_counter() - begin - watched, world.time, trouble)
 
     def ends(self, max_time: float | None = None) -> Diagnostic | None:
-        """What ends the run now, whether or not its products have been dropped off."""
+        """The reason why the run ends now, whether or not its units are made."""
         world, patience = self.world, self.patience
         if world.hooks.trouble is not None:
             return world.hooks.trouble
@@ -274,8 +274,9 @@ class Simulation:
         return None
 
     def _unseen(self, max_time: float | None) -> int:
-        """So many ticks may go by at once where nobody looks, and nobody acts between two steps."""
-        if self.world.hooks.before_step or self.world.hooks.ticks:
+        """Number of ticks that may pass in one call: nobody observes them or acts between two
+        steps."""
+        if self.world.hooks.each_step or self.world.hooks.ticks:
             return 1
         if max_time is None:
             return MOST
@@ -332,7 +333,7 @@ class Simulation:
 
 
 def _timed(layout: Layout, request: RunRequest, compiled: Compiled | None) -> Settings:
-    """The settings with a timestep that is a number."""
+    """The settings with a numeric timestep."""
     if compiled is not None and compiled.model is not None:
         return compiled.model.settings
     return timed(request.settings, layout, request.world, request.jitter)

@@ -30,8 +30,8 @@ from factory.simulation.world import World
 
 @dataclass(slots=True)
 class Active:
-    """The modes under way: of operations, then of robots that go ahead to the next one while they
-    wait, both by number; their bundle, the axes of each slot, and the clocks, if any has run."""
+    """The active modes by number: of operations, then stages of waiting robots; their bundle, the
+    axes of each slot, and the clocks, if any."""
 
     operations: tuple[int, ...] = ()
     ahead: tuple[int, ...] = ()
@@ -80,7 +80,7 @@ class Supervisor:
 
     @property
     def limits(self) -> Limits:
-        """Of all axes."""
+        """The limits of all axes."""
         return self.bundles.limits
 
     @property
@@ -89,13 +89,13 @@ class Supervisor:
         return self.world.word
 
     def limit(self, limits: Limits) -> None:
-        """From now on axes have these limits."""
+        """Set the limits of the axes."""
         self.bundles.limit(limits)
         self._activate(self.active.operations, self.active.ahead)
 
     def step(self, ticks: int = 1) -> None:
-        """Fire what is enabled as one detached set, then let the world go on for a tick, or for as
-        many as `ticks` where nothing can fire in between."""
+        """Fire what is enabled as one detached set, then advance the world by a tick, or by up to
+        `ticks` if nothing can fire in between."""
         self.word.now = self.world.time
         started = self._startable()
         over = self._finished()
@@ -120,8 +120,8 @@ class Supervisor:
     def undo(
         self, undone: Undone, fired: Sequence[int], marking: Marking, free: Container[int]
     ) -> None:
-        """Go on from a marking, that of the counts `fired`: operations that are no longer marked
-        are over, as are the stages of axes that are `free`."""
+        """Continue from a marking with firing counts `fired`: operations no longer marked are over,
+        as are stages of axes in `free`."""
         active = self.active
         self.fired[:] = fired
         self.ordering.keep_passes()
@@ -140,8 +140,9 @@ class Supervisor:
         fired: Sequence[int],
         ordering: Ordering,
     ) -> None:
-        """Go on in another factory that has the same operations, robots by number and axes, from
-        the counts `fired`: what is under way goes on, robots that wait go ahead anew."""
+        """Continue in another factory with the same operations, robots by number and axes, from
+        firing counts `fired`. Operations under way go on; waiting robots start their stages
+        again."""
         axes_of = [*factory.axes, *((stage.axis,) for stage in stages)]
         self.factory, self.ordering = factory, ordering
         self.bundles = Bundles([*modes, *(stage.mode for stage in stages)], axes_of, self.limits)
@@ -157,17 +158,17 @@ class Supervisor:
         self.threads = Threads(net.threaded, net.threads_of(marking), starts)
 
     def recall(self, axes: Container[int]) -> None:
-        """The stages of axes are over, wherever those are."""
+        """End the stages of these axes wherever they are."""
         ahead, own = self.active.ahead, self.bundles.axes_of
         kept = [n for n in ahead if not any(axis in axes for axis in own[n])]
         self._activate(self.active.operations, kept)
 
     def send(self, stages: Iterable[int]) -> None:
-        """Let the axes of stages, by number, go to where those lead."""
+        """Start stages, by number."""
         self._activate(self.active.operations, (*self.active.ahead, *stages))
 
     def coast(self, ticks: int = 1) -> None:
-        """Let the world go on in the modes under way, for some ticks in which nothing fires."""
+        """Advance the world in the active modes for some ticks, firing nothing."""
         self.world.step(self.active.bundle, self.active.axes, ticks)
 
     @property
@@ -191,8 +192,8 @@ class Supervisor:
         return [number for number, within in zip(possible, inside.tolist(), strict=True) if within]
 
     def _prepared(self) -> tuple[int, ...]:
-        """The operations that are awaited and that the world is prepared for. The question is not
-        asked again where there was none and nothing has changed."""
+        """Awaited operations for which the world is prepared. Not evaluated again while the answer
+        was none and nothing has changed."""
         if not (self.enabled or self.world.supplied):
             return ()
         ready = self._ready()
@@ -203,7 +204,7 @@ class Supervisor:
         return tuple(o.index for o in ready)
 
     def _ready(self) -> list[Operation]:
-        """The operations that are awaited and may start, with those of units that are skipped."""
+        """Awaited operations that may start, including those of skipped units."""
         self.ordering.ask_anew()
         prepared, fired, unit = self.world.prepared, self.fired, self.factory.unit
         hold_up, lacking, makes = self.ordering.hold_up, self.world.lacking, self.word.makes
@@ -219,16 +220,16 @@ class Supervisor:
 
     @property
     def _is_restless(self) -> bool:
-        """Whether an operation waits to be skipped until its robots rest."""
+        """Whether an operation is to be skipped and its robots do not rest yet."""
         return bool(self.word.demand) and any(map(self._is_skipped, self.awaited()))
 
     def _is_skipped(self, operation: Operation) -> bool:
-        """Whether it is known that the next unit of an operation is not made."""
+        """Whether the next unit of an operation is known not to be made."""
         unit = self.factory.unit(operation, self.fired[operation.start])
         return unit < self.word.fixed and not self.word.is_made(unit)
 
     def _rests(self, operation: Operation) -> bool:
-        """Whether the robots of an operation stand, and do not go ahead of another."""
+        """Whether the robots of an operation stand and are in no stage of another."""
         going = self.ahead.going(self.active.ahead).values()
         if any(stage.robot in operation.robots for stage in going):
             return False
@@ -236,8 +237,8 @@ class Supervisor:
         return bool((np.abs(self.world.sense()[1][axes]) < STILL).all())
 
     def _skip(self, operations: Sequence[Operation]) -> None:
-        """Operations of units that are not made start and end at once: nothing moves, but robots
-        that are not yet where they wait for the next go there."""
+        """Start and end operations of units that are not made. Nothing moves, except robots that
+        are not yet where they wait next."""
         for event in (event for o in operations for event in (o.start, o.end)):
             self._count((event,))
         over, ahead = {o.index for o in operations}, self.active.ahead
@@ -247,12 +248,12 @@ class Supervisor:
             self._activate(self.active.operations, (*ahead, *begun))
 
     def _sensed(self) -> Array:
-        """Where all axes are [m]."""
+        """Positions of all axes [m]."""
         return self.world.sense()[0]
 
     def _finished(self) -> list[int]:
-        """Operations X with X_e enabled: robots in the goal ball, at rest, and the clock run out;
-        and robots that have come to where they went ahead."""
+        """Operations X with X_e enabled: robots in the goal ball, at rest, and the clock expired;
+        and stages at their goals."""
         active = self.active
         if active.bundle is None or not self.near:
             return []
@@ -273,7 +274,7 @@ class Supervisor:
         return [n for n in over if self._passes(n)] if self.world.hooks.judges else over
 
     def _passes(self, number: int) -> bool:
-        """Whether what has come to its goal may end: every stage may."""
+        """Whether a mode at its goal may end; a stage always may."""
         if number >= len(self.factory.operations):
             return True
         operation = self.factory.operations[number]
@@ -298,8 +299,8 @@ class Supervisor:
             self.events.append(Event(now, transitions[event].name))
 
     def _going_ahead(self, started: list[int], ended: list[int], over: list[int]) -> list[int]:
-        """The stages under way from now on: those that were, and have neither come to their goal
-        nor been overtaken by their operation, and those of robots that begin to wait."""
+        """The stages active from now on: those under way that are neither at their goal nor
+        overtaken by their operation, and those of robots that begin to wait."""
         overtaken = {number for o in started for number in self.ahead.of[o]}
         gone = overtaken.union(over)
         going = [number for number in self.active.ahead if number not in gone]
@@ -308,7 +309,7 @@ class Supervisor:
         return going + [number for o in ended for number in self.ahead.after[o]]
 
     def _activate(self, operations: Iterable[int], ahead: Iterable[int]) -> None:
-        """Rebuild the bundle of active modes; clocks of those that go on are kept."""
+        """Rebuild the bundle of active modes; clocks of continuing modes are kept."""
         active = self.active
         operations, ahead = tuple(operations), tuple(ahead)
         numbers = (*operations, *ahead)

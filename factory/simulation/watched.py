@@ -1,4 +1,4 @@
-"""A run with a monitor beside it, which judges whether its bodies do what its record says."""
+"""A run with a monitor, which judges whether the bodies do what the record says."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a factory runs in: the interface of the ideal world and of MuJoCo."""
+"""The interface of the two worlds in which a factory runs."""
 
 from __future__ import annotations
 
@@ -23,18 +23,19 @@ Job = tuple[Operation, int]
 
 @dataclass(slots=True)
 class Hooks:
-    """Where others take part in a world.
+    """Callbacks of a world.
 
-    `before_step`: called before every timestep. `sensors`: from positions [m] and speeds [m/s] of
-    all axes to what is sensed. `gates`: an operation may start only where all say so; `judges`: it
-    may end only where all do. `ticks`: called after every tick. `ended`: shown the `state` in
-    which operations have ended and parts have changed hands, before the world goes on;
-    `ended_time` [s]: what that took. `trouble`: what ends the run, if anything does; `busy` [s]:
-    until when it is no stall that nothing fires. `account`: what a run that goes on after failures
-    tells of them.
+    `before_step`: called before every timestep; `step_singly`: bodies may be anywhere, so every
+    timestep is inspected. `sensors`: map positions [m] and speeds [m/s] of all axes to measured
+    ones. `gates`: an operation may start only if all allow it; `judges`: it may end only if all
+    allow it. `ticks`: called after every tick. `ended`: observers of the `state` after operations
+    have ended and parts have changed hands; `ended_time` [s]: time they took. `trouble`: ends the
+    run; `busy` [s]: until this time a standstill is no stall. `account`: the failures of a run with
+    recovery.
     """
 
     before_step: list[Callable[[], None]] = field(default_factory=list)
+    step_singly: bool = False
     sensors: list[Callable[[Array, Array], tuple[Array, Array]]] = field(default_factory=list)
     gates: list[Callable[[Operation, int], bool]] = field(default_factory=list)
     judges: list[Callable[[Operation, int], bool]] = field(default_factory=list)
@@ -46,8 +47,13 @@ class Hooks:
     busy: float = 0.0
     account: Account | None = None
 
+    @property
+    def each_step(self) -> bool:
+        """Whether every timestep must be taken singly."""
+        return self.step_singly or bool(self.before_step)
+
     def sensed(self, x: Array, v: Array) -> tuple[Array, Array]:
-        """What sensors make of positions and speeds."""
+        """Positions and speeds as measured."""
         for sensor in self.sensors:
             x, v = sensor(x, v)
         return x, v
@@ -61,7 +67,7 @@ class Hooks:
         return all(judge(operation, unit) for judge in self.judges)
 
     def tell_ended(self) -> None:
-        """Operations have ended."""
+        """Notify the observers of ended operations."""
         begin = perf_counter()
         if self.ended and self.state is not None:
             state = self.state(True)
@@ -79,26 +85,26 @@ class Drop:
 
 
 class World(Protocol):
-    """Where a factory runs: the ideal one or MuJoCo.
+    """The surroundings of a run: the ideal world or MuJoCo.
 
-    A supervisor calls `step`; robots that run their own programs are driven by `move`, `advance`
-    and `settle`. `supplied`: an operation may have become prepared since the last question; the
-    questioner resets it. `dropoffs`: when each product left the factory [s].
+    A supervisor calls `step`; robots with programs of their own are driven by `move`, `advance` and
+    `settle`. `supplied`: an operation may have become prepared; reset by the reader. `dropoffs`:
+    time at which each product left the factory [s].
     """
 
     supplied: bool
 
     @property
     def time(self) -> float:
-        """[s]"""
+        """Simulated time [s]."""
 
     @property
     def lacking(self) -> Container[str]:
-        """The labels of operations that cannot become prepared before this changes."""
+        """Labels of operations that cannot become prepared until this changes."""
 
     @property
     def hooks(self) -> Hooks:
-        """Where others take part."""
+        """The callbacks."""
 
     @property
     def word(self) -> Word:
@@ -106,52 +112,51 @@ class World(Protocol):
 
     @property
     def dropoffs(self) -> list[float]:
-        """When each product left the factory [s]."""
+        """Time at which each product left the factory [s]."""
 
     @property
     def physics_time(self) -> float:
         """Wall time spent in the engine [s]."""
 
     def sense(self) -> tuple[Array, Array]:
-        """Positions x [m] and speeds [m/s] of all axes: in arc length of all carriages, then the
-        heights of all lifts."""
+        """Positions x [m] and speeds [m/s] of all axes: arc lengths of all carriages, then heights
+        of all lifts."""
 
     def observe(self, at_end: bool = False) -> Observation:
-        """What can be measured of it now; `at_end`: as operations have ended."""
+        """The measurable state; `at_end`: at ends of operations."""
 
     def prepared(self, operation: Operation, unit: int) -> bool:
-        """Whether the world is in the domain of an operation's mode as far as parts go: a feeder
-        has a part to give, the outfeed is free."""
+        """Whether the parts that an operation needs are there: a feeder presents one, the outfeed
+        is free."""
 
     def apply(self, started: Sequence[Job], ended: Sequence[Job]) -> None:
-        """Operations start and end now."""
+        """Start and end operations now."""
 
     def step(
         self, bundle: Bundle | None, axes: Index, ticks: int = 1, until: Collection[Past] = ()
     ) -> bool:
-        """A tick, or as many as `ticks` where nothing in between asks for the supervisor, as a pass
-        that it waits `until` does: the axes of the active modes follow their field, all others
-        stand. Whether any mode may have come to its goal."""
+        """Advance by a tick, or by up to `ticks` if the supervisor is not needed in between, for
+        instance by a pass in `until`. The axes of active modes follow their field, all others
+        stand. Returns whether a mode may have reached its goal."""
 
     def move(self, axes: Index, x: Array, v: Array, a: Array) -> None:
-        """From now on `axes` run from x [m] at speed v [m/s] under acceleration a [m/s²]."""
+        """Let `axes` run from x [m] at speed v [m/s] under acceleration a [m/s²]."""
 
     def advance(self, steps: int) -> None:
-        """Some timesteps, the axes as `move` has set them going."""
+        """Advance by timesteps, with the axes moving as set by `move`."""
 
     def settle(self) -> None:
-        """A tick's timesteps are over."""
+        """Act at the end of a tick of such timesteps."""
 
     def delivered(self) -> int:
-        """Products that have left the factory, since the beginning of time."""
+        """Number of products that have left the factory, including those before the run."""
 
     def unstable(self) -> str:
-        """Why the world cannot go on, "" while it can."""
+        """Why the engine gave up; "" if it has not."""
 
     @property
     def dropped(self) -> Drop | None:
-        """The first payload that a robot has dropped, None while there is none. From then on
-        nothing may fire."""
+        """The first dropped payload, if any; nothing may fire after it."""
 
     def figures(self) -> PhysicsFigures | None:
-        """What only bodies can tell, None where there are none."""
+        """Measurements of bodies; None if there are none."""

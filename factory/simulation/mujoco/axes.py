@@ -1,4 +1,4 @@
-"""The slides of a factory in the engine: where the state of each axis is."""
+"""The axes of a factory in the engine: addresses of their state."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from factory.support.engine import mujoco
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Across:
-    """The second slides of robots whose guidepaths have bends: `axes` (b,), their carriages; the
-    `ways` that these go; `row` (axes,): the number of an axis among them, -1 for none. Each (b,):
-    `qpos`, `dof`, `actuator`: addresses in the engine's model."""
+    """The second slides of robots with bent guidepaths: `axes` (b,): their carriages; `ways`: their
+    curves; `row` (axes,): the index of an axis in `axes`, -1 for none. Each (b,): `qpos`, `dof`,
+    `actuator`: addresses in the engine's model."""
 
     axes: Index
     ways: Ways
@@ -30,7 +30,7 @@ class Across:
 
     @classmethod
     def of(cls, m: mujoco.MjModel, layout: Layout, count: int) -> Across:
-        """Those of a layout with so many axes in its compiled model."""
+        """The second slides of a layout with a given number of axes in its compiled model."""
         robots, ways = layout.bent
         called = [layout.factory.robots[robot].name for robot in robots]
         joint = np.array([m.joint(names.slide_across(name)).id for name in called], np.intp)
@@ -41,21 +41,21 @@ class Across:
         return cls(axes, ways, row, address, dof, np.array(drives, np.intp))
 
     def among(self, axes: Index) -> tuple[Index, Index]:
-        """Which of some axes these are, and their numbers."""
+        """Which of some axes have a second slide, and their indices."""
         row = self.row[axes]
         (which,) = (row >= 0).nonzero()
         return which, row[which]
 
     def spread(self, x: Array, along: Array) -> Array:
-        """What is so much along axes (k, axes) at positions (axes,) [m], on their slides and then
-        on the second ones (k, axes + b)."""
+        """A quantity along axes (k, axes) at positions (axes,) [m], resolved into first and second
+        slides (k, axes + b)."""
         _, first, _ = self.ways.at(np.arange(len(self.axes)), x[self.axes])
         both, slides = along[:, self.axes, None] * first, along.copy()
         slides[:, self.axes] = both[..., 0]
         return np.concatenate([slides, both[..., 1]], axis=1)
 
     def along(self, places: Array, speeds: Array) -> tuple[Array, Array]:
-        """Positions [m] and speeds [m/s] (b,) of places and velocities (b, 2)."""
+        """Arc lengths [m] and speeds [m/s] (b,) of positions and velocities (b, 2)."""
         x = self.ways.nearest(places)
         _, first, _ = self.ways.at(np.arange(len(x)), x)
         return x, (speeds * first).sum(axis=-1) / (first**2).sum(axis=-1)
@@ -104,7 +104,7 @@ class Axes:
 
     @property
     def turns(self) -> Truth:
-        """Whether each axis turns about the vertical (axes,)."""
+        """Whether each axis is a rotation about the vertical (axes,)."""
         return np.asarray(self.inertia != 1.0)
 
     def __len__(self) -> int:
@@ -112,7 +112,7 @@ class Axes:
 
     @property
     def tray(self) -> int:
-        """The axis of the outfeed's tray; that of the shutter is the next, and the last."""
+        """The axis of the outfeed's tray; the shutter's is the next and last one."""
         return len(self.qpos) - 2
 
     def of_robot(self, robot: int) -> list[int]:
@@ -131,13 +131,13 @@ class Axes:
         return x, v
 
     def put(self, d: mujoco.MjData, axes: Index, x: Array) -> None:
-        """Axes are at positions [m] from now on, and stand."""
+        """Place axes at positions [m], at rest."""
         self.configure(d.qpos, axes, x)
         d.qvel[self.dof[axes]] = 0.0
         d.qvel[self.across.dof[self.across.among(axes)[1]]] = 0.0
 
     def configure(self, qpos: Array, axes: Index, x: Array) -> None:
-        """Have axes at positions [m] in a configuration (nq,)."""
+        """Place axes at positions [m] in a configuration (nq,)."""
         qpos[self.qpos[axes]] = x
         which, rows = self.across.among(axes)
         if len(rows):
@@ -145,7 +145,7 @@ class Axes:
             qpos[self.qpos[axes[which]]], qpos[self.across.qpos[rows]] = place.T
 
     def off(self, d: mujoco.MjData, x: Array) -> Array:
-        """How far all axes (axes,) are from where they would be at positions [m]."""
+        """Distance of all axes (axes,) from positions [m]."""
         off = np.abs(d.qpos[self.qpos] - x)
         bent = self.across
         if len(bent.axes):

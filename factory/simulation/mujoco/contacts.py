@@ -1,7 +1,7 @@
-"""Contact masks of parts by who holds them, and the pairs of parts left out.
+"""Contact masks of parts by holder, and excluded pairs of parts.
 
-Parts in the same hands are joined and ignore each other; everything else collides: see
-`mjcf/masks.py`. Masks are written on geoms *and* bodies: the broad phase looks at those of bodies.
+Parts in the same hands are joined and do not collide; everything else does: see `mjcf/masks.py`.
+Masks are written on geoms *and* bodies, since the broad phase reads those of bodies.
 """
 
 from __future__ import annotations
@@ -58,15 +58,14 @@ class ContactMasks:
         self._signatures: set[int] = set()
 
     def _solid_geoms(self, bodies: Index) -> Index:
-        """The geoms of bodies that collide: all but those of group 1, which are shown in place of
-        convex pieces."""
+        """The geoms of bodies that collide: all except group 1, which convex pieces replace."""
         first, count = self._m.body_geomadr[bodies], self._m.body_geomnum[bodies]
         geoms = np.concatenate([at + np.arange(n) for at, n in zip(first, count, strict=True)])
         return np.asarray(geoms[self._m.geom_group[geoms] != 1])
 
     def own(self, trees: Mapping[int, int], last: int) -> int:
-        """Give what collides and is no part a code: that of its kinematic tree, or one of its own
-        after the `last` where it is fixed to the floor. Gives the greatest code."""
+        """Assign codes to everything that collides and is not a part: one for each kinematic tree,
+        and one after `last` for each body fixed to the floor. Returns the greatest code."""
         for body in np.flatnonzero(self._masks.any(axis=0)).tolist():
             if self.trunk[body] not in self.solid:
                 tree = int(self._m.body_treeid[body])
@@ -75,14 +74,14 @@ class ContactMasks:
         return last
 
     def look(self, seen: Truth) -> None:
-        """Leave the bodies of all holders out of the broad phase but those that are `seen`
-        (holders,), by code."""
+        """Exclude the bodies of all holders from the broad phase except those `seen` (holders,), by
+        code."""
         shown = seen[self.code]
         np.multiply(self._masks[0], shown, out=self._m.body_contype)
         np.multiply(self._masks[1], shown, out=self._m.body_conaffinity)
 
     def hold(self, holders: Mapping[int, int]) -> None:
-        """From now on parts are each in the hands of a holder (its code), by body."""
+        """Put parts into the hands of holders, by code."""
         m = self._m
         for body, holder in holders.items():
             geoms = self.solid[body]
@@ -96,7 +95,7 @@ class ContactMasks:
             m.geom_contype[geoms], m.geom_conaffinity[geoms] = contype, conaffinity
 
     def remove(self, bodies: Sequence[int]) -> None:
-        """Bodies that are no parts touch nothing any more."""
+        """Let bodies that are not parts collide with nothing."""
         m = self._m
         for body in bodies:
             geoms = m.body_geomadr[body] + np.arange(m.body_geomnum[body])
@@ -104,19 +103,19 @@ class ContactMasks:
             self._masks[:, body] = m.body_contype[body] = m.body_conaffinity[body] = 0
 
     def enter(self, label: str, unit: int, body: int) -> None:
-        """A part's body comes into the factory, for a unit."""
+        """A body enters the factory, for a unit."""
         self.unit[self._own[body]] = unit
         self._exclude(label, unit, body, True)
 
     def leave(self, label: str, body: int) -> None:
-        """A part's body leaves the factory with its unit."""
+        """A body leaves the factory."""
         self._exclude(label, int(self.unit[body]), body, False)
         self.unit[self._own[body]] = -1
 
     def _exclude(self, label: str, unit: int, body: int, now: bool) -> None:
-        """Leave out, or no longer, the pairs of a part with those of its unit that are there. The
-        engine merges the exclusions, a sorted list of unsigned numbers, with its sorted pairs; free
-        slots are behind."""
+        """Exclude the pairs of a part with the present parts of its unit, or include them again.
+        The engine merges the exclusions, a sorted list of unsigned numbers, with its sorted pairs;
+        free slots are at its end."""
         found = (
             (part, other, theirs)
             for part, (partner, theirs) in self._partners.get(label, ())

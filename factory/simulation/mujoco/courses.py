@@ -1,7 +1,7 @@
-"""Courses: what the references of axes do for some ticks, planned ahead.
+"""Courses: the references of axes for a number of ticks, planned ahead.
 
-A reference depends on nothing that is measured, so a course is planned once and then followed, in
-one call of the engine or tick by tick: the run is the same.
+A reference depends on no measurement, so a course is planned once and then followed, in one call of
+the engine or tick by tick, with the same result.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ whether some axis may be at its goal then."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Course:
-    """What the references of n axes do: positions `x` [m] and speeds `v` [m/s] (ticks + 1, n) at
-    the ends of its ticks; the `setpoints` (n, samples, 3) of their drives; whether it ends `near` a
-    goal. It comes near one at its end only."""
+    """The references of n axes: positions `x` [m] and speeds `v` [m/s] (ticks + 1, n) at the ends
+    of ticks; the `setpoints` (n, samples, 3) of their drives; whether it ends `near` a goal. It is
+    near one at its end only."""
 
     x: Array
     v: Array
@@ -42,7 +42,7 @@ class Course:
 
     @property
     def ticks(self) -> int:
-        """How many ticks it takes."""
+        """Its number of ticks."""
         return len(self.x) - 1
 
 
@@ -53,8 +53,8 @@ def planned(
     ticks: tuple[int, int],
     go: Callable[[Array, Array], Move],
 ) -> Course:
-    """The course of axes from positions [m] and speeds [m/s], where `go` says what a tick does: for
-    `ticks[0]` ticks of `ticks[1]` timesteps each, or until something is near its goal."""
+    """The course of axes from positions [m] and speeds [m/s], where `go` advances a tick: for
+    `ticks[0]` ticks of `ticks[1]` timesteps, or until something is near its goal."""
     most, steps = ticks
     xs, vs, accelerations, near = [begin[0]], [begin[1]], list[Array](), False
     while len(accelerations) < most and not near:
@@ -68,8 +68,8 @@ def planned(
 
 
 def along(bundle: Bundle, tick: float, timestep: float) -> Callable[[Array, Array], Move]:
-    """A tick [s] of the modes of a bundle, of timesteps [s]: the field F_p under the limits of its
-    robots."""
+    """The function that advances the modes of a bundle by a tick [s] of timesteps [s]: the field
+    F_p under the limits of its robots."""
 
     def go(x: Array, v: Array) -> Move:
         x1, v1, a = follow(bundle, x, v, tick)
@@ -81,8 +81,7 @@ def along(bundle: Bundle, tick: float, timestep: float) -> Callable[[Array, Arra
 
 
 class Follower:
-    """Some axes of a factory and the course they follow; `x` [m] and `v` [m/s] (axes,) are the
-    references of all axes, of which it keeps its own."""
+    """The axes that follow a course; `x` [m] and `v` [m/s] (axes,): the references of all axes."""
 
     def __init__(self, x: Array, v: Array, drives: Drives, substeps: int) -> None:
         self.x, self.v, self._drives, self._substeps = x, v, drives, substeps
@@ -92,12 +91,12 @@ class Follower:
 
     @property
     def left(self) -> int:
-        """Ticks of the course that are still to come."""
+        """Remaining ticks of the course."""
         return 0 if self.course is None else self.course.ticks - self._at
 
     @property
     def over(self) -> bool:
-        """Whether a course is over."""
+        """Whether the course is over."""
         return self.course is not None and not self.left
 
     @property
@@ -106,8 +105,8 @@ class Follower:
         return self.course is not None and self.over and self.course.near
 
     def until(self, past: Past) -> int:
-        """How many ticks of the course are to come until a reference may be past a point; all that
-        are left where it never is."""
+        """Remaining ticks until a reference may have passed a point; all of them if it never
+        does."""
         if self.course is None or past.axis not in self.axes:
             return self.left
         slot = int(np.flatnonzero(self.axes == past.axis)[0])
@@ -116,12 +115,12 @@ class Follower:
         return int(there.argmax()) if there.any() else self.left
 
     def begin(self, axes: Index, course: Course) -> None:
-        """Let axes follow a course from now on."""
+        """Start a course of axes."""
         self.axes, self.course, self._at = axes, course, 0
         self._drives.follow(axes, course.setpoints)
 
     def show(self, ticks: int) -> None:
-        """Some ticks of the course are about to pass: the references are where they lead to."""
+        """Advance the references by some ticks of the course."""
         course = self.course
         assert course is not None
         self._at += ticks
@@ -129,7 +128,7 @@ class Follower:
         self._drives.show(self.axes, course.setpoints[:, self._at * self._substeps])
 
     def stop(self, axes: Index) -> None:
-        """Let axes stand where their references are, and leave the course."""
+        """Let axes stand at their references and leave the course."""
         self.v[axes] = 0.0
         self._drives.stand(axes, self.x[axes])
         self.course = None

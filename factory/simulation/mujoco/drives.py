@@ -63,21 +63,17 @@ class Drives:
 
     @property
     def most(self) -> int:
-        """How many setpoints a buffer has room for, and one to spare."""
+        """Number of setpoints that fit into a buffer, one to spare."""
         return len(self._head) - 3
 
     @property
     def time(self) -> float:
-        """[s]"""
+        """Simulated time [s]."""
         return float(self._d.time)
 
     def sampled(self, axes: Index, x: Array, v: Array, a: Array, steps: int) -> Array:
-        """Setpoints (n, legs * steps + 1, 3) in every step of legs of so many steps, and after
-        them.
-
-        `x` [m], `v` [m/s] (legs + 1, n): where each leg begins, and where the last ends; `a`
-        [m/s²] (legs, n).
-        """
+        """Setpoints (n, legs * steps + 1, 3) at every step of legs of `steps` steps, and at the
+        end. `x` [m], `v` [m/s] (legs + 1, n): at the ends of legs; `a` [m/s²] (legs, n)."""
         t = self.timestep * np.arange(steps)[:, None]
         weight = self.weight[axes]
         force = self.mass[axes] * a + weight
@@ -95,9 +91,9 @@ class Drives:
         return told
 
     def bent(self, axes: Index, told: Array, a: Array, lag: Array) -> Array:
-        """Setpoints (n, samples, 3) of axes, whose speeds are those of so long before, `lag`
-        (samples,) [s], under accelerations (n, samples) [m/s²]: where guidepaths have bends those
-        of the first slides, and those of the second slides after all (n + b, samples, 3)."""
+        """Setpoints with the second slides appended, (n + b, samples, 3), from setpoints (n,
+        samples, 3) along axes, whose speeds are those of `lag` (samples,) [s] before, and
+        accelerations (n, samples) [m/s²]."""
         which, rows = self._bent(axes)
         if self._across is None or not len(rows):
             return told
@@ -112,19 +108,18 @@ class Drives:
         return np.concatenate([told, both[:, :, 1].swapaxes(0, 1)])
 
     def _bent(self, axes: Index) -> tuple[Index, Index]:
-        """Which of some axes have a second slide, and the numbers of those."""
+        """Which of some axes have a second slide, and their indices."""
         if self._across is None or not len(self._across.axes):
             return NO_AXES, NO_AXES
         return self._across.among(axes)
 
     def _rows(self, axes: Index) -> Index:
-        """The drives of axes: their own, and then the second ones."""
+        """The drives of axes: first slides, then second ones."""
         _, rows = self._bent(axes)
         return np.concatenate([axes, len(self.own) + rows]) if len(rows) else axes
 
     def follow(self, axes: Index, setpoints: Array) -> None:
-        """Let axes follow setpoints (n, samples, 3), one a timestep from now on; the last is
-        held."""
+        """Let axes follow setpoints (n, samples, 3), one each timestep; the last is held."""
         drives, samples = self._rows(axes), setpoints.shape[1]
         actuators, rows, head = self._actuators[drives], self._row[drives], self._head.copy()
         delay, kept = self._history
@@ -135,7 +130,7 @@ class Drives:
         self.show(axes, setpoints[:, -1])
 
     def show(self, axes: Index, setpoint: Array) -> None:
-        """Have the setpoints (n, 3) of now in `ctrl`, which a step puts behind the last sample."""
+        """Write the current setpoints (n, 3) into `ctrl`, which a step appends to the samples."""
         self._d.ctrl.reshape(-1, INPUTS)[self._actuators[self._rows(axes)]] = setpoint
 
     def stand(self, axes: Index, x: Array) -> None:
@@ -147,6 +142,5 @@ class Drives:
         setpoint[actuators] = self.bent(axes, told, np.zeros((len(axes), 1)), np.zeros(1))[:, 0]
 
     def load(self, axes: Index, mass: Array, weight: Array) -> None:
-        """From the next setpoints on axes move a mass beside their own [kg], and carry a weight
-        [N]."""
+        """Set the added mass [kg] and weight [N] of axes, from their next setpoints on."""
         self.mass[axes], self.weight[axes] = self.own[axes] + mass, weight

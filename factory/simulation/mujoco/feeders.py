@@ -1,9 +1,9 @@
 """Feeders: each presents the next part of its label, the n-th for unit n.
 
-A copy gets into a housing while the slider is up, where nothing of it can be seen. It comes down
-when the robot that has taken the last one is out of the way. Feeders of one line, whose parts one
-robot takes, take turns in the order of its program: no part comes down before all their sliders are
-at rest. Whose turn it is follows from how many parts each has shown.
+A copy enters a housing unseen, while the slider is up. It comes down when the robot that took the
+previous one is out of the way. The feeders of one line, whose parts one robot takes, take turns in
+the order of its program: no part comes down before all their sliders are at rest. Whose turn it is
+follows from the number of parts that each has presented.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from factory.simulation.mujoco.welds import Place, Welds
 
 @dataclass(frozen=True, slots=True)
 class Station:
-    """An outlet of a feeder: the label of its parts, the robot (index) that takes them, its
-    feeder's code, and where the part is while the slider is down, and up."""
+    """A feeder's outlet: label, robot (index) that takes its parts, code of the feeder, and
+    positions of the part with the slider down and up."""
 
     label: str
     robot: int
@@ -40,12 +40,9 @@ class Station:
 
 
 class Feeders:
-    """The feeders of a factory, by their outlets (n,). `counts`: how often each transition has
-    fired where the run starts.
-
-    `lacking`: the labels of parts that robots have asked for, and that have not come. `due`: when a
-    part that a robot has asked for too early comes soon enough [s]. `back`: what is taken back.
-    """
+    """The feeders of a factory, by outlet (n,). `counts`: firing counts at the start of the run.
+    `lacking`: labels of parts that robots wait for; `due`: the time by which such a part must come
+    to be in time [s]. `back`: withdrawn parts."""
 
     def __init__(
         self,
@@ -68,7 +65,7 @@ class Feeders:
         self._serve(model.layout)
 
     def _serve(self, layout: Layout) -> None:
-        """From now on robots take parts as in a layout."""
+        """Let robots take parts as in a layout."""
         by_label = layout.factory.by_label
         self._number = {
             station.label: n
@@ -80,19 +77,18 @@ class Feeders:
         self._lines = {self._stations[line[0]].code: line for line in lines if line}
 
     def _turn(self, line: Sequence[int], rounds: Mapping[str, int]) -> int:
-        """Whose turn it is in a line, after so many rounds of each label: the first that is
-        behind."""
+        """Whose turn it is in a line after given rounds of each label: the first that is behind."""
         return min(line, key=lambda number: rounds[self._stations[number].label])
 
     def _vacant(self) -> list[int]:
-        """The feeders whose turn it is in lines that show nothing and take nothing back, but for
-        those for which nothing was left, and has not come back since."""
+        """Feeders whose turn it is in lines that present and withdraw nothing, except those that
+        ran out and have had no copy back since."""
         empty, returns = self._lines.keys() - self._holdings.holders, self._holdings.returns
         lines = [self._lines[code] for code in empty if self._spent.get(code) != returns]
         return sorted(number for number in map(self._next, lines) if number is not None)
 
     def _next(self, line: Sequence[int]) -> int | None:
-        """Whose turn it is in a line; None while it is not known which unit is made next."""
+        """Whose turn it is in a line; None while the next unit is not known."""
         while True:
             number = line[0] if len(line) == 1 else self._turn(line, self.supply.rounds())
             label = self._stations[number].label
@@ -100,30 +96,30 @@ class Feeders:
                 return number if self.supply.is_known(label) else None
 
     def serves(self, label: str) -> bool:
-        """Whether robots take such things from feeders."""
+        """Whether robots take such labels from feeders."""
         return label in self._number
 
     @property
     def welds(self) -> dict[str, int]:
-        """What holds the part that a feeder presents, by label."""
+        """The weld that holds the part that a feeder presents, by label."""
         stations = ((label, self._stations[n].code) for label, n in self._number.items())
         return {label: self._holdings.weld[code, label] for label, code in stations}
 
     @property
     def trees(self) -> dict[int, int]:
-        """The code of the feeder that each slider is of, by its kinematic tree."""
+        """The code of each slider's feeder, by kinematic tree."""
         codes = (station.code for station in self._stations)
         return dict(zip(self._sliders.trees.tolist(), codes, strict=True))
 
     def begin(self) -> None:
-        """Where the run starts, each feeder presents a part if it can and its robot is not yet
-        under way with another."""
+        """At the start, let each feeder present a part if it can and its robot is not yet under way
+        with another."""
         due = [number for number in self._vacant() if not self._passing.holds[number]]
         self._sliders.begin(self._load(due, down=True))
 
     def presents(self, label: str, unit: int) -> bool:
-        """Whether a robot may come for the part for that unit: it is down before the robot can be
-        there, and may be let in."""
+        """Whether a robot may come for the part of a unit: it will be down before the robot, and
+        may be let in."""
         if not self.supply.admits(unit):
             return False
         number = self._number[label]
@@ -138,19 +134,19 @@ class Feeders:
         return True
 
     def taken(self, label: str) -> None:
-        """The robot takes the part."""
+        """The robot takes the presented part."""
         self._passing.holding(self._stations[self._number[label]].robot)
 
     def end(self, operations: Sequence[Operation]) -> None:
-        """These operations have ended: sliders whose parts have been taken go up."""
+        """Operations have ended: sliders whose parts were taken go up."""
         for operation in operations:
             self._passing.end(operation)
         taken = [self._number[o.label] for o in operations if o.label in self._number]
         self._send(np.array(taken, np.intp), down=False)
 
     def tend(self) -> bool:
-        """Let the next parts come down from housings whose sliders have come up, where the robots
-        are out of the way. Whether one comes that a robot has asked for."""
+        """Let the next parts come down from housings whose sliders are up and whose robots are out
+        of the way. Returns whether an awaited part does."""
         self._sliders.settle()
         if self.back.numbers:
             self._take_back()
@@ -170,16 +166,14 @@ class Feeders:
         return bool(come)
 
     def at_rest(self) -> Iterator[tuple[Station, int, int]]:
-        """The parts that are shown by sliders that rest, and have not been looked at: where, for
-        which unit, and the body."""
+        """Presented parts on resting sliders that no camera has examined: station, unit, body."""
         for label, unit in self.shown().items():
             number = self._number[label]
             if label not in self.back.good and self._sliders.ends[number] == NEVER:
                 yield self._stations[number], unit, self._holdings[label, unit]
 
     def take_back(self, label: str, scrap: int) -> None:
-        """A part that is shown goes back into the housing, and is no longer for any unit but for
-        `scrap`."""
+        """Withdraw a presented part; it belongs to the unit `scrap` from now on."""
         number = self._number[label]
         self.supply.next[label] -= self.supply.period
         self._holdings.assign({self._holdings.held(self._stations[number].code)[label]: scrap})
@@ -187,28 +181,27 @@ class Feeders:
         self.back.good.discard(label)
 
     def served(self) -> Iterator[str]:
-        """The labels of feeders that take a part back, but for those whose robots are in its way:
-        it waits for them."""
+        """Labels of feeders that withdraw a part, except those blocked by their robots."""
         for number in self.back.numbers:
             if self._passing.is_aside(number):
                 line = self._lines.get(self._stations[number].code, ())
                 yield from (self._stations[n].label for n in line)
 
     def shown(self) -> dict[str, int]:
-        """The unit of the part that is shown of each label, as they came."""
+        """The unit of the presented part of each label, in the order of presentation."""
         codes, rows = {station.code for station in self._stations}, self._holdings.rows()
         labels = (holding.label for _, holding in rows if holding.holder in codes)
         return {label: unit for label in labels if (unit := self.shows(label)) is not None}
 
     def shows(self, label: str) -> int | None:
-        """The unit of the part that is shown of a label, None where none is."""
+        """The unit of the presented part of a label; None for none."""
         number = self._number[label]
         body = self._holdings.held(self._stations[number].code).get(label)
         return None if body is None or number in self.back.numbers else self._holdings.of(body).unit
 
     def undone(self, units: Mapping[str, int], rounds: Mapping[str, int], scrap: int) -> None:
-        """The next part of each label is for another unit, after so many rounds; what it is no
-        longer the turn of is taken back."""
+        """Set the next unit of each label and the rounds made; parts whose turn it no longer is are
+        withdrawn."""
         self.lacking.clear()
         self._spent.clear()
         turns = {self._turn(line, rounds) for line in self._lines.values()}
@@ -219,37 +212,37 @@ class Feeders:
                 self.take_back(label, scrap + number)
 
     def exchange(self, robot: int, layout: Layout) -> None:
-        """A robot (index) is gone, and others take parts as in a layout. What is shown `elsewhere`
-        has been taken back."""
+        """A robot (index) is removed, and the others take parts as in a layout. Parts presented
+        `elsewhere` have been withdrawn."""
         self._passing.gone(robot)
         self.lacking.clear()
         self._spent.clear()
         self._serve(layout)
 
     def elsewhere(self, layout: Layout) -> list[str]:
-        """The labels of parts that are shown where they are not taken in a layout."""
+        """Labels of presented parts that no robot takes there in a layout."""
         by_label = layout.factory.by_label
         robots = ((x, self._stations[self._number[x]].robot) for x in self.shown())
         return [label for label, robot in robots if by_label[label].carrier != robot]
 
     def in_the_way(self) -> set[int]:
-        """The robots (index) under which a part comes late that they wait for."""
+        """Robots (index) that stand under a late part that they wait for."""
         vacant = self._vacant()
         due = (self._stations[n] for n in self._obstructed() if n in vacant)
         return {station.robot for station in due if self._supplied(station.label)}
 
     def _obstructed(self) -> list[int]:
-        """Feeders that are late, whose robots stand where the next part comes down. That robots are
-        in time for it, unless something fails, is in the layout."""
+        """Late feeders whose robots stand where the next part comes down. Only after a failure: the
+        layout sees to it otherwise."""
         late = self.back.late if self.supply.recovers else ()
         return [n for n in late if self._passing.is_under(n)]
 
     def stay_clear(self, robot: int) -> None:
-        """The next part for a robot (index) comes down when that is out of the way."""
+        """Let the next part of a robot (index) come down only when the robot is out of the way."""
         self._passing.come_clear(robot)
 
     def _take_back(self) -> None:
-        """Sliders with what is taken back go up, and let go of it where nothing of it is seen."""
+        """Move sliders with withdrawn parts up, and release these out of sight."""
         for number in [*self.back.numbers]:
             if self._sliders.ends[number] < NEVER:
                 continue
@@ -264,8 +257,7 @@ class Feeders:
         self._welds.write()
 
     def _is_busy(self, number: int) -> bool:
-        """Whether a feeder is in a line of which a slider is on its way, or is to show nothing
-        yet."""
+        """Whether a slider in a feeder's line moves, or the feeder must present nothing yet."""
         ends, line = self._sliders.ends, self._lines[self._stations[number].code]
         awaited = self.back.awaited
         return any(ends[n] < NEVER or self._stations[n].label in awaited for n in line)
@@ -275,8 +267,8 @@ class Feeders:
         self._welds.masks.fresh.update(self._stations[n].code for n in numbers.tolist())
 
     def _load(self, numbers: Sequence[int], down: bool = False) -> Index:
-        """Put the next copies into feeders, where there are some to spare and units that need
-        them. Gives which."""
+        """Put copies into feeders that have some to spare and units that need them. Returns
+        which."""
         loaded = [n for n in numbers if self._supplied(self._stations[n].label)]
         missing = {*numbers}.difference(loaded)
         codes = (self._stations[number].code for number in missing)

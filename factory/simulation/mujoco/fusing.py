@@ -1,8 +1,8 @@
-"""Parts that are joined for good become one rigid body: same mass, pose and momentum.
+"""Fusion: parts joined for good become one rigid body of the same mass, pose and momentum.
 
-The exchange conserves linear and angular momentum: they go over to the body that takes the place of
-the others, whose mass and inertia are theirs together. What is lost is their motion against each
-other, which the welds that join them have brought to rest before.
+Linear and angular momentum are conserved: they are given to the new body, whose mass and inertia
+are the sum of theirs. Only motion of the parts against each other is lost, which the welds have
+damped before.
 """
 
 from __future__ import annotations
@@ -24,11 +24,9 @@ first [m]."""
 
 
 class Fusion:
-    """Of free bodies whose origins are their centres of mass.
-
-    `places` (nbody, 3): where those are in the frame of the product; `radii` (nbody,): how far
-    their vertices are from there [m].
-    """
+    """Fuses free bodies whose origins are their centres of mass. `places` (nbody, 3): their
+    positions in the frame of the product; `radii` (nbody,): largest distance of a vertex from there
+    [m]."""
 
     def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, places: Array, radii: Array) -> None:
         self._d, self._mass, self._places, self._radii = d, m.body_mass.copy(), places, radii
@@ -41,8 +39,8 @@ class Fusion:
         self._yields = (axes / np.maximum(m.body_inertia, least)[:, None]) @ back
 
     def misfits(self, groups: Sequence[Sequence[int]]) -> Array:
-        """For groups of bodies (n,): how far at most any vertex is from its place beside the
-        group's first body [m]. Bodies never turn but by what their welds yield."""
+        """For groups of bodies (n,): largest displacement of a vertex relative to the group's first
+        body [m]. Bodies turn only as far as their welds yield."""
         sizes = [len(group) for group in groups]
         first = np.repeat([group[0] for group in groups], sizes)
         bodies, d = np.concatenate(groups), self._d
@@ -55,17 +53,17 @@ class Fusion:
         return np.asarray(np.maximum.reduceat(apart, starts))
 
     def sleeps(self, bodies: Mapping[str, int]) -> bool:
-        """Whether bodies that one holder has sleep: all do, or none."""
+        """Whether the bodies of a holder sleep: all do, or none."""
         return bool(self._d.tree_asleep[self._tree[next(iter(bodies.values()))]] >= 0)
 
     def turns(self, bodies: Sequence[int]) -> float:
-        """How far at most any of some bodies is turned against the first [rad]."""
+        """Largest rotation of bodies against the first [rad]."""
         turn = self._d.xmat[np.array(bodies)].reshape(-1, 3, 3)
         return float(angles(turn[0].T @ turn).max())
 
     def fuse(self, bodies: Sequence[int], whole: int) -> None:
-        """Put the body `whole` in the place of others, with their momentum and angular momentum.
-        Its attitude is that of the heaviest. Angular speeds are in a body's own frame."""
+        """Replace bodies by the body `whole`, with their momentum and angular momentum, and the
+        attitude of the heaviest. Angular velocities are in body frames."""
         d, chosen = self._d, np.array(bodies)
         mass = self._mass[chosen]
         share = mass / mass.sum()

@@ -1,4 +1,4 @@
-"""The dry friction of slides: what a guide has empty, and more under the weight of a load."""
+"""Dry friction of guides: a constant, and a share of the load's weight."""
 
 from __future__ import annotations
 
@@ -11,10 +11,8 @@ from factory.support.engine import mujoco
 
 
 class Guides:
-    """The guides of some axes, of which `dof` (axes,) are the degrees of freedom.
-
-    `empty` (axes,): friction without a load [N], which the model has when this is made.
-    """
+    """The guides of axes with degrees of freedom `dof` (axes,). `empty` (axes,): friction without a
+    load [N], as in the model."""
 
     def __init__(self, m: mujoco.MjModel, dof: Index, across: Across) -> None:
         self._m, self._dof, self._across = m, dof, across
@@ -22,12 +20,12 @@ class Guides:
         self._loads = np.zeros(len(dof))
 
     def load(self, axes: Index, loads: Array) -> None:
-        """From now on axes bear loads [kg] beside their own weight."""
+        """Set the loads of axes beside their own weight [kg]."""
         self._loads[axes] = loads
         self._rub(axes)
 
     def rub(self, axes: Index, newtons: float) -> None:
-        """From now on axes have another friction when they are empty [N]."""
+        """Set the friction of empty axes [N]."""
         self.empty[axes] = newtons
         self._rub(axes)
 

@@ -1,4 +1,5 @@
-"""Who holds which part, for which unit: one table, from which welds and contact masks follow."""
+"""Which holder has which part, for which unit: one table, from which welds and contact masks
+follow."""
 
 from __future__ import annotations
 
@@ -67,37 +68,37 @@ class Holdings:
         return self._present[part]
 
     def of(self, body: int) -> HeldPart:
-        """What a body that is in the factory is, and who holds it."""
+        """The label, unit and holder of a body in the factory."""
         return self._of[body]
 
     def rows(self) -> Iterator[tuple[int, HeldPart]]:
-        """All bodies that are in the factory, as they came into it."""
+        """All bodies in the factory, in the order of their coming."""
         return iter(self._of.items())
 
     @property
     def holders(self) -> Set[int]:
-        """The codes of those that have something."""
+        """The codes of holders that have something."""
         return self._held.keys()
 
     def held(self, holder: int) -> Mapping[str, int]:
-        """The bodies that a holder (its code) has, by label."""
+        """The bodies of a holder (code), by label."""
         return self._held.get(holder, NOTHING)
 
     def unit(self, holder: int) -> int | None:
-        """The unit that a holder (its code) has parts of, None where it has nothing."""
+        """The unit of a holder's parts (code); None if it has nothing."""
         body = next(iter(self.held(holder).values()), None)
         return None if body is None else self._of[body].unit
 
     def hand(self, robot: int) -> Mapping[str, int]:
-        """The bodies that a robot (index) holds, by label."""
+        """The bodies in a robot's hand (index), by label."""
         return self.held(robot_code(robot))
 
     def in_hands(self) -> dict[int, Mapping[str, int]]:
-        """The same of each robot (index) that holds something."""
+        """The bodies in each robot's hand (index), by label."""
         return {code - 1: held for code, held in self._held.items() if code < self._tray}
 
     def loads(self) -> dict[int, float]:
-        """What each robot (index) that holds something carries [kg]."""
+        """Mass of each robot's payload (index) [kg]."""
         held = self.in_hands().items()
         return {robot: sum(self._mass[label] for label in bodies) for robot, bodies in held}
 
@@ -110,7 +111,7 @@ class Holdings:
         return ((weld, holder) for (holder, _), weld in self.weld.items())
 
     def take(self, label: str, unit: int, holder: int) -> int:
-        """A holder (its code) gets a part to spare, for a unit; gives its body."""
+        """Give a spare part to a holder (code), for a unit. Returns its body."""
         body = self.free[label].popleft()
         self._welds.loose([self.parking[body][0]])
         self._enter(body, HeldPart(label, unit, NOBODY))
@@ -119,23 +120,22 @@ class Holdings:
         return body
 
     def move(self, bodies: Iterable[int], holder: int) -> None:
-        """Bodies go from hand to hand: from now on this holder (its code) has them. The gaps of its
-        grips are measured."""
+        """Hand bodies over to a holder (code). The gaps of its grips are measured."""
         for body in [*bodies]:
             self._let_go(body)
             self._switch(body, holder)
             self._welds.grip({self.weld[holder, self._of[body].label]: body})
 
     def drop(self, holder: int) -> dict[str, int]:
-        """A holder (its code) lets go of all that it has, which falls; gives the bodies by label.
-        They touch whatever they touched before."""
+        """Release all bodies of a holder (code), which fall; returns them by label. They collide
+        with the same bodies as before."""
         bodies = dict(self.held(holder))
         for body in bodies.values():
             self._let_go(body)
         return bodies
 
     def put_away(self, bodies: Iterable[int]) -> None:
-        """Bodies are to spare from now on, out of sight."""
+        """Park bodies as spares, out of sight."""
         for body in [*bodies]:
             self.returns += 1
             self._let_go(body)
@@ -144,7 +144,7 @@ class Holdings:
             self.free[self._of.pop(body).label].append(body)
 
     def assign(self, units: Mapping[int, int]) -> None:
-        """Bodies are for other units from now on."""
+        """Assign bodies to other units."""
         for body in units:
             self._leave(body)
         for body, unit in units.items():
@@ -167,7 +167,7 @@ class Holdings:
         self._welds.hold([body], holder)
 
     def _let_go(self, body: int) -> None:
-        """Whoever holds a body does no longer."""
+        """Release a body from its holder."""
         label, _, holder = self._of[body]
         if holder == NOBODY:
             return
@@ -186,7 +186,7 @@ class Holdings:
 
 
 def _welds(m: mujoco.MjModel, model: Model) -> dict[tuple[int, str], int]:
-    """The weld by which each holder, by its code, holds a label: robots first, then the tray, then
+    """The weld by which each holder (code) holds a label: robots first, then the tray, then
     feeders."""
     factory, outlets, found = model.factory, outlets_of(model.layout), dict[tuple[int, str], str]()
     for grip in grips_of(model.layout, model.carried):

@@ -1,4 +1,4 @@
-"""What is measured in the engine while a factory runs: residuals, contacts, finished products."""
+"""Measurements in the engine during a run: weld residuals, contacts, finished products."""
 
 from __future__ import annotations
 
@@ -21,13 +21,10 @@ from factory.support.engine import mujoco
 
 
 class Inspection:
-    """Keeps the worst figures of a run. Contacts are looked at after every step of the engine.
-
-    `joining`: for each operation under way (index) the unit whose inputs it joins. `onsets`: of
-    contact that nothing intends; `pressing`: what is no such contact. `residual` [m]: the largest
-    of a weld's position. `error`: that of a product, None before one is finished. `soundness`: of
-    the engine's model.
-    """
+    """Keeps the worst figures of a run. Contacts are inspected after every step of the engine.
+    `joining`: for each operation under way (index) the unit whose inputs it joins. `onsets`:
+    unintended contacts; `pressing`: intended ones. `residual` [m]: largest position error of a
+    weld. `error`: that of a product, None before the first. `soundness`: of the engine's model."""
 
     def __init__(
         self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, soundness: Soundness
@@ -44,11 +41,11 @@ class Inspection:
 
     @property
     def unintended(self) -> list[tuple[str, str]]:
-        """The names of the geoms of each contact that nothing intends."""
+        """The pairs of geoms, by name, of unintended contacts."""
         return self.onsets.pairs
 
     def exchange(self, layout: Layout) -> None:
-        """From now on robots do what a layout says."""
+        """Let robots do what a layout says."""
         self._model = replace(self._model, layout=layout)
 
     def welds(self) -> None:
@@ -57,13 +54,13 @@ class Inspection:
             self.residual = max(self.residual, float(np.abs(residuals(self._d)).max()))
 
     def tick(self) -> None:
-        """A tick is over: what touched in it may be apart."""
+        """At the end of a tick, forget which geoms touched."""
         if not self._d.ncon:
             self.onsets.apart()
 
     def contacts(self) -> None:
-        """Keep the forces between inputs that are being joined, and count the onsets of all other
-        contacts but those of pads with what they hold: nothing intends those."""
+        """Record the forces between inputs that are being joined, and count the onsets of all other
+        contacts except between pads and their payloads."""
         found = self._d.contact
         now = set()
         for number in np.flatnonzero(found.dist[: self._d.ncon] < 0).tolist():
@@ -77,7 +74,7 @@ class Inspection:
         self.onsets.note(now, float(self._d.time))
 
     def _joined(self, one: int, other: int) -> str | None:
-        """The label of the operation that is joining the parts of two geoms, None for none."""
+        """The label of the operation that joins the parts of two geoms; "" for none."""
         a, b = self._m.geom_bodyid[[one, other]].tolist()
         unit, code = self._masks.unit, self._masks.code
         if unit[a] < 0 or unit[a] != unit[b]:
@@ -95,8 +92,8 @@ class Inspection:
         self.force[label] = max(self.force.get(label, 0.0), force)
 
     def measure(self, unit: int, bodies: np.ndarray, misfit: Misfit) -> None:
-        """Keep the error of the finished product of a unit, and how far off its parts were when
-        they became one body."""
+        """Record the error of the finished product of a unit, with the misfit of its parts when
+        they were fused."""
         product = self._products[unit % len(self._products)]
         found = product.measure(self._d, bodies).worse(misfit)
         self.error = found.worse(self.error or Misfit())

@@ -1,8 +1,9 @@
-"""What disturbances do to the engine: forces, masses, drives, friction, measurements.
+"""Disturbances in the engine: forces, masses, drives, friction, measurements.
 
-Masses, friction and limits are written into the model at once. Pushes, measurements and weak drives
-act before every timestep. A drive's force is kp (reference - measured) + ...; a measurement that is
-off by e enters the engine's own feedback as the constant -kp e - kv e', which is added to its bias.
+Masses, friction and limits are written into the model at once. Pushes, measurement errors and weak
+drives act before every timestep. A drive's force is kp (reference - measured) + ...; a measurement
+error e enters the engine's own feedback as the constant -kp e - kv e', which is added to its
+bias.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ it, and nothing ever sticks."""
 
 
 class Interference:
-    """Acts on a world. Axes are carriages and lifts, by number; the outfeed is left alone."""
+    """Disturbs a world. Axes are carriages and lifts, by number; the outfeed is left alone."""
 
     def __init__(self, world: MujocoWorld) -> None:
         self._world, self._m, self._d = world, world.m, world.d
@@ -49,18 +50,18 @@ class Interference:
         self._world.parts.joining.weigh(self._m, self._d)
 
     def rub(self, axes: Index, newtons: float) -> None:
-        """Axes have dry friction when they are empty, and as much more under a load as ever."""
+        """Set the dry friction of empty axes; the share of the load stays as it is."""
         self._world.motion.guides.rub(axes, newtons)
         self._m.dof_solimp[self._dof[self._slides(axes)], :2] = HARD
 
     def drag(self, axes: Index, speed: Array) -> None:
-        """Axes have damping with which their drives' greatest force holds a `speed` [m/s]."""
+        """Give axes the damping at which their drives' greatest force sustains a `speed` [m/s]."""
         force, second = self._m.actuator_forcerange[self._actuator[axes], 1], self._second(axes)
         damping = force / speed
         self._m.dof_damping[self._dof[self._slides(axes)]] = [*damping, *damping[second]]
 
     def weaken(self, axes: Index, factor: float) -> None:
-        """Drives give `factor` times the force that they are asked for."""
+        """Scale the forces of drives by `factor`."""
         slides = self._slides(axes)
         drives = self._actuator[slides]
         self._gain[slides] *= factor
@@ -70,23 +71,23 @@ class Interference:
             self._hook()
 
     def mismeasure(self, measure: Measure) -> None:
-        """Positions and speeds are measured like this, by drives and supervisor."""
+        """Set the function by which drives and supervisor measure positions and speeds."""
         self._measures.append(measure)
         self._hook()
         self._measure()
 
     def push(self, body: int, force: Array | None) -> None:
-        """A body is pushed with a force (3,) [N] from now on, or no more."""
+        """Push a body with a force (3,) [N] from now on, or stop pushing."""
         self._d.xfrc_applied[body, :3] = 0.0 if force is None else force
         self._world.motion.sleep.wake([body])
 
     def off(self, axis: int) -> float:
-        """How far an axis is from its setpoint [m], in the direction of its slide."""
+        """Deviation of an axis from its setpoint [m]."""
         setpoint = self._d.ctrl.reshape(-1, INPUTS)[self._actuator[axis], 0]
         return float(self._d.qpos[self._axes.qpos[axis]] - setpoint)
 
     def greatest_force(self, axis: int) -> float:
-        """Of an axis's drive [N]."""
+        """Greatest force of an axis's drive [N]."""
         return float(self._m.actuator_forcerange[self._actuator[axis], 1])
 
     def _hook(self) -> None:
@@ -96,7 +97,7 @@ class Interference:
             self._world.hooks.sensors.append(lambda x, v: self._measured or (x, v))
 
     def _act(self) -> None:
-        """Before a timestep."""
+        """Act before a timestep."""
         self._measure()
         bias = np.zeros(len(self._gain))
         for axis in np.flatnonzero(self._gain != 1.0).tolist():

@@ -1,4 +1,4 @@
-"""Joined sub-assemblies become one body each, once their parts have settled."""
+"""Sub-assemblies become one body each once their joined parts have settled."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ NOTHING: Mapping[int, float] = MappingProxyType({})
 
 
 class Joining:
-    """Where the model has bodies for sub-assemblies: `waiting`, the label that each robot (index)
-    has joined and since when [s]; `misfit`: how far out of place a unit's parts were when
-    they became one."""
+    """The fusions of a model that has bodies for sub-assemblies. `waiting`: the label that each
+    robot (index) has joined, and when [s]; `misfit`: by unit, the misfit of its parts when they
+    were fused."""
 
     def __init__(self, model: Model, holdings: Holdings, welds: Welds) -> None:
         self._model, self._holdings, self._welds = model, holdings, welds
@@ -30,7 +30,7 @@ class Joining:
         self._asleep: set[int] = set()
 
     def weigh(self, m: mujoco.MjModel, d: mujoco.MjData) -> None:
-        """From now on bodies have the masses that the model has."""
+        """Take the masses of bodies from the model again."""
         places, radii = np.zeros((m.nbody, 3)), np.zeros(m.nbody)
         for label, ids in self._holdings.body.items():
             places[ids] = self._model.carried.centre[label]
@@ -38,13 +38,13 @@ class Joining:
         self.fusion = Fusion(m, d, places, radii)
 
     def joined(self, robot: int, label: str, now: float) -> None:
-        """A robot has joined the parts of a sub-assembly."""
+        """Note that a robot has joined the parts of a sub-assembly."""
         if label in self._model.carried.wholes:
             self.waiting[robot] = label, now
 
     def settle(self, now: float) -> None:
-        """Let one body take the place of those that a robot has joined, once they have settled.
-        What has been looked at asleep is not looked at again before it wakes."""
+        """Fuse joined parts that have settled. Parts once examined asleep are not examined again
+        before they wake."""
         late = [robot for robot, (_, since) in self.waiting.items() if now - since > SETTLING]
         asleep = {r for r in late if self.fusion.sleeps(self._holdings.hand(r))}
         late = [robot for robot in late if robot not in asleep or robot not in self._asleep]
@@ -55,9 +55,8 @@ class Joining:
             self._welds.write()
 
     def fuse(self, robots: Iterable[int], apart: Mapping[int, float] = NOTHING) -> None:
-        """Let one body each take the place of those that robots (index) have joined, if it has not
-        yet. Where no copy of that body is free, its holder's bodies become one first. `apart`:
-        misfits that are known [m]."""
+        """Fuse what robots (index) have joined, if not done yet. If no copy of that body is free,
+        those of its holder are fused first. `apart`: known misfits [m]."""
         for robot in robots:
             if robot not in self.waiting:
                 continue
@@ -69,13 +68,13 @@ class Joining:
             self._become_one(robot, label, misfit)
 
     def _misfits(self, robots: Sequence[int]) -> list[float]:
-        """How far out of place anything is of what each robot holds [m]."""
+        """The misfit of each robot's payload [m]."""
         held = [[*self._holdings.hand(robot).values()] for robot in robots]
         return list(map(float, self.fusion.misfits(held)))
 
     def _become_one(self, robot: int, label: str, misfit: float) -> None:
-        """A robot gets one body, of this label, for all that it holds. A body that has just become
-        free may be that one, so it is put away first."""
+        """Replace a robot's payload by one body of a label. That may be one that is being freed, so
+        the payload is put away first."""
         self._welds.write()
         bodies = [*self._holdings.hand(robot).values()]
         unit = self._holdings.of(bodies[0]).unit

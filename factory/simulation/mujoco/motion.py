@@ -1,4 +1,4 @@
-"""How the axes of a factory move in the engine: references, drives, sleep, and the steps."""
+"""The motion of the axes in the engine: references, drives, sleep, steps."""
 
 from __future__ import annotations
 
@@ -54,15 +54,15 @@ class Motion:
         self.plan = np.zeros((4, len(self.axes)))
 
     def begin(self, loads: Mapping[int, float]) -> None:
-        """All axes stand, and each robot (index) carries its load [kg]."""
+        """Let all axes stand, and each robot (index) carry its load [kg]."""
         every = np.arange(len(self.axes))
         self.load([*self.axes.lift], [0.0] * len(self.axes.lift))
         self.load([*loads], [*loads.values()])
         self.robots.stop(every)
 
     def load(self, robots: Sequence[int], loads: Sequence[float]) -> None:
-        """From now on robots (index) carry so much [kg], and their guides: those with a lift that
-        stands hold it at once, all others from their next courses on."""
+        """Set the payloads of robots (index) [kg] in drives and guides: at once for lifts that
+        stand, for all others from their next courses on."""
         if not robots:
             return
         lift, mass, carriages = self.axes.lift, np.array(loads), np.array(robots)
@@ -77,7 +77,7 @@ class Motion:
                 self.drives.stand(stand, self.robots.x[stand])
 
     def put(self, at: Mapping[int, float]) -> None:
-        """Axes are put somewhere else [m], and stand there."""
+        """Place axes elsewhere [m], at rest."""
         axes, x = np.array([*at], np.intp), np.array([*at.values()])
         self.axes.put(self._d, axes, x)
         self.robots.x[axes] = x
@@ -85,8 +85,8 @@ class Motion:
         self.sleep.wake(self.axes.body[axes].tolist())
 
     def turn(self, active: Index) -> None:
-        """Other modes are active. Robots whose operation has ended stop where their reference is:
-        they may hand over at a low speed, which would carry them out of the goal, and of the next
+        """Activate other modes. Robots whose operation has ended stop at their references: a
+        handover may happen at a low speed, which would carry them out of the goal and of the next
         domain."""
         left = np.zeros(len(self.axes), bool)
         left[self.active] = True
@@ -101,8 +101,8 @@ class Motion:
         self.stepping.turn(np.concatenate(moving))
 
     def step(self, bundle: Bundle | None, ticks: int) -> int:
-        """Follow the modes of a bundle, and the tray's way, for some ticks, but not past the end of
-        a course; gives how many."""
+        """Follow the modes of a bundle, and the tray's way, for some ticks, at most to the end of a
+        course. Returns how many."""
         ticks = min(ticks, self.stepping.at_once)
         if bundle is not None:
             self.plan_robots(bundle)
@@ -116,7 +116,7 @@ class Motion:
         return ticks
 
     def move_tray(self, ticks: int) -> int:
-        """The tray follows its way for some ticks, but not past the end of a course; gives how
+        """Move the tray along its way for some ticks, at most to the end of a course. Returns how
         many."""
         self.plan_tray()
         follower = self.outfeed.follower
@@ -127,7 +127,7 @@ class Motion:
         return ticks
 
     def plan_tray(self) -> None:
-        """The tray's next course begins where one is over. Come to its goal, it stands."""
+        """Start the tray's next course when one is over. At its goal it stands."""
         outfeed, follower = self.outfeed, self.outfeed.follower
         if outfeed.moves and not follower.left:
             self._begin(follower, outfeed.axes, self._tray_course(*outfeed.beginning))
@@ -137,14 +137,14 @@ class Motion:
             self.sleep.may_sleep(outfeed.axes)
 
     def plan_robots(self, bundle: Bundle) -> None:
-        """The next stride of the active modes begins where one is over."""
+        """Start the next stride of the active modes when one is over."""
         if not self.robots.left:
             self._plan(bundle)
             if self.outfeed.moves:  # its courses end with those of the robots
                 self.outfeed.follower.course = None
 
     def _plan(self, bundle: Bundle) -> None:
-        """The next stride of the active modes. The load of each robot is that of its operation."""
+        """The next stride of the active modes, each robot with the payload of its operation."""
         axes, robots = self.active, self.robots
         self._begin(robots, axes, self._course(bundle, robots.x[axes], robots.v[axes]))
 
@@ -173,14 +173,14 @@ class Motion:
         return self.stepping.course(begin, lambda: outfeed.course(x, v))
 
     def send_tray(self, loaded: bool) -> None:
-        """The tray goes away with a product, or home without."""
+        """Send the tray away with a product, or home without."""
         self.outfeed.send(loaded)
         self.guides.load(self.outfeed.axes, self.outfeed.load)
         self.sleep.stay_awake(self.outfeed.axes)
 
     def move(self, axes: Index, x: Array, v: Array, a: Array) -> None:
-        """From now on `axes` run from x [m] at speed v [m/s] under acceleration a [m/s²], for as
-        long as setpoints can be written ahead, or until they are told otherwise."""
+        """Let `axes` run from x [m] at speed v [m/s] under acceleration a [m/s²], for as long as
+        setpoints can be written ahead or until the next call."""
         self.robots.x[axes], self.robots.v[axes] = x, v
         self.plan[0, axes] = self.drives.time
         self.plan[1:, axes] = x, v, a
@@ -210,6 +210,6 @@ class Motion:
             self.drives.show(axes, self.drives.bent(axes, told, a[:, None], np.zeros(1))[:, 0])
 
     def _planned(self, axes: Index, t: Array) -> tuple[Array, Array]:
-        """Where axes are on their plans, and how fast, some time [s] after those began."""
+        """Positions and speeds of axes on their plans, some time [s] after these began."""
         _, x, v, a = self.plan[:, axes]
         return x + t * (v + t / 2 * a), v + t * a

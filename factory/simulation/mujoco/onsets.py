@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 
 class Onsets:
-    """`pairs`: the names of the geoms of each, in the order of time; `begun`: when the first was
+    """`pairs`: the pairs of geoms, by name, in the order of time; `begun`: time of the first onset
     [s]. `name` gives a geom's name."""
 
     def __init__(self, name: Callable[[int], str]) -> None:
@@ -16,7 +16,7 @@ class Onsets:
         self._touching: frozenset[tuple[int, int]] = frozenset()
 
     def note(self, now: set[tuple[int, int]], t: float) -> None:
-        """These pairs of geoms touch at a time [s], after a step of the engine."""
+        """Record the touching pairs of geoms at a time [s], after a step of the engine."""
         fresh = sorted(now - self._touching)
         if fresh and self.begun is None:
             self.begun = t
@@ -24,5 +24,5 @@ class Onsets:
         self._touching = frozenset(now)
 
     def apart(self) -> None:
-        """Nothing touches."""
+        """Forget which geoms touch."""
         self._touching = frozenset()

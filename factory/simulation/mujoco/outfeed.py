@@ -1,5 +1,5 @@
-"""The outfeed's tray: it goes into the shed with a product, and comes back without. In between the
-shed is shut."""
+"""The outfeed's tray: it carries a product into the shed and comes back empty. In between the shed
+is shut."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ CLOSE = NEAR + AHEAD
 
 
 class Outfeed:
-    """The tray and its way, and the shutter of its shed. `goal` [m]: where the tray goes, 0 is
-    home. `busy`: it is away, or has not been seen at rest at home, the shed open, since. `loading`:
-    it has just been given a product, and leaves a tick later."""
+    """The tray and the shutter of its shed. `goal` [m]: where the tray goes, 0 is home. `busy`: it
+    has not been at rest at home, with the shed open, since it left. `loading`: it has just been
+    given a product, and leaves a tick later."""
 
     def __init__(
         self, d: mujoco.MjData, model: Model, axes: Axes, follower: Follower, drives: Drives
@@ -48,23 +48,23 @@ class Outfeed:
         self._limits = speed, acceleration
 
     def send(self, loaded: bool) -> None:
-        """From now on it carries a product, or none, and goes away, or home."""
+        """Send the tray away with a product, or home without."""
         self.goal, self.busy, self.loading = self._far[0] if loaded else 0.0, True, loaded
         self._drives.load(self.axes, self.load, WEIGHT)
         self.follower.course = None
 
     @property
     def load(self) -> Array:
-        """What tray and shutter carry (2,) [kg]."""
+        """Loads of tray and shutter (2,) [kg]."""
         return np.array([self._product if self.goal else 0.0, 0.0])
 
     @property
     def ends(self) -> list[float]:
-        """Where tray and shutter go [m]: the shed is shut while a product is in it."""
+        """Goals of tray and shutter [m]: the shed is shut while a product is in it."""
         return [self.goal, self._far[1] if self.goal else 0.0]
 
     def rests(self) -> bool:
-        """Whether tray and shutter rest where they go."""
+        """Whether tray and shutter rest at their goals."""
         x, v = self._d.qpos[self._address[0]], self._d.qvel[self._address[1]]
         slow = NEAR / self._settings.tick
         return all(
@@ -74,7 +74,7 @@ class Outfeed:
 
     @property
     def moves(self) -> bool:
-        """Whether a reference has yet to come to rest at its end, or it is busy."""
+        """Whether a reference is not at rest at its goal, or the tray is busy."""
         if self.busy:
             return True
         x, v = (each[self.axes].tolist() for each in (self.follower.x, self.follower.v))
@@ -82,16 +82,16 @@ class Outfeed:
 
     @property
     def beginning(self) -> tuple[Array, Array]:
-        """Where its next course begins [m], and how fast [m/s]."""
+        """Positions [m] and speeds [m/s] at which the next course begins."""
         return self.follower.x[self.axes], self.follower.v[self.axes]
 
     def course(self, x: Array, v: Array) -> Course:
-        """A stride of its way from there, as fast as its limits allow, until it is nearly there."""
+        """A stride of its way at the limits, until it is near its goal."""
         ticks = self._settings.stride, self._settings.steps
         return planned(self._drives, self.axes, (x, v), ticks, self._go)
 
     def _go(self, x: Array, v: Array) -> Move:
-        """A tick: the shutter begins to come down when the product is past it."""
+        """Advance by a tick: the shutter begins to come down when the product is past it."""
         ends = np.array(self.ends)
         goals = ends if x[0] >= self._far[0] - BEHIND + PLAY else np.array([self.goal, 0.0])
         x1, v1, a = towards(goals, x, v, self._limits, self._settings.tick)

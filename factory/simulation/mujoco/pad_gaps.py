@@ -1,7 +1,6 @@
-"""How far the pads of holders are from what they take, as they take it.
-
-All of it is of now: the engine tells of where its last step began.
-"""
+"""Distances between the pads of holders and their payloads at the moment of taking. They are
+computed from the current state; the engine's derived quantities belong to the start of its last
+step."""
 
 from __future__ import annotations
 
@@ -16,12 +15,9 @@ from factory.support.engine import mujoco
 
 
 class PadGaps:
-    """`largest` [m]: the largest distance between the pads of a holder and the nearest of the
-    bodies that it holds, None while no holder with pads has taken any.
-
-    A holder's pads are measured when it takes what it holds first. Welds are rigid: what it takes
-    besides makes the nearest of its bodies no farther.
-    """
+    """`largest` [m]: largest distance between a holder's pads and the nearest of its bodies; None
+    while no holder with pads has taken anything. Pads are measured at a holder's first payload.
+    Welds are rigid, so further bodies bring the nearest no farther away."""
 
     def __init__(self, m: mujoco.MjModel, d: mujoco.MjData) -> None:
         self.largest: float | None = None
@@ -36,8 +32,8 @@ class PadGaps:
             self._at_zero[pads] = d.geom_xpos[pads] - moved
 
     def measure(self, on: Mapping[int, int]) -> None:
-        """Measure welds that are about to be switched on, each with its body. A holder that lets go
-        of parts for what they have become has taken that before."""
+        """Measure welds that are about to close, each with its body. A holder that exchanges parts
+        for their fused body has been measured before."""
         taken: dict[int, tuple[int, list[int]]] = {}
         for weld, body in on.items():
             holder = int(self._m.eq_obj1id[weld])

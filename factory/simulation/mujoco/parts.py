@@ -66,9 +66,9 @@ class Parts:
         self.welds.write()
 
     def bear(self) -> bool:
-        """Hands whose load is more than they bear let go of it: whether there are any. Their
-        robots do not know: what they hold by the books stays the same. Where a weld has closed less
-        than a tick ago it may still pull its part into place, and nothing is measured."""
+        """Open hands whose load exceeds their strength. Returns whether there are any. Their robots
+        do not notice. Welds closed less than a tick ago may still pull their part into place, so
+        nothing is measured then."""
         if self._d.time - self.welds.closed < TICKS * self.model.settings.tick:
             return False
         loose = self.strength.look()
@@ -78,13 +78,13 @@ class Parts:
         return bool(loose)
 
     def complete(self, ended: Sequence[tuple[Operation, int]]) -> None:
-        """What robots of operations that end have joined is one body before it changes hands."""
+        """Fuse what robots of ending operations have joined, before it changes hands."""
         if self.joining.waiting:
             self.joining.fuse([robot for operation, _ in ended for robot in operation.robots])
 
     def hand_over(self, ended: Sequence[tuple[Operation, int]]) -> None:
-        """Switch the grips that the ends of operations ask for, each with the number of its unit: a
-        feeder's too, and at dropoff all of the output robot's against those of the tray."""
+        """Switch the grips at the ends of operations, each with its unit; a feeder's too, and at
+        dropoff all of the output robot's for those of the tray."""
         for operation, unit in ended:
             if self.model.factory.drops(operation.index):
                 self.holdings.move(self.holdings.hand(operation.carrier).values(), self.tray)
@@ -106,7 +106,7 @@ class Parts:
         self.joining.joined(carrier, operation.label, float(self._d.time))
 
     def recycle(self) -> None:
-        """Return the bodies of the product on the tray to their feeders, out of sight."""
+        """Return the bodies of the product on the tray to the feeders, out of sight."""
         assert self.on_tray is not None
         self.joining.misfit.pop(self.on_tray, None)
         self.holdings.put_away(self.holdings.held(self.tray).values())
@@ -145,7 +145,7 @@ class Parts:
                         yield label, unit, holder.carrier
 
     def _give(self, m: mujoco.MjModel, label: str, unit: int, robot: int) -> None:
-        """Put a copy into a robot's hands, where the weld holds it."""
+        """Put a copy into a robot's hand, at the pose of the weld."""
         weld = np.array([self.holdings.weld[robot_code(robot), label]])
         x, y, z = held_at(m, weld, self._d.xpos, self._d.xmat)[0].tolist()
         self.welds.place(self.holdings.take(label, unit, robot_code(robot)), (x, y, z))

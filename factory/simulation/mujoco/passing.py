@@ -1,4 +1,4 @@
-"""The robots that feeders serve: whether they are out of the way, and how soon they can be back."""
+"""The robots that feeders serve: whether they are out of the way, and how soon they can return."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ class _Lifts:
 
 
 class Passing:
-    """The robots that take parts from feeders, by outlets (n,). `holds` (n,): it has yet to deliver
-    the part that it took last."""
+    """The robots that take parts from feeders, by outlet (n,). `holds` (n,): whether the part taken
+    last is not delivered yet."""
 
     def __init__(
         self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, request: RunRequest
@@ -73,53 +73,53 @@ class Passing:
         self.holds = np.zeros(len(carriers), bool)
 
     def end(self, operation: Operation) -> None:
-        """An operation has ended: robots of it may have delivered."""
+        """Note that robots of an ended operation may have delivered."""
         for robot, label in zip(operation.robots, operation.after, strict=True):
             if robot in self._fed and label == NOPART:
                 self.holds[self._fed[robot]] = False
 
     def holding(self, robot: int) -> None:
-        """A robot (index) has taken a part from its feeder."""
+        """Note that a robot (index) has taken a part from its feeder."""
         self.holds[self._fed[robot]] = True
 
     def gone(self, robot: int) -> None:
-        """A robot (index) has been taken away for good."""
+        """Note that a robot (index) has been removed."""
         self._clear[self._fed.get(robot, [])] = np.inf
 
     def come_clear(self, robot: int) -> None:
-        """A robot (index) holds nothing, and the next part comes down once it is out of the way, or
-        at home if its hand has to be there first."""
+        """A robot (index) holds nothing: the next part comes down once it is out of the way, or at
+        home if its hand must be there first."""
         for number in self._fed.get(robot, ()):
             self.holds[number] = not self._first[number]
 
     def is_aside(self, number: int) -> bool:
-        """Whether a robot is out of the way of what its feeder shows. One whose hand is there
-        before that comes down is never in its way."""
+        """Whether a robot is clear of its feeder's part. A robot whose hand must be there before
+        the part always is."""
         at = self._at()[0][number]
         return bool(self._first[number] or at <= self._clear[number])
 
     def is_under(self, number: int) -> bool:
-        """Whether a robot's hand, which has nothing to hold, is where the next part comes down: one
-        that holds from above comes when that is down."""
+        """Whether a robot's empty hand is where the next part comes down. Hands from above come
+        after the part."""
         return self._kinds[number] == "above" and not self.is_aside(number)
 
     def clear(self) -> Truth:
-        """Whether each robot (n,) is so far away with its part that the next can come down; or, if
-        its hand has to be there first, rests at home without one."""
+        """Whether each robot (n,) is far enough away with its part for the next one to come down;
+        or, if its hand must be there first, rests at home without one."""
         at, v = self._at()
         home = ~self.holds & (np.abs(v) < STILL) & (at >= self._home - HOME)
         self._lifts.narrow(home, self._d)
         return np.asarray(np.where(self._first, home, ~self.holds | (at <= self._clear)))
 
     def soonest(self, number: int) -> float:
-        """The least time in which a robot can be at its feeder [s]; 0 for one whose hand comes from
-        above: the part has to be down before."""
+        """Least time in which a robot can be at its feeder [s]; 0 for a hand from above: the part
+        has to be down before."""
         if self._kinds[number] == "above":
             return 0.0
         way = float(self._home[number] - self._at()[0][number])
         return self._fastest.rest(max(way, 0.0))
 
     def _at(self) -> tuple[Array, Array]:
-        """Where the robots (n,) are [m], and how fast [m/s]."""
+        """Positions [m] and speeds [m/s] of the robots (n,)."""
         x, v = self._axes.measured(self._d)
         return x[self._carriers], v[self._carriers]

@@ -1,5 +1,4 @@
-"""Contact that is no fault of the factory: that of a pad with what it is to hold, and of what has
-fallen."""
+"""Contacts that are no fault of the factory: of pads with their payloads, and of fallen bodies."""
 
 from __future__ import annotations
 
@@ -24,10 +23,10 @@ FREE = 6
 
 
 class Pressing:
-    """What the pads of robots and feeders are to hold. `fallen`: bodies that lie about, or that a
-    feeder shows askew; `askew`: the latter, which press on nothing; `shaken`: those that what has
-    fallen has touched since, with all that is in the same hands; `touched`: the pairs of geoms of
-    which one was of any of these."""
+    """The payloads that pads of robots and feeders may touch. `fallen`: bodies that lie about or
+    askew in a feeder; `askew`: the latter, which press on nothing; `shaken`: bodies touched by
+    fallen ones, with all in the same hands; `touched`: the pairs of geoms that involve any of
+    these."""
 
     def __init__(self, m: mujoco.MjModel, model: Model, masks: ContactMasks) -> None:
         factory, layout = model.factory, model.layout
@@ -45,8 +44,8 @@ class Pressing:
             self._holds.setdefault(slider.rpartition("/")[0], set()).add(outlet.label)
 
     def meant(self, one: int, other: int, apart: float) -> bool:
-        """Whether of two geoms, so far `apart` [m], one is a pad and the other what that is to
-        hold, and neither is deep in the other; or one has fallen."""
+        """Whether a contact of two geoms, `apart` [m], is intended: one is a pad and the other its
+        payload, neither deep in the other; or one has fallen."""
         if (self.fallen or self.shaken) and self._has_fallen(one, other):
             return True
         if apart < -PRESSED:
@@ -54,7 +53,7 @@ class Pressing:
         return self._bears(one, other) or self._bears(other, one)
 
     def _has_fallen(self, one: int, other: int) -> bool:
-        """Whether one of two geoms is of what has fallen, or what that has shaken."""
+        """Whether one of two geoms belongs to a fallen or shaken body."""
         bodies = {*self._m.geom_bodyid[[one, other]].tolist()}
         if bodies.isdisjoint(self.fallen | self.shaken):
             return False
@@ -64,7 +63,7 @@ class Pressing:
         return True
 
     def knocked(self, one: int, other: int) -> None:
-        """Two geoms touch that are joined now: one is shaken where the other alone has fallen."""
+        """Two geoms of joined parts touch: one becomes shaken if only the other has fallen."""
         bodies = {*self._m.geom_bodyid[[one, other]].tolist()}
         if self.fallen and len(bodies & self.fallen) == 1:
             self._shake(bodies)

@@ -1,4 +1,4 @@
-"""How far the parts of a finished product are from their places in it, and how far turned."""
+"""Errors of position and rotation of the parts of a finished product."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from factory.support.engine import mujoco
 
 @dataclass(frozen=True, slots=True)
 class Misfit:
-    """How far any vertex is from its place beside a first body [m], how far any body is turned
+    """Largest displacement of a vertex relative to a first body [m], largest rotation of a body
     against that one [rad], and the `label` of the body with that vertex."""
 
     vertex: float = 0.0
@@ -27,8 +27,8 @@ class Misfit:
 
 
 class ProductError:
-    """The vertices of a product: which body each is of, and where it belongs, in the frame of its
-    own body and in that of the first."""
+    """The vertices of a product: the body of each, and its position in the frames of that body and
+    of the first."""
 
     def __init__(self, model: Model, product: str) -> None:
         solids, bodies = model.layout.product.solids, model.carried

@@ -1,4 +1,4 @@
-"""Sleep: the engine leaves out what has been slow for a while, until it is woken."""
+"""Sleep: the engine skips slow kinematic trees until they are woken."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FRESH = -1 - int(mujoco.mjMINAWAKE)
 
 
 class Sleep:
-    """Which axes stay awake, by their kinematic `trees` (axes,), and how bodies are woken."""
+    """Keeps axes awake, by their kinematic `trees` (axes,), and wakes bodies."""
 
     def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, trees: Index) -> None:
         self._m, self._d, self._trees = m, d, trees
@@ -29,8 +29,7 @@ class Sleep:
         self._awake = np.zeros(len(trees), bool)
 
     def stay_awake(self, axes: Index) -> None:
-        """Axes of an active mode do not sleep: a robot that fell asleep before its next setpoint
-        would never move again."""
+        """Keep the axes of an active mode awake: a robot asleep would ignore its next setpoint."""
         new = axes[~self._awake[axes]]
         if len(new):
             self._awake[new] = True
@@ -38,7 +37,7 @@ class Sleep:
             self._rouse(self._trees[new])
 
     def may_sleep(self, axes: Index) -> None:
-        """Axes are in no active mode any more; but what an awake axis belongs to stays awake."""
+        """Let axes sleep that are in no active mode, except in trees with an awake axis."""
         self._awake[axes] = False
         self._m.tree_sleep_policy[self._trees[axes]] = MAY_SLEEP
         self._m.tree_sleep_policy[self._trees[self._awake]] = STAYS_AWAKE

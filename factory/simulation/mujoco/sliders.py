@@ -1,8 +1,7 @@
-"""The sliders of the feeders: each goes up empty and comes down with a part. From that of a line
-several parts hang, one after the other; it comes down to a height of its own with each.
+"""The sliders of feeders: each goes up empty and comes down with a part.
 
-A stroke is planned once for all, and written ahead as a whole when it begins. So nothing is done
-for a slider while it is under way.
+The slider of a line presents several parts, one after the other, each at its height. A stroke is
+planned once and written ahead as a whole when it begins, so a moving slider costs nothing.
 """
 
 from __future__ import annotations
@@ -33,9 +32,8 @@ NEVER = np.inf
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Strokes:
-    """The ways of n sliders, up without a load and then down with it: from where to where they go,
-    `low` and `high` (n,) [m], the `seconds` (2, n) that they take, and the `setpoints` (2, n,
-    samples, 3) of their drives."""
+    """The strokes of n sliders, up empty and then down with a load: from `low` to `high` (n,) [m],
+    their durations `seconds` (2, n), and the `setpoints` (2, n, samples, 3) of their drives."""
 
     low: Array
     high: Array
@@ -46,8 +44,8 @@ class Strokes:
     def of(
         cls, drives: Drives, loads: Array, ends: tuple[Array, Array], ticks: int, s: Settings
     ) -> Strokes:
-        """Those of sliders that go up and down between two `ends` [m] with such loads [kg], in no
-        more than so many ticks."""
+        """The strokes of sliders between two `ends` [m] with given loads [kg], within a number of
+        ticks."""
         (low, high), every = ends, np.arange(len(loads))
         limits = _limits(s, len(loads))
         ways: list[Course] = []
@@ -101,17 +99,16 @@ class Sliders:
 
     @property
     def now(self) -> float:
-        """What is due by then is due [s]."""
+        """The current time of strokes' ends [s]."""
         return self._drives.time + self._soon
 
     def _load(self, chosen: Index, loaded: bool) -> None:
-        """Sliders carry their loads, or nothing."""
+        """Set the loads of sliders."""
         load = self._loads[chosen] * loaded
         self._drives.load(chosen, load, (SLIDER_MASS + load) * GRAVITY)
 
     def begin(self, down: Index) -> None:
-        """All sliders stand where the run begins: up without a load, but for those that are `down`
-        with theirs."""
+        """At the start all sliders stand: up and empty, or `down` with their loads."""
         up = np.setdiff1d(np.arange(len(self.ends)), down)
         for chosen, at, is_down in (
             (up, self._strokes.high, False),
@@ -121,19 +118,19 @@ class Sliders:
             self._stand(chosen, is_down)
 
     def _stand(self, chosen: Index, down: bool) -> None:
-        """Sliders stand down with their loads, or up without."""
+        """Let sliders stand, down with their loads or up and empty."""
         if len(chosen):
             self._load(chosen, down)
             ends = self._strokes.low if down else self._strokes.high
             self._drives.stand(chosen, ends[chosen])
 
     def is_up(self, number: int) -> bool:
-        """Whether a slider that rests is up."""
+        """Whether a resting slider is up."""
         low, high = self._strokes.low[number], self._strokes.high[number]
         return bool(self._d.qpos[self._address[number]] > (low + high) / 2)
 
     def send(self, chosen: Index, down: bool, loaded: bool = False) -> None:
-        """Sliders set out, down with their loads or up without, or with what is taken back."""
+        """Start strokes: down with loads, up empty, or up with a withdrawn part."""
         if not len(chosen):
             return
         self._load(chosen, down or loaded)
@@ -144,8 +141,7 @@ class Sliders:
         self._sleep.wake(self._body[chosen])
 
     def show(self, steps: int) -> None:
-        """Some timesteps are about to pass: the setpoints of sliders under way are those of
-        then."""
+        """Write the setpoints of moving sliders after some timesteps."""
         (moving,) = (self.ends < NEVER).nonzero()
         if len(moving):
             since = (self._drives.time - self._begun[moving]) / self._drives.timestep
@@ -155,8 +151,8 @@ class Sliders:
             self._drives.show(moving, setpoints[self._down[moving], moving, at])
 
     def settle(self) -> None:
-        """Sliders that have come to the end of their ways since stand. The engine lets them sleep
-        by itself: until there they are never slow."""
+        """Let sliders stand that have completed their strokes since. The engine lets them sleep by
+        itself: until then they are never slow."""
         (over,) = (self.ends <= self._drives.time + self._drives.timestep / 2).nonzero()
         if len(over):
             down = self._down[over] == 1
@@ -166,12 +162,12 @@ class Sliders:
 
 
 def _limits(settings: Settings, count: int) -> tuple[Array, Array]:
-    """The speeds and accelerations of so many sliders."""
+    """Speed and acceleration limits of sliders."""
     speed, acceleration = settings.feeder_limits
     return np.full(count, speed), np.full(count, acceleration)
 
 
 def _padded(setpoints: Array, samples: int) -> Array:
-    """So many setpoints (n, samples, 3), the last one again and again."""
+    """A given number of setpoints (n, samples, 3), with the last one repeated."""
     more = samples - setpoints.shape[1]
     return np.pad(setpoints, ((0, 0), (0, more), (0, 0)), mode="edge")

@@ -1,8 +1,8 @@
-"""Whether the engine's model is that of the factory: what should be solid is, bodies weigh what
-their parts do and have their shapes, and nothing in the engine is switched off.
+"""Whether the engine's model is that of the factory: solid things collide, bodies have the mass and
+shape of their parts, and nothing in the engine is switched off. A run of another model proves
+nothing.
 
-A run of another model proves nothing. What is expected comes from the layout's parts and from who
-holds what, not from the model that was written.
+The expectation comes from the layout's parts and from the holdings, not from the written model.
 """
 
 from __future__ import annotations
@@ -82,11 +82,11 @@ class Soundness:
         self._geoms = np.stack([np.concatenate([*solid.values()]), owner])
 
     def weigh(self, bodies: Iterable[int], factor: float) -> None:
-        """Bodies weigh `factor` times as much, on purpose."""
+        """Expect bodies to weigh `factor` times as much, as a disturbance has set."""
         self.mass[[*bodies]] *= factor
 
     def glance(self) -> None:
-        """See whether all parts have the masks of what their holders hold, before hands change."""
+        """Check that all parts have the masks of their holders' payloads, before hands change."""
         geoms, owner = self._geoms
         wrong = self._m.geom_contype[geoms] != masks_of(1)[0] * self.masks.code[owner]
         if wrong.any() and not self.found:
@@ -94,7 +94,7 @@ class Soundness:
             self.found = tuple(_each("NotSolid", "{} is not solid", names))
 
     def look(self) -> None:
-        """Look for what is not as it should be, unless something was not before."""
+        """Check everything, unless a fault was found before."""
         self.found = self.found or (
             *self._options(),
             *self._loose(),
@@ -103,7 +103,7 @@ class Soundness:
         )
 
     def _options(self) -> Iterator[Diagnostic]:
-        """The engine's options that are not a factory's."""
+        """Engine options that differ from a factory's."""
         option = self._m.opt
         for name, bit in mujoco.mjtDisableBit.__members__.items():
             if int(bit) & option.disableflags & ~HARMLESS:
@@ -117,7 +117,7 @@ class Soundness:
         yield from _each("Options", "gravity acts less on {}", map(self._body, floating))
 
     def _loose(self) -> Iterator[Diagnostic]:
-        """What does not collide, and should."""
+        """Geoms that should collide and do not."""
         m, layout = self._m, self._model.layout
         stations = self._stations()
         at = stations[~np.isin(m.geom_bodyid[stations], [*self.gone])]
@@ -136,14 +136,14 @@ class Soundness:
         yield from _each("NotSolid", "{} do not collide", self._left_out())
 
     def _stations(self) -> Index:
-        """The geoms of robots and of what stands, which collide with everything."""
+        """The geoms of robots and stations, which collide with everything."""
         m, bodies = self._m, range(self._m.nbody)
         robots = np.array([names.kind(self._body(body)) == "robot" for body in bodies])
         stands = [names.kind(n) in STANDS and not n.endswith(ROD) for n in self._name]
         return np.flatnonzero(robots[m.geom_bodyid] & (m.geom_group == 0) | stands)
 
     def _unmasked(self) -> Iterator[str]:
-        """The geoms of held parts whose masks are not those of what their holder holds."""
+        """Geoms of held parts whose masks are not those of their holder's payloads."""
         m, held = self._m, dict[int, list[tuple[int, int]]]()
         for weld, code in self._grips():
             if self._d.eq_active[weld]:
@@ -155,7 +155,7 @@ class Soundness:
             yield from (self._name[geom] for geom in geoms[~right].tolist())
 
     def _left_out(self) -> Iterator[str]:
-        """The pairs of bodies that are left out of contact, and should not be."""
+        """Pairs of bodies that are excluded from contact and should not be."""
         apart = {frozenset(pair) for pair in self._model.excluded}
         listed = self._m.exclude_signature.view(np.uint32)
         for signature in listed[listed != np.iinfo(np.uint32).max].tolist():
@@ -164,7 +164,7 @@ class Soundness:
                 yield " and ".join(pair)
 
     def _heavy(self) -> Iterator[Diagnostic]:
-        """Bodies that weigh something else than they should."""
+        """Bodies of a wrong mass."""
         mass, wanted, up = self._m.body_mass.copy(), self.mass, self._m.body_parentid
         for body in range(self._m.nbody - 1, 0, -1):
             mass[up[body]] += mass[body]
@@ -173,8 +173,7 @@ class Soundness:
         yield from _each("Mass", "{}", words)
 
     def _misshapen(self) -> Iterator[Diagnostic]:
-        """Parts whose geoms are elsewhere in their bodies than in the product, or of another
-        size."""
+        """Parts whose geoms differ in place or size from the product."""
         m, wrong = self._m, list[str]()
         shape = np.hstack([m.geom_pos, m.geom_quat, m.geom_size])
         if np.array_equal(shape, self._shape):
@@ -193,8 +192,8 @@ class Soundness:
             self._shape = shape
 
     def _nominal(self, label: str, body: int, geoms: Index) -> tuple[Array, Array, Array]:
-        """Where the geoms of a body are in it (n, 3), how they are turned (n, 3, 3), and their
-        sizes (n, 3); nan for those of meshes."""
+        """Positions (n, 3), rotations (n, 3, 3) and sizes (n, 3) of the geoms of a body; nan for
+        meshes."""
         m, solids, bodies = self._m, self._model.layout.product.solids, self._model.carried
         place, turn = np.zeros((len(geoms), 3)), np.zeros((len(geoms), 3, 3))
         size = np.full((len(geoms), 3), np.nan)
@@ -217,7 +216,7 @@ class Soundness:
 
 
 def _each(code: str, words: str, wrong: Iterable[str]) -> Iterator[Diagnostic]:
-    """A fault of each of the first, and how many more have it."""
+    """A fault for each of the first names, and the number of the others."""
     found = list(dict.fromkeys(wrong))
     yield from (Diagnostic(code, words.format(name)) for name in found[:NAMED])
     if len(found) > NAMED:

@@ -1,4 +1,4 @@
-"""How the engine is stepped: one timestep a call here; `fast/` does the same in fewer calls."""
+"""Stepping of the engine, one timestep a call; `fast/` does the same in fewer calls."""
 
 from __future__ import annotations
 
@@ -15,26 +15,23 @@ from factory.support.settings import Settings
 
 
 class Stepping(Protocol):
-    """Steps the engine and plans courses. Whoever does it, a run is the same, to the last bit.
-
-    `at_once`: how many ticks go to the engine in one call, at most. `seconds`: spent in the
-    engine's steps.
-    """
+    """Steps the engine and plans courses. Every implementation gives the same run, to the last bit.
+    `at_once`: largest number of ticks in one call; `seconds`: time spent in the engine's steps."""
 
     at_once: int
     seconds: float
 
     def turn(self, active: Index) -> None:
-        """These axes move from now on, and no others."""
+        """Let exactly these axes move."""
 
     def follow(self, axes: Index, course: Course) -> None:
-        """Axes follow a course from now on."""
+        """Let axes follow a course."""
 
     def advance(self, steps: int) -> None:
-        """Some timesteps; what touches in any of them is inspected."""
+        """Advance by timesteps; contacts are inspected in each."""
 
     def course(self, begin: Hashable, make: Callable[[], Course]) -> Course:
-        """The course that `make` gives; `begin` is all that it depends on."""
+        """The course that `make` gives; `begin` determines it."""
 
 
 class SingleSteps:
@@ -54,13 +51,13 @@ class SingleSteps:
         self.hooks, self.inspection, self._substeps = hooks, inspection, settings.steps
 
     def turn(self, active: Index) -> None:
-        """All bodies are looked at, whatever moves."""
+        """Every body stays in the broad phase."""
 
     def follow(self, axes: Index, course: Course) -> None:
-        """All bodies are looked at, wherever it leads."""
+        """Every body stays in the broad phase."""
 
     def advance(self, steps: int) -> None:
-        """Some timesteps; hooks are called before each."""
+        """Advance by timesteps; hooks are called before each."""
         for number in range(steps):
             if number and number % self._substeps == 0:
                 self.inspection.tick()
@@ -77,5 +74,5 @@ class SingleSteps:
         self.seconds += perf_counter() - begin
 
     def course(self, begin: Hashable, make: Callable[[], Course]) -> Course:
-        """It is planned anew."""
+        """The course, planned anew."""
         return make()

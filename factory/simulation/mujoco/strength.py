@@ -1,8 +1,8 @@
-"""How much of the strength of hands their loads use, as measured, and which hands let go.
+"""The share of hands' strength that their loads use, as measured, and hands that let go.
 
-A weld holds a body at its centre of mass. Its force and torque are the same load as a force and a
-moment about the middle of the tips, which is what tips bear: a hand that holds far from the centre
-of mass bears the moment of the weight, too. All of it is of where the engine's last step began.
+A weld holds a body at its centre of mass. Its force and torque are equivalent to a force and a
+moment about the middle of the tips, which is what tips bear: a hand far from the centre of mass
+bears the moment of the weight too. All values belong to the start of the engine's last step.
 """
 
 from __future__ import annotations
@@ -81,8 +81,8 @@ class Strength:
         self._next, self._risen = -np.inf, float(d.time)
 
     def look(self) -> list[int]:
-        """Measure all hands that hold something and are awake, if that was not done just before.
-        Gives the welds of those whose load is more than they bear."""
+        """Measure all hands that hold something and are awake, unless just done. Returns the welds
+        of overloaded hands."""
         d = self._d
         if not self._grips or not d.ne or d.time < self._next:
             return []
@@ -105,7 +105,7 @@ class Strength:
         return [self._grips[grip][1] for grip in grips[weak].tolist()]
 
     def _keep(self, found: Array, grips: Index) -> None:
-        """Keep the largest share of those that hold something."""
+        """Keep the largest share."""
         holding = np.unique(self._hand[grips[grips < len(self._grips)]])
         if len(holding):
             worst = int(holding[found[holding].argmax()])
@@ -114,10 +114,10 @@ class Strength:
             self.most = self._use(worst, max(0.0, float(found[worst])), grips)
 
     def _of_grips(self) -> Array:
-        """For each grip what of its weld's rows uses strength (grips + 1, 11, 6). Rows of place are
-        the opposite of the force on the body, those of turn twice the opposite of the torque; so
-        they are the load as it acts at the body's centre of mass. Bodies keep the axes of the
-        world."""
+        """For each grip the map from the rows of its weld to the terms of strength (grips + 1, 11,
+        6). Position rows are the opposite of the force on the body, rotation rows twice the
+        opposite of the torque: together the load at the body's centre of mass. Bodies keep the axes
+        of the world."""
         found = np.zeros((len(self._grips) + 1, TERMS, ROWS))
         layout = self._model.layout
         grips = {(grip.robot, grip.label): grip for grip in grips_of(layout, self._model.carried)}
@@ -135,7 +135,7 @@ class Strength:
         return found
 
     def _use(self, number: int, share: float, grips: Index) -> StrengthUse:
-        """What the n-th hand holds, and which share of its strength that uses."""
+        """The payload of the n-th hand, and the share of its strength used."""
         factory, carried = self._model.factory, self._model.carried
         robot = factory.robots[int(self._robots[number])]
         held = grips[self._hand[grips] == number].tolist()
@@ -146,7 +146,7 @@ class Strength:
         return StrengthUse(share, robot.name, next(whole, bodies[0]))
 
     def _drop(self, number: int, use: StrengthUse) -> Drop:
-        """What is said of the n-th hand, which lets go."""
+        """The diagnostic of the n-th hand, which lets go."""
         factory, now, robot = self._model.factory, float(self._d.time), int(self._robots[number])
         bears = _told(self._hands[robot])
         message = (
@@ -158,7 +158,7 @@ class Strength:
 
 
 def _told(hand: Hand) -> str:
-    """What a hand holds with, in words."""
+    """The grip of a hand, in words."""
     what = {"suction": "suction pad", "pin": "pin"}[hand.tip]
     tips = f"two {what}s" if len(hand.places) > 1 else f"a {what}"
     return f"{tips}, radius {1e3 * hand.radius:g} mm"

@@ -1,4 +1,4 @@
-"""What feeders have to show: the units that need parts, and parts that go back."""
+"""What feeders have to present: units that need parts, and withdrawn parts."""
 
 from __future__ import annotations
 
@@ -27,23 +27,23 @@ class Supply:
         self.recovers = request.recovers
 
     def rounds(self) -> dict[str, int]:
-        """How many parts of each label have been taken."""
+        """Number of parts of each label taken."""
         return {label: unit // self.period for label, unit in self.next.items()}
 
     def wants(self, label: str) -> bool:
-        """Whether some unit has yet to get its part."""
+        """Whether a unit still needs its part."""
         if self.word.demand:
             return bool(self.word.makes(self.next[label]))
         return self.next[label] < max(self.word.most, self._begun[label])
 
     def skips(self, label: str) -> bool:
-        """Whether the next unit is not made, so that it is the turn of the one after that."""
+        """Whether the next unit is not made, so that the turn passes on."""
         skipped = self.word.makes(self.next[label]) is False
         self.next[label] += self.period * skipped
         return skipped
 
     def is_known(self, label: str) -> bool:
-        """Whether it is known if the next unit is made."""
+        """Whether the next unit is known."""
         return self.word.makes(self.next[label]) is not None
 
     def admits(self, unit: int) -> bool:
@@ -53,11 +53,10 @@ class Supply:
 
 @dataclass(slots=True)
 class TakenBack:
-    """What goes wrong with parts that are shown. `numbers`: the feeders whose part is on its way
-    back; `fresh`: those that have begun to be shown, with their unit, by
-    label; `good`: labels whose part has been looked at and is good; `awaited`: labels of which none
-    is to come yet; `late`: feeders that had nothing to show on their turn, so that their robots may
-    be home before the next part comes down."""
+    """Withdrawn parts. `numbers`: feeders that withdraw a part; `fresh`: units of parts that have
+    begun to be presented, by label; `good`: labels whose presented part passed the camera;
+    `awaited`: labels of which none may come yet; `late`: feeders that had nothing to present on
+    their turn, so that their robots may be home before the next part."""
 
     numbers: list[int] = field(default_factory=list)
     fresh: dict[str, int] = field(default_factory=dict)

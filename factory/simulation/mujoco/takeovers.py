@@ -1,4 +1,4 @@
-"""What is measured of bodies as a grip closes on them, before it pulls."""
+"""Measurements of bodies as a grip closes on them."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class Takeovers:
         self._qpos = m.jnt_qposadr[m.body_jntadr][:, None] + np.arange(7)
 
     def measure(self, welds: Index, bodies: Index) -> None:
-        """Welds close on bodies: where those are now, while `xpos` tells of where the last step
-        began."""
+        """Measure bodies on which welds close, at their current places; `xpos` belongs to the start
+        of the last step."""
         q, frames = self._d.qpos, self._frames.chosen(welds)
         pose = q[self._qpos[bodies]]
         gap = np.linalg.norm(pose[:, :3] - frames.at(q[frames.along]), axis=1)

@@ -1,6 +1,5 @@
-"""The welds that a run switches, who holds which body, and bodies put somewhere: all that changes
-between two steps of the engine, gathered and written at once.
-"""
+"""The welds that a run switches, and bodies that it places: all changes between two steps of the
+engine, gathered and written at once."""
 
 from __future__ import annotations
 
@@ -53,20 +52,20 @@ class Welds:
         self._on.update(welds)
 
     def grip(self, welds: Mapping[int, int]) -> None:
-        """Switch welds on that take bodies over: their gaps are measured."""
+        """Close welds that take bodies over: their gaps are measured."""
         self.join(welds)
         self._gripped.update(welds)
 
     def hold(self, bodies: Iterable[int], holder: int) -> None:
-        """From now on parts are in the hands of a holder (its code)."""
+        """Put parts into the hands of a holder (code)."""
         self._held.update(dict.fromkeys(bodies, holder))
 
     def place(self, body: int, at: Place) -> None:
-        """Put a free body somewhere [m], at rest, in the orientation in which it is presented."""
+        """Place a free body [m], at rest, in the orientation in which it is presented."""
         self._placed[body] = at
 
     def turn(self, body: int, quaternion: Array, aside: Array) -> None:
-        """Turn a free body, so far `aside` (3,) [m] from where it is."""
+        """Turn a free body, displaced by `aside` (3,) [m]."""
         address = self._m.jnt_qposadr[self._m.body_jntadr[body]]
         self._d.qpos[address : address + 3] += aside
         self._d.qpos[address + 3 : address + 7] = quaternion
@@ -74,7 +73,7 @@ class Welds:
         self._sleep.wake([body])
 
     def write(self) -> None:
-        """Write all that has been gathered into the engine; bodies that it concerns are woken."""
+        """Write all gathered changes into the engine, and wake the bodies concerned."""
         if not (self._on or self._off or self._held or self._placed):
             return
         self._put()
@@ -96,7 +95,7 @@ class Welds:
             gathered.clear()
 
     def _put(self) -> None:
-        """Put bodies where they belong; `xpos` too, which the engine renews in its next step."""
+        """Place bodies; `xpos` too, which the engine renews in its next step."""
         if not self._placed:
             return
         bodies, at = np.array([*self._placed]), np.array([*self._placed.values()])

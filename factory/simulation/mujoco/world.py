@@ -91,7 +91,7 @@ class MujocoWorld:
 
     @property
     def time(self) -> float:
-        """[s]"""
+        """Simulated time [s]."""
         return float(self.d.time)
 
     @property
@@ -114,12 +114,12 @@ class MujocoWorld:
 
     @property
     def lacking(self) -> set[str]:
-        """The labels of parts that have been asked for, and have not come."""
+        """Labels of parts that robots wait for."""
         return self.parts.feeders.lacking
 
     def prepared(self, operation: Operation, unit: int) -> bool:
-        """A feeder presents the part of that unit, if it is made; the outfeed has room for a
-        product."""
+        """Whether a feeder presents the part of that unit, if it is made; whether the outfeed is
+        free."""
         if not self.hooks.admit(operation, unit):
             return False
         if self.parts.feeders.serves(operation.label) and self.word.is_made(unit):
@@ -177,11 +177,11 @@ class MujocoWorld:
         return motion.robots.near
 
     def move(self, axes: Index, x: Array, v: Array, a: Array) -> None:
-        """From now on `axes` run from x [m] at speed v [m/s] under acceleration a [m/s²]."""
+        """Let `axes` run from x [m] at speed v [m/s] under acceleration a [m/s²]."""
         self.motion.move(axes, x, v, a)
 
     def advance(self, steps: int) -> None:
-        """Some timesteps, the axes as `move` has set them going."""
+        """Advance by timesteps, with the axes moving as set by `move`."""
         self.motion.stepping.advance(steps)
 
     def exchange(self, robot: int, layout: Layout) -> None:
@@ -196,14 +196,14 @@ class MujocoWorld:
         self.inspection.exchange(layout)
 
     def in_the_way(self, away: Container[int]) -> set[int]:
-        """The robots (index) that stand where a part comes late that they wait for, but for those
-        one of whose axes is to stay `away`."""
+        """Robots (index) that block the late part that they wait for, except those with an axis in
+        `away`."""
         lift = self.motion.axes.lift
         robots = self.parts.feeders.in_the_way()
         return {r for r in robots if r not in away and lift.get(r, r) not in away}
 
     def settle(self) -> None:
-        """A tick's timesteps are over, and the tray's next tick begins."""
+        """At the end of a tick's timesteps, start the tray's next tick."""
         self.motion.settle()
         if self._looks(1):
             self._bear()
@@ -211,8 +211,8 @@ class MujocoWorld:
         self.motion.plan_tray()
 
     def _settle(self, ticks: int) -> None:
-        """After some ticks: at the end of a course look at what is not looked at in every tick, and
-        always at the outfeed's tray."""
+        """After some ticks: at the end of a course make the less frequent checks; always look after
+        the outfeed's tray."""
         looks = self._looks(ticks)
         self._unseen += ticks
         self.inspection.tick()
@@ -234,18 +234,18 @@ class MujocoWorld:
             self.motion.send_tray(False)
 
     def _looks(self, ticks: int) -> bool:
-        """Whether it is to be looked, after some ticks, at what is not looked at in every tick."""
+        """Whether the less frequent checks are due after some ticks."""
         ahead, stride = self.motion.robots.left, self.model.settings.stride
         return not ahead and self._unseen + ticks > stride // 2
 
     def _bear(self) -> None:
-        """Hands whose load is more than they bear let go. What falls may come anywhere: from then
-        on everything is looked at in every timestep."""
-        if self.parts.bear() and anything not in self.hooks.before_step:
-            self.hooks.before_step.append(anything)
+        """Open overloaded hands. A falling body may come anywhere, so every timestep is inspected
+        from then on."""
+        if self.parts.bear():
+            self.hooks.step_singly = True
 
     def _look(self) -> None:
-        """At what is looked at when other modes begin, and about once in a stride from then."""
+        """Make the checks that follow a change of modes, and come about once in a stride."""
         self._unseen = 0
         self.inspection.welds()
         self.supplied |= self.parts.feeders.tend()
@@ -254,15 +254,15 @@ class MujocoWorld:
 
     @property
     def dropped(self) -> Drop | None:
-        """The first load that was more than its hand bears, None while there was none."""
+        """The first overload of a hand, if any."""
         return self.parts.strength.dropped
 
     def delivered(self) -> int:
-        """Products that have left the outfeed, since the beginning of time."""
+        """Number of products that have left the outfeed, including those before the run."""
         return self._before + len(self.dropoffs)
 
     def unstable(self) -> str:
-        """What made the engine give up, "" while it has not."""
+        """Why the engine gave up; "" if it has not."""
         warned = self.d.warning.number
         if not warned.any():
             return ""
@@ -276,7 +276,3 @@ class MujocoWorld:
         """The figures of the run so far."""
         found = self.inspection.figures(self.parts.welds, self.parts.strength.most)
         return found if self.dropped is None else replace(found, dropped_s=self.dropped.time)
-
-
-def anything() -> None:
-    """Before a timestep in which anything may come anywhere: that there is a hook is enough."""

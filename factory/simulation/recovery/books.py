@@ -1,4 +1,5 @@
-"""The books: where robots are by the marking, and what they hold there."""
+"""The state that the marking implies: which operation each robot is in, and which label it
+holds."""
 
 from __future__ import annotations
 
@@ -12,39 +13,39 @@ from factory.simulation.supervisor import Supervisor
 
 
 class Books:
-    """Those of a supervisor, as they are now or in another marking, in the `layout` of now. A robot
-    that is gone holds nothing."""
+    """Reads the state of a factory from a supervisor's marking, or from another marking, under the
+    current `layout`. A robot that has been removed holds nothing."""
 
     def __init__(self, layout: Layout, supervisor: Supervisor) -> None:
         self.layout, self.supervisor = layout, supervisor
 
     @property
     def factory(self) -> Factory:
-        """The factory of now."""
+        """The current factory."""
         return self.layout.factory
 
     @property
     def marking(self) -> Marking:
-        """The places that are marked now."""
+        """The marked places."""
         return frozenset(place for place, is_so in enumerate(self.supervisor.marked) if is_so)
 
     def step_of(self, robot: int, marking: Marking | None = None) -> int:
-        """The step of its gear that a robot (index) is at: twice that of its program, and one more
-        where the operation is under way."""
+        """The position of a robot (index) in its gear: 2k before the k-th operation of its program,
+        2k + 1 in it."""
         marked = self.marking if marking is None else marking
         places = self.factory.net.gears[robot].places
         return next(step for step, place in enumerate(places) if place in marked)
 
     def operation_of(self, robot: int, marking: Marking | None = None) -> Operation:
-        """The operation that a robot (index) is in, or waits for."""
+        """The operation that a robot (index) takes part in or waits for."""
         step = self.step_of(robot, marking)
         return self.factory.operations[self.factory.robots[robot].operations[step // 2]]
 
     def holds(
         self, robot: int, marking: Marking | None = None, fired: Sequence[int] | None = None
     ) -> str:
-        """The label that a robot (index) holds, NOPART for nothing; `fired`: how often each
-        transition has, in another marking."""
+        """The label that a robot (index) holds, NOPART for none. `fired`: firing counts of the
+        transitions, for another marking."""
         if not self.factory.robots[robot].operations:
             return NOPART
         operation, is_in_it = self.operation_of(robot, marking), self.step_of(robot, marking) % 2
@@ -54,10 +55,10 @@ class Books:
         return operation.before[operation.robots.index(robot)] if is_made else NOPART
 
     def place_of(self, robot: int, marking: Marking | None = None) -> tuple[int, bool]:
-        """Which operation (index) a robot is in, or waits for, and whether it is in it."""
+        """The operation (index) of a robot, and whether it is under way."""
         return self.operation_of(robot, marking).index, bool(self.step_of(robot, marking) % 2)
 
     def held(self, marking: Marking | None = None, fired: Sequence[int] | None = None) -> list[str]:
-        """The label that each robot holds, NOPART for nothing."""
+        """The label that each robot holds, NOPART for none."""
         marked = self.marking if marking is None else marking
         return [self.holds(robot.index, marked, fired) for robot in self.factory.robots]

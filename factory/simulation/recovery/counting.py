@@ -1,4 +1,4 @@
-"""Faults and failures counted against each other: what was missed, and what was a false alarm."""
+"""Faults matched with detected failures: missed faults and false alarms."""
 
 from __future__ import annotations
 
@@ -28,8 +28,9 @@ def summed(
     binned: int = 0,
     spilled: tuple[str, ...] = (),
 ) -> Failures:
-    """All failures of a run. A robot that is dead and never asked to move is not missed. One that
-    is stuck in its operation is no false alarm, and tells of an input that has slipped."""
+    """The failures of a run. A dead robot that was never asked to move does not count as missed. A
+    robot that is stuck in its operation does not count as a false alarm: it indicates an input that
+    has slipped."""
     stuck = sum(one.test == "jammed" and not one.is_death for one in found)
     tests, wanted = Counter(one.test for one in found), Counter[str]()
     tests["jammed"] -= stuck

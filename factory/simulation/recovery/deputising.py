@@ -1,4 +1,4 @@
-"""Deputies that take over in a run (few-robots.md, section 45): the net is exchanged under it."""
+"""Takeovers during a run (few-robots.md, section 45): the net is exchanged while it runs."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ from factory.timing.timing import Timing
 
 @dataclass(frozen=True, slots=True)
 class Successors:
-    """A takeover, and the `layout` of the crew that stays, in which robots keep their numbers."""
+    """A takeover, and the `layout` of the remaining robots, which keep their numbers."""
 
     takeover: Takeover
     layout: Layout
 
     @property
     def barred(self) -> frozenset[tuple[int, str]]:
-        """The robots (index) with the labels that they cannot carry back to B."""
+        """Pairs (robot index, label) that the robot cannot carry back to B."""
         return not_carried_back(self.layout)
 
 
 class Deputising:
-    """`by_robot`: the deputies that are to take over, by the robots that are dead (indices);
-    `exchanges`: those that have."""
+    """`by_robot`: for each dead robot (index) the deputy that will take over; `exchanges`: the
+    takeovers made."""
 
     def __init__(self, simulation: Simulation, books: Books) -> None:
         self._simulation, self._books = simulation, books
@@ -43,7 +43,7 @@ class Deputising:
         self.exchanges: list[Exchange] = []
 
     def appoint(self, robot: int, dead: Container[int]) -> str:
-        """A deputy is to take over for a robot (index): its name, "" where there is none, or it is
+        """Appoint the deputy of a robot (index). Returns its name, "" if there is none or it is
         among the `dead`."""
         deputy = deputies_in(self._simulation.layout).get(robot, -1)
         if deputy < 0 or self._change(robot, deputy, dead) is None:
@@ -52,7 +52,7 @@ class Deputising:
         return self._books.factory.robots[deputy].name
 
     def take_over(self, robot: int, dead: Container[int]) -> Successors | None:
-        """What changes as the deputy of a robot takes over; None where it cannot any more."""
+        """The changes by which the deputy of a robot takes over; None if it no longer can."""
         return self._change(robot, self.by_robot.pop(robot), dead)
 
     def _change(self, robot: int, deputy: int, dead: Container[int]) -> Successors | None:
@@ -65,7 +65,7 @@ class Deputising:
         return Successors(takeover, layout) if layout else None
 
     def exchange(self, change: Successors, fired: tuple[int, ...], undone: Undone) -> None:
-        """The run goes on in another net from the counts `fired`."""
+        """Continue the run in another net, from the firing counts `fired`."""
         simulation, layout, takeover = self._simulation, change.layout, change.takeover
         request, settings = simulation.request, simulation.request.settings
         modes = operation_modes(layout, settings.eps)

@@ -1,4 +1,4 @@
-"""WorldFault campaigns as files: TOML with a table [[fault]] for each fault."""
+"""Fault campaigns as TOML files, with one table [[fault]] for each fault."""
 
 from __future__ import annotations
 
@@ -45,8 +45,9 @@ WORDS |= {dict: "a table", list: "a list of tables [[fault]]"}
 
 
 def read_campaign(path: Path, spares: int = 0, swap: float = SWAP) -> Campaign:
-    """The campaign that a file describes, with so many spares. Raises InputError with every fault
-    of the file: BadFile, Syntax, UnknownParameter, BadValue, BadFault."""
+    """The campaign described by a file, with `spares` spare robots, each exchanged within `swap`
+    [s]. Raises InputError with every error of the file: BadFile, Syntax, UnknownParameter,
+    BadValue, BadFault."""
     text, values = read_toml(path, EXAMPLE)
     found = _Reader(path, text)
     found.check(values, KEYS, "")
@@ -64,14 +65,15 @@ def read_campaign(path: Path, spares: int = 0, swap: float = SWAP) -> Campaign:
 
 
 class _Reader:
-    """Collects what is wrong with a file."""
+    """Collects the errors of a file."""
 
     def __init__(self, path: Path, text: str) -> None:
         self.path, self.text = path, text
         self.wrong: list[Diagnostic] = []
 
     def check(self, values: Mapping[str, Any], known: Mapping[str, type], where: str) -> None:
-        """Every key is known, and its value of the right type and not negative."""
+        """Check that every key is known and that its value has the right type and is not
+        negative."""
         for key, value in values.items():
             at = key_position(self.path, self.text, key)
             if key not in known:
@@ -84,7 +86,7 @@ class _Reader:
                 self.wrong.append(Diagnostic("BadValue", message, at, EXAMPLE))
 
     def faults(self, tables: list[Any]) -> Iterator[WorldFault]:
-        """The faults that are described well."""
+        """The faults whose tables are valid."""
         starts = [m.start() for m in re.finditer(r"^\s*\[\[\s*fault\s*\]\]", self.text, re.M)]
         for number, table in enumerate(tables):
             line = self.text.count("\n", 0, starts[number]) + 1 if number < len(starts) else 1
@@ -120,8 +122,8 @@ def _is(value: object, kind: type) -> bool:
 
 
 def check_names(campaign: Campaign, factory: Factory) -> None:
-    """Raises InputError (BadFault) where a fault names a robot or label that the factory has not,
-    or a label that no such fault can concern."""
+    """Raises InputError (BadFault) if a fault names a robot or label that the factory lacks, or a
+    label that this kind of fault cannot concern."""
     robots = [robot.name for robot in factory.robots]
     parts, joined, every = (
         [*dict.fromkeys(name for o in some for name in (o.label, o.written))]

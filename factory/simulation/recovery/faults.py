@@ -1,4 +1,4 @@
-"""Faults: what the world does to a factory that goes wrong, as values."""
+"""Faults of the world, as values."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class WorldFault:
 
     @property
     def way(self) -> float:
-        """How far a part is off, or has slipped [m]."""
+        """Displacement of a part that is misplaced or has slipped [m]."""
         if self.metres is not None:
             return self.metres
         return ASKEW if self.kind == "misplaced" and not self.degrees else SLIPPED
@@ -85,8 +85,8 @@ class WorldFault:
 
 @dataclass(frozen=True, slots=True)
 class Sensors:
-    """What sensors are worth: standard deviation of a measured distance [m], and what is sensed of
-    a grip must have held for so long [s] to be believed."""
+    """Quality of sensors: the standard deviation of a measured distance (`noise` [m]), and the time
+    for which a grip sensor must report a loss before it is believed (`delay` [s])."""
 
     noise: float = 5e-5
     delay: float = 0.03
@@ -99,8 +99,8 @@ CLEAR, SWAP = 10.0, 30.0
 
 @dataclass(frozen=True, slots=True)
 class Campaign:
-    """Faults of a run, drawn by `seed`. `clear` [s]: how long a thing that has fallen lies until
-    it is taken away; `swap` [s]: how long it takes to replace a dead robot by one of `spares`."""
+    """The faults of a run, drawn by `seed`. `clear` [s]: time until a thing that has fallen is
+    removed; `swap` [s]: time to replace a dead robot by one of `spares`."""
 
     faults: tuple[WorldFault, ...] = ()
     seed: int = 0
@@ -111,5 +111,5 @@ class Campaign:
 
 
 def campaign_of(values: Mapping[str, Any]) -> Campaign:
-    """The campaign in a table. Raises ValueError where it is none."""
+    """The campaign in a table. Raises ValueError if the table is not a campaign."""
     return value_of(Campaign, values, "faults")

@@ -1,4 +1,4 @@
-"""What has gone wrong how often on end, and what its template says is done about it then."""
+"""Counts of consecutive failures, and the template's response to them."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ from factory.problem.template import Kind, Response
 
 @dataclass(slots=True)
 class OnEnd:
-    """How often on end an operation (index) was `tried` again, and a label `scrapped`."""
+    """Consecutive repetitions of each operation (`tried`, by index) and consecutive scrappings of
+    each label (`scrapped`)."""
 
     tried: Counter[int] = field(default_factory=Counter)
     scrapped: Counter[str] = field(default_factory=Counter)
 
     def response(self, operation: Operation, test: str) -> Kind:
-        """What is done about a failure of an operation that has been tried so often."""
+        """The response of the template to a failure of an operation repeated so many times."""
         tried, none = self.tried[operation.index], tuple[Response, ...]()
         failures = operation.template.failures
         responses = next((f.responses for f in failures if f.test == test), none)

@@ -1,121 +1,143 @@
-"""What recovery asks of a world, and does to it: the interface of both worlds."""
+"""The interface by which recovery observes and acts on a world: the same for both worlds."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence, Set
-from typing import Protocol
 
 from factory.layout.layout import Layout
 from factory.plant.factory import Operation
 from factory.simulation.recovery.faults import WorldFault
 
 
-class Plant(Protocol):
-    """The bodies of a factory in which things go wrong.
+class Plant(ABC):
+    """The bodies of a factory in which faults occur, in this order: faults, sensors, responses.
 
-    The first methods let faults strike, the next are what sensors tell, the last what is done about
-    it. Robots are given by index.
+    Robots are given by index. A world subclasses it and overrides what it can do; the defaults are
+    those of a world in which nothing falls, leans or blocks.
     """
 
+    @abstractmethod
     def lose(self, robot: int) -> bool:
-        """A robot's hand opens, and nothing tells; whether it held anything."""
+        """Open a robot's hand, unnoticed by the supervisor. Returns whether it held anything."""
 
+    @abstractmethod
     def slip(self, operation: Operation, metres: float) -> None:
-        """The last input of an operation that has started slips in its hand."""
+        """Let the last input of an operation under way slip in its hand by `metres` [m]."""
 
     @property
+    @abstractmethod
     def slipped(self) -> frozenset[int]:
-        """The operations (index) under way whose inputs have slipped."""
+        """Operations (index) under way one of whose inputs has slipped."""
 
+    @abstractmethod
     def fresh(self) -> Sequence[tuple[str, int]]:
-        """The parts that feeders have begun to show since the last question: label and unit."""
+        """Parts (label, unit) that feeders have begun to present since the last call."""
 
+    @abstractmethod
     def spoil(self, label: str, fault: WorldFault) -> None:
-        """What a feeder shows is askew or no good."""
+        """Make the part that a feeder presents defective, or misplace it."""
 
+    @abstractmethod
     def supplied(self) -> None:
-        """Some operation may have become prepared."""
+        """Note that an operation may have become prepared."""
 
     def tick(self) -> None:
-        """A tick is over."""
+        """Act at the end of a tick."""
 
+    @abstractmethod
     def lost(self) -> Sequence[int]:
-        """The robots that no longer feel what they carry."""
+        """Robots whose grip sensors no longer report their payload."""
 
     def knocked(self, robot: int) -> bool:
-        """Whether something that fell has touched what a robot holds."""
+        """Whether a robot's hand is closed and something that had fallen or slipped has touched its
+        payload."""
+        return False
 
+    @abstractmethod
     def feels(self, robots: Sequence[int]) -> bool:
-        """Whether robots feel all that they carry, now."""
+        """Whether the grip sensors of all these robots report their payloads."""
 
+    @abstractmethod
     def offers(self, label: str) -> bool:
-        """Whether a feeder shows a part that has been looked at and found good."""
+        """Whether a feeder presents a part that its camera has accepted."""
 
+    @abstractmethod
     def refused(self) -> Sequence[tuple[str, int, str]]:
-        """Parts that a feeder's camera finds askew or no good: label, unit, the test that says so.
-        They are taken back, and the next come."""
+        """Parts (label, unit, failed test) that a feeder's camera rejects. Each is withdrawn, and
+        the next one is presented."""
 
     def unseen(self) -> Sequence[str]:
-        """The kinds of faults of parts that have been taken back, since the last question, for
-        another reason, before any camera looked at them."""
+        """Kinds of faults of parts that were withdrawn, since the last call, before a camera had
+        examined them."""
+        return ()
 
+    @abstractmethod
     def residual(self, operation: Operation) -> float:
-        """How far inputs are from where they belong when they are about to be joined, as measured
-        [m]."""
+        """Measured distance of inputs from their places in a joint about to be made [m]."""
 
     def rejects(self, robot: int) -> bool:
-        """Whether an inspection rejects what a robot holds."""
+        """Whether an inspection rejects a robot's payload."""
+        return False
 
+    @abstractmethod
     def undone(self, holds: Sequence[str], fired: Sequence[int], going: Set[int]) -> Sequence[int]:
-        """From now on robots hold these labels by the books, NOPART for nothing, transitions have
-        fired so often, and some robots are `going` back. Gives those that hold something that is
-        scrap now."""
+        """Adopt the state after an undo: the label that each robot holds (NOPART for none), the
+        firing counts of the transitions, and the robots that are `going` back. Returns the robots
+        whose payload has become scrap."""
 
     def let_go(self, robot: int, seconds: float) -> None:
-        """A robot lets scrap fall, which lies for so long [s]."""
+        """Drop a robot's scrap, which lies there for some time [s]."""
 
     def throw_away(self, robot: int, label: str, seconds: float) -> None:
-        """A robot at its B end lets go of a label that is scrap, over its bin, where that is wide
-        enough; it lies for so long [s]."""
+        """Drop scrap with a label at the robot's B end, into its bin if that is wide enough; it
+        lies there for some time [s]."""
 
     def in_the_way(self, away: Set[int]) -> Set[int]:
-        """The robots that stand where a part comes late that they wait for, but for those one of
-        whose axes is to stay `away`."""
+        """Robots that block the late part that they wait for, except those with an axis in
+        `away`."""
+        return frozenset()
 
     def takes_back(self, robot: int) -> bool:
-        """Whether something goes back up in a robot's feeder, and the robot is out of its way."""
+        """Whether a part is being withdrawn into a robot's feeder, with the robot out of its
+        way."""
+        return False
 
     def came_back(self, robot: int) -> None:
-        """A robot is where it waits."""
+        """Note that a robot has returned to where it waits."""
 
     @property
     def lying(self) -> Sequence[float]:
-        """Until when [s] things lie about."""
+        """Times [s] at which the things that lie about are removed."""
+        return ()
 
     @property
     def closed(self) -> frozenset[int]:
-        """The robots that could touch what lies about."""
+        """Robots that could touch something that lies about."""
+        return frozenset()
 
+    @abstractmethod
     def lift_out(self, robot: int, at: Mapping[int, float]) -> None:
-        """A dead robot and what it holds are taken away, and another is put in its place, with its
-        axes at these places [m]."""
+        """Replace a dead robot, payload removed, by another with its axes at these places [m]."""
 
     def clear_out(self, robot: int, layout: Layout) -> None:
-        """A dead robot is taken away for good: what it holds is too, and what is shown where nobody
-        takes it in a `layout` goes back."""
+        """Remove a dead robot and its payload for good, and withdraw the presented parts that no
+        robot of a `layout` takes."""
 
     def exchange(self, robot: int, layout: Layout) -> None:
-        """A dead robot is gone, and the others go on as in a `layout`, where all have their
-        numbers."""
+        """Go on without a robot, as in a `layout` that keeps the numbers of the others."""
 
     @property
     def binned(self) -> int:
-        """How often scrap has fallen into a bin."""
+        """Number of times scrap has fallen into a bin."""
+        return 0
 
     @property
     def spilled(self) -> Sequence[str]:
-        """The robots, by name, that have let scrap fall where there is no bin for it."""
+        """Names of the robots that dropped scrap where there is no bin for it."""
+        return ()
 
     @property
     def contacts(self) -> int:
-        """Pairs of things that touched of which one had fallen, or lay askew."""
+        """Pairs of bodies that touched of which one had fallen or lay askew."""
+        return 0

@@ -1,5 +1,5 @@
-"""A factory that goes on: what sensors tell is a failure of an operation, and its template says
-what is done."""
+"""Recovery of a run: sensor readings become failures of operations, and templates say how to
+respond."""
 
 from __future__ import annotations
 
@@ -31,10 +31,8 @@ IN_VAIN = 2.0
 
 
 class Recovery:
-    """What goes wrong in a simulation, and what is done about it; see `recover`.
-
-    `pending`: operations that must not end as they are, each with the test that says so.
-    """
+    """The faults of a simulation, their detection and the responses; see `recover`. `pending`:
+    operations at their goals that have failed a test, with the name of the test."""
 
     def __init__(self, simulation: Simulation, books: Books, plant: Plant, campaign: Campaign):
         self.simulation, self.books, self.plant = simulation, books, plant
@@ -53,17 +51,17 @@ class Recovery:
 
     @property
     def found(self) -> Sequence[Failing]:
-        """Every failure so far."""
+        """All failures so far."""
         return self.responding.found
 
     @property
     def stood(self) -> Sequence[Stood]:
-        """From when on which robots stood, for whatever reason."""
+        """For each change of the robots that stand: the time, and which."""
         return self.responding.standing.stood
 
     @property
     def exchanges(self) -> Sequence[Exchange]:
-        """The deputies that have taken over so far."""
+        """The takeovers so far."""
         return self.responding.deputising.exchanges
 
     @property
@@ -80,7 +78,7 @@ class Recovery:
 
     @property
     def _stopped(self) -> frozenset[int]:
-        """Robots that begin nothing."""
+        """Robots that may not start an operation."""
         busy = self.responding
         return frozenset({*self.plant.closed, *busy.dead, *busy.returning.ways})
 
@@ -93,7 +91,7 @@ class Recovery:
         return self._stopped.isdisjoint(operation.robots)
 
     def _judge(self, operation: Operation, unit: int) -> bool:
-        """Whether an operation that has come to its goal is as it should be."""
+        """Whether an operation at its goal passes its tests."""
         if operation.index in self.pending or not self.plant.feels(operation.robots):
             return False
         if not operation.inputs and not self.plant.offers(operation.label):
@@ -113,7 +111,7 @@ class Recovery:
         return False
 
     def _tick(self) -> None:
-        """After every tick of the world."""
+        """Act after a tick of the world."""
         now = self._now
         self._take_notice(now)
         self.striking.tick(now)
@@ -127,7 +125,7 @@ class Recovery:
         self._go_on(now)
 
     def _take_notice(self, now: float) -> None:
-        """Of what has fired since the last tick."""
+        """Process the transitions that have fired since the last tick."""
         supervisor, factory = self.books.supervisor, self._factory
         fresh, self._seen = supervisor.events[self._seen :], len(supervisor.events)
         firings = [event.transition for event in fresh if isinstance(event, Event)]
@@ -146,7 +144,7 @@ class Recovery:
                 self.responding.used(label)
 
     def _sense(self, now: float) -> None:
-        """What sensors tell, and what is done about it."""
+        """Read the sensors and respond."""
         respond, by_label = self.responding, self._factory.by_label
         untested = self.plant.slipped - self.pending.keys()
         for label, _, test in self.plant.refused():
@@ -169,7 +167,7 @@ class Recovery:
             self.striking.count(kind, -1)
 
     def _go_on(self, now: float) -> None:
-        """Robots stand, go on and come back; spares come."""
+        """Update which robots stand, return and are replaced."""
         respond = self.responding
         for robot in respond.replaced(now):
             self.striking.standing.pop(robot, None)
@@ -184,7 +182,7 @@ class Recovery:
             respond.give_up()
 
     def _ends(self, now: float) -> float:
-        """Until when something lasts that excuses the factory [s]."""
+        """Time until which a standstill is excused [s]."""
         striking, respond = self.striking, self.responding
         ends = [*self.plant.lying, *striking.empty.values(), striking.dark]
         ends += [*respond.dead.values(), *striking.standing.values()]
@@ -193,15 +191,15 @@ class Recovery:
 
     @property
     def given(self) -> Mapping[str, object]:
-        """The campaign, as values of JSON."""
+        """The campaign as JSON values."""
         return dict(table_of(self._campaign))
 
     def strike(self, fault: WorldFault) -> None:
-        """A fault strikes as soon as it can, whatever it says of when."""
+        """Apply a fault as soon as possible, whatever time or unit it names."""
         self.striking.strike(fault, self._now)
 
     def report(self) -> Failures:
-        """What went wrong so far."""
+        """Summary of faults and failures so far."""
         undone = (e for e in self.books.supervisor.events if isinstance(e, Undone))
         return summed(
             self.responding.found,
@@ -216,11 +214,11 @@ class Recovery:
 
 
 def recover(simulation: Simulation, campaign: Campaign = Campaign()) -> Recovery:  # noqa: B008
-    """Let a simulation that is ready to run go on when its operations fail as the faults of a
-    campaign make them; call it once, before `run`.
+    """Enable recovery in a simulation, and apply the faults of a campaign to it. Call it once,
+    before `run`.
 
-    Raises InputError (BadFault) where a fault names a robot or label that is not there, and where
-    the robots run their own programs.
+    Raises InputError (BadFault) if a fault names an unknown robot or label, or if the robots run
+    their own programs.
     """
     supervisor = simulation.supervisor
     if not isinstance(supervisor, Supervisor):

@@ -1,6 +1,5 @@
 """The response to a failure: the net fires backwards to the greatest marking without it
-(nets/undo.py), robots go back to where they wait in that marking, and drop on the way what is no
-longer needed."""
+(nets/undo.py); robots return to where they wait in that marking and drop what has become scrap."""
 
 from __future__ import annotations
 
@@ -36,9 +35,9 @@ BINNED = 1.0
 
 
 class Responding:
-    """`found`: every failure. `dead`: robots (index) that are known to be dead, and when they are
-    replaced [s], never without a spare or a deputy. `returning`: robots on their way back.
-    `standing`: robots that stand. `deputising`: deputies that take over."""
+    """`found`: all failures. `dead`: for each robot (index) known to be dead the time of its
+    replacement [s], inf without spare or deputy. `returning`, `standing`, `deputising`: robots that
+    return, that stand, and takeovers."""
 
     def __init__(
         self, simulation: Simulation, books: Books, plant: Plant, campaign: Campaign
@@ -60,15 +59,15 @@ class Responding:
         self.deputising = Deputising(simulation, books)
 
     def passed(self, operation: Operation) -> None:
-        """An operation has come to its goal and is good."""
+        """Note that an operation has passed its tests."""
         self._on_end.tried.pop(operation.index, None)
 
     def used(self, label: str) -> None:
-        """Something has been joined, and was not scrapped."""
+        """Note that a label has been joined: it was not scrapped."""
         self._on_end.scrapped[label] = 0
 
     def refused(self, leaf: Operation, test: str) -> None:
-        """A feeder takes a part back: its robot gets out of the way of the next."""
+        """A feeder withdraws a part: its robot makes room for the next one."""
         response = self._on_end.response(leaf, test)
         if response == "stop":
             self._end(test, leaf, f"'{leaf.label}' fails the test '{test}'")
@@ -87,8 +86,7 @@ class Responding:
         self.returning.send(robot, WayBack(self.returning.aside(robot, leaf), done=back))
 
     def make_way(self) -> None:
-        """Robots that wait at their feeders, and are in the way of what comes late there, go out of
-        its way."""
+        """Send robots that block a late part at their feeders out of its way."""
         books, supervisor = self._books, self._books.supervisor
         away = supervisor.ordering.axes(2 * number for number in supervisor.active.operations)
         late = self._plant.in_the_way(away)
@@ -99,7 +97,7 @@ class Responding:
             self.returning.send(robot, WayBack(self.returning.rest(robot, books.marking)))
 
     def lost(self, robot: int) -> None:
-        """A robot has lost what it held: that is made again."""
+        """A robot has lost its payload: undo to where that is made again."""
         label, operation = self._books.holds(robot), self._books.operation_of(robot)
         if self._on_end.response(operation, "lost") == "stop":
             self._end("lost", operation, f"{self._name(robot)} has lost '{label}'", robot)
@@ -108,8 +106,8 @@ class Responding:
         self._undo((self._books.factory.by_label[label].end,), operation, "lost")
 
     def failed(self, operation: Operation, test: str) -> None:
-        """An operation has come to its goal and is no good: it is done again, or all that it was to
-        join is made again."""
+        """An operation has failed a test at its goal: repeat it, or scrap its inputs and make them
+        again."""
         response, by_label = self._on_end.response(operation, test), self._books.factory.by_label
         if response == "again":
             self._on_end.tried[operation.index] += 1
@@ -124,9 +122,9 @@ class Responding:
             self._undo(ends, operation, test)
 
     def stuck(self, robot: int) -> None:
-        """A robot makes no progress. Where the template of its operation tests for that, this has
-        failed, and the robot goes back. One that does not, or that had not left where it waited, is
-        dead, as is any other."""
+        """A robot makes no progress. If its operation is under way and its template has the test
+        `jammed`, the operation has failed; otherwise, or if the robot had not left where it waited,
+        it is dead."""
         if robot in self.dead or robot in self.returning.ways:
             return
         operation = self._books.operation_of(robot)
@@ -138,8 +136,8 @@ class Responding:
             self.died(robot)
 
     def died(self, robot: int) -> None:
-        """A robot is dead. After some time it is taken away, and one from the depot takes its
-        place, or a deputy its tours; what it held is lost with it."""
+        """A robot is dead, and its payload lost. It is replaced by a spare after `swap` seconds,
+        else by a deputy."""
         label, operation = self._books.holds(robot), self._books.operation_of(robot)
         spare, deputy = self.used_spares < self._campaign.spares, ""
         if not spare and not (deputy := self.deputising.appoint(robot, self.dead)):
@@ -157,8 +155,8 @@ class Responding:
             self._undo(asked, operation, "jammed")
 
     def replaced(self, now: float) -> list[int]:
-        """The robots that are replaced now [s], and stand where they wait, or that are gone. A
-        deputy takes over when no robot is on its way back."""
+        """Replace the robots that are due [s], and return them. A deputy takes over only when no
+        robot is returning."""
         due, appointed = (r for r, until in self.dead.items() if until <= now), self.deputising
         settled = self.returning.halted(self.dead)
         found = [robot for robot in due if settled or robot not in appointed.by_robot]
@@ -169,7 +167,7 @@ class Responding:
         return found
 
     def _replaced(self, robot: int) -> bool:
-        """Whether a dead robot is replaced now: its deputy may be dead too."""
+        """Replace a dead robot. Returns False if its deputy is dead too."""
         if robot in self.deputising.by_robot:
             return self._take_over(robot)
         self.returning.ways.pop(robot, None)
@@ -181,7 +179,7 @@ class Responding:
         return True
 
     def _take_over(self, robot: int) -> bool:
-        """The deputy of a dead robot takes over its tours: the net is exchanged."""
+        """Let the deputy of a dead robot take over its tours: the net is exchanged."""
         change = self.deputising.take_over(robot, self.dead)
         if change is None:
             self.dead[robot] = np.inf
@@ -204,7 +202,7 @@ class Responding:
         return True
 
     def _exchange(self, change: Successors, fired: tuple[int, ...], undone: Undone) -> None:
-        """The net and all that is derived from it are exchanged."""
+        """Exchange the net and everything derived from it."""
         self.deputising.exchange(change, fired, undone)
         eps, books = self._simulation.request.settings.eps, self._books
         ways = ((r, way) for r, way in self.returning.ways.items() if r not in self.dead)
@@ -212,13 +210,13 @@ class Responding:
         self._wasting.barred = change.barred
 
     def give_up(self) -> None:
-        """What can be finished without the robots that are dead is: the run ends."""
+        """End the run: all that can be made without the dead robots has been made."""
         robot = next(robot for robot, until in self.dead.items() if until == np.inf)
         operation = self._books.operation_of(robot)
         self._stop(f"{self._name(robot)} is dead, and there is no spare", operation)
 
     def _undo(self, asked: tuple[int, ...], operation: Operation, reason: str) -> None:
-        """The net fires backwards, and robots go back."""
+        """Fire the net backwards and send robots back."""
         books, supervisor, factory = self._books, self._books.supervisor, self._books.factory
         before, under_way = books.marking, supervisor.active.operations
         held, joins = books.held(), joins_of(factory)
@@ -238,9 +236,8 @@ class Responding:
         self._plant.supplied()
 
     def _lacking(self, held: Sequence[str], fired: Sequence[int]) -> tuple[int, ...]:
-        """The ends of what robots would hold after other counts, and do not, where they `held`
-        these labels: nothing was made for a unit that is skipped, so it cannot take the place of
-        what is lost."""
+        """End transitions of labels that robots would hold after other firing counts and do not
+        `held` now: a skipped unit has no parts, so it cannot replace what was lost."""
         books, marking = self._books, marking_after(self._books.factory.net, fired)
         if books.supervisor.word.demand is None:
             return ()
@@ -254,8 +251,8 @@ class Responding:
         over: Sequence[Operation],
         marking: Marking,
     ) -> None:
-        """Robots go to where they wait in a marking, by way of their B ends with what is scrap, or
-        let it fall at once where they cannot carry it there; those of operations that are `over`
+        """Send robots to where they wait in a marking. A robot with scrap goes to its B end first,
+        or drops it at once if it cannot carry it there. The robots of operations that are `over`
         leave in the reverse order of their coming."""
         scrap = self._wasting.held
         after = dict[int, frozenset[int]]()
@@ -277,17 +274,16 @@ class Responding:
             self.returning.send(robot, WayBack(goals, first, done, partial(self._is_up, robot)))
 
     def _bin(self, robot: int, label: str, rest: list[Goal]) -> None:
-        """A robot at the B end of its guidepath lets scrap fall into the bin there, and goes to
-        where it waits."""
+        """Drop a robot's scrap into the bin at its B end, and send the robot to where it waits."""
         self._plant.throw_away(robot, label, BINNED)
         self.returning.send(robot, WayBack(rest))
 
     def _is_up(self, robot: int) -> bool:
-        """Whether nothing goes back up in a robot's feeder."""
+        """Whether no part is being withdrawn into a robot's feeder."""
         return not self._plant.takes_back(robot)
 
     def _scrap(self, test: str, operation: Operation, robot: int, labels: tuple[str, ...]) -> None:
-        """Things are scrapped; one too often on end, and the run stops."""
+        """Scrap labels; end the run if one is scrapped too many times in succession."""
         self._note(test, operation, robot, "scrap", labels)
         for label in labels:
             self._on_end.scrapped[label] += 1
@@ -296,7 +292,7 @@ class Responding:
                 self._stop(what, self._books.factory.by_label[label])
 
     def _end(self, test: str, operation: Operation, what: str, robot: int = -1) -> None:
-        """A failure ends the run."""
+        """Record a failure that ends the run."""
         self._note(test, operation, robot, "stop")
         self._stop(what, operation)
 

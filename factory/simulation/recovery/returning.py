@@ -1,7 +1,7 @@
-"""Robots on their way back, after what they did has been undone.
+"""Robots that return after an undo.
 
-Each goes to where it waits in the marking that the factory goes on from. Those of one operation
-leave in the reverse order of their coming, one after the other; so each goes back the way it came.
+Each goes to where it waits in the new marking. The robots of one operation leave one after the
+other, in the reverse order of their coming, so that each goes back the way it came.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ PAST = 2e-3
 
 @dataclass(slots=True)
 class WayBack:
-    """What a robot has yet to do: go to `goals` one after the other, but only when the robots in
-    `after` are back, and it is `ready`; then what `done` says. `stage`: the number of what it is
-    doing, `since` when [s] it could have been."""
+    """The return of a robot: it goes to its `goals` in turn, starting when the robots in `after`
+    have returned and `ready` holds; then `done` is called. `stage`: the number of its current mode;
+    `since` [s]: since when it could have moved."""
 
     goals: list[Goal]
     after: frozenset[int] = frozenset()
@@ -48,8 +48,7 @@ class WayBack:
 
 
 class Returning:
-    """The robots (index) of a factory that are on their way back: `ways`. They begin with `ways`
-    that have not begun."""
+    """The robots (index) that are returning: `ways`. Starts with `ways` that have not begun."""
 
     def __init__(
         self,
@@ -67,12 +66,11 @@ class Returning:
         self.ways = dict(ways)
 
     def send(self, robot: int, way: WayBack) -> None:
-        """A robot is to go a way, in place of any that it goes."""
+        """Give a robot a way back, replacing any that it has."""
         self.ways[robot] = way
 
     def tick(self, held: Iterable[int], now: float) -> None:
-        """Let robots that are at the end of a stage begin the next now [s], but those that are
-        `held`."""
+        """Start the next stages at time now [s], except of the robots that are `held`."""
         going, held, begun = {*self._supervisor.active.ahead}, {*held}, list[int]()
         for robot, way in [*self.ways.items()]:
             if way.stage not in going or robot in held:
@@ -91,31 +89,31 @@ class Returning:
             self._supervisor.send(begun)
 
     def halted(self, dead: Iterable[int]) -> bool:
-        """Whether all that are on their way back are `dead`, or wait for such before they begin."""
+        """Whether every returning robot is `dead` or waits for a dead one."""
         stuck = {*dead}
         return all(r in stuck or not stuck.isdisjoint(w.after) for r, w in self.ways.items())
 
     def late(self, before: float) -> list[int]:
-        """The robots that have done the same since before some time [s]."""
+        """Robots that have been in one stage since before a time [s]."""
         return [robot for robot, way in self.ways.items() if way.since < before]
 
     def home(self, robot: int) -> list[Goal]:
-        """The way of a robot to the B end of its guidepath: its lift first, but for one that is set
-        for what the robot holds, which goes back as high as it came."""
+        """The way of a robot to its B end: its lift first, unless the lift is adjusted to its
+        payload, which returns at the height at which it came."""
         lift, layout = self._layout.factory.lift_axis.get(robot), self._layout
         stays = robot in layout.factory.adjusted
         rise = [] if lift is None or stays else [(lift, _highest(layout, robot))]
         return [*rise, (robot, layout.guidepaths[robot].length)]
 
     def aside(self, robot: int, leaf: Operation) -> list[Goal]:
-        """The way of a robot out of the way of its feeder; none where its hand is there before what
-        that shows comes down, and when it goes up again."""
+        """The way by which a robot makes room for a part that its feeder presents or withdraws;
+        empty if its hand is in place before that part."""
         hand = self._layout.hand(robot)
         return [] if hand is not None and hand.first else [(robot, _aside(self._layout, leaf))]
 
     def rest(self, robot: int, marking: Marking) -> list[Goal]:
-        """The way of a robot to where it waits in a marking. Where the part that it takes next has
-        to come down before it, it waits out of the way."""
+        """The way of a robot to where it waits in a marking; clear of its feeder if the next part
+        comes down before it may go there."""
         layout, gear = self._layout, self._layout.factory.net.gears[robot]
         marking = self._without_skipped(robot, marking)
         step = next(i for i, place in enumerate(gear.places) if place in marking) // 2
@@ -130,7 +128,8 @@ class Returning:
         return [rise, *goals] if rise[1] == up > 0 else goals
 
     def _without_skipped(self, robot: int, marking: Marking) -> Marking:
-        """The marking with a robot that skips a unit at the beginning of its tour."""
+        """The marking after a robot has skipped the units that are not made, at the beginning of
+        its tour."""
         factory, word = self._layout.factory, self._supervisor.word
         gear, program = factory.net.gears[robot].places, factory.robots[robot].operations
         step = next(i for i, place in enumerate(gear) if place in marking) // 2
@@ -142,20 +141,20 @@ class Returning:
         return marking.difference(gear) | {gear[2 * first]}
 
     def has_left(self, robot: int, marking: Marking) -> bool:
-        """Whether a robot is away from where it waits in a marking, or would, if what it does had
-        not begun."""
+        """Whether a robot is away from where it would wait if its current operation had not
+        started."""
         x, _ = self._supervisor.world.sense()
         return any(abs(x[axis] - at) > LEFT for axis, at in self.rest(robot, marking))
 
 
 def order_of(mode: Mode, robots: Sequence[int]) -> tuple[int, ...]:
-    """The robots of an operation in the order in which they come to it."""
+    """The robots of an operation in the order in which they reach it."""
     return tuple(robots[slot] for slot in mode.order if slot < len(robots))
 
 
 def _waiting(layout: Layout, robot: int, step: int) -> float:
-    """Where a robot waits for the operation of a step of its program [m]: where it would as a run
-    begins, but out of the way of the part that it takes next, which has to come down."""
+    """Where a robot waits for the operation at a step of its program [m]: its position at the start
+    of a run, or clear of the part that has to come down first."""
     factory, hand = layout.factory, layout.hand(robot)
     program = factory.robots[robot].operations
     at, operation = layout.home(robot, program[step]), factory.operations[program[step]]
@@ -165,7 +164,7 @@ def _waiting(layout: Layout, robot: int, step: int) -> float:
 
 
 def _aside(layout: Layout, leaf: Operation) -> float:
-    """Where the robot of a feeder is out of the way of what that shows [m]."""
+    """Where the robot of a feeder is clear of the presented part [m]."""
     at = layout.guidepaths[leaf.carrier].length
     return max(0.0, at - passing(layout, leaf) - PAST)
 
@@ -175,7 +174,7 @@ def _highest(layout: Layout, robot: int) -> float:
 
 
 def _goals(layout: Layout) -> Iterable[Goal]:
-    """Every goal that a robot may be sent to."""
+    """All goals to which a robot can be sent."""
     factory = layout.factory
     lifts = factory.lift_axis
     for robot in (robot for robot in factory.robots if robot.operations):
@@ -195,7 +194,7 @@ def _rounded(goal: Goal) -> Goal:
 
 
 def _mode(layout: Layout, axis: int, at: float, eps: float) -> Mode:
-    """The mode that moves an axis alone to a place [m]."""
+    """The mode that moves one axis to a place [m]."""
     robots = len(layout.guidepaths)
     longest = layout.guidepaths[axis].length if axis < robots else at
     upper: Array = np.array([max(longest, at)])

@@ -1,5 +1,4 @@
-"""Robots that stand: those that the world has stopped, and those that must not come near what lies
-about."""
+"""Robots that stand: stopped by a fault, or kept away from things that lie about."""
 
 from __future__ import annotations
 
@@ -25,13 +24,13 @@ MOVES = 5e-3
 
 
 def patience(seconds: float) -> float:
-    """What should take some seconds is late after so many [s]."""
+    """The time [s] after which something is late that should take so many `seconds`."""
     return SLUGGISH * seconds + GRACE
 
 
 class Standing:
-    """Lets robots (index) of a simulation stand, each under a limit of its own on its speed;
-    `stood`: which of them did, from when on."""
+    """Stops robots (index) of a simulation by their speed limits. `stood`: for each change of the
+    robots that stand, the time and which."""
 
     def __init__(self, simulation: Simulation, supervisor: Supervisor) -> None:
         self._simulation, self._limits = simulation, simulation.limits
@@ -45,7 +44,7 @@ class Standing:
         self._went: dict[int, float] = {}
 
     def let_stand(self, robots: Iterable[int]) -> None:
-        """From now on these robots stand, and no others: they brake as they always do."""
+        """Stop these robots, and release all others. They brake within their usual limits."""
         chosen = frozenset(robots)
         if chosen == self._now:
             return
@@ -56,7 +55,7 @@ class Standing:
         self.stood.append((self._simulation.world.time, names))
 
     def limit(self, limits: Limits) -> None:
-        """From now on these are the limits of robots that do not stand."""
+        """Set the limits of robots that do not stand."""
         self._limits = limits
         self._apply()
 
@@ -71,13 +70,13 @@ class Standing:
         return frozenset(axis for robot in robots for axis in self._axes[robot])
 
     def begun(self, operation: Operation, now: float) -> None:
-        """An operation begins now [s], or goes on after a wait that is no fault of its robots."""
+        """Restart the clock of an operation at time now [s]: it begins, or resumes after a wait
+        that its robots did not cause."""
         self._begun[operation.index] = now
 
     def jammed(self, now: float, excused: frozenset[int]) -> list[int]:
-        """The robots of operations that are late, and those that go ahead and are late, which are
-        asked to move and do not, but for those that are `excused`, as are all in their
-        operations."""
+        """Robots that do not move although a late operation or stage asks them to. Operations of
+        `excused` robots are not late."""
         supervisor, factory = self._supervisor, self._supervisor.factory
         found, modes = list[int](), supervisor.bundles
         for number in supervisor.active.operations:
@@ -95,7 +94,7 @@ class Standing:
         return found
 
     def latest(self, now: float) -> float:
-        """When the last of what is under way is late [s]."""
+        """The time at which the last operation or stage under way becomes late [s]."""
         active = self._supervisor.active.operations
         ends = [self._late(number, now) for number in active]
         return max([*ends, *(since + self._longest for since in self._went.values())], default=0.0)
@@ -109,7 +108,7 @@ class Standing:
         return begun + patience(self._simulation.delays[number])
 
     def _at_fault(self, mode: Mode, axes: list[int]) -> list[int]:
-        """The robots whose axes a mode asks to move, and that do not."""
+        """Robots that a mode asks to move and that do not."""
         simulation = self._simulation
         x, v = simulation.world.sense()
         bundle = Bundle.of([mode], [self._limits.of(axes)])

@@ -1,4 +1,4 @@
-"""When faults strike: drawn for each operation that starts, for each part that is shown."""
+"""When faults occur: drawn for each operation that starts and each part that is presented."""
 
 from __future__ import annotations
 
@@ -16,11 +16,9 @@ EARLY, LATE = 0.1, 0.9
 
 
 class Striking:
-    """Lets the faults of a campaign strike a plant whose operations take so long (`delays` [s]).
-
-    `struck`: how many have, by kind. `dark` [s]: until when no sensor tells anything. `empty`:
-    until when feeders give nothing, by label. `standing`: until when robots (index) stand.
-    """
+    """Applies the faults of a campaign to a plant whose operations take `delays` [s]. `struck`:
+    number of faults of each kind; `dark` [s]: end of the sensor blackout; `empty`: by label, when
+    its feeder gives parts again; `standing`: by robot (index), when it moves again."""
 
     def __init__(
         self, campaign: Campaign, plant: Plant, names: tuple[str, ...], delays: tuple[float, ...]
@@ -36,9 +34,9 @@ class Striking:
         self.standing: dict[int, float] = {}
 
     def strike(self, fault: WorldFault, now: float) -> None:
-        """A fault that names a robot or a label, or is a blackout, strikes now, or as soon as it
-        can: a robot that holds nothing drops what it carries next, a feeder shows the next part
-        so, the next joint slips."""
+        """Apply a fault that names a robot or label, or a blackout, now or as soon as possible: a
+        robot that holds nothing drops its next payload; a feeder presents the next part so; the
+        next joint slips."""
         robot = self._names.index(fault.robot) if fault.robot else -1
         match fault.kind:
             case "down" | "dead":
@@ -55,7 +53,7 @@ class Striking:
         self.count(fault.kind)
 
     def started(self, operation: Operation, unit: int, now: float) -> None:
-        """An operation has started."""
+        """Apply the faults that are due as an operation starts."""
         for robot, label in zip(operation.robots, operation.before, strict=True):
             name = self._names[robot]
             if label != NOPART and self._strikes("drop", unit, now, label, name):
@@ -73,29 +71,29 @@ class Striking:
             self.darken(now + fault.seconds)
 
     def stand(self, robot: int, until: float) -> None:
-        """A robot (index) stands until then [s]."""
+        """Stop a robot (index) until a time [s]."""
         self.standing[robot] = max(self.standing.get(robot, 0.0), until)
 
     def starve(self, label: str, until: float) -> None:
-        """A feeder gives nothing until then [s]."""
+        """Stop a feeder until a time [s]."""
         self.empty[label] = max(self.empty.get(label, 0.0), until)
 
     def darken(self, until: float) -> None:
-        """No sensor tells anything until then [s]."""
+        """Blind all sensors until a time [s]."""
         self.dark = max(self.dark, until)
 
     def shown(self, label: str, unit: int, now: float) -> WorldFault | None:
-        """What is wrong with a part that a feeder is about to show for a unit."""
+        """The fault of the part that a feeder is about to present for a unit, if any."""
         return self._strikes("bad_part", unit, now, label) or self._strikes(
             "misplaced", unit, now, label
         )
 
     def count(self, kind: str, times: int = 1) -> None:
-        """Something has struck so often more; less often, where it is gone unseen."""
+        """Add to the number of faults of a kind; negative if one vanished undetected."""
         self.struck[kind] = self.struck.get(kind, 0) + times
 
     def tick(self, now: float) -> None:
-        """What is due: things are dropped; what lasted is over."""
+        """Drop payloads that are due, and end faults that are over."""
         while self._due and self._due[0][0] <= now:
             if not self._plant.lose(heappop(self._due)[1]):
                 self.count("drop", -1)

@@ -1,4 +1,4 @@
-"""What robots hold that is scrap. On its way to its bin a robot holds nothing by the books."""
+"""Scrap in robots' hands. In the marking, a robot that carries scrap to its bin holds nothing."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from factory.problem.pag import NOPART
 
 @dataclass(slots=True)
 class Wasting:
-    """`held`: the label that each robot (index) holds that is scrap; `barred`: robots with the
-    labels that they cannot carry back to B."""
+    """`held`: the label of the scrap that each robot (index) holds; `barred`: pairs (robot, label)
+    that the robot cannot carry back to B."""
 
     barred: frozenset[tuple[int, str]]
     held: dict[int, str] = field(default_factory=dict)
 
     def waste(self, robots: Iterable[int], held: Mapping[int, str]) -> None:
-        """What these robots hold is scrap, and nothing else is; by the books they have `held` it,
-        until now or until earlier."""
+        """Declare the payloads of exactly these robots scrap; their labels are those of `held`, or
+        known from before."""
         known = self.held | {robot: label for robot, label in held.items() if label != NOPART}
         self.held = {robot: known.get(robot, NOPART) for robot in robots}
 

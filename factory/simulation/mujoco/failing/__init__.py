@@ -1,1 +1,1 @@
-"""Where things go wrong in the engine."""
+"""Faults and recovery in the engine."""

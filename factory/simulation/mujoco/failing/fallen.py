@@ -1,4 +1,4 @@
-"""What has fallen: where it lies, and which robots could touch it."""
+"""Fallen bodies: where they lie, and which robots could touch them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from factory.layout.bins import TOP, Bin
 from factory.layout.sweeping import SweptFloor
 from factory.mjcf.masks import robot_code
 from factory.simulation.mujoco.failing.jets import Jets
-from factory.simulation.mujoco.world import MujocoWorld, anything
+from factory.simulation.mujoco.world import MujocoWorld
 
 SETTLES = 0.5
 """So long after the last thing has been cleared away nothing shakes any more [s]."""
@@ -19,8 +19,8 @@ SETTLES = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Heap:
-    """The `bodies` of something that has fallen, by label, `until` when they lie [s], and the bin
-    `into` which they are to fall, if any."""
+    """Fallen `bodies` by label, the time `until` which they lie [s], and the bin `into` which they
+    fall, if any."""
 
     bodies: Mapping[str, int]
     until: float
@@ -28,8 +28,8 @@ class Heap:
 
 
 class Fallen:
-    """What lies about in a world: `heaps`; `closed`: the robots (index) that could touch it, but
-    for what lies in its bin; `binned`: how often something has fallen into one."""
+    """What lies about in a world: `heaps`; `closed`: robots (index) that could touch something
+    outside its bin; `binned`: number of heaps that fell into a bin."""
 
     def __init__(self, world: MujocoWorld) -> None:
         self._world, self._swept = world, SweptFloor.of(world.model.layout)
@@ -39,7 +39,7 @@ class Fallen:
         self.closed = frozenset[int]()
 
     def let_fall(self, robot: int, seconds: float, into: Bin | None = None) -> None:
-        """A robot lets go of all that it holds, which lies for so long [s], in a bin where one is
+        """Drop everything that a robot holds, to lie for some time [s], into a bin if one is
         given."""
         world = self._world
         bodies = world.parts.holdings.drop(robot_code(robot))
@@ -51,7 +51,7 @@ class Fallen:
         self.closed |= self._near()
 
     def tick(self) -> bool:
-        """A tick is over: what has lain long enough is cleared away. Whether anything was."""
+        """At the end of a tick, remove what has lain long enough. Returns whether anything was."""
         parts, now = self._world.parts, self._world.time
         self._jets.tick()
         over = [heap for heap in self.heaps if heap.until <= now]
@@ -66,30 +66,28 @@ class Fallen:
         return bool(over)
 
     def watch(self, bodies: Iterable[int]) -> None:
-        """From now on bodies may come anywhere: all is looked at in every timestep."""
-        world = self._world
-        world.inspection.pressing.fallen.update(bodies)
-        if anything not in world.hooks.before_step:
-            world.hooks.before_step.append(anything)
+        """Bodies may come anywhere from now on: every timestep is inspected."""
+        self._world.inspection.pressing.fallen.update(bodies)
+        self._world.hooks.step_singly = True
 
     def calm(self, bodies: Iterable[int]) -> None:
-        """Bodies are where they should be again, but for those that lie about."""
+        """Bodies are back in their places, except those that lie about."""
         lie = {body for heap in self.heaps for body in heap.bodies.values()}
         self._world.inspection.pressing.fallen.difference_update({*bodies} - lie)
 
     def _forget(self) -> None:
-        """What is out of sight has not fallen."""
+        """Forget fallen bodies that are out of sight."""
         world, units = self._world, self._world.parts.masks.unit
         pressing = world.inspection.pressing
         pressing.fallen -= {body for body in pressing.fallen if units[body] < 0}
         if pressing.fallen:
             self._calm = world.time + SETTLES
-        elif anything in world.hooks.before_step and world.time >= self._calm:
+        elif world.hooks.step_singly and world.time >= self._calm:
             pressing.shaken.clear()
-            world.hooks.before_step.remove(anything)
+            world.hooks.step_singly = False
 
     def _is_in_bin(self, heap: Heap) -> bool:
-        """Whether all of a heap is in its bin, or sinks into it."""
+        """Whether all bodies of a heap are in its bin or sinking into it."""
         radius, d, into = self._world.model.carried.radius, self._world.d, heap.into
         found = ((*d.xipos[body].tolist(), radius[label]) for label, body in heap.bodies.items())
         return into is not None and all(
@@ -97,7 +95,7 @@ class Fallen:
         )
 
     def _near(self) -> frozenset[int]:
-        """The robots that could touch what lies about now."""
+        """Robots that could touch something that lies about now."""
         m, radius = self._world.m, self._world.model.carried.radius
         about = [heap for heap in self.heaps if not self._is_in_bin(heap)]
         lie = [(body, radius[label]) for h in about for label, body in h.bodies.items()]

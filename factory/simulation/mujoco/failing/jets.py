@@ -1,4 +1,4 @@
-"""Jets of air, which blow what a robot has let go of into its bin."""
+"""Air jets, which blow dropped scrap into a bin."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ BEYOND = 0.01
 
 
 class Jets:
-    """Those of a world that blow: `until` [s], by body."""
+    """The active jets of a world: the time `until` which each blows [s], by body."""
 
     def __init__(self, world: MujocoWorld) -> None:
         self._world = world
         self._until: dict[int, float] = {}
 
     def blow(self, bodies: Iterable[int], target: Bin) -> None:
-        """What falls together from now on falls into a bin: a jet gives it the speed with which it
-        gets there while it falls past the bin's plates."""
+        """Blow bodies that start to fall together into a bin: the jet gives them the speed that
+        brings them there as they pass the bin's plates."""
         m, d, chosen = self._world.m, self._world.d, [*bodies]
         masses = m.body_mass[chosen]
         middle = masses @ d.xipos[chosen] / masses.sum()
@@ -40,7 +40,7 @@ class Jets:
         self._until |= dict.fromkeys(chosen, self._world.time + seconds)
 
     def tick(self) -> None:
-        """A tick is over: jets that have lasted long enough end."""
+        """At the end of a tick, end the jets whose time is over."""
         late = self._world.time + self._world.model.settings.tick / 2
         for body in [body for body, until in self._until.items() if until <= late]:
             del self._until[body]

@@ -1,4 +1,4 @@
-"""What the world does to bodies: hands that open, inputs that slip, parts that lie askew."""
+"""Faults of bodies: hands that open, inputs that slip, parts that lie askew."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ SETTLES = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Slip:
-    """The `welds` of a robot's hand in which something has slipped, and all the `bodies` of the
-    operation, which press on each other."""
+    """The `welds` of a hand in which an input has slipped, and all `bodies` of the operation, which
+    press on each other."""
 
     robot: int
     welds: tuple[int, ...]
@@ -33,11 +33,11 @@ class Slip:
 
 
 class Mishaps:
-    """Those of a world. `slips`: by operation under way (index); `opened`: robots (index) whose
-    hands have opened and that do not know; `bad`: bodies that are no good, and whether that is
-    hidden from feeders' cameras; `unseen`: bodies that no camera has looked at, and the fault;
-    `askew`: bodies that lie so in a feeder, whose code and pad (a geom) are given; `gone`: faults
-    that none will look at any more."""
+    """The faults of a world. `slips`: by operation under way (index); `opened`: robots (index)
+    whose hands have opened undetected; `bad`: defective bodies, and whether the defect is hidden
+    from feeders' cameras; `unseen`: bodies not yet examined by a camera, with their fault; `askew`:
+    bodies that lie askew in a feeder, with its code and pad (a geom); `gone`: faults that no camera
+    can find any more."""
 
     def __init__(self, world: MujocoWorld, fallen: Fallen) -> None:
         self._world, self._fallen, self._nominal = world, fallen, world.m.eq_data.copy()
@@ -50,7 +50,7 @@ class Mishaps:
         self.gone: list[str] = []
 
     def open(self, robot: int) -> None:
-        """A robot's hand opens."""
+        """Open a robot's hand."""
         parts = self._world.parts
         held = parts.holdings.hand(robot)
         parts.welds.loose([parts.holdings.weld[robot_code(robot), label] for label in held])
@@ -59,7 +59,7 @@ class Mishaps:
         self.opened.add(robot)
 
     def slip(self, operation: Operation, metres: float) -> None:
-        """The last input of an operation slips up in its hand."""
+        """Let the last input of an operation slip upwards in its hand."""
         holdings, robot = self._world.parts.holdings, operation.robots[operation.last]
         welds = tuple(holdings.weld[robot_code(robot), label] for label in holdings.hand(robot))
         self._world.m.eq_data[[*welds], 5] += metres
@@ -68,14 +68,15 @@ class Mishaps:
         self._fallen.watch(bodies)
 
     def restore(self, operations: Iterable[int]) -> None:
-        """What has slipped in operations (index) is held as it should be."""
+        """Put slipped inputs of operations (index) back into place."""
         for number in {*operations} & self.slips.keys():
             slip = self.slips.pop(number)
             self._world.m.eq_data[[*slip.welds]] = self._nominal[[*slip.welds]]
             self._settling.append((self._world.time + SETTLES, slip.bodies))
 
     def fresh(self) -> Sequence[tuple[str, int]]:
-        """The parts that feeders have begun to show since the last question, none of them askew."""
+        """The parts that feeders have begun to present since the last call, all of them
+        straight."""
         feeders = self._world.parts.feeders
         found, feeders.back.fresh = [*feeders.back.fresh.items()], {}
         welds = [feeders.welds[label] for label, _ in found]
@@ -83,7 +84,7 @@ class Mishaps:
         return found
 
     def spoil(self, label: str, fault: WorldFault) -> None:
-        """What a feeder shows is askew or no good."""
+        """Make the part that a feeder presents defective, or misplace it."""
         parts, m = self._world.parts, self._world.m
         unit = parts.feeders.shown().get(label)
         if unit is None:
@@ -110,8 +111,8 @@ class Mishaps:
         self._press(body, False)
 
     def _press(self, body: int, presses: bool) -> None:
-        """From now on a body presses on what it touches, or only touches it: a housing is as narrow
-        as what hangs straight in it."""
+        """Let a body press on what it touches, or only touch it: a housing is as narrow as a part
+        that hangs straight in it."""
         m, geoms = self._world.m, self._world.parts.masks.solid[body]
         m.geom_gap[geoms], m.geom_margin[geoms] = (0.0, 0.0) if presses else (FAR, -FAR)
         inspection = self._world.inspection
@@ -119,20 +120,20 @@ class Mishaps:
             (ghosts.discard if presses else ghosts.add)(body)
 
     def _touches(self, body: int, pad: int) -> None:
-        """Count that a body reaches into the pad that holds it: the engine leaves that pair out."""
+        """Count a contact of a body with the pad that holds it: the engine excludes that pair."""
         world, touched = self._world, self._world.inspection.pressing.touched
         for geom in world.parts.masks.solid[body].tolist():
             if mujoco.mj_geomDistance(world.m, world.d, pad, geom, 0.0, None) < -PRESSED:
                 touched.add((pad, geom))
 
     def take_back(self, body: int) -> None:
-        """A part is taken back, whether it has been looked at or not."""
+        """Withdraw a part, whether a camera has examined it or not."""
         if fault := self.unseen.pop(body, ""):
             self.gone.append(fault)
 
     def tick(self) -> None:
-        """A tick is over: what has been joined has not slipped any more, and what is out of sight
-        is as good as new."""
+        """At the end of a tick, forget slips of finished joints and faults of bodies out of
+        sight."""
         world = self._world
         self.restore(
             [n for n, slip in self.slips.items() if not world.parts.holdings.hand(slip.robot)]

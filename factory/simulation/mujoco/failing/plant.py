@@ -1,4 +1,4 @@
-"""The bodies of a factory in which things go wrong, in the engine."""
+"""Faults, sensors and responses in the engine."""
 
 from __future__ import annotations
 
@@ -17,19 +17,20 @@ from factory.simulation.mujoco.failing.sensors import Senses
 from factory.simulation.mujoco.holdings import Holdings
 from factory.simulation.mujoco.world import MujocoWorld
 from factory.simulation.recovery.faults import Campaign, WorldFault
+from factory.simulation.recovery.plant import Plant
 
 SCRAP = 1 << 20
 """Bodies that are scrap count for units from this one on."""
 
 
-class MujocoPlant:
-    """What recovery asks of a `MujocoWorld`, and does to it."""
+class MujocoPlant(Plant):
+    """The faults, sensors and responses of a `MujocoWorld`."""
 
     def __init__(self, world: MujocoWorld, campaign: Campaign) -> None:
         self._world, self._layout, self._clear = world, world.model.layout, campaign.clear
         self._fallen = Fallen(world)
         self._mishaps, self._senses = Mishaps(world, self._fallen), Senses(world, campaign)
-        self._scrapped, self.spilled = SCRAP, list[str]()
+        self._scrapped, self._spilled = SCRAP, list[str]()
 
     @property
     def _factory(self) -> Factory:
@@ -40,7 +41,6 @@ class MujocoPlant:
         return self._world.parts.holdings
 
     def lose(self, robot: int) -> bool:
-        """A robot's hand opens, and nothing tells; whether it held anything."""
         unit = self._holdings.unit(robot_code(robot))
         if unit is None or unit >= SCRAP:
             return False
@@ -48,28 +48,22 @@ class MujocoPlant:
         return True
 
     def slip(self, operation: Operation, metres: float) -> None:
-        """The last input of an operation that has started slips in its hand."""
         self._mishaps.slip(operation, metres)
 
     @property
     def slipped(self) -> frozenset[int]:
-        """The operations (index) under way whose inputs have slipped."""
         return frozenset(self._mishaps.slips)
 
     def fresh(self) -> Sequence[tuple[str, int]]:
-        """The parts that feeders have begun to show since the last question: label and unit."""
         return self._mishaps.fresh()
 
     def spoil(self, label: str, fault: WorldFault) -> None:
-        """What a feeder shows is askew or no good."""
         self._mishaps.spoil(label, fault)
 
     def supplied(self) -> None:
-        """Some operation may have become prepared."""
         self._world.supplied = True
 
     def tick(self) -> None:
-        """A tick is over."""
         if self._world.parts.strength.dropped is not None:
             self._world.parts.strength.dropped = None
             for robot in self._senses.unfelt():
@@ -79,28 +73,21 @@ class MujocoPlant:
             self.supplied()
 
     def lost(self) -> Sequence[int]:
-        """The robots that no longer feel what they carry."""
         units = ((robot, self._holdings.unit(robot_code(robot))) for robot in self._senses.lost())
         return [robot for robot, unit in units if unit is not None and unit < SCRAP]
 
     def knocked(self, robot: int) -> bool:
-        """Whether a robot's hand is closed, and something touched what it holds that had fallen or
-        slipped."""
         bodies, pressing = self._holdings.hand(robot).values(), self._world.inspection.pressing
         is_open = robot in self._mishaps.opened
         return not (is_open or (pressing.shaken | pressing.fallen).isdisjoint(bodies))
 
     def feels(self, robots: Sequence[int]) -> bool:
-        """Whether robots feel all that they carry, now."""
         return self._senses.unfelt().isdisjoint(robots)
 
     def offers(self, label: str) -> bool:
-        """Whether a feeder shows a part that has been looked at and found good."""
         return label in self._world.parts.feeders.back.good
 
     def refused(self) -> Sequence[tuple[str, int, str]]:
-        """Parts that a feeder's camera finds askew or no good: label, unit, the test that says so.
-        They are taken back, and the next come."""
         feeders, found = self._world.parts.feeders, list[tuple[str, int, str]]()
         for station, unit, body in [*feeders.at_rest()]:
             label, test = station.label, ""
@@ -119,24 +106,16 @@ class MujocoPlant:
         return found
 
     def unseen(self) -> Sequence[str]:
-        """The kinds of faults of parts that have been taken back, since the last question, for
-        another reason, before any camera looked at them."""
         gone, self._mishaps.gone = self._mishaps.gone, []
         return gone
 
     def residual(self, operation: Operation) -> float:
-        """How far inputs are from where they belong when they are about to be joined, as measured
-        [m]."""
         return self._senses.residual(operation)
 
     def rejects(self, robot: int) -> bool:
-        """Whether an inspection rejects what a robot holds."""
         return not self._mishaps.bad.keys().isdisjoint(self._holdings.hand(robot).values())
 
     def undone(self, holds: Sequence[str], fired: Sequence[int], going: Set[int]) -> Sequence[int]:
-        """From now on robots hold these labels by the books, NOPART for nothing, transitions have
-        fired so often, and some robots are `going` back. Gives those that hold something that is
-        scrap now."""
         parts, operations = self._world.parts, self._factory.operations
         self._mishaps.restore([o.index for o in operations if fired[o.start] == fired[o.end]])
         scrap = {robot for robot in self._holdings.in_hands() if holds[robot] == NOPART}
@@ -152,8 +131,8 @@ class MujocoPlant:
         return sorted(scrap - gone)
 
     def _units(self, holds: Sequence[str], fired: Sequence[int], scrap: Set[int]) -> dict[int, int]:
-        """The unit for which each robot that holds something holds it from now on: the last that
-        was made of it; what is scrap keeps together."""
+        """The unit of each robot's payload after an undo: the last one made of its label; scrap
+        that belongs together keeps one number."""
         found, fresh = dict[int, int](), dict[int, int]()
         for robot, bodies in self._holdings.in_hands().items():
             if robot not in scrap:
@@ -167,8 +146,8 @@ class MujocoPlant:
         return found
 
     def _renumber(self, units: Mapping[int, int], fired: Sequence[int], scrap: Set[int]) -> None:
-        """Bodies are for other units: those in hands, those that are shown, and the inputs of
-        operations under way, or of those that come apart."""
+        """Assign bodies to units: payloads, presented parts, and inputs of operations under way or
+        taken apart."""
         factory, joining, held = self._factory, self._world.inspection.joining, self._holdings
         for_units = {
             body: units[robot]
@@ -186,9 +165,8 @@ class MujocoPlant:
             joining[number] = wasted[0] if wasted else unit
 
     def _recount(self, fired: Sequence[int], going: Set[int], scrap: Set[int]) -> None:
-        """Feeders show what is needed now. Where a robot comes home with something, nothing comes
-        down until it is there, and what has come goes up again; where with nothing, when it is out
-        of the way."""
+        """Let feeders present what is needed now. If a robot comes home with a payload, its feeder
+        waits, and withdraws what it presents; if without, until the robot is out of the way."""
         factory, feeders = self._factory, self._world.parts.feeders
         units = {leaf.label: self._upcoming(leaf, fired) for leaf in factory.leaves}
         rounds = {label: unit // factory.period for label, unit in units.items()}
@@ -205,11 +183,10 @@ class MujocoPlant:
                         self._take_back(label)
 
     def _upcoming(self, leaf: Operation, fired: Sequence[int]) -> int:
-        """The unit that needs the next part, after so many firings."""
+        """The unit that needs the next part after so many firings."""
         return self._world.word.upcoming(self._factory.unit(leaf, fired[leaf.end]))
 
     def let_go(self, robot: int, seconds: float, into: Bin | None = None) -> None:
-        """A robot lets scrap fall, which lies for so long [s], into a bin where one is given."""
         self._let_fall(robot, seconds, into)
         self._world.parts.welds.write()
         self.came_back(robot)
@@ -220,80 +197,68 @@ class MujocoPlant:
         self._fallen.let_fall(robot, seconds, into)
 
     def throw_away(self, robot: int, label: str, seconds: float) -> None:
-        """A robot at its B end lets go of a label that is scrap, over its bin, where that is wide
-        enough; it lies for so long [s]."""
         found = (one for one in self._world.model.bins if one.robot == robot)
         into = next((one for one in found if label in one.labels), None)
         if into is None:
-            self.spilled.append(self._factory.robots[robot].name)
+            self._spilled.append(self._factory.robots[robot].name)
         self.let_go(robot, seconds, into)
 
     def in_the_way(self, away: Set[int]) -> Set[int]:
-        """The robots that stand where a part comes late that they wait for, but for those one of
-        whose axes is to stay `away`."""
         return self._world.in_the_way(away)
 
     def takes_back(self, robot: int) -> bool:
-        """Whether something goes back up in a robot's feeder, and the robot is out of its way."""
         labels = self._layout.magazine(robot)
         return not {*labels}.isdisjoint(self._world.parts.feeders.served())
 
     def came_back(self, robot: int) -> None:
-        """A robot is where it waits."""
         feeders = self._world.parts.feeders
         feeders.back.awaited.difference_update(self._layout.magazine(robot))
 
     @property
     def lying(self) -> Sequence[float]:
-        """Until when [s] things lie about."""
         return [heap.until for heap in self._fallen.heaps]
 
     @property
     def closed(self) -> frozenset[int]:
-        """The robots that could touch what lies about."""
         return self._fallen.closed
 
     @property
     def binned(self) -> int:
-        """How often scrap has fallen into a bin."""
         return self._fallen.binned
 
     @property
+    def spilled(self) -> Sequence[str]:
+        return self._spilled
+
+    @property
     def contacts(self) -> int:
-        """Pairs of things that touched of which one had fallen, or lay askew."""
         return len(self._world.inspection.pressing.touched)
 
     def lift_out(self, robot: int, at: Mapping[int, float]) -> None:
-        """A dead robot and what it holds are taken away, and another is put in its place, with its
-        axes at these places [m]."""
         self._empty(robot)
         self._world.motion.put(at)
         self.came_back(robot)
         self._world.parts.feeders.stay_clear(robot)
 
     def _empty(self, robot: int) -> None:
-        """What a robot that is taken away holds is put out of sight."""
+        """Put the payload of a robot that is removed out of sight."""
         world = self._world
         world.parts.holdings.put_away(self._holdings.hand(robot).values())
         world.parts.welds.write()
         world.motion.load([robot], [0.0])
 
     def clear_out(self, robot: int, layout: Layout) -> None:
-        """A dead robot is taken away for good: what it holds is too, and what is shown where nobody
-        takes it in a `layout` goes back."""
         self._empty(robot)
         self.came_back(robot)
         for label in self._world.parts.feeders.elsewhere(layout):
             self._take_back(label)
 
     def exchange(self, robot: int, layout: Layout) -> None:
-        """A dead robot is gone, and the others go on as in a `layout`, where all have their
-        numbers."""
         self._world.exchange(robot, layout)
         self._layout = layout
 
     def _take_back(self, label: str) -> None:
-        """What is shown of a label goes back into its feeder."""
+        """Withdraw the presented part of a label into its feeder."""
         feeders = self._world.parts.feeders
         self._mishaps.take_back(self._holdings[label, feeders.shown()[label]])
         feeders.take_back(label, self._next_scrap())

@@ -1,4 +1,4 @@
-"""What sensors tell of bodies: of grips, of joints, of parts that are shown."""
+"""Sensors of grips, joints and presented parts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ TURNED = 0.05
 
 
 class Senses:
-    """Those of a world: what is measured is off by `noise` [m], drawn anew each time."""
+    """The sensors of a world, with normal errors of standard deviation `noise` [m]."""
 
     def __init__(self, world: MujocoWorld, campaign: Campaign) -> None:
         self._world, self._noise = world, campaign.sensors.noise
@@ -29,8 +29,8 @@ class Senses:
         self._since: dict[int, float] = {}
 
     def unfelt(self) -> frozenset[int]:
-        """The robots (index) that do not feel now what they hold: there is no grip, or it is not in
-        its place."""
+        """Robots (index) whose grip sensors do not report their payload now: there is no grip, or
+        the payload is not in its place."""
         holdings, d = self._world.parts.holdings, self._world.d
         if self._seen != holdings.changes:
             self._seen = holdings.changes
@@ -45,14 +45,13 @@ class Senses:
         return frozenset(self._robots[gone].tolist())
 
     def lost(self) -> list[int]:
-        """The robots (index) that have not felt what they hold for some time."""
+        """Robots (index) whose payload has not been reported for at least the sensors' delay."""
         now = self._world.time
         self._since = {robot: self._since.get(robot, now) for robot in sorted(self.unfelt())}
         return [robot for robot, since in self._since.items() if now - since >= self._delay]
 
     def residual(self, operation: Operation) -> float:
-        """How far inputs are from where they belong when they are about to be joined, as measured
-        [m]."""
+        """Measured distance of inputs from their places in a joint about to be made [m]."""
         holdings = self._world.parts.holdings
         held = [
             (holdings.weld[robot_code(operation.carrier), label], body)
@@ -67,7 +66,8 @@ class Senses:
         return float(np.linalg.norm(gaps, axis=1).max())
 
     def is_askew(self, label: str, body: int, place: Array) -> bool:
-        """Whether a feeder's camera finds the part in its `place` (3,) [m]."""
+        """Whether a feeder's camera finds the part displaced or turned from its `place` (3,)
+        [m]."""
         test = self._world.model.factory.by_label[label].template.failure("misplaced")
         if test is None or test.limit is None:
             return False
@@ -80,7 +80,7 @@ class Senses:
         )
 
     def _gaps(self, welds: Index, bodies: Index) -> Array:
-        """How far bodies are (n, 3) [m] from where welds should hold them."""
+        """Distances of bodies from where welds should hold them (n,) [m]."""
         m, q, frames = self._world.m, self._world.d.qpos, self._frames.chosen(welds)
         place = q[m.jnt_qposadr[m.body_jntadr[bodies]][:, None] + np.arange(3)]
         return np.asarray(place - frames.at(q[frames.along]))

@@ -1,1 +1,1 @@
-"""Mechanisms that only make the world faster, behind the interface of `stepping.py`."""
+"""Accelerations of the MuJoCo world, behind the interface of `stepping.py`."""

@@ -56,9 +56,9 @@ class Strides(SingleSteps):
         """Some timesteps: at once, and one by one where anything touches or leaves its way."""
         d = self.d
         self._neighbours.look()
-        if d.ncon or self.hooks.before_step or self._neighbours.astray():
+        if d.ncon or self.hooks.each_step or self._neighbours.astray():
             self._neighbours.everything()
-        if d.ncon or self.hooks.before_step or steps == 1:
+        if d.ncon or self.hooks.each_step or steps == 1:
             super().advance(steps)
             return
         mujoco.mj_copyData(self._before, self.m, d)
