@@ -123,29 +123,17 @@ def _loads(library: str) -> bool:
 
 def trial() -> None:
     """Render a red ball on 64 x 64 pixels, or raise whatever goes wrong."""
-    import numpy as np
-
     from factory.support.engine import mujoco
 
     ball = '<geom size="1" rgba="1 0 0 1"/>'
     m = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{ball}</worldbody></mujoco>")
     d = mujoco.MjData(m)
-    held = context(64, 64)
-    drawing = mujoco.MjrContext(m, mujoco.mjtFontScale.mjFONTSCALE_100.value)
-    mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, drawing)
     mujoco.mj_forward(m, d)
-    scene, camera = mujoco.MjvScene(m, maxgeom=10), mujoco.MjvCamera()
-    mujoco.mjv_defaultFreeCamera(m, camera)
-    everything = mujoco.mjtCatBit.mjCAT_ALL.value
-    mujoco.mjv_updateScene(m, d, mujoco.MjvOption(), None, camera, everything, scene)
-    rectangle, pixels = mujoco.MjrRect(0, 0, 64, 64), np.zeros((64, 64, 3), np.uint8)
-    mujoco.mjr_render(rectangle, scene, drawing)
-    mujoco.mjr_readPixels(pixels, None, rectangle, drawing)
-    red, green = pixels[32, 32, :2]
+    with mujoco.Renderer(m, 64, 64) as renderer:
+        renderer.update_scene(d)
+        red, green = renderer.render()[32, 32, :2]
     if not red > green:
         raise RuntimeError("the picture stays empty")
-    drawing.free()
-    held.free()
 
 
 def import_mujoco() -> Any:
