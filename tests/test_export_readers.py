@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from factory.exporting import exporters
-from factory.exporting.bodies import parts_of
 from factory.geometry.solids import rotation
 from factory.mjcf.loading import load
 from factory.mjcf.names import COMPASS
@@ -305,7 +304,8 @@ def stl_by_trimesh(folder: Path) -> None:
         for label in (node.label for node in chosen.pag.nodes):
             mesh = trimesh.load(written(made("stl", file, label), folder / "x.stl"))
             assert mesh.is_watertight, label
-            solids = [chosen.product.solids[p] for p in parts_of(chosen.pag, label)]
+            parts = chosen.pag.product(label).parts()
+            solids = [chosen.product.solids[p.label] for p in parts]
             low, high = np.min([s.low for s in solids], 0), np.max([s.high for s in solids], 0)
             assert np.allclose(mesh.bounds, 1e3 * np.array([low, high]), atol=0.2), label
 
@@ -338,7 +338,7 @@ def gltf_by_pygltflib(folder: Path) -> None:
     validate(document)
     chosen = project(MESHES)
     nodes = {node.name: node for node in document.nodes}
-    for part in parts_of(chosen.pag, chosen.pag.root):
+    for part in (node.label for node in chosen.pag.parts()):
         solid = chosen.product.solids[part]
         primitive = document.meshes[nodes[part].mesh].primitives[0]
         colour = document.materials[primitive.material].pbrMetallicRoughness.baseColorFactor

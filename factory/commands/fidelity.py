@@ -65,20 +65,20 @@ def fidelity(
 ) -> int:
     """Compare FILE.pag in MuJoCo with the ideal world over the same seeds."""
     from factory.nets.verify import proved
-    from factory.study.bar import RunsBar
     from factory.study.fidelity import measure
     from factory.study.pool import cores
     from factory.support.files import write_text
+    from factory.support.progress import StepBar
 
     writable(options.file, output)
     project = options.project(out.silent)
     layout, settings = project.layout, project.settings
     proved(layout.factory.net)
     warnings = announced(layout.product.warnings, out)
-    with RunsBar(seeds, 0, out.silent) as bar:
+    with StepBar("running", out.silent) as bar:
 
         def done(finished: int) -> None:
-            bar.advance()
+            bar.show("running", finished, seeds)
 
         jobs = jobs or cores()
         measured = measure(layout, range(seeds), units, jitter, settings, jobs, done, max_time)

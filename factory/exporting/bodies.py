@@ -8,8 +8,7 @@ import numpy as np
 
 from factory.exporting.subject import Subject
 from factory.geometry.meshes import Mesh
-from factory.geometry.solids import Solid, rotation
-from factory.problem.pag import PAG
+from factory.geometry.solids import Solid
 
 ROUND = 64
 """Sides of a cylinder."""
@@ -29,31 +28,6 @@ def triangles(solid: Solid) -> Mesh:
     else:
         made = creation.icosphere(subdivisions=3, radius=solid.size[0])
     return Mesh(solid.kind, np.asarray(made.vertices, float), np.asarray(made.faces, np.int64))
-
-
-def placed(solid: Solid) -> Mesh:
-    """A part's mesh where it is in the finished product [m]."""
-    mesh = triangles(solid)
-    vertices = mesh.vertices @ rotation(solid.quaternion).T + solid.position
-    return Mesh(solid.label, vertices, mesh.faces)
-
-
-def joined(meshes: list[Mesh], name: str) -> Mesh:
-    """Several meshes as one."""
-    counts = np.cumsum([0, *(len(m.vertices) for m in meshes)])
-    faces = [m.faces + start for m, start in zip(meshes, counts, strict=False)]
-    return Mesh(name, np.concatenate([m.vertices for m in meshes]), np.concatenate(faces))
-
-
-def parts_of(pag: PAG, label: str) -> list[str]:
-    """The labels of the parts of a sub-assembly, in the order in which they are written there."""
-    found, stack = [], [label]
-    while stack:
-        node = pag[stack.pop()]
-        stack += reversed(node.inputs)
-        if not node.inputs:
-            found.append(node.label)
-    return found
 
 
 def wanted(subject: Subject, ending: str) -> Iterator[tuple[str, str]]:

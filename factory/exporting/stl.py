@@ -5,9 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from factory.exporting.bodies import joined, parts_of, placed, wanted
+from factory.exporting.bodies import triangles, wanted
 from factory.exporting.subject import Subject
 from factory.geometry.meshes import Mesh
+from factory.geometry.pieces import joined
+from factory.geometry.solids import rotation
 from factory.mjcf.mesh_files import stl
 
 FORMAT, TAKES, BINARY, FOLDER, OF = "stl", "pag", True, True, "a label"
@@ -24,6 +26,10 @@ def export(subject: Subject) -> bytes | Mapping[str, bytes]:
 
 def write_stl(subject: Subject, label: str) -> bytes:
     """A sub-assembly as one STL."""
-    solids = subject.project.product.solids
-    mesh = joined([placed(solids[p]) for p in parts_of(subject.project.pag, label)], label)
-    return stl(Mesh(label, mesh.vertices * MILLIMETRES, mesh.faces))
+    project, bodies = subject.project, []
+    for part in project.pag.product(label).parts():
+        solid = project.product.solids[part.label]
+        mesh, turn = triangles(solid), rotation(solid.quaternion)
+        bodies.append((mesh.vertices @ turn.T + solid.position, mesh.faces))
+    vertices, faces = joined(bodies)
+    return stl(Mesh(label, vertices * MILLIMETRES, faces))

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path, PurePosixPath
 
 from factory.importing.labels import file_stem
+from factory.problem.pag import Assembly
+from factory.support.files import MESH, read_bytes
 
 
 def path_inside(name: str) -> PurePosixPath | None:
@@ -37,6 +40,7 @@ class MeshStore:
         self.files: dict[str, bytes] = {}
         self._names: dict[tuple[str, str], str] = {}
         self._taken: set[str] = set()
+        self._read: dict[Path, str] = {}
 
     def add(self, name: str, suffix: str, content: bytes) -> str:
         """The path of a mesh with this content, named as similar to `name` as possible."""
@@ -49,3 +53,16 @@ class MeshStore:
             self._names[key] = path = f"{self.folder}/{stem}{suffix}"
             self.files[path] = content
         return self._names[key]
+
+    def keep(self, node: Assembly, folder: str, above: str = "") -> Assembly:
+        """A node whose mesh, if it has one, is in this store, which lies in a folder `above` it.
+        Raises OSError where the mesh cannot be read from the node's `folder`."""
+        if (mesh := node.parameter("mesh")) is None:
+            return node
+        path = Path(folder) / str(mesh)
+        if path not in self._read:
+            name = PurePosixPath(str(mesh).replace("\\", "/"))
+            self._read[path] = self.add(name.stem, name.suffix.lower(), read_bytes(path, MESH))
+        kept = above + self._read[path]
+        values = (replace(p, value=kept) if p.name == "mesh" else p for p in node.parameters)
+        return replace(node, parameters=tuple(values))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
 import numpy as np
 
@@ -27,12 +27,11 @@ from factory.lang.source import quoted
 from factory.planning.faults import check_in_place, check_places, raise_if_any
 from factory.planning.hulls import EXTRA, hull_stands
 from factory.planning.parts import InPlace, Kept, PlacedPart
-from factory.problem.pag import PAG, Assembly, Parameter
+from factory.problem.pag import PAG, Assembly
 from factory.problem.shapes import SHAPED
 from factory.problem.template import Template
 from factory.support.collector import collector_paused
 from factory.support.errors import Diagnostic, InputError, did_you_mean
-from factory.support.files import MESH, read_bytes
 
 DECOMPOSE = f"{EXTRA}: then it is decomposed into convex bodies"
 
@@ -134,24 +133,12 @@ def _stored(node: Assembly, pag: PAG, store: MeshStore, faults: list[Diagnostic]
         hint = "give it a mesh, a box, a cylinder or a sphere, and its pos"
         faults.append(Diagnostic("MissingPart", message, node.position, hint))
         return node
-    mesh = node.parameter("mesh")
-    if mesh is None:
-        return node
-    name = PurePosixPath(str(mesh))
     try:
-        content = read_bytes(Path(pag.folder) / name, MESH)
+        return store.keep(node, pag.folder)
     except OSError as error:
-        message = f"cannot read '{mesh}': {error.strerror}"
+        message = f"cannot read '{node.parameter('mesh')}': {error.strerror}"
         faults.append(Diagnostic("BadMesh", message, node.position, ANEW))
         return node
-    stored = store.add(name.stem, name.suffix.lower(), content)
-    return replace(
-        node,
-        parameters=tuple(
-            Parameter("mesh", stored, p.position) if p.name == "mesh" else p
-            for p in node.parameters
-        ),
-    )
 
 
 def _refuse_keep(asked: SourceOptions, why: str) -> None:

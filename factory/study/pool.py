@@ -143,6 +143,7 @@ class _Processes(Generic[Item, Result]):
         self.ended = True
         for process in self.started:
             process.kill()
+            process.wait()
 
 
 def _send(stream: Any, value: object) -> None:

@@ -60,14 +60,6 @@ class ProgressBar(Closing):
         raise NotImplementedError
 
 
-def counter(words: str) -> Bar:
-    """A bar with the number done, the total, words and the time left."""
-    from rich import progress as rich
-
-    done = rich.BarColumn(), rich.MofNCompleteColumn(), rich.TextColumn(words)
-    return rich.Progress(*done, rich.TimeRemainingColumn(), console=_stderr(), transient=True)
-
-
 class Waiting(ProgressBar):
     """A spinner that shows `what` is in progress within its context, and the time elapsed."""
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from factory.geometry.pieces import joined
 from factory.geometry.solids import rotation
 from factory.mjcf import names
 from factory.mjcf.replica import Floats, Replica, paint, shown, triangles
@@ -108,13 +109,11 @@ def _look(m: mujoco.MjModel, geoms: Sequence[int]) -> tuple[list[NDArray[Any]], 
     meshes = [placed(m, geom) for geom in geoms]
     paints = np.array([paint(m, geom) for geom in geoms])
     counts = [len(points) for points, _ in meshes]
-    starts = np.cumsum([0, *counts])
-    vertices = np.concatenate([points for points, _ in meshes])
-    faces = [faces + start for (_, faces), start in zip(meshes, starts, strict=False)]
+    vertices, faces = joined(meshes)
     colours = np.round(255 * np.clip(paints[:, :3], 0, 1)).astype(np.uint8)
     made = [
         vertices.astype(np.float32),
-        np.concatenate(faces).astype(np.uint32),
+        faces.astype(np.uint32),
         np.repeat(colours, counts, axis=0),
     ]
     return made, float(paints[:, 3].min())

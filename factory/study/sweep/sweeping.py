@@ -9,7 +9,6 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from factory.study.bar import RunsBar
 from factory.study.pool import over_processes
 from factory.study.sweep.grid import Axis, Point, check_value, points
 from factory.study.sweep.recipe import Recipe, name_of
@@ -17,6 +16,7 @@ from factory.study.sweep.store import Store
 from factory.study.sweep.work import Outcome, Runner, failed
 from factory.support.errors import InputError
 from factory.support.interruption import Interruption
+from factory.support.progress import StepBar
 
 Outcomes = Generator[Outcome, None, None]
 
@@ -48,6 +48,10 @@ class Tally:
     def rate(self) -> float:
         """Runs per second, from the start of the first worker."""
         return (self.done + self.failed) / self.wall_time_s if self.wall_time_s else 0.0
+
+    def __str__(self) -> str:
+        failed = f", {self.failed} failed" if self.failed else ""
+        return f"{self.rate:.1f} runs/s{failed}"
 
     def as_json(self) -> dict[str, Any]:
         """The figures, with the rate and the overhead."""
@@ -104,16 +108,16 @@ def sweep(
             return tally
         begin = perf_counter()
         with (
-            RunsBar(len(grid), tally.there, quiet) as bar,
+            StepBar("running", quiet) as bar,
             closing(run_local(recipe, wanted, jobs)) as outcomes,
         ):
             for outcome in outcomes:
                 with Interruption() as interruption:
                     store.add(outcome, recipe.at(outcome.point))
                 tally.count(outcome)
-                bar.advance(bool(outcome.reason))
+                tally.wall_time_s = perf_counter() - begin
+                bar.show("running", tally.there + tally.done + tally.failed, len(grid), f"{tally}")
                 interruption.observe()
-        tally.wall_time_s = perf_counter() - begin
     return tally
 
 
