@@ -10,26 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.control.profile import World
-from factory.layout.hands.hand import Point3
 from factory.layout.saved import LayoutTable
 from factory.plant.demand import Demand
 from factory.record.log.blocks import Arrays
+from factory.record.monitor.subject import MonitorTable
 from factory.record.project_table import ProjectTable
 from factory.support.settings import AUTO
 from factory.support.tables import LARGE, value_of
-
-
-@dataclass(frozen=True, slots=True)
-class MonitorTable:
-    """The fields of a `MonitorSubject` in a log."""
-
-    goals: tuple[tuple[float, ...], ...]
-    radii: tuple[float, ...]
-    places: Mapping[str, Point3]
-    patience: float
-    early: tuple[tuple[int, int], ...]
-    others: tuple[tuple[int, tuple[int, ...], tuple[float, ...]], ...] = ()
-    bends: tuple[tuple[int, float, tuple[tuple[float, float], ...]], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

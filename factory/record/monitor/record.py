@@ -24,7 +24,7 @@ from factory.record.monitor.calm import judge_calm
 from factory.record.monitor.monitor import Monitor
 from factory.record.monitor.recount import differences, recounted, worst
 from factory.record.monitor.report import Report, Violation
-from factory.record.monitor.subject import MonitorSubject, subject_from
+from factory.record.monitor.subject import MonitorSubject, MonitorTable
 from factory.record.project_table import factory_of, of_its_factory, settings_of
 from factory.record.state import Observation
 from factory.record.verdict import FAULTS, RunVerdict, judged
@@ -160,6 +160,6 @@ def word_of(log: Log, factory: Factory) -> Word | None:
 @of_its_factory()
 def recorded_subject(header: Mapping[str, Any]) -> MonitorSubject:
     """The subject of a log. Raises InputError (BadLog) where its header has no factory."""
-    factory = factory_of(header)
-    kept, start, wip = header["monitor"], header["start"], header["wip"]
-    return subject_from(factory, kept, settings_of(header), start, wip)
+    factory, start = factory_of(header), frozenset(header["start"])
+    table = value_of(MonitorTable, header["monitor"], "monitor")
+    return table.subject(factory, settings_of(header), start, header["wip"])

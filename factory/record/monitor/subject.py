@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -19,6 +19,7 @@ from factory.plant.factory import Factory, Operation
 from factory.plant.fused_bodies import FusedBodies, bodies_of
 from factory.record.state import Recordable
 from factory.support.settings import Settings
+from factory.support.tables import table_of
 
 PATIENCE = 4.0
 """A run stalls when nothing happens for this many times the longest time of an operation."""
@@ -146,27 +147,46 @@ class MonitorSubject:
         """The name of an operation in messages: `mate(sub1)`."""
         return f"{operation.template.name}({operation.label})"
 
-    def _others(self) -> list[list[Any]]:
-        return [[number, [*robots], [*goals]] for (number, robots), goals in self.others.items()]
-
-    def _bends(self) -> list[list[Any]]:
-        """The bends of guidepaths, robot by robot."""
-        return [
-            [robot, rounding, [[bend.at, bend.across] for bend in row]]
-            for robot, (row, rounding) in self.bends.items()
-        ]
-
     def as_json(self) -> dict[str, Any]:
         """The data in a log, beside the PAG and the settings."""
-        return {
-            "goals": [list(goals) for goals in self.goals],
-            "radii": list(self.radii),
-            "places": {part: list(place) for part, place in self.places.items()},
-            "patience": self.patience,
-            "early": sorted(list(pair) for pair in self.early),
-            **({"others": self._others()} if self.others else {}),
-            **({"bends": self._bends()} if self.bends else {}),
-        }
+        made: dict[str, Any] = table_of(MonitorTable.of(self))
+        return made
+
+
+@dataclass(frozen=True, slots=True)
+class MonitorTable:
+    """The fields of a `MonitorSubject` in a log."""
+
+    goals: tuple[tuple[float, ...], ...]
+    radii: tuple[float, ...]
+    places: Mapping[str, tuple[float, float, float]]
+    patience: float
+    early: tuple[tuple[int, int], ...]
+    others: tuple[tuple[int, tuple[int, ...], tuple[float, ...]], ...] = ()
+    bends: tuple[tuple[int, float, tuple[tuple[float, float], ...]], ...] = ()
+
+    @classmethod
+    def of(cls, subject: MonitorSubject) -> MonitorTable:
+        """The fields of a subject."""
+        same = subject.goals, subject.radii, subject.places, subject.patience
+        others = tuple((*manned, goals) for manned, goals in subject.others.items())
+        bends = tuple(
+            (robot, rounding, tuple((bend.at, bend.across) for bend in row))
+            for robot, (row, rounding) in subject.bends.items()
+        )
+        return cls(*same, tuple(sorted(subject.early)), others, bends)
+
+    def subject(
+        self, factory: Factory, settings: Settings, start: Marking, wip: int | None
+    ) -> MonitorSubject:
+        """The subject of a factory. Raises ValueError where the goals are not those of it."""
+        slots = [len(o.robots) for o in factory.operations]
+        if [*map(len, self.goals)] != slots or len(self.radii) != len(slots):
+            raise ValueError("its goals are not those of its PAG")
+        same = factory, self.goals, self.radii, self.places, settings, start, self.patience, wip
+        others = {(number, robots): goals for number, robots, goals in self.others}
+        bends = {r: (tuple(Bend(*bend) for bend in row), far) for r, far, row in self.bends}
+        return MonitorSubject(*same, frozenset(self.early), others, bends)
 
 
 def subject_of(
@@ -229,30 +249,3 @@ def subject_of_run(simulation: Recordable) -> MonitorSubject:
         model.carried if model else None,
     )
     return replace(subject, word=simulation.word) if demanded else subject
-
-
-def subject_from(
-    factory: Factory,
-    kept: Mapping[str, Any],
-    settings: Settings,
-    start: Sequence[int],
-    wip: int | None,
-) -> MonitorSubject:
-    """The inverse of `as_json`. Raises ValueError where `kept` is not of that factory."""
-    goals = tuple(tuple(float(x) for x in row) for row in kept["goals"])
-    radii = tuple(float(x) for x in kept["radii"])
-    slots = [len(o.robots) for o in factory.operations]
-    if [len(row) for row in goals] != slots or len(radii) != len(slots):
-        raise ValueError("its goals are not those of its PAG")
-    places = {str(k): (float(x), float(y), float(z)) for k, (x, y, z) in kept["places"].items()}
-    patience = float(kept["patience"])
-    early = frozenset((int(o), int(r)) for o, r in kept.get("early", ()))
-    marking = frozenset(start)
-    others = {(int(o), tuple(robots)): tuple(row) for o, robots, row in kept.get("others", ())}
-    bends = {
-        int(robot): (tuple(Bend(float(at), float(across)) for at, across in row), float(rounding))
-        for robot, rounding, row in kept.get("bends", ())
-    }
-    return MonitorSubject(
-        factory, goals, radii, places, settings, marking, patience, wip, early, others, bends
-    )
