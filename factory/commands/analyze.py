@@ -9,19 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from factory.commands import options as shared
 from factory.commands.grouped import Grouped
-from factory.commands.options import (
-    DRAW,
-    FLOOR,
-    MOTION,
-    OUTPUT,
-    PATH,
-    RELAY,
-    RUNS,
-    SOURCE,
-    WIP,
-    gathered,
-)
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced, cut_off, read_partly
 from factory.simulation.options import RunOptions
@@ -64,7 +53,7 @@ class AnalyzeOptions:
 
 
 @click.command(cls=Grouped)
-@SOURCE
+@shared.SOURCE
 @click.option("--units", type=click.IntRange(1, 10_000), default=20, help="Number of products.")
 @click.option(
     "--world",
@@ -72,19 +61,21 @@ class AnalyzeOptions:
     default="mujoco",
     help="World whose timing is analysed: MuJoCo, or the paper's ideal world.",
 )
-@DRAW
-@WIP
+@shared.DRAW
+@shared.WIP
 @click.option("--second", "seconds", multiple=True, help="What-if: a second robot like r4.")
 @click.option("--faster", multiple=True, help="What-if: a robot faster by percent, r4=20.")
 @click.option("--shorter", multiple=True, help="What-if: its paths shorter by percent, r4=20.")
-@click.option("--measured", type=PATH, help="Compare with the LOG of a run, under its settings.")
+@click.option(
+    "--measured", type=shared.PATH, help="Compare with the LOG of a run, under its settings."
+)
 @click.option("--run", "on_the_spot", is_flag=True, help="Compare with a run of --units.")
-@gathered(AnalyzeOptions, "study")
-@RUNS
-@FLOOR
-@RELAY
-@MOTION
-@OUTPUT
+@shared.gathered(AnalyzeOptions, "study")
+@shared.RUNS
+@shared.FLOOR
+@shared.RELAY
+@shared.MOTION
+@shared.OUTPUT
 def analyze(
     options: ProjectOptions,
     asked: RunOptions,

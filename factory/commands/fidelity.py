@@ -9,18 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from factory.commands import options as shared
 from factory.commands.grouped import Grouped
-from factory.commands.options import (
-    FLOOR,
-    JOBS,
-    MOTION,
-    OUTPUT,
-    PATH,
-    RELAY,
-    SECONDS,
-    SOURCE,
-    bounded,
-)
 from factory.commands.outputs import writable
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced
@@ -31,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @click.command(cls=Grouped)
-@SOURCE
+@shared.SOURCE
 @click.option(
     "--seeds", type=click.IntRange(1, 10_000), default=5, help="Number of runs: seeds 0 to K - 1."
 )
@@ -42,17 +32,17 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--jitter",
-    type=bounded("jitter"),
+    type=shared.bounded("jitter"),
     default=0.3,
     help="Draw each robot's speed and gain at random within ± this fraction.",
 )
-@JOBS
-@click.option("-o", "--output", type=PATH, help="Write the figures to this file, as JSON.")
-@click.option("--max-time", type=SECONDS, help="Stop a run after this simulated time [s].")
-@FLOOR
-@RELAY
-@MOTION
-@OUTPUT
+@shared.JOBS
+@click.option("-o", "--output", type=shared.PATH, help="Write the figures to this file, as JSON.")
+@click.option("--max-time", type=shared.SECONDS, help="Stop a run after this simulated time [s].")
+@shared.FLOOR
+@shared.RELAY
+@shared.MOTION
+@shared.OUTPUT
 def fidelity(
     options: ProjectOptions,
     out: OutputOptions,

@@ -7,18 +7,8 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from factory.commands import options as shared
 from factory.commands.grouped import Grouped
-from factory.commands.options import (
-    FLOOR,
-    MOTION,
-    OF_A_PICTURE,
-    OUTPUT,
-    PATH,
-    PICTURE,
-    RELAY,
-    RUN,
-    SOURCE,
-)
 from factory.commands.outputs import for_a_pag, writable
 from factory.commands.requests import OutputOptions, PictureOptions, ProjectOptions
 from factory.commands.warnings import announced, cut_off, read_partly
@@ -31,21 +21,21 @@ if TYPE_CHECKING:
 
 
 @click.command(cls=Grouped)
-@SOURCE
+@shared.SOURCE
 @click.option(
     "-o",
     "--output",
-    type=PATH,
+    type=shared.PATH,
     required=True,
     help="OUT.mp4, or OUT.png for a still.",
 )
 @click.option("--at", default="end", help="Time of a still [s], or `end`.")
-@RUN
-@PICTURE
-@FLOOR
-@RELAY
-@MOTION
-@OUTPUT
+@shared.RUN
+@shared.PICTURE
+@shared.FLOOR
+@shared.RELAY
+@shared.MOTION
+@shared.OUTPUT
 def render(
     options: ProjectOptions,
     asked: RunOptions,
@@ -61,7 +51,7 @@ def render(
 
     file = options.file
     if is_log(file):
-        for_a_pag(file, "a log", "output", "at", *OF_A_PICTURE)
+        for_a_pag(file, "a log", "output", "at", *shared.OF_A_PICTURE)
     writable(file, output, shown.poster)
     shot = Shot(output, shown.picture(), shown.fps, _moment(at), shown.poster)
     size, is_still, moment = shot.picture.size, shot.is_still, shot.at

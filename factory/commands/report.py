@@ -8,20 +8,8 @@ from pathlib import Path
 
 import click
 
+from factory.commands import options as shared
 from factory.commands.grouped import Grouped
-from factory.commands.options import (
-    DRAW,
-    FLOOR,
-    LENIENT,
-    MOTION,
-    OUTPUT,
-    PATH,
-    RELAY,
-    RUNS,
-    SECONDS,
-    SOURCE,
-    WIP,
-)
 from factory.commands.outputs import for_a_pag, writable
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.run import summarise
@@ -31,23 +19,23 @@ from factory.support.console import emit, say
 
 
 @click.command(cls=Grouped)
-@SOURCE
-@click.option("-o", "--output", type=PATH, required=True, help="Output page: OUT.html.")
+@shared.SOURCE
+@click.option("-o", "--output", type=shared.PATH, required=True, help="Output page: OUT.html.")
 @click.option(
     "--units",
     type=click.IntRange(1, 10_000),
     default=4,
     help="Number of products to make; the cycle time is measured from 4 on.",
 )
-@DRAW
-@WIP
-@click.option("--max-time", type=SECONDS, help="Stop after this simulated time [s].")
-@LENIENT
-@RUNS
-@FLOOR
-@RELAY
-@MOTION
-@OUTPUT
+@shared.DRAW
+@shared.WIP
+@click.option("--max-time", type=shared.SECONDS, help="Stop after this simulated time [s].")
+@shared.LENIENT
+@shared.RUNS
+@shared.FLOOR
+@shared.RELAY
+@shared.MOTION
+@shared.OUTPUT
 def report(options: ProjectOptions, asked: RunOptions, out: OutputOptions, output: Path) -> int:
     """Write one HTML page about a run of FILE.pag, or about the run in a LOG of `run --log`.
 

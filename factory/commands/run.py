@@ -8,21 +8,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from factory.commands import options as shared
 from factory.commands.allowing import ALLOW
 from factory.commands.grouped import Grouped
 from factory.commands.monitor import found_by, say_failures, say_verdict, tell_failures
-from factory.commands.options import (
-    FAULTS,
-    FLOOR,
-    LENIENT,
-    MOTION,
-    OUTPUT,
-    PATH,
-    PICTURE,
-    RELAY,
-    RUN,
-    SOURCE,
-)
 from factory.commands.outputs import for_a_film, writable
 from factory.commands.requests import (
     OutputOptions,
@@ -45,17 +34,17 @@ if TYPE_CHECKING:
 
 
 @click.command(cls=Grouped)
-@SOURCE
-@FAULTS
-@RUN
+@shared.SOURCE
+@shared.FAULTS
+@shared.RUN
 @ALLOW
 @click.option(
     "--demand",
     metavar="FILE|SEED",
     help="Orders for a mix: a file with a line product,time for each; or drawn by a seed.",
 )
-@click.option("--video", type=PATH, help="Film the run (.mp4).")
-@click.option("--log", type=PATH, help="Log every tick to a file.")
+@click.option("--video", type=shared.PATH, help="Film the run (.mp4).")
+@click.option("--log", type=shared.PATH, help="Log every tick to a file.")
 @click.option(
     "--distributed", is_flag=True, help="Each robot runs its own program (paper, section 6)."
 )
@@ -65,12 +54,12 @@ if TYPE_CHECKING:
     help="Check the run from the engine's states alone: at events (default), every tick, never.",
 )
 @click.option("--resume", is_flag=True, help="Continue an interrupted run, whose log is FILE.")
-@LENIENT
-@PICTURE
-@FLOOR
-@RELAY
-@MOTION
-@OUTPUT
+@shared.LENIENT
+@shared.PICTURE
+@shared.FLOOR
+@shared.RELAY
+@shared.MOTION
+@shared.OUTPUT
 def run(
     options: ProjectOptions,
     asked: RunOptions,

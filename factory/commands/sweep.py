@@ -9,23 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from factory.commands import options as shared
 from factory.commands.grouped import Grouped
-from factory.commands.options import (
-    FLOOR,
-    JOBS,
-    MOTION,
-    OUTPUT,
-    PATH,
-    PROJECT,
-    RELAY,
-    SECONDS,
-    SEEDS,
-    TEMPLATES,
-    UNITS,
-    WIP,
-    bounded,
-    gathered,
-)
 from factory.commands.outputs import writable
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced
@@ -56,31 +41,31 @@ class SweepOptions:
 
 
 @click.command(cls=Grouped)
-@click.argument("source", metavar="[FILE]", type=PATH, required=False)
-@TEMPLATES
+@click.argument("source", metavar="[FILE]", type=shared.PATH, required=False)
+@shared.TEMPLATES
 @click.option(
     "--vary",
     multiple=True,
     metavar="KEY=VALUES",
     help="Values to vary: seed=0:100, jitter=0.1,0.3, speed=0.2:0.6:0.1 ... (repeatable).",
 )
-@click.option("-o", "--output", "database", type=PATH, help="Database of the results.")
-@JOBS
+@click.option("-o", "--output", "database", type=shared.PATH, help="Database of the results.")
+@shared.JOBS
 @click.option("--retry", is_flag=True, help="Repeat failed runs.")
 @click.option("--summary", is_flag=True, help="Print means, deviations and confidence intervals.")
 @click.option("--world", type=click.Choice(["mujoco", "ideal"]), help="As for `run`.")
-@click.option("--units", type=UNITS, help="Products per run (default: 4).")
-@click.option("--seed", type=SEEDS, help="As for `run`.")
-@click.option("--jitter", type=bounded("jitter"), help="As for `run` (default: 0).")
-@WIP
-@click.option("--max-time", type=SECONDS, help="Stop a run after this time [s].")
+@click.option("--units", type=shared.UNITS, help="Products per run (default: 4).")
+@click.option("--seed", type=shared.SEEDS, help="As for `run`.")
+@click.option("--jitter", type=shared.bounded("jitter"), help="As for `run` (default: 0).")
+@shared.WIP
+@click.option("--max-time", type=shared.SECONDS, help="Stop a run after this time [s].")
 @click.option("--fuse/--no-fuse", default=None, help="As for `run`.")
-@gathered(SweepOptions, "runs")
-@PROJECT
-@FLOOR
-@RELAY
-@MOTION
-@OUTPUT
+@shared.gathered(SweepOptions, "runs")
+@shared.PROJECT
+@shared.FLOOR
+@shared.RELAY
+@shared.MOTION
+@shared.OUTPUT
 def sweep(
     options: ProjectOptions,
     runs: SweepOptions,

@@ -9,19 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from factory.commands import options as shared
 from factory.commands.grouped import Grouped
-from factory.commands.options import (
-    DRAW,
-    FAULTS,
-    FLOOR,
-    MOTION,
-    OUTPUT,
-    RELAY,
-    RUNS,
-    SOURCE,
-    WIP,
-    address,
-)
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced
 from factory.simulation.options import RunOptions
@@ -35,17 +24,17 @@ FOR_EVER = 10**9
 
 
 @click.command(cls=Grouped)
-@SOURCE
-@FAULTS
-@address(8765)
+@shared.SOURCE
+@shared.FAULTS
+@shared.address(8765)
 @click.option("--paused", is_flag=True, help="Wait until Play is pressed.")
-@DRAW
-@WIP
-@RUNS
-@FLOOR
-@RELAY
-@MOTION
-@OUTPUT
+@shared.DRAW
+@shared.WIP
+@shared.RUNS
+@shared.FLOOR
+@shared.RELAY
+@shared.MOTION
+@shared.OUTPUT
 def view(
     options: ProjectOptions,
     asked: RunOptions,

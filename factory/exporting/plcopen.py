@@ -7,17 +7,8 @@ from collections.abc import Iterable
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
+from factory.exporting.iec import declarations as iec
 from factory.exporting.iec.cell import declarations
-from factory.exporting.iec.declarations import (
-    ELEMENTARY,
-    SECTIONS,
-    ArrayType,
-    Configuration,
-    DataType,
-    Declarations,
-    OrganizationUnit,
-    Variable,
-)
 from factory.exporting.subject import Subject
 from factory.support.version import __version__
 
@@ -41,7 +32,7 @@ def export(subject: Subject) -> str:
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
 
 
-def _project(declared: Declarations) -> Element:
+def _project(declared: iec.Declarations) -> Element:
     project = Element("project", {"xmlns": SPACE, "xmlns:xhtml": XHTML})
     made = {"companyName": "", "productName": "factory", "productVersion": __version__}
     SubElement(project, "fileHeader", {**made, "creationDateTime": DATED})
@@ -61,9 +52,9 @@ def _project(declared: Declarations) -> Element:
     return project
 
 
-def _data_type(parent: Element, data_type: DataType) -> None:
+def _data_type(parent: Element, data_type: iec.DataType) -> None:
     base = SubElement(parent, "baseType")
-    if isinstance(data_type, ArrayType):
+    if isinstance(data_type, iec.ArrayType):
         array = SubElement(base, "array")
         SubElement(array, "dimension", {"lower": "1", "upper": str(data_type.size)})
         _type(SubElement(array, "baseType"), data_type.of)
@@ -72,17 +63,17 @@ def _data_type(parent: Element, data_type: DataType) -> None:
     _documented(parent, data_type.comment)
 
 
-def _unit(parent: Element, unit: OrganizationUnit) -> None:
+def _unit(parent: Element, unit: iec.OrganizationUnit) -> None:
     interface = SubElement(parent, "interface")
     if unit.returns:
         _type(SubElement(interface, "returnType"), unit.returns)
     for section, variables in unit.sections:
-        _variables(SubElement(interface, SECTIONS[section]), variables)
+        _variables(SubElement(interface, iec.SECTIONS[section]), variables)
     body = SubElement(SubElement(SubElement(parent, "body"), "ST"), "xhtml:p")
     body.text = "\n".join(unit.body)
 
 
-def _variables(parent: Element, variables: Iterable[Variable]) -> None:
+def _variables(parent: Element, variables: Iterable[iec.Variable]) -> None:
     for variable in variables:
         declared = SubElement(parent, "variable", {"name": variable.name})
         _type(SubElement(declared, "type"), variable.type)
@@ -90,7 +81,7 @@ def _variables(parent: Element, variables: Iterable[Variable]) -> None:
 
 
 def _type(parent: Element, name: str) -> None:
-    if name in ELEMENTARY:
+    if name in iec.ELEMENTARY:
         SubElement(parent, name)
     else:
         SubElement(parent, "derived", {"name": name})
@@ -101,7 +92,7 @@ def _documented(parent: Element, comment: str) -> None:
         SubElement(SubElement(parent, "documentation"), "xhtml:p").text = comment
 
 
-def _configuration(parent: Element, declared: Configuration) -> None:
+def _configuration(parent: Element, declared: iec.Configuration) -> None:
     configurations = SubElement(parent, "configurations")
     configuration = SubElement(configurations, "configuration", {"name": declared.name})
     resource = SubElement(configuration, "resource", {"name": declared.resource})

@@ -34,11 +34,17 @@ NOTHING: Mapping[str, str] = MappingProxyType({})
 
 CHILD = """\
 import pickle, sys
-sys.path[:] = pickle.load(sys.stdin.buffer)
-from factory.study.pool import serve
-serve()
+try:
+    sys.path[:] = pickle.load(sys.stdin.buffer)
+    from factory.study.pool import serve
+    serve()
+except (EOFError, BrokenPipeError, pickle.UnpicklingError):
+    pass
 """
-"""The program of a process."""
+"""The program of a process, which ends without a word where its parent has ended."""
+
+DIED = EOFError, OSError, pickle.UnpicklingError
+"""Exceptions of a pipe whose other end has died, perhaps within a message."""
 
 pickle_locked_mappings()  # layouts and factories contain many
 
@@ -111,7 +117,7 @@ class _Processes(Generic[Item, Result]):
             try:
                 _send(process.stdin, item)
                 result, error = pickle.load(process.stdout)  # type: ignore[arg-type]
-            except (EOFError, OSError):
+            except DIED:
                 status = process.wait()
                 continue
             self.free.append(process)
@@ -133,7 +139,7 @@ class _Processes(Generic[Item, Result]):
                 _send(process.stdin, self.work)
                 pickle.load(process.stdout)  # type: ignore[arg-type]
                 return process
-            except (EOFError, OSError):
+            except DIED:
                 status = process.wait()
         message = f"the processes die as they start (exit status {status})"
         raise RunError(Diagnostic("Killed", message, None, "use fewer --jobs, or more memory"))
@@ -169,7 +175,7 @@ def serve() -> None:
 
 def _read(items: SimpleQueue[Any]) -> None:
     """Read the items; the input ends when this process is to end, or its parent has ended."""
-    with suppress(EOFError, OSError):
+    with suppress(*DIED):
         while True:
             items.put(pickle.load(sys.stdin.buffer))
     os._exit(1)

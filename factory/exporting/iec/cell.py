@@ -9,15 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from factory.exporting.iec.declarations import (
-    ArrayType,
-    Configuration,
-    DataType,
-    Declarations,
-    OrganizationUnit,
-    Structure,
-    Variable,
-)
+from factory.exporting.iec import declarations as iec
 from factory.exporting.iec.robots import COMPLETED, RobotBlocks
 from factory.exporting.subject import Subject
 from factory.layout.exclusions import coordinated
@@ -35,7 +27,7 @@ LONGEST_SCAN = 1000
 """Greatest period of the task [ms]."""
 
 
-def declarations(subject: Subject) -> Declarations:
+def declarations(subject: Subject) -> iec.Declarations:
     """The programs of a factory's robots, scanned as often as the subject's choice says. Raises
     InputError (Usage), and where a mode cannot be entered."""
     project = subject.project
@@ -62,7 +54,7 @@ def stations(factory: Factory) -> dict[int, int]:
     return feeders | {dropoff.index: len(feeders) + 1 for dropoff in factory.dropoffs}
 
 
-def cell(layout: Layout, settings: Settings, name: str, scan: int = SCAN) -> Declarations:
+def cell(layout: Layout, settings: Settings, name: str, scan: int = SCAN) -> iec.Declarations:
     """All that is declared for a layout, of a product with a name; its task has a period `scan`
     [ms]. Raises InputError where a mode cannot be entered."""
     factory = layout.factory
@@ -75,12 +67,12 @@ def cell(layout: Layout, settings: Settings, name: str, scan: int = SCAN) -> Dec
         stations(factory),
     )
     units = [blocks.block(robot) for robot in factory.present]
-    return Declarations(
+    return iec.Declarations(
         f"{name}: the programs of {len(units)} robots",
         tuple(_operations(factory)),
         tuple(_types(layout)),
         (_completed(), *units, _program(layout)),
-        Configuration("Plant", "Controller", "Scan", scan, "Production", "FACTORY"),
+        iec.Configuration("Plant", "Controller", "Scan", scan, "Production", "FACTORY"),
     )
 
 
@@ -92,34 +84,38 @@ def _operations(factory: Factory) -> Iterator[str]:
         yield f"operation {operation.index + 1}: {names}, by {robots}"
 
 
-def _types(layout: Layout) -> Iterator[DataType]:
+def _types(layout: Layout) -> Iterator[iec.DataType]:
     factory = layout.factory
     robots, axes = len(factory.robots), len(layout.guidepaths) + len(layout.strokes)
     outfeed = max(stations(factory).values())
-    yield Structure(
+    yield iec.Structure(
         "CELL",
         (
-            Variable("Carries", "UINT", "the operation that made what it brings, 0 for nothing"),
-            Variable("Entered", "UDINT", "operations, since the start"),
-            Variable("Finished", "UDINT", "operations, since the start"),
+            iec.Variable(
+                "Carries", "UINT", "the operation that made what it brings, 0 for nothing"
+            ),
+            iec.Variable("Entered", "UDINT", "operations, since the start"),
+            iec.Variable("Finished", "UDINT", "operations, since the start"),
         ),
         "what a robot shows to all others",
     )
-    yield Structure(
+    yield iec.Structure(
         "AXIS",
         (
-            Variable("Position", "LREAL", "arc length of a carriage from A, height of a lift; m"),
-            Variable("Speed", "LREAL", "m/s"),
-            Variable("Target", "LREAL", "where the drive is to go and stay; m"),
+            iec.Variable(
+                "Position", "LREAL", "arc length of a carriage from A, height of a lift; m"
+            ),
+            iec.Variable("Speed", "LREAL", "m/s"),
+            iec.Variable("Target", "LREAL", "where the drive is to go and stay; m"),
         ),
     )
-    yield ArrayType("CELL_LIST", robots, "CELL")
-    yield ArrayType("AXIS_LIST", axes, "AXIS", _order(layout))
-    yield ArrayType("REAL_LIST", axes, "LREAL", "of axes")
-    yield ArrayType("GRIP_LIST", robots, "BOOL", "of robots")
-    yield ArrayType("JOB_LIST", robots, "UINT", "of robots")
+    yield iec.ArrayType("CELL_LIST", robots, "CELL")
+    yield iec.ArrayType("AXIS_LIST", axes, "AXIS", _order(layout))
+    yield iec.ArrayType("REAL_LIST", axes, "LREAL", "of axes")
+    yield iec.ArrayType("GRIP_LIST", robots, "BOOL", "of robots")
+    yield iec.ArrayType("JOB_LIST", robots, "UINT", "of robots")
     feeders = ", ".join(f"{n} {leaf.label}" for n, leaf in enumerate(factory.leaves, start=1))
-    yield ArrayType("READY_LIST", outfeed, "BOOL", f"feeders: {feeders}; outfeed: {outfeed}")
+    yield iec.ArrayType("READY_LIST", outfeed, "BOOL", f"feeders: {feeders}; outfeed: {outfeed}")
 
 
 def _order(layout: Layout) -> str:
@@ -129,39 +125,39 @@ def _order(layout: Layout) -> str:
     return "; ".join((", ".join(("carriages of the robots", *tools)), *lifts))
 
 
-def _completed() -> OrganizationUnit:
+def _completed() -> iec.OrganizationUnit:
     """The function that says how often a robot has come past an operation of its loop."""
     turns = (
-        Variable("Turn", "UDINT", "operations that a robot has come past"),
-        Variable("Place", "UDINT", "place of the operation in its loop, from 0"),
-        Variable("Length", "UDINT", "operations in its loop"),
+        iec.Variable("Turn", "UDINT", "operations that a robot has come past"),
+        iec.Variable("Place", "UDINT", "place of the operation in its loop, from 0"),
+        iec.Variable("Length", "UDINT", "operations in its loop"),
     )
     body = (f"{COMPLETED} := (Turn + Length - 1 - Place) / Length;",)
-    return OrganizationUnit("FUNCTION", COMPLETED, (("VAR_INPUT", turns),), body, "UDINT")
+    return iec.OrganizationUnit("FUNCTION", COMPLETED, (("VAR_INPUT", turns),), body, "UDINT")
 
 
-def _program(layout: Layout) -> OrganizationUnit:
+def _program(layout: Layout) -> iec.OrganizationUnit:
     factory = layout.factory
     axes = len(layout.guidepaths) + len(layout.strokes)
     inputs = (
-        Variable("Position", "REAL_LIST", "m"),
-        Variable("Speed", "REAL_LIST", "m/s"),
-        Variable("Held", "GRIP_LIST", "sensors: a grip is closed on something"),
-        Variable("Ready", "READY_LIST", "a feeder shows a part; the outfeed is free"),
+        iec.Variable("Position", "REAL_LIST", "m"),
+        iec.Variable("Speed", "REAL_LIST", "m/s"),
+        iec.Variable("Held", "GRIP_LIST", "sensors: a grip is closed on something"),
+        iec.Variable("Ready", "READY_LIST", "a feeder shows a part; the outfeed is free"),
     )
     outputs = (
-        Variable("Target", "REAL_LIST", "m"),
-        Variable("Grip", "GRIP_LIST", "close the grip"),
-        Variable("Job", "JOB_LIST", "operation that a robot is in, 0 for none"),
-        Variable("Carries", "JOB_LIST", "operation that made what a robot brings"),
+        iec.Variable("Target", "REAL_LIST", "m"),
+        iec.Variable("Grip", "GRIP_LIST", "close the grip"),
+        iec.Variable("Job", "JOB_LIST", "operation that a robot is in, 0 for none"),
+        iec.Variable("Carries", "JOB_LIST", "operation that made what a robot brings"),
     )
     robots = [factory.robots[robot] for robot in factory.present]
     inside = (
-        Variable("Cells", "CELL_LIST"),
-        Variable("Axes", "AXIS_LIST"),
-        *(Variable(robot.name, f"ROBOT_{robot.name}") for robot in robots),
-        Variable("Begun", "BOOL"),
-        Variable("Index", "INT"),
+        iec.Variable("Cells", "CELL_LIST"),
+        iec.Variable("Axes", "AXIS_LIST"),
+        *(iec.Variable(robot.name, f"ROBOT_{robot.name}") for robot in robots),
+        iec.Variable("Begun", "BOOL"),
+        iec.Variable("Index", "INT"),
     )
     body = [
         f"FOR Index := 1 TO {axes} DO",
@@ -187,4 +183,4 @@ def _program(layout: Layout) -> OrganizationUnit:
         "END_FOR;",
     ]
     sections = (("VAR_INPUT", inputs), ("VAR_OUTPUT", outputs), ("VAR", inside))
-    return OrganizationUnit("PROGRAM", "FACTORY", sections, tuple(body))
+    return iec.OrganizationUnit("PROGRAM", "FACTORY", sections, tuple(body))

@@ -4,24 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from factory.exporting.iec.declarations import (
-    ArrayType,
-    Configuration,
-    DataType,
-    Declarations,
-    OrganizationUnit,
-    Variable,
-    comment,
-)
+from factory.exporting.iec import declarations as iec
 
 
-def write(declared: Declarations) -> str:
+def write(declared: iec.Declarations) -> str:
     """The text: types, then units, each after those that it uses, then the configuration."""
     return "\n".join(_lines(declared)) + "\n"
 
 
-def _lines(declared: Declarations) -> Iterator[str]:
-    yield from (f"(* {comment(text)} *)" for text in (declared.name, *declared.remarks))
+def _lines(declared: iec.Declarations) -> Iterator[str]:
+    yield from (f"(* {iec.comment(text)} *)" for text in (declared.name, *declared.remarks))
     for data_type in declared.types:
         yield from ("TYPE", *_type(data_type), "END_TYPE")
     for unit in declared.units:
@@ -29,9 +21,9 @@ def _lines(declared: Declarations) -> Iterator[str]:
     yield from ("", *_configuration(declared.configuration))
 
 
-def _type(data_type: DataType) -> Iterator[str]:
+def _type(data_type: iec.DataType) -> Iterator[str]:
     remark = _remark(data_type.comment)
-    if isinstance(data_type, ArrayType):
+    if isinstance(data_type, iec.ArrayType):
         yield f"    {data_type.name} : ARRAY [1..{data_type.size}] OF {data_type.of};{remark}"
         return
     yield f"    {data_type.name} : STRUCT{remark}"
@@ -39,7 +31,7 @@ def _type(data_type: DataType) -> Iterator[str]:
     yield "    END_STRUCT;"
 
 
-def _unit(unit: OrganizationUnit) -> Iterator[str]:
+def _unit(unit: iec.OrganizationUnit) -> Iterator[str]:
     returns = f" : {unit.returns}" if unit.returns else ""
     yield f"{unit.kind} {unit.name}{returns}"
     for section, variables in unit.sections:
@@ -48,16 +40,16 @@ def _unit(unit: OrganizationUnit) -> Iterator[str]:
     yield f"END_{unit.kind}"
 
 
-def _variables(variables: Iterable[Variable], indent: str) -> Iterator[str]:
+def _variables(variables: Iterable[iec.Variable], indent: str) -> Iterator[str]:
     for variable in variables:
         yield f"{indent}{variable.name} : {variable.type};{_remark(variable.comment)}"
 
 
 def _remark(text: str) -> str:
-    return f" (* {comment(text)} *)" if text else ""
+    return f" (* {iec.comment(text)} *)" if text else ""
 
 
-def _configuration(configuration: Configuration) -> Iterator[str]:
+def _configuration(configuration: iec.Configuration) -> Iterator[str]:
     task, program = configuration.task, configuration.program
     yield f"CONFIGURATION {configuration.name}"
     yield f"    RESOURCE {configuration.resource} ON PLC"
