@@ -11,9 +11,9 @@ import pytest
 import factory
 from benches.fidelity.convergence import soften
 from factory.layout.layout import Layout
-from factory.record.state import Event
+from factory.study.analysis.measured import operation_times
 from factory.study.fidelity import QUANTITIES, SeedRecord, measure, measure_seed
-from factory.study.fidelity.comparing import Alter, Case, durations
+from factory.study.fidelity.comparing import Alter, Case
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
 from tests.command_line import PAPER, ROOT, Terminal
@@ -129,9 +129,11 @@ def test_a_stalled_run_is_told_and_fails() -> None:
 
 
 def test_the_nth_time_of_an_operation_is_its_duration() -> None:
-    record = [Event(0.0, "a_s"), Event(0.1, "b_s"), Event(0.5, "a_e"), Event(0.7, "a_s")]
-    ended = [*record, Event(1.0, "a_e"), Event(1.1, "c_e")]
-    assert durations(ended) == {("a", 1): 0.5, ("a", 2): pytest.approx(0.3)}
+    factory = layout().factory
+    a, b, c = factory.operations[:3]
+    firings = [(a.start, 0.0), (b.start, 0.1), (a.end, 0.5), (a.start, 0.7), (a.end, 1.0)]
+    spent = operation_times(factory, [*firings, (c.end, 1.1)])
+    assert spent[:3] == [[0.5, pytest.approx(0.3)], [], []]
 
 
 def test_processes_give_the_same_figures() -> None:

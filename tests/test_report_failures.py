@@ -3,13 +3,12 @@ that stood over time; nothing of it in a report of any other run."""
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
 
 from factory.record.log import LogWriter
-from factory.record.log.failed import failures_in
+from factory.record.log.failed import failures_of
 from factory.show.report import page, recording_of
 from factory.show.report.failures import failures_data, failures_section
 from factory.show.report.pace import measured
@@ -95,7 +94,7 @@ def test_from_the_command_line(run: Terminal, tmp_path: Path) -> None:
 def test_what_a_log_keeps_is_read_as_it_was_written(recording: Recording) -> None:
     failures, robots = recording.log.failures, frozenset(recording.log.header["robots"])
     assert failures is not None
-    assert failures_in(json.dumps(table_of(failures)).encode(), robots) == failures
+    assert failures_of(table_of(failures), robots) == failures
 
 
 @pytest.mark.parametrize(
@@ -115,4 +114,4 @@ def test_what_is_no_account_of_failures_is_refused(
     assert recording.log.failures is not None
     told = {**table_of(recording.log.failures), key: value}
     with pytest.raises(ValueError, match=words):
-        failures_in(json.dumps(told).encode(), frozenset(recording.log.header["robots"]))
+        failures_of(told, frozenset(recording.log.header["robots"]))

@@ -32,7 +32,7 @@ def new(name: Path, out: OutputOptions) -> int:
     from factory.support.files import write_all
 
     files = {name / path: content for path, content in starter(name.name).items()}
-    if name.is_symlink() or (name.exists() and not _is_empty(name)):
+    if name.is_symlink() or (name.exists() and (name.is_file() or any(name.iterdir()))):
         message, hint = f"'{name}' is there already", "choose another name"
         raise InputError(Diagnostic("BadFile", message, None, hint))
     writable_folder(name)
@@ -46,10 +46,6 @@ def new(name: Path, out: OutputOptions) -> int:
         say(f"  cd {name}")
         say(f"  factory run {name.name}.pag --units 3")
     return 0
-
-
-def _is_empty(folder: Path) -> bool:
-    return folder.is_dir() and not any(folder.iterdir())
 
 
 def starter(name: str) -> dict[str, bytes]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from factory.support.errors import Diagnostic
 
@@ -35,13 +35,7 @@ class CutOff:
 
     def as_json(self) -> dict[str, object]:
         """The key `cut_off` of a `--json` document; it is null where the units were made."""
-        return {
-            "t": round(self.t, 6),
-            "products": self.products,
-            "units": self.units,
-            "code": self.code,
-            "message": self.message,
-        }
+        return {**asdict(self), "t": round(self.t, 6)}
 
     def diagnostic(self, file: object) -> Diagnostic:
         """The message about the log in a file."""

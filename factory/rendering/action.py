@@ -41,7 +41,7 @@ def action_of(m: mujoco.MjModel, d: mujoco.MjData) -> Action:
     for own, corners_of in (*_bodies(m, d), *_loads(m, d)):
         points[own].append(corners_of)
     boxes = {own: box_of(np.concatenate(corners_of)) for own, corners_of in points.items()}
-    beside = [placed(m, d, g) for g in range(m.ngeom) if _feeds(m, g)]
+    beside = [placed(m, d, g) for g in range(m.ngeom) if names.kind(m.geom(g).name) == "feeder"]
     robots: list[Array] = []
     for (body, _), box in boxes.items():
         way = _way(m, d, body, boxes.get((body, "load"), box))
@@ -50,10 +50,6 @@ def action_of(m: mujoco.MjModel, d: mujoco.MjData) -> Action:
     return Action(
         *(np.array(corners_of).reshape(-1, 8, 3) for corners_of in (robots or beside, beside))
     )
-
-
-def _feeds(m: mujoco.MjModel, geom: int) -> bool:
-    return names.kind(m.geom(geom).name) == "feeder"
 
 
 def _bodies(m: mujoco.MjModel, d: mujoco.MjData) -> Iterator[tuple[Own, Array]]:

@@ -55,12 +55,6 @@ def failures_so_far(ticks: Sequence[Arrays], robots: frozenset[str]) -> Failures
     )
 
 
-def failures_in(content: bytes, robots: frozenset[str]) -> Failures:
-    """The failures in the last block of a log whose robots have these names. Raises ValueError
-    where the text is not the table of `Failures`."""
-    return failures_of(json.loads(content), robots)
-
-
 def failures_of(table: Any, robots: frozenset[str]) -> Failures:
     """The failures in a table. Raises ValueError."""
     failures = value_of(Failures, table, "failures")
@@ -85,7 +79,8 @@ def undone_in(ticks: Sequence[Arrays], header: Mapping[str, Any]) -> tuple[Place
     """The undos in the blocks of a log. Raises ValueError for an entry that is not one, that names
     an unknown transition or robot, or that is out of order."""
     tables = [json.loads(arrays["undone"].tobytes()) for arrays in ticks if "undone" in arrays]
-    entries = tuple(entry for table in tables for entry in _entries(table))
+    kind: Any = tuple[Placed, ...]
+    entries = tuple(entry for table in tables for entry in value_of(kind, table, "undone"))
     fired = sum(len(arrays["fired"]) for arrays in ticks)
     transitions, robots, last = {*header["transitions"]}, {*header["robots"]}, 0
     for after, undone in entries:
@@ -100,9 +95,3 @@ def undone_in(ticks: Sequence[Arrays], header: Mapping[str, Any]) -> tuple[Place
             raise ValueError(f"something is undone at {undone.t} s, before the run")
         last = after
     return entries
-
-
-def _entries(table: Any) -> tuple[Placed, ...]:
-    kind: Any = tuple[Placed, ...]
-    made: tuple[Placed, ...] = value_of(kind, table, "undone")
-    return made

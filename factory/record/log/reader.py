@@ -18,7 +18,7 @@ from factory.record.ending import CutOff
 from factory.record.failures import Failures
 from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, blocks, check_magic, is_cut
 from factory.record.log.checks import check_block, check_course, check_header, state_bytes
-from factory.record.log.failed import Placed, failures_in, failures_so_far, undone_in
+from factory.record.log.failed import Placed, failures_of, failures_so_far, undone_in
 from factory.record.log.states import (
     StateRows,
     StoredRows,
@@ -281,7 +281,7 @@ def _failures(end: Arrays, ticks: Sequence[Arrays], header: Mapping[str, Any]) -
     """All failures, from the last block, or those up to the end of a log that lacks it."""
     robots = frozenset(header["robots"])
     if "failures" in end:
-        return failures_in(end["failures"].tobytes(), robots)
+        return failures_of(json.loads(end["failures"].tobytes()), robots)
     return failures_so_far(ticks, robots)
 
 

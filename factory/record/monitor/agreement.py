@@ -62,8 +62,11 @@ def contradictions(
     tokens = [int(place in subject.start) for place in range(len(gears.threaded.places))]
     fired = [subject.counts.get(event, 0) for event in range(len(gears.threaded.transitions))]
     for time, marking in markings:
-        while left and left[0][0] < time + (ROUNDING if _is_undone(left[0][1]) else -ROUNDING):
-            _, entry = left.popleft()
+        while left:
+            t, entry = left[0]
+            if t >= time + (ROUNDING if isinstance(entry, Undone) else -ROUNDING):
+                break
+            left.popleft()
             _play(gears.threaded.net, tokens, fired, entry)
             if isinstance(entry, Undone) and entry.exchanged:
                 gears = next(nets)
@@ -75,10 +78,6 @@ def contradictions(
             words = f"the recorded marking does not follow from the firings: {names}"
             yield _violation(subject, time, "", words)
             return
-
-
-def _is_undone(entry: Entry) -> bool:
-    return isinstance(entry, Undone)
 
 
 def _play(net: PetriNet, tokens: list[int], fired: list[int], entry: Entry) -> None:

@@ -126,11 +126,6 @@ class Transfers:
             self.blame("Exchanged", holder[1], label, message)
         return max(units)
 
-    def _parts(self, copies: Sequence[int]) -> list[str]:
-        """The labels of the parts in copies."""
-        contents = self.subject.factory.contents
-        return [part for copy in copies for part in contents[self.anatomy.label[copy]]]
-
     # --- one copy ------------------------------------------------------------------------------
 
     def _holder(self, switch: Switch) -> Holder | None:
@@ -234,7 +229,8 @@ class Transfers:
         held = [self.inside[copy] for copy in copies]
         if sum(map(len, held)) == len(wanted) and all(parts <= wanted for parts in held):
             return
-        found = self._parts(sorted(copies))
+        contents, names = self.subject.factory.contents, self.anatomy.label
+        found = [inside for copy in sorted(copies) for inside in contents[names[copy]]]
         missing, extra = sorted(wanted - set(found)), sorted(set(found) - wanted)
         twice = sorted({part for part in found if found.count(part) > 1}) if not extra else []
         for part, what in [

@@ -81,20 +81,16 @@ def stations(
     factory: Factory, m: mujoco.MjModel, ends: Iterable[tuple[Operation, Floats]]
 ) -> dict[tuple[float, float], list[str]]:
     """The stations of operations, each with the state of the engine (nq,) as it ends."""
-    replica = Replica(m)
+    replica, sites = Replica(m), {m.site(number).name for number in range(m.nsite)}
     stations: dict[tuple[float, float], list[str]] = {}
     for operation, qpos in ends:
         nest = f"{factory.robots[operation.carrier].name}/nest"
-        if len(operation.robots) < 2 or not _has_site(m, nest):
+        if len(operation.robots) < 2 or nest not in sites:
             continue
         replica.place(qpos)
         x, y = (round(float(v), 3) for v in replica.d.site_xpos[m.site(nest).id][:2])
         stations.setdefault((x, y), []).append(operation.label)
     return stations
-
-
-def _has_site(m: mujoco.MjModel, name: str) -> bool:
-    return int(mujoco.mj_name2id(m, mujoco.mjtObj.mjOBJ_SITE.value, name)) >= 0
 
 
 def placed(m: mujoco.MjModel, geom: int) -> tuple[Floats, NDArray[np.int64]]:

@@ -275,7 +275,8 @@ def _title(key: str) -> str:
 def made_how(recording: Recording) -> str:
     """The inputs of the run: files, world, settings, versions."""
     header = recording.log.header
-    settings = ", ".join(f"{k} {v:g}" for k, v in header["settings"].items() if _is_number(v))
+    numbers = {k: v for k, v in header["settings"].items() if isinstance(v, int | float)}
+    settings = ", ".join(f"{k} {v:g}" for k, v in numbers.items())
     versions = ", ".join(f"{k} {v}" for k, v in header.get("versions", {}).items())
     file = header["pag"]["file"].replace("\\", "/").rpartition("/")[2]
     rows = [
@@ -288,10 +289,6 @@ def made_how(recording: Recording) -> str:
         rows.append(("Log", recording.log.cut_off.with_cause))
     body = "".join(f"<dt>{name}</dt><dd>{escape(str(words))}</dd>" for name, words in rows)
     return f"<dl>{body}</dl>"
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float)
 
 
 def _table(columns: tuple[str, ...], rows: str) -> str:

@@ -200,7 +200,8 @@ class _Tour:
                 line.bundle, line.at = merged, now
             if not inserted:
                 now += timing.takes(number, TOOL_WAY)
-        first = tuple(self.made[kid] for kid in self._begins(robot))
+        begun = begun_by(factory, robot)
+        first = tuple(self.made[kid] for kid in begun if kid in self.made)
         return TourBundle(
             (robot,),
             now,
@@ -231,6 +232,3 @@ class _Tour:
             return []
         pairs = zip(operation.robots, operation.before, strict=True)
         return [guest for guest, label in pairs if guest != robot and label != NOPART]
-
-    def _begins(self, robot: int) -> list[int]:
-        return [guest for guest in begun_by(self.timing.factory, robot) if guest in self.made]

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from statistics import fmean
 
 from factory.layout.layout import Layout
 from factory.mjcf.model import product_name
-from factory.record.state import Event
+from factory.plant.factory import Factory
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from factory.study.analysis.flow import steady_units
+from factory.study.analysis.measured import operation_times
 from factory.study.fidelity.measuring import Measurement
 from factory.study.fidelity.quantities import QUANTITIES
 from factory.study.fidelity.record import Fidelity, SeedRecord
@@ -106,7 +108,7 @@ def measure_seed(case: Case, seed: int) -> SeedRecord:
         case.alter(physical.physical.m)
     measurement = Measurement(physical)
     ideal_run, run = ideal.run(max_time=case.max_time), measurement.run(case.max_time)
-    figures = _compared(ideal_run, run) | measurement.figures()
+    figures = _compared(layout.factory, ideal_run, run) | measurement.figures()
     return SeedRecord(
         seed,
         run.units,
@@ -117,7 +119,7 @@ def measure_seed(case: Case, seed: int) -> SeedRecord:
     )
 
 
-def _compared(ideal: Run, run: Run) -> dict[str, float | None]:
+def _compared(factory: Factory, ideal: Run, run: Run) -> dict[str, float | None]:
     """The figures that need both runs."""
     return {
         "illegal_records": (not ideal.refines_net) + (not run.refines_net),
@@ -125,31 +127,21 @@ def _compared(ideal: Run, run: Run) -> dict[str, float | None]:
         "cycle_time_s": run.cycle_time_s,
         "cycle_from_ideal_percent": _over(run.cycle_time_s, ideal.cycle_time_s),
         "cycle_from_predicted_percent": _over(run.cycle_time_s, run.predicted_cycle_time_s),
-        "duration_difference_mean_s": _later(ideal.lasting, run.lasting),
+        "duration_difference_mean_s": _later(factory, ideal, run),
     }
 
 
-def _later(ideal: Iterable[Event], physical: Iterable[Event]) -> float | None:
-    """Mean duration of operations in the second record less that in the first [s]. The n-th time
-    of an operation is compared with the n-th; None if no operation ends in both."""
-    one, other = durations(ideal), durations(physical)
-    pairs = [other[turn] - one[turn] for turn in one if turn in other]
+def _later(factory: Factory, ideal: Run, physical: Run) -> float | None:
+    """Mean duration of operations in the second run less that in the first [s]. The n-th time of an
+    operation is compared with the n-th; None if no operation ends in both."""
+    number = factory.net.threaded.net.transition_index
+    one, other = (
+        operation_times(factory, ((number[e.transition], e.t) for e in run.lasting))
+        for run in (ideal, physical)
+    )
+    both = chain(*(zip(*times, strict=False) for times in zip(one, other, strict=True)))
+    pairs = [late - early for early, late in both]
     return fmean(pairs) if pairs else None
-
-
-def durations(events: Iterable[Event]) -> dict[tuple[str, int], float]:
-    """X_e - X_s [s] of each operation that ends in a record, by its name and number of times."""
-    spent: dict[tuple[str, int], float] = {}
-    began: dict[str, float] = {}
-    times: dict[str, int] = {}
-    for event in events:
-        name = event.transition[:-2]
-        if event.transition.endswith("_s"):
-            began[name] = event.t
-        elif name in began:
-            times[name] = times.get(name, 0) + 1
-            spent[name, times[name]] = event.t - began[name]
-    return spent
 
 
 def _over(value: float | None, reference: float | None) -> float | None:

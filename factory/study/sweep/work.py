@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import socket
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import lru_cache
@@ -23,7 +23,7 @@ from factory.simulation.simulation import Compiled, Simulation, compiled
 from factory.simulation.watched import watched
 from factory.study.sweep.grid import FAULT_RATE, SETTINGS, Point
 from factory.study.sweep.recipe import Recipe
-from factory.support.errors import FactoryError
+from factory.support.errors import Diagnostic, FactoryError
 from factory.support.settings import Settings
 
 T = TypeVar("T")
@@ -96,13 +96,13 @@ class Runner:
         figures: dict[str, Any] = {}
         try:
             run = self.run(point)
-            reason, document = _reason(run), run.as_json()
+            reason, document = _told(run.verdict.failures), run.as_json()
             figures = {name: document[name] for name in FIGURES}
             if run.failures is not None:
                 counts = run.failures.as_json() | {"failures": len(run.failures.found)}
                 figures |= {name: counts[name] for name in FAILING_FIGURES}
         except FactoryError as error:
-            reason = "; ".join(f"{d.code} {d.message}" for d in error.diagnostics[:3])
+            reason = _told(error.diagnostics)
         except Exception as error:
             reason = f"Internal {type(error).__name__}: {error}"
         return _outcome(point, reason, figures, perf_counter() - begin)
@@ -129,7 +129,8 @@ class Runner:
         simulation = Simulation(layout, request, shared)
         if rate is None:
             return watched(simulation, max_time=self.recipe.max_time)
-        recovery = recover(simulation, _campaign(rate, values["seed"]))
+        faults = tuple(WorldFault(kind, rate=rate) for kind in ("drop", "bad_joint"))
+        recovery = recover(simulation, Campaign(faults, values["seed"]))
         run = watched(simulation, max_time=self.recipe.max_time)
         return replace(run, failures=recovery.report())
 
@@ -164,14 +165,8 @@ def _outcome(point: Point, reason: str, figures: Mapping[str, Any], took: float)
     return Outcome(point, reason, figures, took, worker, 1, now)
 
 
-def _campaign(rate: float, seed: int) -> Campaign:
-    """Faults of both kinds, dropped parts and slipped inputs, in this share of the operations."""
-    return Campaign(tuple(WorldFault(kind, rate=rate) for kind in ("drop", "bad_joint")), seed)
-
-
-def _reason(run: Run) -> str:
-    """Why a run counts as failed, "" if it does not."""
-    return "; ".join(f"{d.code} {d.message}" for d in run.verdict.failures[:3])
+def _told(failures: Sequence[Diagnostic]) -> str:
+    return "; ".join(f"{d.code} {d.message}" for d in failures[:3])
 
 
 def _or_raise(result: T | FactoryError) -> T:
