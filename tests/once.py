@@ -18,7 +18,7 @@ import pytest
 
 from factory.compiler.mating import mating
 from factory.layout.request import Ground
-from factory.support.pickling import pickle_locked_mappings
+from factory.study.pool import pickle_locked_mappings
 
 ANEW = ("test_cold_and_warm", "test_layout_optimised", "test_progress", "test_reproducible")
 

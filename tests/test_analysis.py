@@ -29,11 +29,10 @@ from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from factory.study.analysis import Change, Timing, analyse
-from factory.study.analysis.firing import earliest_firings
+from factory.study.analysis.analysing import least_wip
+from factory.study.analysis.firing import circuits, earliest_firings, slacks
 from factory.study.analysis.flow import flow, reached
-from factory.study.analysis.slack import circuits, slacks
 from factory.study.analysis.timed import timed_net
-from factory.study.analysis.what_if import least_wip
 from factory.support.settings import Settings
 from factory.timing.prediction import duration
 from factory.timing.timed import timed

@@ -20,8 +20,8 @@ from factory.record.log import Log
 from factory.record.log.model import model_of
 from factory.record.monitor.record import recorded_subject
 from factory.rendering.caption import Caption, draw_notices
-from factory.rendering.colours import DEAD
 from factory.rendering.history import History
+from factory.rendering.ink import DEAD
 from factory.rendering.marks import LeftOut
 from factory.rendering.net_panel import NetPanel
 from factory.rendering.rows import Rows

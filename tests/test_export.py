@@ -31,7 +31,7 @@ import factory.exporting
 from factory import to_networkx
 from factory.exporting import Subject, exporters
 from factory.exporting.bodies import file_name
-from factory.exporting.events import COLUMNS
+from factory.exporting.csv import COLUMNS
 from factory.exporting.svg import draw_net
 from factory.exporting.swimlanes import swimlanes
 from factory.exporting.tree_drawing import draw_tree

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from factory.exporting import Subject, exporters
-from factory.exporting.events import rows
+from factory.exporting.csv import rows
 from factory.record.log import Log
 from tests.failing_runs import failing
 

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import rotation
 from factory.importing import Options, import_product
-from factory.importing.places import quaternion
+from factory.importing.part_maker import quaternion
 from factory.lang import read_pag
 from factory.problem.pag import PAG
 from factory.problem.template import Template

@@ -16,8 +16,7 @@ from hypothesis.extra import numpy as arrays
 
 import factory
 from factory.record.log import MAGIC, Log, LogWriter, is_log, read_log
-from factory.record.log.blocks import HEAD, LENGTH, pack_rows, unpack_rows
-from factory.record.log.states import StoredRows
+from factory.record.log.blocks import HEAD, LENGTH, StoredRows, pack_rows, unpack_rows
 from factory.record.monitor.record import watch_log
 from factory.record.state import State
 from factory.simulation.request import RunRequest

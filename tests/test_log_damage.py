@@ -245,7 +245,7 @@ def test_a_log_that_does_not_fit(
     def full(*_: object) -> None:
         raise error("too much")
 
-    monkeypatch.setattr("factory.record.log.states.unpack_rows", full)
+    monkeypatch.setattr("factory.record.log.blocks.unpack_rows", full)
     assert is_refused(log, "too much")
 
 

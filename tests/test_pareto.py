@@ -17,11 +17,10 @@ from hypothesis import strategies as st
 from factory.pipeline import Project, read
 from factory.show.pareto import floor_plans, front_page
 from factory.show.pareto.chart import ChartAxis, cycle_chart
-from factory.study.allocation.least import least_robots
+from factory.study.allocation.aim import least_robots
 from factory.study.pareto import Effort, FrontPoint, FrontSweep, ParetoFront, pareto, sweeping
-from factory.study.pareto.front import undominated
+from factory.study.pareto.front import Trial, tried, undominated
 from factory.study.pareto.point_files import commands_of, point_files
-from factory.study.pareto.trial import Trial, tried
 from factory.support import progress
 from factory.support.progress import StepBar
 from factory.support.settings import Settings
@@ -280,7 +279,7 @@ def test_what_fits_a_floor_is_found_where_the_product_as_written_does_not(run: T
 
 def test_a_failed_run_is_told(run: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
     failed = Trial(4, 1.0, 1.0, 1.0, ("mujoco: Contact: r1 meets r2",))
-    monkeypatch.setattr("factory.study.pareto.trial.tried", lambda _: failed)
+    monkeypatch.setattr("factory.study.pareto.front.tried", lambda _: failed)
     done = run("pareto", PAPER, "--validate", 1, "--no-hands")
     assert done.status == 1
     assert "failed" in done.out

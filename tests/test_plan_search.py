@@ -21,15 +21,13 @@ from factory.planning.blocking import CLASHES, DEEPER, FREE, LOCKED, SCRAPES, Bl
 from factory.planning.cannot import cores, interlocks, removal
 from factory.planning.dividing import Divider
 from factory.planning.divisions import divisions
-from factory.planning.estimate import Expected
-from factory.planning.exact import Best, Tree, TreeTask, tables
+from factory.planning.exact import Best, Expected, Tree, TreeTask, tables
 from factory.planning.growing import Site, bettered, divided, units_of
 from factory.planning.judging import Judge, Judged
 from factory.planning.parts import InPlace
 from factory.planning.searching import Sought, budget_of, trees
 from factory.planning.source import placed
-from factory.planning.stance import ROOT_AXIS, Stance, stances
-from factory.planning.subsets import subsets
+from factory.planning.subsets import ROOT_AXIS, Stance, stances, subsets
 from factory.planning.writing import planned_product
 
 TEMPLATES = all_templates()

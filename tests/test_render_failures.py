@@ -19,11 +19,10 @@ from factory.record.log.model import model_of
 from factory.record.monitor.record import recorded_subject
 from factory.record.monitor.subject import subject_of
 from factory.rendering.caption import TOLD, Caption, draw_notices
-from factory.rendering.colours import AMBER, DEAD, FLASH
 from factory.rendering.film import moment_of
 from factory.rendering.gantt_panel import GanttPanel
 from factory.rendering.history import History
-from factory.rendering.ink import Ink
+from factory.rendering.ink import AMBER, DEAD, FLASH, Ink
 from factory.rendering.marks import Mark, Marks
 from factory.rendering.net_panel import NetPanel
 from factory.rendering.rows import Rows

@@ -17,20 +17,19 @@ from factory.record.monitor.record import recorded_subject
 from factory.record.monitor.subject import subject_of_run
 from factory.record.state import State
 from factory.rendering import Film, Picture, Still, camera_named, panels_named, render_log
+from factory.rendering.action import Snapshot
 from factory.rendering.camerawork import Moment
 from factory.rendering.caption import FADES, SHOWN, draw_title, strength
-from factory.rendering.colours import GROUND, operation_colours, robot_colours
 from factory.rendering.film import moment_of, take_of
 from factory.rendering.following import Followed
 from factory.rendering.gantt_panel import GanttPanel
 from factory.rendering.history import History, OperationProgress, depths, followed
-from factory.rendering.ink import Ink, fitted, width
+from factory.rendering.ink import GROUND, Ink, fitted, operation_colours, robot_colours, width
 from factory.rendering.net_panel import NetPanel
 from factory.rendering.picture import PANELS, shared
 from factory.rendering.reel import Poster
 from factory.rendering.rows import CLOSE, EASY, ROOM, Rows, neighbourhood
 from factory.rendering.sheet import BOTTOM, FOOT, OUTSIDE, TALLEST
-from factory.rendering.subject import Snapshot
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError

@@ -12,7 +12,7 @@ from factory.mjcf import names
 from factory.mjcf.replica import Replica
 from factory.problem.pag import NOPART
 from factory.record.log import Log, LogWriter, read_log
-from factory.rendering.action import Action, action_of, shape_of
+from factory.rendering.action import Action, action_of, placed, shape_of
 from factory.rendering.camera import orbit, overview
 from factory.rendering.camerawork import Take
 from factory.rendering.fading import FAINT, Fading
@@ -20,7 +20,6 @@ from factory.rendering.film import moment_of, take_of
 from factory.rendering.following import Viewpoint
 from factory.rendering.junction import handover_view
 from factory.rendering.picture import Picture
-from factory.rendering.subject import placed
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco

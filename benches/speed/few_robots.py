@@ -16,8 +16,7 @@ from factory.pipeline import read
 from factory.plant.fused_bodies import fusing_pays
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
-from factory.study.allocation.aim import Aim
-from factory.study.allocation.least import least_robots
+from factory.study.allocation.aim import Aim, least_robots
 from factory.study.allocation.search import allocated
 from factory.support.settings import Settings
 

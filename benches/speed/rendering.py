@@ -15,11 +15,11 @@ from benches.speed.factories import Case, Steady, laid_out, robots_at_least, run
 from benches.speed.processes import ROOT, fresh, interleaved, median, ratio, serve, spread
 from benches.tables import table
 from factory.record.monitor.subject import subject_of_run
+from factory.rendering.action import Snapshot
 from factory.rendering.camerawork import Camerawork, Moment, Take
 from factory.rendering.history import History
 from factory.rendering.picture import Picture
 from factory.rendering.reel import Reel
-from factory.rendering.subject import Snapshot
 from factory.rendering.video import FPS
 from factory.simulation.simulation import Simulation
 from factory.support import gl

@@ -101,7 +101,7 @@ def _found(
     """The front, with the runs of `trials` of its points; and the error of an interruption, if the
     user stopped the search after a first point."""
     from factory.study.pareto import FrontSweep
-    from factory.study.pareto.trial import tried
+    from factory.study.pareto.front import tried
     from factory.support.progress import StepBar
 
     front = None

@@ -24,8 +24,7 @@ from factory.support.progress import StepBar, Waiting
 if TYPE_CHECKING:
     from factory.geometry.meshes import Array
     from factory.pipeline import Project
-    from factory.planning.hulls import Drawn
-    from factory.planning.parts import InPlace
+    from factory.planning.parts import Drawn, InPlace
     from factory.planning.plan import CannotAssemble, Planned, PlannedJoin, PlanOptions
     from factory.planning.searching import Aim
     from factory.plant.approaches import Approach, Kind

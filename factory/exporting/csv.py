@@ -8,11 +8,76 @@ from __future__ import annotations
 
 import csv
 import io
-from dataclasses import astuple
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import astuple, dataclass
 
-from factory.exporting.events import COLUMNS, rows
 from factory.exporting.subject import Subject
+from factory.nets.undone import Undone
+from factory.plant.factory import Factory
+from factory.record.log import Log
+from factory.record.project_table import factory_of
 from factory.support.errors import one_line
+
+
+@dataclass(frozen=True, slots=True)
+class EventRow:
+    """A transition that fired, or was undone, at `time_s` [s]. `kind`: start, end, start undone or
+    end undone; `operation`: the label it makes; `unit`: how often the transition has fired, less
+    how often it was undone; `robots`: those of the operation."""
+
+    time_s: float
+    transition: str
+    kind: str
+    operation: str
+    template: str
+    unit: int
+    carrier: str
+    robots: tuple[str, ...]
+    file: str
+    line: int
+    column: int
+
+
+COLUMNS = tuple(EventRow.__dataclass_fields__)
+"""The names of the columns."""
+
+
+def rows(log: Log) -> Iterator[EventRow]:
+    """The events in the order in which they were recorded: a row for each time that a transition
+    fires, and one for each that is undone. Raises InputError (BadLog) where the log is not of the
+    factory that its header describes."""
+    factory, units = factory_of(log.header), Counter[int]()
+    numbers = factory.net.threaded.net.transition_index
+    for time, entry in log.timed_entries:
+        if isinstance(entry, Undone):
+            for name in entry.transitions:
+                number = numbers[name]
+                yield _row(factory, time, number, units[number], " undone")
+                units[number] -= 1
+            continue
+        number = numbers[entry]
+        units[number] += 1
+        yield _row(factory, time, number, units[number])
+
+
+def _row(factory: Factory, time: float, number: int, unit: int, undone: str = "") -> EventRow:
+    operation = factory.operations[number // 2]
+    at = operation.position
+    return EventRow(
+        round(time, 9),
+        factory.net.threaded.transitions[number].name,
+        ("end" if number % 2 else "start") + undone,
+        operation.label,
+        operation.template.name,
+        unit,
+        factory.robots[operation.carrier].name,
+        tuple(factory.robots[r].name for r in operation.robots),
+        at.file if at else "",
+        at.line if at else 0,
+        at.column if at else 0,
+    )
+
 
 FORMAT, TAKES = "csv", "log"
 

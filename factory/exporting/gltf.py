@@ -5,14 +5,79 @@ the ending of the file; into a folder, a .glb for every label."""
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from factory.exporting.bodies import triangles, wanted
-from factory.exporting.gltf_scene import new_scene, pose, shaded, written
 from factory.exporting.subject import Subject
+from factory.geometry.meshes import Array, Indices, Mesh
 from factory.geometry.solids import Product, rotation
+from factory.mjcf.mesh_files import corner_normals
 from factory.problem.pag import PAG
+
+UPRIGHT = ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, -1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+"""From z upwards to y upwards."""
+
+WORLD = "/world"
+"""The outermost node."""
+
+
+def new_scene(root: str) -> Any:
+    """An empty scene with a node, in whose frame z is upwards."""
+    import trimesh
+
+    scene = trimesh.Scene(base_frame=WORLD)
+    scene.graph.update(root, WORLD, matrix=np.array(UPRIGHT))
+    return scene
+
+
+def written(scene: Any, binary: bool) -> bytes:
+    """A scene as a file, binary or as JSON with its buffer inside (section 4.4)."""
+    import trimesh
+
+    gltf = trimesh.exchange.gltf
+    if binary:
+        return bytes(gltf.export_glb(scene, include_normals=True))
+    inside = {"merge_buffers": True, "embed_buffers": True}
+    return bytes(gltf.export_gltf(scene, include_normals=True, **inside)["model.gltf"])
+
+
+def pose(position: ArrayLike, turn: ArrayLike) -> Array:
+    """A place (3,) and a rotation (3, 3) as one matrix (4, 4)."""
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = turn, position
+    return matrix
+
+
+def shaded(mesh: Mesh, rgba: ArrayLike) -> Any:
+    """A mesh in a colour, with normals smooth on rounded surfaces and discontinuous at edges."""
+    import trimesh
+
+    vertices, faces, normals = _unwelded(mesh)
+    body = trimesh.Trimesh(vertices, faces, vertex_normals=normals, process=False)
+    closed = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).is_watertight
+    paint = np.round(255 * np.asarray(rgba, float)).astype(np.uint8)
+    material = trimesh.visual.material.PBRMaterial(
+        baseColorFactor=paint,
+        metallicFactor=0.1,
+        roughnessFactor=0.6,
+        doubleSided=not closed,
+        alphaMode="BLEND" if paint[3] < 255 else "OPAQUE",
+    )
+    body.visual = trimesh.visual.TextureVisuals(material=material)
+    return body
+
+
+def _unwelded(mesh: Mesh) -> tuple[Array, Indices, Array]:
+    """Vertices, faces and normals, with a vertex for each distinct normal at a corner."""
+    corners = np.concatenate(
+        [mesh.vertices[mesh.faces], np.round(corner_normals(mesh), 6)], axis=2
+    ).reshape(-1, 6)
+    found, index = np.unique(corners, axis=0, return_inverse=True)
+    return found[:, :3], index.reshape(-1, 3).astype(np.int64), found[:, 3:]
+
 
 FORMAT, TAKES, BINARY, FOLDER, OF = "gltf", "pag", True, True, "a label"
 

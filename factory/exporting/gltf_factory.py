@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from factory.exporting.gltf_scene import new_scene, pose, shaded, written
+from factory.exporting.gltf import new_scene, pose, shaded, written
 from factory.exporting.subject import Subject
 from factory.geometry.meshes import Array, Mesh
 from factory.geometry.solids import rotation

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from factory.control.mode import Truth
-from factory.exporting.events import EventRow, rows
+from factory.exporting.csv import EventRow, rows
 from factory.exporting.motion import BodyMotion, motion_of
 from factory.exporting.subject import Subject
 from factory.geometry.meshes import Array

@@ -8,8 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from factory.importing.draft import MATE, MOST_NODES, PART, DraftNode, ImportFaults, too_many
-from factory.importing.part_maker import PartMaker
-from factory.importing.places import Placement
+from factory.importing.part_maker import PartMaker, Placement
 from factory.importing.tree_file import mesh_name
 from factory.lang.source import Source, quoted
 from factory.lang.values import GEOMETRY

@@ -17,7 +17,7 @@ from factory.importing.draft import PART, DraftNode, ImportFaults
 from factory.importing.importer import Imported
 from factory.importing.labels import file_stem, label_of
 from factory.importing.mesh_files import MeshStore
-from factory.importing.places import Placement
+from factory.importing.part_maker import Placement
 from factory.importing.scene_file import MESHES, SCENES, read_one, read_scene
 from factory.lang.source import quoted
 from factory.problem.pag import PAG, Assembly, Parameter

@@ -9,8 +9,7 @@ from pathlib import PurePosixPath
 from factory.importing.document import DocumentNode as Node
 from factory.importing.draft import MATE, MOST_NODES, PART, DraftNode, ImportFaults, too_many
 from factory.importing.labels import label_of
-from factory.importing.part_maker import PartMaker
-from factory.importing.places import Placement
+from factory.importing.part_maker import PartMaker, Placement
 from factory.lang.operations import MESHES, Signature
 from factory.lang.source import quoted
 from factory.lang.values import GEOMETRY, SHAPES, Kind

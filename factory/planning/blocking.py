@@ -24,8 +24,7 @@ from factory.compiler.mating.overlaps import Finder, Overlaps
 from factory.compiler.mating.paths import TOLERANCE
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
-from factory.planning.hulls import Drawn
-from factory.planning.parts import InPlace
+from factory.planning.parts import Drawn, InPlace
 from factory.planning.standing import Feet
 
 FREE, SCRAPES, DEEPER, LOCKED, CLASHES = range(5)

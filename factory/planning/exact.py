@@ -1,4 +1,5 @@
-"""The optimal assembly tree of a few units: an AND/OR search over all connected subsets.
+"""The optimal assembly tree of a few units, by expected cycle times: an AND/OR search over all
+connected subsets.
 
 A state is a subset of the units and an axis of the floor, along which its inputs come; its choices
 are the divisions in two that its blocking graphs permit (closed sets of one of the graphs), its
@@ -23,9 +24,43 @@ from typing import Any
 import numpy as np
 
 from factory.geometry.meshes import Array
+from factory.layout.durations import Pace
 from factory.planning.divisions import Batch, Divisions, Late, TooLate, never
-from factory.planning.estimate import Expected
 from factory.planning.subsets import LEVEL_PRICES, Masks, Subsets
+from factory.plant.approaches import MARGIN
+
+STATION = 0.06
+"""The distance between two stations on a guidepath beyond the size of a sub-assembly [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Expected:
+    """Times [s] at the `pace` of robots, elementwise for arrays of lengths [m]."""
+
+    pace: Pace
+
+    def rest(self, way: Array) -> Array:
+        """From rest to rest."""
+        speed, acceleration = self.pace.speed, self.pace.acceleration
+        short = 2 * np.sqrt(np.maximum(way, 0.0) / acceleration)
+        return np.where(way < speed**2 / acceleration, short, way / speed + speed / acceleration)
+
+    def delivering(self, size: Array) -> Array:
+        """The time of a robot to deliver something of this size and return."""
+        return 2 * self.rest(size + STATION) + self.pace.lost
+
+    def stop(self, size: Array) -> Array:
+        """The time of a carrier to take something of this size."""
+        return self.rest(size + STATION) + self.pace.lost
+
+    def step(self, size: Array) -> Array:
+        """The additional time to move on to the next station."""
+        return (size + STATION) / self.pace.speed
+
+    def lift(self, stroke: Array) -> Array:
+        """The waiting time while a part is lowered by a stroke."""
+        return self.rest(np.maximum(stroke, 0.0) + MARGIN)
+
 
 RELAY = 1.0
 """The price of a relay."""

@@ -15,7 +15,7 @@ from factory.planning.cannot import Direction, Units
 from factory.planning.exact import Tree
 from factory.planning.judging import Join, Judged
 from factory.planning.parts import InPlace, PlacedPart
-from factory.planning.stance import ROOT_AXIS, Stance
+from factory.planning.subsets import ROOT_AXIS, Stance
 from factory.planning.writing import Screwed
 
 WORDS = re.compile(

@@ -18,11 +18,9 @@ from factory.planning.blocking import Blocking
 from factory.planning.cannot import Units
 from factory.planning.dividing import Divider
 from factory.planning.divisions import Late, divisions, never
-from factory.planning.estimate import Expected
-from factory.planning.exact import RELAY, Best, Tree, TreeTask
+from factory.planning.exact import RELAY, Best, Expected, Tree, TreeTask
 from factory.planning.judging import Judge, Judged
-from factory.planning.stance import ROOT_AXIS, Stance
-from factory.planning.subsets import subsets
+from factory.planning.subsets import ROOT_AXIS, Stance, subsets
 
 SMALL = 8
 """The number of units that are solved exactly."""

@@ -11,10 +11,8 @@ import numpy as np
 from factory.geometry.meshes import Array
 from factory.planning.blocking import CLASHES, DEEPER, LOCKED, Blocking
 from factory.planning.cannot import Direction, Units
-from factory.planning.estimate import Expected
-from factory.planning.exact import RELAY, Tree
-from factory.planning.stance import ROOT_AXIS, Stance
-from factory.planning.subsets import APART, BLOCKED, LOOSE, PASSES, TIPS
+from factory.planning.exact import RELAY, Expected, Tree
+from factory.planning.subsets import APART, BLOCKED, LOOSE, PASSES, ROOT_AXIS, TIPS, Stance
 
 PRICES = {CLASHES: BLOCKED, LOCKED: PASSES, DEEPER: LOOSE}
 """The price of a join by its level of blocking."""

@@ -19,7 +19,7 @@ from factory.planning.exact import Tree
 from factory.planning.judging import Judged
 from factory.planning.parts import InPlace
 from factory.planning.searching import Aim
-from factory.planning.stance import Stance
+from factory.planning.subsets import Stance
 from factory.planning.writing import Screwed, planned_product
 from factory.planning.writing import Tree as LabelTree
 from factory.problem.robot_types import load_catalogue

@@ -16,17 +16,15 @@ from factory.layout.durations import Pace
 from factory.pipeline import Project, all_templates
 from factory.planning.blocking import CLASHES, DEEPER, LOCKED, SCRAPES, Blocking, blocking, rooms
 from factory.planning.cannot import Direction, Interlock, Removal, removal
-from factory.planning.estimate import Expected
+from factory.planning.exact import Expected
 from factory.planning.fastening import fastened, fasteners, renumbered
-from factory.planning.hulls import Drawn, refuse_hidden
 from factory.planning.judging import Join, Judged
 from factory.planning.laying import LaidOut, Layouts
-from factory.planning.parts import InPlace
+from factory.planning.parts import Drawn, InPlace, refuse_hidden
 from factory.planning.posing import Pose, along, posed, said, screwing, toppling
 from factory.planning.searching import Aim, Sought, Trees, budget_of, trees
-from factory.planning.stance import ROOT_AXIS, Stance, stances
 from factory.planning.standing import feet
-from factory.planning.subsets import BLOCKED
+from factory.planning.subsets import BLOCKED, ROOT_AXIS, Stance, stances
 from factory.planning.turning import only
 from factory.planning.writing import Tree, planned_product, screws_in
 from factory.problem.pag import PAG

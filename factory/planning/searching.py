@@ -14,12 +14,10 @@ import numpy as np
 from factory.geometry.meshes import Array
 from factory.planning.blocking import Blocking
 from factory.planning.divisions import Divisions, Late, TooLate, divisions
-from factory.planning.estimate import Expected
-from factory.planning.exact import Best, Tables, TreeTask, tables
+from factory.planning.exact import Best, Expected, Tables, TreeTask, tables
 from factory.planning.growing import Site, bettered, divided
 from factory.planning.judging import Judge, Judged
-from factory.planning.stance import ROOT_AXIS, Stance, stances
-from factory.planning.subsets import MOST, Subsets, subsets
+from factory.planning.subsets import MOST, ROOT_AXIS, Stance, Subsets, stances, subsets
 from factory.support.allowance import Allowance
 
 Aim = Literal["cycle", "robots", "floor"]

@@ -25,8 +25,7 @@ from factory.importing.scene_file import MESHES, SCENES
 from factory.lang.pag_reader import load_pag
 from factory.lang.source import quoted
 from factory.planning.faults import check_in_place, check_places, raise_if_any
-from factory.planning.hulls import EXTRA, hull_stands
-from factory.planning.parts import InPlace, Kept, PlacedPart
+from factory.planning.parts import EXTRA, InPlace, Kept, PlacedPart, hull_stands
 from factory.problem.pag import PAG, Assembly
 from factory.problem.shapes import SHAPED
 from factory.problem.template import Template

@@ -11,6 +11,7 @@ import numpy as np
 from factory.control.mode import Array
 from factory.mjcf import names
 from factory.record.monitor.subject import MonitorSubject
+from factory.rendering.action import Snapshot
 from factory.rendering.caption import Caption, draw_notices, draw_title
 from factory.rendering.gantt_panel import GanttPanel
 from factory.rendering.history import History
@@ -21,7 +22,6 @@ from factory.rendering.painter import Painter
 from factory.rendering.picture import Area, PanelName, Picture, Size, shared
 from factory.rendering.rows import Rows
 from factory.rendering.sheet import OUTSIDE
-from factory.rendering.subject import Snapshot
 from factory.support.engine import mujoco
 from factory.support.errors import Diagnostic, InputError
 from factory.support.resource import Closing

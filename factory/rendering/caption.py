@@ -9,9 +9,20 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from factory.nets.verdict import listing
-from factory.rendering.colours import AMBER, DEAD, FAINT, FLASH, INK, WHITE
 from factory.rendering.history import History
-from factory.rendering.ink import Colour, Ink, Pixels, fitted, width
+from factory.rendering.ink import (
+    AMBER,
+    DEAD,
+    FAINT,
+    FLASH,
+    INK,
+    WHITE,
+    Colour,
+    Ink,
+    Pixels,
+    fitted,
+    width,
+)
 
 HALO = (250, 250, 251)
 

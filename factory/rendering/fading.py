@@ -13,7 +13,7 @@ import shapely
 from factory.geometry.sight import Array, View
 from factory.mjcf import names
 from factory.mjcf.replica import Replica, paint, shown
-from factory.rendering.subject import placed
+from factory.rendering.action import placed
 
 FAINT = 0.16
 """Opacity of a geom that hides the action."""

@@ -13,11 +13,11 @@ from factory.record.log.model import model_of
 from factory.record.monitor.record import recorded_subject
 from factory.record.monitor.subject import subject_of_run
 from factory.record.state import Recorder, State
+from factory.rendering.action import Snapshot, held
 from factory.rendering.camerawork import Moment, Take, When, past_the_end, pictureless
 from factory.rendering.history import TIE, History
 from factory.rendering.picture import USUAL, Picture
 from factory.rendering.reel import Reel, save
-from factory.rendering.subject import Snapshot, held
 from factory.rendering.video import FPS, check_output
 
 if TYPE_CHECKING:

@@ -16,10 +16,9 @@ from factory.geometry.sight import Array, Framing, View, fit, towards
 from factory.mjcf import names
 from factory.mjcf.replica import Replica
 from factory.record.monitor.subject import MonitorSubject
-from factory.rendering.action import action_of
+from factory.rendering.action import SIGNS, Snapshot, action_of, corners
 from factory.rendering.camera import HANDOVER, PART, Camera, from_above, orbit, overview
 from factory.rendering.junction import handover_view
-from factory.rendering.subject import SIGNS, Snapshot, corners
 from factory.support.engine import mujoco
 
 LAG = 0.25

@@ -5,19 +5,22 @@ from __future__ import annotations
 from math import ceil
 
 from factory.control.mode import Array
-from factory.rendering.colours import (
+from factory.rendering.history import TIE, History, OperationProgress, Spell
+from factory.rendering.ink import (
     AMBER,
     DEAD,
     FAINT,
     FLASH,
     LINE,
     WHITE,
+    Ink,
+    Pixels,
+    fitted,
     operation_colours,
     pale,
     template_colours,
+    width,
 )
-from factory.rendering.history import TIE, History, OperationProgress, Spell
-from factory.rendering.ink import Ink, Pixels, fitted, width
 from factory.rendering.rows import PanelRow, Rows
 from factory.rendering.sheet import FOOT, PanelSheet
 

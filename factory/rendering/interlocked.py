@@ -12,8 +12,7 @@ from factory.geometry.meshes import Array, Indices
 from factory.geometry.sight import fit, towards
 from factory.planning.cannot import Interlock
 from factory.planning.parts import InPlace
-from factory.rendering.colours import GROUND, INK
-from factory.rendering.ink import Colour, Ink, Pixels, fitted, width
+from factory.rendering.ink import GROUND, INK, Colour, Ink, Pixels, fitted, width
 from factory.rendering.painter import LOOSE_SAMPLES, LooseParts
 from factory.rendering.picture import Size
 from factory.rendering.reel import write_still

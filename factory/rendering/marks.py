@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from factory.layout.sweeping import APART
 from factory.mjcf import names
 from factory.mjcf.replica import SHOWN, Replica, bodies_of
-from factory.rendering.colours import AMBER, DEAD, FLASH
+from factory.rendering.action import Snapshot
 from factory.rendering.history import History
-from factory.rendering.ink import Colour
-from factory.rendering.subject import Snapshot
+from factory.rendering.ink import AMBER, DEAD, FLASH, Colour
 from factory.support.engine import mujoco
 
 Zone = tuple[float, float, float]

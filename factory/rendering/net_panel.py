@@ -15,19 +15,23 @@ import numpy as np
 from factory.control.mode import Array
 from factory.layout.layout import Point2
 from factory.plant.factory import Operation
-from factory.rendering.colours import (
+from factory.rendering.history import History, OperationProgress, Spell
+from factory.rendering.ink import (
     FAINT,
     FLASH,
     GROUND,
     INK,
     LINE,
     WHITE,
+    Colour,
+    Ink,
+    Pixels,
+    fitted,
+    mixed,
     operation_colours,
     pale,
     robot_colours,
 )
-from factory.rendering.history import History, OperationProgress, Spell
-from factory.rendering.ink import Colour, Ink, Pixels, fitted, mixed
 from factory.rendering.rows import PanelRow, Rows
 from factory.rendering.sheet import PanelSheet, robots_shown
 

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.rendering.colours import AMBER, EDGE, FAINT, GROUND, INK, robot_colours
-from factory.rendering.ink import Ink, width
+from factory.rendering.ink import AMBER, EDGE, FAINT, GROUND, INK, Ink, robot_colours, width
 from factory.rendering.rows import PanelRow, Rows
 
 TALLEST = 62.0

@@ -16,7 +16,7 @@ from factory.pipeline import Project
 from factory.plant.factory import Factory
 from factory.problem.pag import most_allowed
 from factory.problem.shapes import is_plain
-from factory.study.allocation.least import Least, least_robots
+from factory.study.allocation.aim import Least, least_robots
 from factory.support.errors import Diagnostic
 from factory.timing.pool import part_pool
 

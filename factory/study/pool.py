@@ -6,6 +6,7 @@ in another. (The executors of the standard library and of joblib fail as a whole
 
 from __future__ import annotations
 
+import copyreg
 import os
 import pickle
 import sys
@@ -19,7 +20,16 @@ from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 from factory.support.errors import Diagnostic, RunError
-from factory.support.pickling import pickle_locked_mappings
+
+
+def _locked(contents: dict[object, object]) -> MappingProxyType[object, object]:
+    return MappingProxyType(contents)
+
+
+def pickle_locked_mappings() -> None:
+    """Teach pickle to copy locked mappings."""
+    copyreg.pickle(MappingProxyType, lambda proxy: (_locked, (dict(proxy),)))
+
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")

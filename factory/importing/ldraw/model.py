@@ -19,10 +19,18 @@ from factory.importing.ldraw.lines import (
     direct_colour,
     key_of,
 )
-from factory.importing.ldraw.shapes import LDU, LIBRARY, UPRIGHT, Shapes, matrix, mesh_of
-from factory.importing.ldraw.shelf import Shelf, children_first
+from factory.importing.ldraw.shapes import (
+    LDU,
+    LIBRARY,
+    UPRIGHT,
+    Shapes,
+    Shelf,
+    children_first,
+    matrix,
+    mesh_of,
+)
 from factory.importing.mesh_files import MeshStore
-from factory.importing.places import Placement
+from factory.importing.part_maker import Placement
 from factory.lang.source import quoted
 from factory.problem.pag import Parameter
 from factory.support.errors import Diagnostic

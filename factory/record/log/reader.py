@@ -16,17 +16,23 @@ from numpy.typing import NDArray
 from factory.nets.undone import Entry, lasting
 from factory.record.ending import CutOff
 from factory.record.failures import Failures
-from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, blocks, check_magic, is_cut
-from factory.record.log.checks import check_block, check_course, check_header, state_bytes
-from factory.record.log.failed import Placed, failures_of, failures_so_far, undone_in
-from factory.record.log.states import (
+from factory.record.log.blocks import (
+    LENGTH,
+    MAGIC,
+    Arrays,
     StateRows,
     StoredRows,
     Unpacking,
     all_rows,
+    bad_log,
+    blocks,
+    check_magic,
+    is_cut,
     locked,
     without_states,
 )
+from factory.record.log.checks import check_block, check_course, check_header, state_bytes
+from factory.record.log.failed import Placed, failures_of, failures_so_far, undone_in
 from factory.record.verdict import check_figures
 from factory.support.claim import is_claimed
 from factory.support.errors import InputError

@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 from factory.layout.saved import LayoutTable
 from factory.nets.undone import Undone
 from factory.pipeline import Project
-from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, block, pack_rows
+from factory.record.log.blocks import LENGTH, MAGIC, STATES, Arrays, bad_log, block, pack_rows
 from factory.record.log.failed import Written
-from factory.record.log.states import STATES
 from factory.record.monitor.subject import subject_of_run
 from factory.record.project_table import project_table
 from factory.record.state import Array, Event, Observation, Recordable, Recorder, State

@@ -14,10 +14,9 @@ from factory.plant.factory import Factory
 from factory.show.report.approaches import approaches_section
 from factory.show.report.drawings import floor_plan, net_drawing
 from factory.show.report.failures import failures_data, failures_section
-from factory.show.report.fidelity import fidelity
 from factory.show.report.frames import frames
 from factory.show.report.links import data, labels_of
-from factory.show.report.pace import measured, predicted
+from factory.show.report.pace import fidelity, measured, predicted
 from factory.show.report.recording import Recording
 from factory.show.report.scene import Pack, scene
 from factory.show.report.sections import (

@@ -1,14 +1,87 @@
-"""The aim of an allocation: a number of robots, or a cycle time."""
+"""The aim of an allocation, a number of robots or a cycle time; and the least number of robots that
+can make a product, tools apart: a lower bound, with its proof.
+
+A part needs one robot. A sub-assembly of two inputs needs max(S1, S2 + 1) robots, where S1 >= S2
+are the numbers of the inputs: the input that is made first is held while the other is made. If a
+third robot takes both, at least three are needed. This is the Sethi-Ullman number of the tree. No
+program needs fewer, folded or not: a robot holds each part and sub-assembly until it is joined.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from math import inf
 from typing import Literal
 
+from factory.compiler.expanding import Node, expand
 from factory.compiler.parallel import Branches
+from factory.problem.pag import NOPART, PAG
+from factory.problem.template import Template
 from factory.support.bounds import check_values
 from factory.support.settings import LEAST
+
+SHOWN = 6
+"""Number of labels of a proof that are shown."""
+
+
+@dataclass(frozen=True, slots=True)
+class Least:
+    """The least `robots` that can hold a product while it is made, the kinds of `tools` that it
+    takes besides, and the labels on the way from the product down to where so many are needed, with
+    what each needs (`path`)."""
+
+    robots: int
+    tools: int
+    path: tuple[tuple[str, int], ...]
+
+    @property
+    def total(self) -> int:
+        """Robots and tools."""
+        return self.robots + self.tools
+
+    def __str__(self) -> str:
+        """The bound and its proof, in words."""
+        words = f"'{self.path[0][0]}' needs at least {self.total} robots"
+        if self.tools:
+            tools = "1 tool" if self.tools == 1 else f"{self.tools} tools"
+            words += f": {self.robots} carriers and {tools}"
+        return words + self._proof()
+
+    def _proof(self) -> str:
+        """The labels on the path at which one carrier fewer is needed."""
+        steps = [b for a, b in pairwise(self.path) if a[1] > b[1] > 1]
+        words = ", ".join(f"'{label}' needs {needs}" for label, needs in steps[:SHOWN])
+        more = ", ..." if len(steps) > SHOWN else ""
+        return f" ({words}{more})" if steps else ""
+
+
+def least_robots(pag: PAG, templates: Mapping[str, Template]) -> Least:
+    """The bound for a product. Linear."""
+    nodes = expand(pag, templates)
+    needs: dict[str, int] = {}
+    for label, node in nodes.items():
+        needs[label] = _needed(node, templates, sorted(needs[x] for x in node.inputs))
+    tools = {
+        (node.template.name, slot) for node in nodes.values() for slot in node.template.tools()
+    }
+    path, label = [(pag.root, needs[pag.root])], pag.root
+    while nodes[label].inputs and needs[label] > 1:
+        label = max(nodes[label].inputs, key=lambda x: needs[x])
+        path.append((label, needs[label]))
+    return Least(needs[pag.root], len(tools), tuple(path))
+
+
+def _needed(node: Node, templates: Mapping[str, Template], inputs: list[int]) -> int:
+    """How many robots it takes to hold what a node makes, while it is made."""
+    if not inputs:
+        return 1
+    needed = max(count + n for n, count in enumerate(reversed(inputs)))
+    template = node.template
+    takes_over = template.before[template.carrier - 1] == NOPART and not template.instead
+    return max(needed, len(inputs) + 1) if takes_over else needed
+
 
 STEP = 1.15
 """Ratio of successive bounds on estimated cycles."""

@@ -16,11 +16,10 @@ from math import inf
 from factory.compiler.folding import kept_apart, lines_of
 from factory.pipeline import Project
 from factory.problem.plan import THIRD
-from factory.study.allocation.aim import Aim, usual_effort
+from factory.study.allocation.aim import Aim, least_robots, usual_effort
 from factory.study.allocation.bundles import Filling
 from factory.study.allocation.candidate import Candidate
 from factory.study.allocation.estimating import Estimator
-from factory.study.allocation.least import least_robots
 from factory.support.allowance import Allowance
 from factory.support.errors import Diagnostic, InputError
 

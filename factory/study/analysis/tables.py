@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
-from factory.study.analysis.analysing import Analysis
+from factory.study.analysis.analysing import Analysis, Scenario, listed
 from factory.study.analysis.measured import ComparedFigure, Comparison
-from factory.study.analysis.what_if import Scenario, listed
 
 SHOWN = 12
 """Number of rows of a table; `-v` shows all."""

@@ -8,8 +8,7 @@ from functools import cached_property
 
 from factory.nets.marked import NONE, MarkedNet
 from factory.nets.petri import PetriNet, Place
-from factory.study.analysis.firing import Floats, earliest_firings
-from factory.study.analysis.slack import Slack, circuits
+from factory.study.analysis.firing import Floats, Slack, circuits, earliest_firings
 from factory.timing.timed import FEEDER, OUTFEED, SAME, Timed, timed
 from factory.timing.timing import AS_IT_IS, Change, Timing
 

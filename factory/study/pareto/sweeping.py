@@ -20,10 +20,9 @@ from math import ceil, inf
 from factory.compiler.parallel import Branches
 from factory.pipeline import Project
 from factory.problem.plan import THIRD, Plan
-from factory.study.allocation.aim import Aim, usual_effort
+from factory.study.allocation.aim import Aim, least_robots, usual_effort
 from factory.study.allocation.candidate import Candidate
 from factory.study.allocation.estimating import Estimate, Estimator
-from factory.study.allocation.least import least_robots
 from factory.study.allocation.search import SINGLE, Search
 from factory.study.pareto.front import (
     FrontPoint,

@@ -23,12 +23,9 @@ from factory.problem.robot_types import load_catalogue
 from factory.simulation.options import check_ideal
 from factory.study.sweep.grid import DEFAULTS, SETTINGS, Axis, Point, Value
 from factory.support.errors import usage_error
-from factory.support.pickling import pickle_locked_mappings
 from factory.support.resources import mjcf_folder
 from factory.support.tables import table_of
 from factory.support.version import __version__
-
-pickle_locked_mappings()  # factories contain many
 
 
 @dataclass(frozen=True)
