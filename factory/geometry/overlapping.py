@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from weakref import finalize
 
 import numpy as np
 
@@ -86,18 +85,10 @@ class DrawnOverlaps:
         return words
 
 
-_KNOWN: dict[tuple[int, Insides], DrawnOverlaps] = {}
-"""The overlaps of existing products, by identity."""
-
-
 def overlaps_of(product: Product, *insides: frozenset[str]) -> DrawnOverlaps:
     """The overlaps of all parts of a product, computed once; `insides`: of the parts of each of
     several products, whose parts are together in it."""
-    key = id(product), insides
-    if key not in _KNOWN:
-        _KNOWN[key] = _found(product, insides)
-        finalize(product, _KNOWN.pop, key, None)
-    return _KNOWN[key]
+    return product.kept(_found, insides)
 
 
 def everywhere(product: Product) -> tuple[AllowedOverlap, ...]:

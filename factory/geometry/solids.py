@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import colorsys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -13,6 +14,8 @@ from factory.geometry.meshes import LEAST_MASS, Array, MassProperties, Mesh, sou
 from factory.geometry.pieces import box_piece, cylinder_piece, sphere_piece
 from factory.problem.pag import Assembly
 from factory.support.errors import Diagnostic
+
+Kept = TypeVar("Kept")
 
 DENSITY = 1000.0
 """Density of a part that states neither mass nor density [kg/m³]."""
@@ -69,9 +72,22 @@ class Product:
     low: Array
     high: Array
     warnings: tuple[Diagnostic, ...] = ()
+    _kept: dict[object, Any] = field(init=False, default_factory=dict, compare=False, repr=False)
+
+    def kept(self, make: Callable[..., Kept], *given: object) -> Kept:
+        """What `make` makes of the product and of what is `given`: once for equal values, so that
+        further factories of the product need not make it again."""
+        key = make, *given
+        if key not in self._kept:
+            self._kept[key] = make(self, *given)
+        made: Kept = self._kept[key]
+        return made
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "solids", MappingProxyType(dict(self.solids)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Product, (dict(self.solids), self.low, self.high, self.warnings)
 
     @property
     def middle(self) -> Array:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from factory.compiler.mating.depth import Difference, Polytope, exact, polytope
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product, Solid
 
@@ -18,8 +19,8 @@ ROUNDING = 1e-9
 @dataclass(frozen=True, slots=True)
 class ConvexBodies:
     """All convex bodies: `vertices` (n, 3) of each, `low`, `high` (bodies, 3) its bounding box,
-    `part` the number of the part it belongs to, `boxes` whether it is its bounding box [m]; and the
-    `solids` of the parts."""
+    `part` the number of the part it belongs to, `boxes` whether it is its bounding box [m]; the
+    `solids` of the parts, and the `product` that they are of."""
 
     vertices: tuple[Array, ...] = field(repr=False)
     part: NDArray[np.int64]
@@ -27,13 +28,36 @@ class ConvexBodies:
     high: Array
     boxes: NDArray[np.bool_]
     solids: tuple[Solid, ...] = field(repr=False)
+    product: Product = field(repr=False)
 
-    def shape(self, body: int) -> tuple[Array, bytes]:
-        """A body's vertices from the low corner of its box, and a key that is the same for bodies
-        of the same shape, turned the same way."""
-        placed = self.vertices[body] - self.low[body]
-        key = np.round(placed / ROUNDING).astype(np.int64)
-        return placed, key.tobytes()
+
+class Shapes:
+    """The shapes of a product's bodies: the `keys` of those of each part, the same for bodies of
+    one shape that are turned the same way; of each its vertices (n, 3) from the low corner of its
+    box [m]; and the Minkowski differences of two."""
+
+    def __init__(self, product: Product) -> None:
+        self.keys: dict[str, list[bytes]] = {}
+        self.vertices: dict[bytes, Array] = {}
+        self._polytopes: dict[bytes, Polytope] = {}
+        self._differences: dict[tuple[bytes, bytes], Difference] = {}
+        for label, solid in product.solids.items():
+            for vertices in solid.pieces or (solid.corners,):
+                placed = vertices - vertices.min(axis=0)
+                key = np.round(placed / ROUNDING).astype(np.int64).tobytes()
+                self.keys.setdefault(label, []).append(key)
+                self.vertices.setdefault(key, placed)
+
+    def difference(self, pair: tuple[bytes, bytes]) -> Difference:
+        """That of two shapes, by their keys."""
+        if pair not in self._differences:
+            self._differences[pair] = exact(*map(self._polytope, pair))
+        return self._differences[pair]
+
+    def _polytope(self, key: bytes) -> Polytope:
+        if key not in self._polytopes:
+            self._polytopes[key] = polytope(self.vertices[key])
+        return self._polytopes[key]
 
 
 def bodies(product: Product, parts: Sequence[str]) -> ConvexBodies:
@@ -51,7 +75,9 @@ def bodies(product: Product, parts: Sequence[str]) -> ConvexBodies:
     low, high = np.minimum.reduceat(points, starts), np.maximum.reduceat(points, starts)
     boxes = _boxes(points, starts, counts, low, high)
     solids = tuple(product.solids[label] for label in parts)
-    return ConvexBodies(tuple(vertices_of), np.array(part, np.int64), low, high, boxes, solids)
+    return ConvexBodies(
+        tuple(vertices_of), np.array(part, np.int64), low, high, boxes, solids, product
+    )
 
 
 def _boxes(

@@ -9,18 +9,17 @@ finished product is measured alike.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from factory.compiler.mating.bodies import ConvexBodies
 from factory.compiler.mating.meetings import Ints
 from factory.compiler.mating.paths import CLEAR, LAST, SIGNS, TOLERANCE, Depths
 from factory.geometry.meshes import Array, Mesh, hull_of, is_closed, volume_of
 from factory.geometry.overlap import SAMPLES, Common, common, drawn, swept
-from factory.geometry.solids import Solid
 
 ALIKE = 1e-6
 """Convex bodies are all of a mesh if their volumes differ by no more than this share."""
@@ -29,14 +28,25 @@ QUICK, SURELY = 8, 10 * TOLERANCE
 """With so few samples a clash that is deeper than this [m] is told from a touch."""
 
 
+class _Found:
+    """What has been found of some parts of a product, by their labels: what each sweeps, and how
+    deep two get into each other; and whether meshes, by identity, are rough or wider."""
+
+    def __init__(self, *_: object) -> None:
+        self.sweeps: dict[tuple[str, int, int], Any] = {}
+        self.finished: dict[tuple[str, str], float] = {}
+        self.pairs: dict[tuple[str, str, bool, int], tuple[Any, ...]] = {}
+        self.kinds: dict[int, tuple[bool, bool]] = {}
+
+
 class DrawnWays:
     """The parts of a product by number, and how deep they get into each other as drawn. What
-    each sweeps is made once."""
+    is found of them is kept with the product."""
 
-    def __init__(self, solids: Sequence[Solid]) -> None:
-        self._solids = solids
-        self._sweeps: dict[tuple[int, int, int], Any] = {}
-        self._finished: dict[tuple[int, int], float] = {}
+    def __init__(self, bodies: ConvexBodies) -> None:
+        self._solids = bodies.solids
+        self._labels = [solid.label for solid in bodies.solids]
+        self._found = bodies.product.kept(_Found, frozenset(self._labels))
 
     @cached_property
     def rough(self) -> NDArray[np.bool_]:
@@ -51,7 +61,7 @@ class DrawnWays:
     @cached_property
     def _meshes(self) -> NDArray[np.bool_]:
         flags = np.zeros((2, len(self._solids)), bool)
-        kinds: dict[int, tuple[bool, bool]] = {}
+        kinds = self._found.kinds
         for part, solid in enumerate(self._solids):
             if solid.mesh is not None:
                 key = id(solid.mesh)
@@ -79,7 +89,7 @@ class DrawnWays:
         """The depths of pairs of parts on the ways of the first along an axis; of pairs that stand
         `still` those in the finished product alone."""
         pairs = zip(moving.tolist(), standing.tolist(), still.tolist(), strict=True)
-        rows = [self._pair(*pair, axis) for pair in pairs]
+        rows = [self._kept(*pair, axis) for pair in pairs]
         finished, *columns = (np.array([row[n] for row in rows], float) for n in range(4))
         path, shift, graze = (column.reshape(-1, 2) for column in columns)
         return Depths(finished, path, shift, graze)
@@ -102,6 +112,12 @@ class DrawnWays:
             [self._body(a).min_gap(self._body(b), 2 * gap) <= gap for a, b in pairs], bool
         )
 
+    def _kept(self, moving: int, standing: int, still: bool, axis: int) -> tuple[Any, ...]:
+        key = self._labels[moving], self._labels[standing], still, axis
+        if key not in self._found.pairs:
+            self._found.pairs[key] = self._pair(moving, standing, still, axis)
+        return self._found.pairs[key]
+
     def _pair(self, moving: int, standing: int, still: bool, axis: int) -> tuple[Any, ...]:
         finished = self.finished(moving, standing)
         if still:
@@ -117,9 +133,10 @@ class DrawnWays:
 
     def finished(self, one: int, other: int) -> float:
         """Penetration depth of two parts in the finished product [m]."""
-        if (one, other) not in self._finished:
-            self._finished[one, other] = common(self._body(one), self._body(other)).depth
-        return self._finished[one, other]
+        key, found = (self._labels[one], self._labels[other]), self._found.finished
+        if key not in found:
+            found[key] = common(self._body(one), self._body(other)).depth
+        return found[key]
 
     def _path(self, moving: int, standing: int, axis: int, sign: int) -> tuple[float, float]:
         """How deep the first part gets into the second on its way, and where [m]. The depth of a
@@ -160,10 +177,11 @@ class DrawnWays:
         return drawn(self._solids[part])
 
     def _swept(self, part: int, axis: int, sign: int) -> Any:
-        if (part, axis, sign) not in self._sweeps:
+        key, sweeps = (self._labels[part], axis, sign), self._found.sweeps
+        if key not in sweeps:
             out = sign * self._beyond * np.eye(3)[axis]
-            self._sweeps[part, axis, sign] = swept(self._body(part), out)
-        return self._sweeps[part, axis, sign]
+            sweeps[key] = swept(self._body(part), out)
+        return sweeps[key]
 
 
 def is_exact(mesh: Mesh) -> bool:

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.compiler.mating.bodies import ConvexBodies
-from factory.compiler.mating.depth import Difference, Polytope, exact, polytope
+from factory.compiler.mating.bodies import ConvexBodies, Shapes
 from factory.compiler.mating.drawn import DrawnWays
 from factory.compiler.mating.meetings import Ints, Meetings
 from factory.compiler.mating.paths import (
@@ -108,16 +107,12 @@ Pairs = tuple[Ints, Ints, Ints, Depths]
 
 
 class Finder:
-    """Finds overlaps in one product; shapes are kept from one axis to the next, what is found in
-    the user's cache."""
+    """Finds overlaps in one product; shapes are kept with it, what is found in the user's cache."""
 
     def __init__(self, convex: ConvexBodies, where: Meetings) -> None:
         self.bodies, self.meetings = convex, where
-        self.drawn = DrawnWays(convex.solids)
-        self._keys: dict[int, bytes] = {}
-        self._shapes: dict[bytes, Array] = {}
-        self._polytopes: dict[bytes, Polytope] = {}
-        self._differences: dict[tuple[bytes, bytes], Difference] = {}
+        self.drawn = DrawnWays(convex)
+        self._shapes = convex.product.kept(Shapes)
 
     def along(self, axis: int, wanted: NDArray[np.bool_]) -> Overlaps:
         """The overlaps of the wanted meetings when their inputs come along an axis: x, y or z."""
@@ -249,38 +244,21 @@ class Finder:
     def _refine(self, moving: Ints, standing: Ints, axis: int, depths: Depths) -> None:
         """Replaces the depths of boxes by those of the bodies where these are no boxes."""
         groups: dict[tuple[bytes, bytes], list[int]] = {}
+        keys = [key for solid in self.bodies.solids for key in self._shapes.keys[solid.label]]
         both = self.bodies.boxes[moving] & self.bodies.boxes[standing]
         for row in np.flatnonzero(~both).tolist():
-            pair = self._key(int(moving[row])), self._key(int(standing[row]))
-            groups.setdefault(pair, []).append(row)
+            groups.setdefault((keys[moving[row]], keys[standing[row]]), []).append(row)
         low = self.bodies.low
         for pair, members in groups.items():
             rows = np.array(members)
             apart = low[moving[rows]] - low[standing[rows]]
-            one, other = (self._shapes[key] for key in pair)
+            one, other = (self._shapes.vertices[key] for key in pair)
             if len(one) * len(other) > MANY:
                 depths.put(rows, sought(one, other, apart, axis))
             else:
-                difference = self._exact(pair)
+                difference = self._shapes.difference(pair)
                 heights, slopes = difference.heights(apart), difference.normals[:, axis]
                 depths.put(rows, depths_of(heights, slopes)[0])
-
-    def _exact(self, pair: tuple[bytes, bytes]) -> Difference:
-        if pair not in self._differences:
-            self._differences[pair] = exact(*map(self._polytope, pair))
-        return self._differences[pair]
-
-    def _polytope(self, key: bytes) -> Polytope:
-        if key not in self._polytopes:
-            self._polytopes[key] = polytope(self._shapes[key])
-        return self._polytopes[key]
-
-    def _key(self, body: int) -> bytes:
-        if body not in self._keys:
-            vertices, key = self.bodies.shape(body)
-            self._keys[body] = key
-            self._shapes.setdefault(key, vertices)
-        return self._keys[body]
 
     def _by_parts(self, by_bodies: Pairs, exact: Pairs, rough: Flags) -> Overlaps:
         """Of all bodies of two parts the deepest, and how deep they are as drawn."""

@@ -33,7 +33,7 @@ class Holding:
         wanted: Mapping[str, Sequence[Point3]] = MappingProxyType({}),
     ) -> None:
         self.factory, self.product, self.push, self.turning = factory, product, push, turning
-        self.surfaces, self.wanted = Surfaces(product), wanted
+        self.surfaces, self.wanted = product.kept(Surfaces), wanted
         self.on = carriers(factory)
         self.axis = [0] * len(factory.robots)
         for robot, carrier in enumerate(self.on):
@@ -79,15 +79,15 @@ class Holding:
         or with one of a `radius` [m]."""
         key = label, kind, axis, way, radius
         if key not in self._places:
-            parts, loads = self.factory.contents[label], self.loads(label)
+            of, loads = (tuple(self.factory.contents[label]), (axis, way)), self.loads(label)
             if radius:
                 known = self.places(label, kind, axis, way)
-                found = resized(self.surfaces, parts, (axis, way), loads, known, radius)
+                found = self.product.kept(resized, *of, loads, known, radius)
             else:
-                of, asked = (self.surfaces, self.product, parts), self.wanted.get(label, ())
-                mix = self.factory.pag.mix is not None
-                found = places(*of, kind, (axis, way), loads, mix, (*asked, *self._axis(parts)))
-                found = self._about_axis(parts, found)
+                asked, mix = tuple(self.wanted.get(label, ())), self.factory.pag.mix is not None
+                asked += tuple(self._axis(of[0]))
+                found = self.product.kept(places, *of, kind, loads, mix, asked)
+                found = self._about_axis(of[0], found)
             self._places[key] = found
         return self._places[key]
 
@@ -110,8 +110,8 @@ class Holding:
         if label not in self._loads:
             made = self.made(self.factory.by_label[label].carrier)
             labels = [label, *(o.label for o in made if not self.factory.drops(o.index))]
-            contents = dict.fromkeys(tuple(self.factory.contents[held]) for held in labels)
-            self._loads[label] = Loads.of(self.product, contents, self.push)
+            held = tuple(dict.fromkeys(tuple(self.factory.contents[held]) for held in labels))
+            self._loads[label] = self.product.kept(Loads.of, held, self.push)
         return self._loads[label]
 
     def boxes(self, label: str) -> Array:

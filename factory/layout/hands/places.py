@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from math import pi
 
 import numpy as np
@@ -98,20 +98,21 @@ class Places:
         return len(self.at)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Loads:
-    """All that a hand ever holds, n sub-assemblies: `mass` (n,) [kg], `centre` (n, 3) of mass [m],
-    and the acceleration by which each is pushed to any side, `push` [m/s²]."""
+    """All that a hand ever holds, n sub-assemblies of parts, `held`; the acceleration by which each
+    is pushed to any side, `push` [m/s²]; `mass` (n,) [kg] and `centre` (n, 3) of mass [m]."""
 
-    mass: Array
-    centre: Array
-    push: float = PUSH
+    held: tuple[tuple[str, ...], ...]
+    push: float
+    mass: Array = field(compare=False)
+    centre: Array = field(compare=False)
 
     @classmethod
-    def of(cls, product: Product, held: Iterable[Sequence[str]], push: float = PUSH) -> Loads:
+    def of(cls, product: Product, held: tuple[tuple[str, ...], ...], push: float) -> Loads:
         """Those of sub-assemblies of such parts."""
         masses, centres = zip(*(centre_of(product, parts) for parts in held), strict=True)
-        return cls(np.array(masses), np.array(centres), push)
+        return cls(held, push, np.array(masses), np.array(centres))
 
     def about(self, at: Array) -> tuple[Array, Array]:
         """Force (3, 1, m) [N] and moment (3, n, m) [Nm] about places `at` (n, 3) of each load, at
@@ -131,11 +132,10 @@ def centre_of(product: Product, parts: Sequence[str]) -> tuple[float, Array]:
 
 
 def places(
-    surfaces: Surfaces,
     product: Product,
-    parts: Sequence[str],
-    kind: Kind,
+    parts: tuple[str, ...],
     side: tuple[int, int],
+    kind: Kind,
     loads: Loads,
     on_raster: bool = False,
     wanted: Sequence[Point3] = (),
@@ -144,6 +144,7 @@ def places(
     it, where nothing of it is further out; `loads`: what is held there; `on_raster`: with places
     on lines that other sub-assemblies have too; `wanted`: points [m] that are tried as well."""
     axis, way = side
+    surfaces = product.kept(Surfaces)
     _, centre = centre_of(product, parts)
     across = [a for a in range(3) if a != axis]
     bodies = [b for part in parts for b in surfaces.bodies[part]]
@@ -199,8 +200,8 @@ def places(
 
 
 def resized(
-    surfaces: Surfaces,
-    parts: Sequence[str],
+    product: Product,
+    parts: tuple[str, ...],
     side: tuple[int, int],
     loads: Loads,
     known: Places,
@@ -208,6 +209,7 @@ def resized(
 ) -> Places:
     """Those of some `known` places with a pad no smaller where one of a `radius` [m] fits, each
     once, with such a pad; loads and side as for `places`."""
+    surfaces = product.kept(Surfaces)
     points = np.unique(known.at[known.radius >= radius - SAME], axis=0)
     if not len(points):
         return known.chosen(np.zeros(0, np.intp))
