@@ -19,7 +19,7 @@ from scipy.spatial import ConvexHull
 
 from factory.commands.warnings import LISTED, condensed
 from factory.compiler.expanding import expand
-from factory.compiler.mating import overlaps, paths
+from factory.compiler.mating import bodies, paths
 from factory.compiler.mating.depth import Difference, exact, polytope, rough, summits
 from factory.compiler.mating.findings import (
     BLOCKED,
@@ -461,7 +461,7 @@ def test_few_facets_of_fine_bodies_are_looked_at(monkeypatch: pytest.MonkeyPatch
 
     real_touching = paths._touching
     monkeypatch.setattr(paths, "_touching", touching)
-    monkeypatch.setattr(overlaps, "exact", pytest.fail)
+    monkeypatch.setattr(bodies, "exact", pytest.fail)
     p, q = egg(3000, (0.02, 0.03, 0.02)), egg(3000, (0.02, 0.02, 0.04))
     beside, above = (
         one(judged(ALONG_Y, a=[p], b=[q + by])) for by in ([0.041, 0, 0], [0, 0.06, 0])

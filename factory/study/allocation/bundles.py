@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import inf
 
 from factory.compiler.folding import Line, begun_by, delivery, kind_of, sides_of
 from factory.layout.durations import Pace
 from factory.layout.guidepath import Box
-from factory.plant.factory import Factory
+from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
 
 BETWEEN = 0.08
@@ -42,7 +43,7 @@ class Filling:
     onward: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class SizeTiming:
     """Durations of a factory's operations, estimated from the `sizes` of its sub-assemblies [m] and
     the `pace` of its robots."""
@@ -63,6 +64,14 @@ class SizeTiming:
         if label == NOPART:
             return TOOL_WAY
         return (self.sizes[label] + self.sizes.get(last.label, self.sizes[label])) / 2 + BETWEEN
+
+    @cached_property
+    def tours(self) -> tuple[_Tour, ...]:
+        """The tour of each robot of a factory with a robot for each label, tools apart."""
+        robots = range(len(self.factory.robots))
+        kinds = [kind_of(self.factory, robot) if robot else ("output",) for robot in robots]
+        chosen = (robot for robot in robots if kinds[robot][0] != "tool")
+        return tuple(_Tour.of(self, robot, kinds[robot]) for robot in chosen)
 
     def takes(self, number: int, way: float) -> float:
         """Duration of an operation in which the longest way is `way` [s]."""
@@ -160,75 +169,90 @@ class _Local:
     at: float
 
 
-def bundled(timing: SizeTiming, filling: Filling) -> TourBundle:
-    """The bundle of the output robot of a factory with a robot for each label."""
-    factory, made = timing.factory, dict[int, TourBundle]()
-    for robot in reversed(range(len(factory.robots))):
-        if robot == 0 or kind_of(factory, robot)[0] != "tool":
-            made[robot] = _Tour(timing, filling, made).bundle(robot)
-    return made[0]
-
-
 @dataclass(frozen=True, slots=True)
 class _Tour:
-    """Makes bundles of single tours; `made`: those of the tours that deliver to them."""
+    """The tour of a `robot`, whatever lines there are: its `kind`, the `sides` from which it may
+    come and how far it goes `past` others, as `TourBundle` has them; the robots `first` that bring
+    what it begins with; for each further operation its number, and the robots that bring something
+    to what the robot already holds (`stops`), and for each of these the operation that it delivers
+    to (`kids`)."""
 
-    timing: SizeTiming
-    filling: Filling
-    made: dict[int, TourBundle]
+    robot: int
+    kind: tuple[object, ...]
+    sides: frozenset[int]
+    past: float
+    first: tuple[int, ...]
+    stops: tuple[tuple[int, tuple[int, ...]], ...]
+    kids: tuple[tuple[int, int], ...]
 
-    def bundle(self, robot: int) -> TourBundle:
-        """The bundle of one tour. Each robot that delivers to it joins the line with the shortest
-        wait, or a new line where the wait is too long; with `onward` only the last two lines are
-        considered, since two can come to one station."""
-        factory, timing = self.timing.factory, self.timing
+    @classmethod
+    def of(cls, timing: SizeTiming, robot: int, kind: tuple[object, ...]) -> _Tour:
+        """That of a robot of a factory with a robot for each label."""
+        factory = timing.factory
         numbers = factory.robots[robot].operations
-        kids = [kid for number in numbers for kid in self._inserted(robot, number)]
-        work = sum(timing.takes(delivery(factory, k).index, self.made[k].out) for k in kids)
-        spare = min(self.filling.slack * work, max(self.filling.limit - work, 0.0))
+        inserted = {n: _inserted(factory, robot, factory.operations[n]) for n in numbers}
+        kids = [kid for robots in inserted.values() for kid in robots]
+        return cls(
+            robot,
+            kind,
+            frozenset(sides_of(factory, robot)) if robot else frozenset({1}),
+            timing.past(robot, numbers),
+            tuple(kid for kid in begun_by(factory, robot) if kind_of(factory, kid)[0] != "tool"),
+            tuple((n, inserted[n]) for n in (numbers[1:-1] if robot else numbers[1:])),
+            tuple((kid, delivery(factory, kid).index) for kid in kids),
+        )
+
+    def bundle(
+        self, timing: SizeTiming, filling: Filling, made: Mapping[int, TourBundle]
+    ) -> TourBundle:
+        """Its bundle; `made`: those of the robots that deliver to it. Each of these joins the line
+        with the shortest wait, or a new line where the wait is too long; with `onward` only the
+        last two lines are considered, since two can come to one station."""
+        work = sum(timing.takes(number, made[kid].out) for kid, number in self.kids)
+        spare = min(filling.slack * work, max(filling.limit - work, 0.0))
         now, waited, locals_ = 0.0, 0.0, list[_Local]()
-        for number in numbers[1:-1] if robot else numbers[1:]:
-            inserted = self._inserted(robot, number)
-            for kid in inserted:
-                lines = locals_[-ABREAST:] if self.filling.onward else locals_
-                wait, merged, line = self._least(lines, self.made[kid], now)
+        for number, kids in self.stops:
+            for kid in kids:
+                lines = locals_[-ABREAST:] if filling.onward else locals_
+                wait, merged, line = _least(lines, made[kid], now, filling)
                 if line is None or merged is None or waited + wait > spare + 1e-9:
-                    now += timing.takes(number, self.made[kid].out)
-                    locals_.append(_Local(self.made[kid], now))
+                    now += timing.takes(number, made[kid].out)
+                    locals_.append(_Local(made[kid], now))
                     continue
                 waited, now = waited + wait, now + wait + timing.takes(number, merged.out)
                 line.bundle, line.at = merged, now
-            if not inserted:
+            if not kids:
                 now += timing.takes(number, TOOL_WAY)
-        begun = begun_by(factory, robot)
-        first = tuple(self.made[kid] for kid in begun if kid in self.made)
-        return TourBundle(
-            (robot,),
-            now,
-            kind_of(factory, robot) if robot else ("output",),
-            frozenset(sides_of(factory, robot)) if robot else frozenset({1}),
-            tuple(line.bundle for line in locals_),
-            first,
-            timing.past(robot, numbers),
-            timing.pace,
-        )
+        below = tuple(line.bundle for line in locals_)
+        first = tuple(made[kid] for kid in self.first)
+        tours, pace = (self.robot,), timing.pace
+        return TourBundle(tours, now, self.kind, self.sides, below, first, self.past, pace)
 
-    def _least(
-        self, lines: Sequence[_Local], kid: TourBundle, now: float
-    ) -> tuple[float, TourBundle | None, _Local | None]:
-        """The shortest wait of a tour for a kid [s], with the merged bundle and the line; None
-        where it can join none of them."""
-        best: tuple[float, TourBundle | None, _Local | None] = inf, None, None
-        for line in lines:
-            wait = max(0.0, line.at + kid.load - kid.pace.rest(kid.out) - now)
-            if wait < best[0] and (merged := line.bundle.merged(kid, self.filling)) is not None:
-                best = wait, merged, line
-        return best
 
-    def _inserted(self, robot: int, number: int) -> list[int]:
-        """The robots that bring something to what a robot already holds."""
-        operation = self.timing.factory.operations[number]
-        if operation.carrier != robot or operation.before[operation.template.carrier - 1] == NOPART:
-            return []
-        pairs = zip(operation.robots, operation.before, strict=True)
-        return [guest for guest, label in pairs if guest != robot and label != NOPART]
+def bundled(timing: SizeTiming, filling: Filling) -> TourBundle:
+    """The bundle of the output robot of a factory with a robot for each label."""
+    made = dict[int, TourBundle]()
+    for tour in reversed(timing.tours):
+        made[tour.robot] = tour.bundle(timing, filling, made)
+    return made[0]
+
+
+def _least(
+    lines: Sequence[_Local], kid: TourBundle, now: float, filling: Filling
+) -> tuple[float, TourBundle | None, _Local | None]:
+    """The shortest wait of a tour for a kid [s], with the merged bundle and the line; None where it
+    can join none of them."""
+    best: tuple[float, TourBundle | None, _Local | None] = inf, None, None
+    for line in lines:
+        wait = max(0.0, line.at + kid.load - kid.pace.rest(kid.out) - now)
+        if wait < best[0] and (merged := line.bundle.merged(kid, filling)) is not None:
+            best = wait, merged, line
+    return best
+
+
+def _inserted(factory: Factory, robot: int, operation: Operation) -> tuple[int, ...]:
+    """The robots that bring something in an operation to what a robot already holds."""
+    if operation.carrier != robot or operation.before[operation.template.carrier - 1] == NOPART:
+        return ()
+    pairs = zip(operation.robots, operation.before, strict=True)
+    return tuple(guest for guest, label in pairs if guest != robot and label != NOPART)

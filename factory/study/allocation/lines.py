@@ -7,7 +7,7 @@ estimated from sizes.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 
 from factory.compiler.folding import Line, count_of, fold, folded
@@ -26,14 +26,11 @@ SLACKS = (inf, 1.5, 0.6, 0.25, 0.0)
 
 @dataclass(frozen=True)
 class Shift:
-    """A factory with one robot for each label, whose lines are to be chosen; the `boxes` of its
-    sub-assemblies, the `pace` of its robots, and the estimated time of each robot in operations in
-    a cycle, its `work` [s]."""
+    """A factory with one robot for each label, whose lines are to be chosen, with its `timing`; the
+    estimated time of each robot in operations in a cycle, its `work` [s]."""
 
-    factory: Factory
+    timing: SizeTiming
     catalogue: Catalogue
-    boxes: Mapping[str, Box]
-    pace: Pace
     work: tuple[float, ...]
 
     @classmethod
@@ -41,23 +38,24 @@ class Shift:
         cls, factory: Factory, catalogue: Catalogue, boxes: Mapping[str, Box], pace: Pace
     ) -> Shift:
         """The shift of a factory, with the `boxes` of its sub-assemblies."""
-        delays = estimated_delays(SizeTiming.of(factory, boxes, pace))
+        timing = SizeTiming.of(factory, boxes, pace)
+        delays = estimated_delays(timing)
         work = tuple(sum(delays[n] for n in robot.operations) for robot in factory.robots)
-        return cls(factory, catalogue, boxes, pace, work)
+        return cls(timing, catalogue, work)
 
     def seconds(self, lines: Sequence[Line]) -> float:
         """The cycle time with these lines, by estimated delays [s]."""
         if not lines:
             return max(self.work)
-        made = folded(self.factory, lines, self.catalogue)
-        delays = estimated_delays(SizeTiming.of(made, self.boxes, self.pace))
+        made = folded(self.timing.factory, lines, self.catalogue)
+        delays = estimated_delays(replace(self.timing, factory=made))
         net = marked(made.net)
         idle = [0.0] * (len(net.tokens) - len(delays))
         return max_cycle_ratio(net, [*delays, *idle]).seconds
 
     def count(self, lines: Sequence[Line]) -> int:
         """Number of robots with these lines, tools included."""
-        return count_of(self.factory, lines)
+        return count_of(self.timing.factory, lines)
 
     def fillings(self, step: float, slacks: Sequence[float] = SLACKS) -> Iterator[Filling]:
         """Fillings to try: limits from the longest work of one robot, each `step` times the one
@@ -71,12 +69,11 @@ class Shift:
 
     def lines(self, filling: Filling) -> tuple[Line, ...]:
         """The lines for a filling."""
-        timing = SizeTiming.of(self.factory, self.boxes, self.pace)
-        return tuple(bundled(timing, filling).lines())
+        return tuple(bundled(self.timing, filling).lines())
 
     def plan(self, filling: Filling) -> Plan:
         """The plan with the lines for a filling."""
-        return fold(self.factory, self.lines(filling), self.catalogue).plan
+        return fold(self.timing.factory, self.lines(filling), self.catalogue).plan
 
 
 def _ways(timing: SizeTiming) -> tuple[list[float], list[float]]:
