@@ -39,6 +39,10 @@ BUILDS = "builds"
 """The folder of the receipts of builds."""
 
 
+_spare: dict[Path, int] = {}
+"""The bytes that there is room for in each folder, since this process last looked."""
+
+
 def digest(*parts: object) -> str:
     """The name of an entry that depends on these: arrays, bytes, and values whose `repr` differs
     where they differ."""
@@ -80,14 +84,16 @@ def store(folder: str, name: str, content: bytes) -> None:
     path = _path(folder, name)
     with suppress(OSError):
         write_bytes(path, hashlib.sha256(content).digest() + content)
-        _shrink(path.parent)
+        left = _spare.get(path.parent, 0) - len(content)
+        _spare[path.parent] = left if left >= 0 else _shrink(path.parent)
 
 
 def _path(folder: str, name: str) -> Path:
     return user_cache() / folder / (name + SUFFIX)
 
 
-def _shrink(folder: Path) -> None:
+def _shrink(folder: Path) -> int:
+    """Remove the oldest entries beyond MOST; how many more bytes there is room for."""
     entries = [(entry.stat(), entry.path) for entry in os.scandir(folder)]
     spare = MOST - sum(stat.st_size for stat, _ in entries)
     for stat, path in sorted(entries, key=lambda entry: entry[0].st_mtime_ns):
@@ -95,6 +101,7 @@ def _shrink(folder: Path) -> None:
             break
         os.unlink(path)
         spare += stat.st_size
+    return spare
 
 
 def load_arrays(folder: str, name: str) -> Arrays | None:
