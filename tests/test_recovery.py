@@ -159,6 +159,15 @@ def test_a_truck_with_several_faults() -> None:
     assert sorted(one.test for one in failures.found) == ["lost", "rejected", "residual"]
 
 
+def test_what_comes_after_a_part_that_lies_askew_hangs_straight() -> None:
+    """However many lie askew at once: the next ones touch no housing."""
+    layout = with_hands("truck")
+    leaves = layout.factory.leaves
+    faults = tuple(WorldFault("misplaced", label=leaf.label, unit=1) for leaf in leaves)
+    run, failures = run_with(*faults, layout=layout, units=1)
+    assert_recovered(run, failures, {"misplaced": len(leaves)})
+
+
 SHIFTED, TURNED = {"metres": 5e-3}, {"degrees": 15.0}
 
 

@@ -4,6 +4,7 @@ engine, gathered and written at once."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -15,6 +16,18 @@ from factory.simulation.mujoco.takeovers import Takeovers
 from factory.support.engine import mujoco
 
 Place = tuple[float, float, float]
+
+
+@dataclass(slots=True)
+class Gathered:
+    """What is to be switched `on` and `off` (welds, the former with the bodies that they hold), of
+    these what takes bodies over (`gripped`), who has what (`held`), and what is put where."""
+
+    on: dict[int, int] = field(default_factory=dict)
+    off: set[int] = field(default_factory=set)
+    gripped: dict[int, int] = field(default_factory=dict)
+    held: dict[int, int] = field(default_factory=dict)
+    placed: dict[int, Place] = field(default_factory=dict)
 
 
 class Welds:
@@ -34,35 +47,43 @@ class Welds:
         self.taken = Takeovers(m, d, radii)
         self.pads = PadGaps(m, d)
         self.closed = -np.inf
-        self._on: dict[int, int] = {}
-        self._off: set[int] = set()
-        self._gripped: dict[int, int] = {}
-        self._held: dict[int, int] = {}
-        self._placed: dict[int, Place] = {}
+        self._next = Gathered()
+        self._bent: dict[int, Array] = {}
 
     def loose(self, welds: Iterable[int]) -> None:
         """Switch welds off."""
         for weld in welds:
-            self._on.pop(weld, None)
-            self._gripped.pop(weld, None)
-            self._off.add(weld)
+            self._next.on.pop(weld, None)
+            self._next.gripped.pop(weld, None)
+            self._next.off.add(weld)
 
     def join(self, welds: Mapping[int, int]) -> None:
         """Switch welds on, each aimed at a body."""
-        self._on.update(welds)
+        self._next.on.update(welds)
 
     def grip(self, welds: Mapping[int, int]) -> None:
         """Close welds that take bodies over: their gaps are measured."""
         self.join(welds)
-        self._gripped.update(welds)
+        self._next.gripped.update(welds)
 
     def hold(self, bodies: Iterable[int], holder: int) -> None:
         """Put parts into the hands of a holder (code)."""
-        self._held.update(dict.fromkeys(bodies, holder))
+        self._next.held.update(dict.fromkeys(bodies, holder))
 
     def place(self, body: int, at: Place) -> None:
         """Place a free body [m], at rest, in the orientation in which it is presented."""
-        self._placed[body] = at
+        self._next.placed[body] = at
+
+    def bend(self, weld: int, place: Array) -> None:
+        """A weld holds its body at another place in its holder (7,), until it is switched on anew,
+        or straightened."""
+        self._bent.setdefault(weld, self._m.eq_data[weld, 3:10].copy())
+        self._m.eq_data[weld, 3:10] = place
+
+    def straighten(self, welds: Iterable[int]) -> None:
+        """Welds hold their bodies where they should."""
+        for weld in self._bent.keys() & welds:
+            self._m.eq_data[weld, 3:10] = self._bent.pop(weld)
 
     def turn(self, body: int, quaternion: Array, aside: Array) -> None:
         """Turn a free body, displaced by `aside` (3,) [m]."""
@@ -74,31 +95,31 @@ class Welds:
 
     def write(self) -> None:
         """Write all gathered changes into the engine, and wake the bodies concerned."""
-        if not (self._on or self._off or self._held or self._placed):
+        if self._next == Gathered():
             return
+        self.straighten(self._next.on)
         self._put()
-        self.pads.measure(self._on)
-        if self._gripped:
-            welds, bodies = np.array([*self._gripped.items()]).T
+        self.pads.measure(self._next.on)
+        if self._next.gripped:
+            welds, bodies = np.array([*self._next.gripped.items()]).T
             self.taken.measure(welds, bodies)
         m, d = self._m, self._d
-        off, on = np.array([*self._off], np.intp), np.array([*self._on], np.intp)
-        bodies = np.array([*self._on.values()], np.intp)
+        off, on = np.array([*self._next.off], np.intp), np.array([*self._next.on], np.intp)
+        bodies = np.array([*self._next.on.values()], np.intp)
         touched = [m.eq_obj1id[off], m.eq_obj2id[off], m.eq_obj1id[on], bodies]
         d.eq_active[off] = False
         m.eq_obj2id[on], d.eq_active[on] = bodies, True
         if len(on):
             self.closed = float(d.time)
-        self._sleep.wake({*np.concatenate(touched).tolist(), *self._placed})
-        self.masks.hold(self._held)
-        for gathered in (self._on, self._off, self._gripped, self._held, self._placed):
-            gathered.clear()
+        self._sleep.wake({*np.concatenate(touched).tolist(), *self._next.placed})
+        self.masks.hold(self._next.held)
+        self._next = Gathered()
 
     def _put(self) -> None:
         """Place bodies; `xpos` too, which the engine renews in its next step."""
-        if not self._placed:
+        if not self._next.placed:
             return
-        bodies, at = np.array([*self._placed]), np.array([*self._placed.values()])
+        bodies, at = np.array([*self._next.placed]), np.array([*self._next.placed.values()])
         joint, d = self._m.body_jntadr[bodies], self._d
         address = self._m.jnt_qposadr[joint][:, None] + np.arange(7)
         d.qpos[address] = np.hstack([at, self._m.qpos0[address[:, 3:]]])

@@ -18,6 +18,9 @@ from factory.support.engine import mujoco
 FAR = 1.0
 """Contact of what lies askew is counted to this depth, and presses on nothing [m]."""
 
+UP = np.array([0, 0, 1, 0, 0, 0, 0])
+"""Upwards, in the place of a body in its holder."""
+
 SETTLES = 0.5
 """What has slipped is back in its place in the hand so long after it is held right [s]."""
 
@@ -40,7 +43,7 @@ class Mishaps:
     can find any more."""
 
     def __init__(self, world: MujocoWorld, fallen: Fallen) -> None:
-        self._world, self._fallen, self._nominal = world, fallen, world.m.eq_data.copy()
+        self._world, self._fallen = world, fallen
         self._settling: list[tuple[float, tuple[int, ...]]] = []
         self.slips: dict[int, Slip] = {}
         self.opened: set[int] = set()
@@ -62,7 +65,9 @@ class Mishaps:
         """Let the last input of an operation slip upwards in its hand."""
         holdings, robot = self._world.parts.holdings, operation.robots[operation.last]
         welds = tuple(holdings.weld[robot_code(robot), label] for label in holdings.hand(robot))
-        self._world.m.eq_data[[*welds], 5] += metres
+        for weld in welds:
+            place = self._world.m.eq_data[weld, 3:10]
+            self._world.parts.welds.bend(weld, place + metres * UP)
         bodies = tuple(body for r in operation.robots for body in holdings.hand(r).values())
         self.slips[operation.index] = Slip(robot, welds, bodies)
         self._fallen.watch(bodies)
@@ -71,16 +76,14 @@ class Mishaps:
         """Put slipped inputs of operations (index) back into place."""
         for number in {*operations} & self.slips.keys():
             slip = self.slips.pop(number)
-            self._world.m.eq_data[[*slip.welds]] = self._nominal[[*slip.welds]]
+            self._world.parts.welds.straighten(slip.welds)
             self._settling.append((self._world.time + SETTLES, slip.bodies))
 
     def fresh(self) -> Sequence[tuple[str, int]]:
         """The parts that feeders have begun to present since the last call, all of them
         straight."""
-        feeders = self._world.parts.feeders
-        found, feeders.back.fresh = [*feeders.back.fresh.items()], {}
-        welds = [feeders.welds[label] for label, _ in found]
-        self._world.m.eq_data[welds] = self._nominal[welds]
+        back = self._world.parts.feeders.back
+        found, back.fresh = [*back.fresh.items()], {}
         return found
 
     def spoil(self, label: str, fault: WorldFault) -> None:
@@ -95,15 +98,14 @@ class Mishaps:
         if fault.kind == "bad_part":
             self.bad[body] = fault.hidden
             return
-        half = np.radians(fault.degrees) / 2
+        half, place = np.radians(fault.degrees) / 2, m.eq_data[weld, 3:10].copy()
         about_x, turn, pose = np.array([np.cos(half), np.sin(half), 0, 0]), np.zeros(4), np.zeros(4)
-        mujoco.mju_mulQuat(turn, self._nominal[weld, 6:10], about_x)
+        mujoco.mju_mulQuat(turn, place[3:], about_x)
         slider = self._world.d.xquat[m.eq_obj1id[weld]]
         mujoco.mju_mulQuat(pose, slider, turn)
         aside = np.zeros(3)
         mujoco.mju_rotVecQuat(aside, np.array([0, fault.way, 0]), slider)
-        m.eq_data[weld, 4] += fault.way
-        m.eq_data[weld, 6:10] = turn
+        parts.welds.bend(weld, np.array([place[0], place[1] + fault.way, place[2], *turn]))
         parts.welds.turn(body, pose, aside)
         self._fallen.watch([body])
         pad = int(m.body_geomadr[m.eq_obj1id[weld]])
