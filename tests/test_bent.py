@@ -66,8 +66,9 @@ def test_a_way_is_smooth_and_no_faster_than_its_coordinate() -> None:
 def test_the_nearest_point_of_a_place_on_a_way_is_that_place() -> None:
     for x in np.linspace(-0.1, 1.5, 321):
         at = np.full(3, x)
-        place, _, _ = WAYS.at(np.arange(3), at)
-        assert np.abs(WAYS.nearest(place) - at).max() < 1e-9
+        place, first, _ = WAYS.at(np.arange(3), at)
+        for found, known in zip(WAYS.nearest(place), (at, first), strict=True):
+            assert np.abs(found - known).max() < 1e-12
 
 
 def test_a_way_lies_in_its_pieces() -> None:
@@ -148,8 +149,8 @@ def test_a_monitor_sees_where_a_robot_on_a_bend_is(layout: Layout) -> None:
     assert not monitor.report(run.lasting).violations
     moved = Simulation(layout, RunRequest(units=1, settings=Settings()))
     blind = beside(moved)
-    blind.anatomy.bent.ways.corner[0] += 0.05
-    blind.anatomy.bent.ways.start[0, 1:] += 0.05
+    blind.anatomy.bent.ways.ends[0, 1:-1] += 0.05
+    blind.anatomy.bent.ways.middle[0, 1:] += 0.05
     run = moved.run([blind.observe])
     assert blind.report(run.lasting).violations
 

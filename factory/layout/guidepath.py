@@ -143,9 +143,8 @@ class Guidepath:
 
     def corner(self, at: float) -> Point2:
         """Where the carriage's line would have the corner at an arc length, were it not round."""
-        ways = way_of(self.bends, self.rounding)
-        leg = int((at > ways.corner[0]).sum())
-        back, across = (ways.point + ways.way * (at - ways.start)[..., None])[0, leg].tolist()
+        place, _, second = way_of(self.bends, self.rounding).at(np.array([0]), np.array([at]))
+        back, across = (place - second * self.rounding**2 / 2)[0].tolist()
         return self._placed(back, across + self.offset)
 
     def world(self, extent: Extent, middle: Point2) -> Box:

@@ -25,9 +25,6 @@ Index = NDArray[np.intp]
 FAR = 1e9
 """Where a corner is that a way does not have [m]."""
 
-NEWTON = 4
-"""Steps in which the nearest point of a corner is found: the error is below a nanometre."""
-
 
 @dataclass(frozen=True, slots=True)
 class Bend:
@@ -45,17 +42,18 @@ class Bend:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ways:
-    """Some ways (n,) from the origin, which begin and end along the first axis.
+    """Some ways (n,) from the origin, which begin and end along the first axis, piece by piece:
+    straight and round in turn, each with a constant second derivative.
 
-    `corner` (n, c): coordinates of their corners, FAR for none; `start` (n, c + 1), `point`
-    (n, c + 1, 2) and `way` (n, c + 1, 2): coordinate and place where each leg begins, and its
-    direction; `rounding` (n,) [m].
+    `ends` (n, 2c + 2): the coordinates where pieces begin, and where the last one ends, from -FAR
+    to FAR, which are also those of pieces that a way does not have; `middle` (n, 2c + 1): where
+    straight ones begin, and the corners of round ones; `terms` (n, 2c + 1, 3, 2): place, first and
+    second derivative there; `rounding` (n,) [m].
     """
 
-    corner: Array
-    start: Array
-    point: Array
-    way: Array
+    ends: Array
+    middle: Array
+    terms: Array
     rounding: Array
 
     @classmethod
@@ -69,52 +67,55 @@ class Ways:
             for step, bend in enumerate(row):
                 corner[number, 2 * step : 2 * step + 2] = bend.at, bend.end
                 way[number, 2 * step + 1] = 0.0, np.copysign(1.0, bend.across)
+        curved = [radius if row else 1.0 for row, radius in zip(bends, rounding, strict=True)]
+        radius = np.array(curved, float)
         start = np.concatenate([np.zeros((len(bends), 1)), corner], axis=1)
         legs = np.diff(start, axis=1)[:, :, None] * way[:, :-1]
         point = np.concatenate([np.zeros((len(bends), 1, 2)), np.cumsum(legs, axis=1)], axis=1)
-        curved = [radius if row else 1.0 for row, radius in zip(bends, rounding, strict=True)]
-        return cls(corner, start, point, way, np.array(curved, float))
+        terms = np.zeros((len(bends), 2 * count + 1, 3, 2))
+        terms[:, ::2, 0], terms[:, ::2, 1] = point, way
+        turn, reach = np.diff(way, axis=1), radius[:, None]
+        terms[:, 1::2, 0] = point[:, 1:] + turn * reach[..., None] / 4
+        terms[:, 1::2, 1] = (way[:, :-1] + way[:, 1:]) / 2
+        terms[:, 1::2, 2] = turn / (2 * reach[..., None])
+        middle = np.insert(start, np.arange(1, count + 1), corner, axis=1)
+        ends = np.full((len(bends), 2 * count + 2), FAR)
+        ends[:, 0], ends[:, 1:-1:2], ends[:, 2:-1:2] = -FAR, corner - reach, corner + reach
+        return cls(ends, middle, terms, radius)
 
     def at(self, rows: Index, x: Array) -> tuple[Array, Array, Array]:
         """Places, first and second derivatives (..., m, 2) of the ways `rows` (m,) at coordinates
         (..., m) [m]."""
-        leg = (x[..., None] > self.corner[rows]).sum(axis=-1)
-        place = self.point[rows, leg] + self.way[rows, leg] * (x - self.start[rows, leg])[..., None]
-        round_ = self.rounding[rows][:, None]
-        off = x[..., None] - self.corner[rows]
-        inside = np.maximum(round_ - np.abs(off), 0.0)
-        turn = self.way[rows, 1:] - self.way[rows, :-1]
-        share = inside / (2 * round_)
-        place = place + np.einsum("...mc,mcj->...mj", inside * share / 2, turn)
-        slope = np.where(off > 0.0, -share, share)
-        first = self.way[rows, leg] + np.einsum("...mc,mcj->...mj", slope, turn)
-        bent = np.where(inside > 0.0, 1.0 / (2 * round_), 0.0)
-        return place, first, np.einsum("...mc,mcj->...mj", bent, turn)
+        piece = (x[..., None] > self.ends[rows, 1:-1]).sum(axis=-1)
+        off, terms = (x - self.middle[rows, piece])[..., None], self.terms[rows, piece]
+        place, first, second = terms[..., 0, :], terms[..., 1, :], terms[..., 2, :]
+        gain = off * second
+        return place + off * (first + gain / 2), first + gain, second
 
-    def nearest(self, places: Array) -> Array:
-        """The coordinates (n,) of the points of the ways that are nearest to places (n, 2) [m];
-        before the first corner and after the last, those of their lines."""
-        rows = np.arange(len(places))
-        ahead = np.einsum("nlj,nlj->nl", places[:, None] - self.point, self.way)
-        low, high = np.zeros_like(self.start), np.full_like(self.start, FAR)
-        low[:, 0], high[:, :-1] = -FAR, np.diff(self.start, axis=1)
-        ahead = np.clip(ahead, low, high)
-        off = places[:, None] - self.point - ahead[..., None] * self.way
-        leg = (off**2).sum(axis=-1).argmin(axis=1)
-        x = self.start[rows, leg] + ahead[rows, leg]
-        for _ in range(NEWTON):
-            place, first, second = self.at(rows, x)
-            apart = places - place
-            slope = (first**2).sum(axis=-1) - (apart * second).sum(axis=-1)
-            x = x + (apart * first).sum(axis=-1) / np.maximum(slope, 0.25)
-        return np.asarray(x)
+    def nearest(self, places: Array) -> tuple[Array, Array]:
+        """The coordinates (n,) of the points of the ways that are nearest to places (n, 2) [m], and
+        first derivatives (n, 2) there; before the first corner and after the last, of their lines.
+
+        On a round piece the coordinate is u δ from the corner, where u³ + p u = q. That has one
+        solution if p > 0, which it is for a place that is not far inside the corner.
+        """
+        place, first, second = self.terms.transpose(2, 0, 1, 3)
+        apart, reach = places[:, None] - place, self.rounding[:, None]
+        off = np.einsum("npj,npj->np", apart, first)
+        lift = np.einsum("npj,npj->np", apart[:, 1::2], second[:, 1::2])
+        half = np.sqrt(np.maximum(2.0 - 4.0 * lift, 0.25) / 3.0)
+        turned = np.arcsinh(2.0 * off[:, 1::2] / (reach * half**3))
+        off[:, 1::2] = 2.0 * reach * half * np.sinh(turned / 3.0)
+        low, high = self.ends[:, :-1] - self.middle, self.ends[:, 1:] - self.middle
+        off = np.minimum(np.maximum(off, low), high)
+        left = apart - off[..., None] * (first + off[..., None] / 2 * second)
+        best = np.arange(len(places)), np.einsum("npj,npj->np", left, left).argmin(axis=1)
+        return self.middle[best] + off[best], first[best] + off[best][:, None] * second[best]
 
     def pieces(self, row: int, low: float, high: float) -> Iterator[Array]:
         """A way between two coordinates [m] piece by piece: the two ends of a straight one, the
         three control points of a parabola. Each piece lies in the hull of its points (k, 2)."""
-        corners = self.corner[row][self.corner[row] < FAR]
-        ends = (corners[:, None] + self.rounding[row] * np.array([-1.0, 0.0, 1.0])).ravel()
-        cuts = [low, *(cut for cut in ends.tolist() if low < cut < high), high]
+        cuts = [low, *(cut for cut in self.ends[row].tolist() if low < cut < high), high]
         middle, half = np.add(cuts[:-1], cuts[1:]) / 2, np.diff(cuts)[:, None] / 2
         place, first, second = self.at(np.full(len(middle), row), middle)
         lift = second * half**2 / 2

@@ -55,13 +55,12 @@ class BentWays:
 
     def along(self, qpos: Array, qvel: Array) -> tuple[Array, Array]:
         """Their arc lengths [m] and speeds [m/s]."""
-        x = self.ways.nearest(qpos[self.slides])
-        _, first, _ = self.ways.at(np.arange(len(x)), x)
+        x, first = self.ways.nearest(qpos[self.slides])
         return x, (qvel[self.dofs] * first).sum(axis=-1) / (first**2).sum(axis=-1)
 
     def reached(self, ctrl: Array) -> Array:
         """The arc lengths [m] of their setpoints."""
-        return self.ways.nearest(ctrl[self.drives])
+        return self.ways.nearest(ctrl[self.drives])[0]
 
 
 @dataclass(frozen=True, eq=False)

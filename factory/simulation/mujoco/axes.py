@@ -56,8 +56,7 @@ class Across:
 
     def along(self, places: Array, speeds: Array) -> tuple[Array, Array]:
         """Arc lengths [m] and speeds [m/s] (b,) of positions and velocities (b, 2)."""
-        x = self.ways.nearest(places)
-        _, first, _ = self.ways.at(np.arange(len(x)), x)
+        x, first = self.ways.nearest(places)
         return x, (speeds * first).sum(axis=-1) / (first**2).sum(axis=-1)
 
 
