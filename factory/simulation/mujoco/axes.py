@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -27,13 +27,17 @@ class Across:
     qpos: Index
     dof: Index
     actuator: Index
+    found: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(cls, m: mujoco.MjModel, layout: Layout, count: int) -> Across:
         """The second slides of a layout with a given number of axes in its compiled model."""
         robots, ways = layout.bent
         called = [layout.factory.robots[robot].name for robot in robots]
-        joint = np.array([m.joint(names.slide_across(name)).id for name in called], np.intp)
+        pairs = [
+            [m.joint(slide(n)).id for slide in (names.slide, names.slide_across)] for n in called
+        ]
+        joint = np.array(pairs, np.intp).reshape(-1, 2)
         drives = [m.actuator(names.drive_across(name)).id for name in called]
         axes, row = np.array(robots, np.intp), np.full(count, -1)
         row[axes] = np.arange(len(axes))
@@ -56,8 +60,12 @@ class Across:
 
     def along(self, places: Array, speeds: Array) -> tuple[Array, Array]:
         """Arc lengths [m] and speeds [m/s] (b,) of positions and velocities (b, 2)."""
-        x, first = self.ways.nearest(places)
-        return x, (speeds * first).sum(axis=-1) / (first**2).sum(axis=-1)
+        state = places.tobytes() + speeds.tobytes()
+        if state not in self.found:
+            x, first = self.ways.nearest(places)
+            self.found.clear()
+            self.found[state] = x, (speeds * first).sum(axis=-1) / (first**2).sum(axis=-1)
+        return self.found[state]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,10 +131,7 @@ class Axes:
         x, v = d.qpos[self.qpos[: self.tray]], d.qvel[self.dof[: self.tray]]
         bent = self.across
         if len(bent.axes):
-            x[bent.axes], v[bent.axes] = bent.along(
-                np.stack([x[bent.axes], d.qpos[bent.qpos]], axis=-1),
-                np.stack([v[bent.axes], d.qvel[bent.dof]], axis=-1),
-            )
+            x[bent.axes], v[bent.axes] = bent.along(d.qpos[bent.qpos], d.qvel[bent.dof])
         return x, v
 
     def put(self, d: mujoco.MjData, axes: Index, x: Array) -> None:
@@ -141,7 +146,7 @@ class Axes:
         which, rows = self.across.among(axes)
         if len(rows):
             place, _, _ = self.across.ways.at(rows, x[which])
-            qpos[self.qpos[axes[which]]], qpos[self.across.qpos[rows]] = place.T
+            qpos[self.across.qpos[rows]] = place
 
     def off(self, d: mujoco.MjData, x: Array) -> Array:
         """Distance of all axes (axes,) from positions [m]."""
@@ -149,6 +154,5 @@ class Axes:
         bent = self.across
         if len(bent.axes):
             place, _, _ = bent.ways.at(np.arange(len(bent.axes)), x[bent.axes])
-            here = np.stack([d.qpos[self.qpos[bent.axes]], d.qpos[bent.qpos]], axis=-1)
-            off[bent.axes] = np.linalg.norm(here - place, axis=-1)
+            off[bent.axes] = np.linalg.norm(d.qpos[bent.qpos] - place, axis=-1)
         return np.asarray(off)

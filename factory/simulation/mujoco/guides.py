@@ -35,4 +35,4 @@ class Guides:
         which, rows = self._across.among(np.asarray(axes))
         if len(rows):
             same = self._m.dof_frictionloss[self._dof[np.asarray(axes)[which]]]
-            self._m.dof_frictionloss[self._across.dof[rows]] = same
+            self._m.dof_frictionloss[self._across.dof[rows]] = same[:, None]

@@ -32,7 +32,7 @@ class Interference:
         self._world, self._m, self._d = world, world.m, world.d
         self._axes = axes = world.motion.axes
         self._robots = slice(axes.tray)
-        self._dof = np.concatenate([axes.dof[self._robots], axes.across.dof])
+        self._dof = np.concatenate([axes.dof[self._robots], axes.across.dof[:, 1]])
         self._actuator = np.concatenate([axes.actuator[self._robots], axes.across.actuator])
         self._gain = np.ones(len(self._actuator))
         self._measures: list[Measure] = []
