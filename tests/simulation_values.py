@@ -10,17 +10,11 @@ from typing import Any
 
 import numpy as np
 
-import factory
 from benches.speed.factories import balanced
 from benches.speed.factories import laid_out as floor_of
-from factory.compiler.compiler import compile_pag
-from factory.compiler.expanding import expand
-from factory.compiler.mating.mating import matings
-from factory.geometry.product import product_geometry
 from factory.lang import read_pag
 from factory.layout.layout import Layout
-from factory.pipeline import all_templates
-from factory.problem.robot_types import load_catalogue
+from factory.pipeline import Project, all_templates, read
 from factory.simulation.mujoco.stepping import SingleSteps
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
@@ -32,26 +26,31 @@ from tests.examples import without_hands
 FENCE = (ROOT / "tests" / "baselines" / "fence.pag").read_text("utf-8")
 """A small product with lifts."""
 
+BAR = """root = cell; cell = place ( base, bar );
+base = atomic ( box = (0.24, 0.24, 0.02), pos = (0, 0, 0.01) );
+bar = atomic ( box = (0.2, 0.02, 0.03), pos = (0, 0, 0.0351), fed = 1.2 )"""
+"""A long part that a manipulator turns."""
+
 
 @cache
 def laid_out_with_lifts(text: str) -> Layout:
     """The factory of a PAG's text on its floor, with lifts for what must be lowered."""
     templates = all_templates()
-    pag = read_pag(text, templates)
-    product = product_geometry(pag)
-    found = matings(expand(pag, templates), product).approaches
-    made = compile_pag(pag, templates, load_catalogue(), found)
-    return factory.lay_out(made)
+    return Project(read_pag(text, templates), templates).layout
 
 
 @cache
 def layout_of(name: str) -> Layout:
-    """The factory of an example, of a balanced product of so many parts, or the fence's, on its
-    floor."""
+    """The factory of an example, of a balanced product of so many parts, of the fence, of the bar,
+    or of the paper with a tee, on its floor."""
     if name.isdigit():
         return floor_of(balanced(int(name)))
     if name == "fence":
         return laid_out_with_lifts(FENCE)
+    if name == "bar":
+        return laid_out_with_lifts(BAR)
+    if name == "tee":
+        return read(ROOT / "examples" / "paper.pag").with_branches([("part3", 2)]).layout
     return without_hands(name)
 
 

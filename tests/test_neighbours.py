@@ -103,6 +103,8 @@ RUNS: list[tuple[str, dict[str, Any]]] = [
     ("fence", {}),
     ("chest", {"settings": Settings(timestep=0.004, substeps=3, stage=1)}),
     ("20", {"fuse": True, "wip": 1}),
+    ("tee", {"units": 3}),
+    ("bar", {}),
 ]
 COARSE = "20", {"settings": Settings(timestep=0.01, substeps=1)}
 
@@ -216,7 +218,8 @@ def within_boxes(simulation: Simulation) -> bool:
 
 
 @pytest.mark.parametrize(
-    ("name", "given"), [("fence", {}), ("chest", {"fuse": True}), ("20", {}), ("paper", {})]
+    ("name", "given"),
+    [("fence", {}), ("chest", {"fuse": True}), ("20", {}), ("tee", {}), ("bar", {})],
 )
 def test_what_a_holder_has_is_within_its_box(name: str, given: dict[str, Any]) -> None:
     simulation = ready(name, **given)

@@ -39,16 +39,19 @@ at, for the same reason."""
 
 
 class Extents:
-    """The axes along which holders go: carriages, then the outfeed's tray. `low` and `high` (n,):
-    the ends of the way that each goes until it is told another [m]; `along` (n, 2): where that
-    leads, seen from above."""
+    """The slides along which holders go: of carriages, of the outfeed's tray, and the second ones
+    of robots on bends; `axes` (n,): of which. `low` and `high` (n,): the ends of the way that each
+    goes until it is told another [m]; `along` (n, 2): where that leads, seen from above."""
 
     def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, axes: Axes, robots: int) -> None:
-        slides = np.array([*range(robots), axes.tray])
-        self._number = np.full(len(axes), -1)
-        self._number[slides] = np.arange(len(slides))
-        self.slides, self._address = slides, axes.qpos[slides]
-        self.along = d.xaxis[m.body_jntadr[axes.body[slides]], :2].copy()
+        bent, first = axes.across, np.array([*range(robots), axes.tray])
+        self._every, self._number = axes, np.full(len(axes), -1)
+        self._number[first] = np.arange(len(first))
+        self._second = len(first) + np.arange(len(bent.axes))
+        self.axes = np.concatenate([first, bent.axes])
+        self._address = np.concatenate([axes.qpos[first], bent.qpos[:, 1]])
+        dofs = np.concatenate([axes.dof[first], bent.dof[:, 1]])
+        self.along = d.xaxis[m.dof_jntid[dofs], :2].copy()
         self.stand(d)
 
     def stand(self, d: mujoco.MjData) -> None:
@@ -57,7 +60,13 @@ class Extents:
 
     def go(self, axes: Index, x: Array) -> None:
         """Some axes of a factory go from where they are by positions (ticks, n) [m]."""
-        number = self._number[axes]
+        number, bent = self._number[axes], self._every.across
+        which, rows = bent.among(axes)
+        if len(rows):
+            place, _, _ = bent.ways.at(rows, x[:, which])
+            x = np.concatenate([x, place[..., 1]], axis=1)
+            x[:, which] = place[..., 0]
+            number = np.concatenate([number, self._second[rows]])
         if (number < 0).any():
             number, x = number[number >= 0], x[:, number >= 0]
         self.low[number] = np.minimum(self.low[number], x.min(axis=0))
@@ -71,7 +80,7 @@ class Extents:
 
 class Neighbours:
     """The holders of a model's parts, by their codes, where the run begins; `culls`: some may be
-    left out, but not where guidepaths have bends."""
+    left out."""
 
     def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, parts: Parts, axes: Axes) -> None:
         shutter = parts.tray + len(parts.feeders.welds) + 1
@@ -80,13 +89,15 @@ class Neighbours:
             dict(zip(axes.tree.tolist(), self._holder.tolist(), strict=True)) | parts.feeders.trees
         )
         count = parts.masks.own(trees, shutter) + 1
-        self.culls, self._calm = count > FEW and not len(axes.across.axes), -np.inf
+        self.culls, self._calm = count > FEW, -np.inf
         self._active: Index | None = None
         self._seen, self._moved = np.ones(count, bool), False
         if self.culls:
             mujoco.mj_kinematics(m, d)
             self._ways = Extents(m, d, axes, len(parts.model.factory.robots))
+            turns = axes.turns
             self._box = _boxes(m, d, parts, count)
+            _turned(*self._box, self._holder[turns], d.xanchor[m.dof_jntid[axes.dof[turns]], :2])
             self._began = self._ways.low
             self._bodies = _of_trees(m, parts.masks.code)
 
@@ -133,12 +144,12 @@ class Neighbours:
     def boxes(self) -> tuple[Array, Array]:
         """The corners (2, holders) of the box that each holder sweeps until it is told another way,
         with all that it ever holds [m]."""
-        ways, robots = self._ways, self._holder[self._ways.slides]
+        ways, robots = self._ways, self._holder[self._ways.axes]
         low, high = (corners.copy() for corners in self._box)
         ends = np.stack([ways.low, ways.high]) - self._began
         swept = ends[:, None] * ways.along.T
-        low[:, robots] += swept.min(axis=0)
-        high[:, robots] += swept.max(axis=0)
+        np.add.at(low, (slice(None), robots), swept.min(axis=0))
+        np.add.at(high, (slice(None), robots), swept.max(axis=0))
         return low, high
 
     def everything(self) -> None:
@@ -192,6 +203,14 @@ def _boxes(m: mujoco.MjModel, d: mujoco.MjData, parts: Parts, count: int) -> tup
     np.minimum.at(least, code, place + low[which])
     np.maximum.at(most, code, place + high[which])
     return least.T - MARGIN, most.T + MARGIN
+
+
+def _turned(low: Array, high: Array, holders: Index, middle: Array) -> None:
+    """Widen the boxes with these corners (2, count) [m] of holders that turn about vertical axes at
+    `middle` (n, 2), to what they fill in any turn."""
+    reach = np.maximum(high[:, holders] - middle.T, middle.T - low[:, holders])
+    radius = np.hypot(*reach)
+    low[:, holders], high[:, holders] = middle.T - radius, middle.T + radius
 
 
 def boxes(m: mujoco.MjModel, d: mujoco.MjData, masks: ContactMasks) -> tuple[Array, Array]:
