@@ -148,8 +148,8 @@ class Neighbours:
         low, high = (corners.copy() for corners in self._box)
         ends = np.stack([ways.low, ways.high]) - self._began
         swept = ends[:, None] * ways.along.T
-        np.add.at(low, (slice(None), robots), swept.min(axis=0))
-        np.add.at(high, (slice(None), robots), swept.max(axis=0))
+        np.add.at(low.T, robots, swept.min(axis=0).T)
+        np.add.at(high.T, robots, swept.max(axis=0).T)
         return low, high
 
     def everything(self) -> None:
