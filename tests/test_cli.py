@@ -16,7 +16,7 @@ import pytest
 from factory.commands import cli
 from factory.exporting.certificate.check import check_certificate
 from factory.record.log import read_log
-from factory.support.extras import EXTRAS
+from factory.support.version import EXTRAS
 from tests.command_line import PAPER, ROOT, Terminal, files_in
 
 NUMBER = (int, float)

@@ -19,8 +19,7 @@ from factory.show.pareto import floor_plans, front_page
 from factory.show.pareto.chart import ChartAxis, cycle_chart
 from factory.study.allocation.aim import least_robots
 from factory.study.pareto import Effort, FrontPoint, FrontSweep, ParetoFront, pareto, sweeping
-from factory.study.pareto.front import Trial, tried, undominated
-from factory.study.pareto.point_files import commands_of, point_files
+from factory.study.pareto.front import Trial, commands_of, point_files, tried, undominated
 from factory.support import progress
 from factory.support.progress import StepBar
 from factory.support.settings import Settings

@@ -149,7 +149,7 @@ COMMAND = (
 )
 ENGINE = f"{STOPPED}from factory.support.engine import mujoco\nraise SystemExit(5)"
 EXTRA = (
-    f"{STOPPED}from factory.support.extras import optional\n"
+    f"{STOPPED}from factory.support.version import optional\n"
     "optional('stops', 'it', 'this', 'extra')\nraise SystemExit(5)"
 )
 

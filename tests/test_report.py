@@ -29,7 +29,7 @@ from factory.simulation.run import STEADY
 from factory.simulation.simulation import Simulation
 from factory.study.analysis import Timing, analyse
 from factory.study.analysis.measured import logged_record
-from factory.study.fidelity.quantities import QUANTITIES
+from factory.study.fidelity.record import QUANTITIES
 from factory.support.errors import InputError
 from tests.command_line import PAPER, Terminal, files_in
 from tests.layout_values import paper_layout

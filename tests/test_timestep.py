@@ -27,7 +27,7 @@ from factory.record.state import State
 from factory.simulation.modelling import physical_model
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
-from factory.study.fidelity.quantities import QUANTITIES
+from factory.study.fidelity.record import QUANTITIES
 from factory.support.errors import InputError
 from factory.support.resources import mjcf_folder
 from factory.support.settings import AUTO, TICK, Settings

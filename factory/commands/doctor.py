@@ -12,9 +12,8 @@ from factory.commands.options import OUTPUT
 from factory.commands.requests import OutputOptions
 from factory.support.console import emit, say
 from factory.support.errors import FactoryError
-from factory.support.extras import EXTRAS, installs
 from factory.support.namesake import MEND, clash
-from factory.support.version import release
+from factory.support.version import EXTRAS, installs, release
 
 PACKAGES = (
     "mujoco",

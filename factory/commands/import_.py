@@ -56,7 +56,7 @@ def import_(
     """Convert SOURCE to a PAG: an LDraw model (.ldr, .mpd), a tree of meshes (.json, .yaml), a bill
     of materials with levels (.csv), or a folder with one of these."""
     from factory.importing import Options, import_product
-    from factory.importing.assembling import Mates
+    from factory.importing.draft import Mates
     from factory.pipeline import all_templates
     from factory.support.files import own_names, write_all
 

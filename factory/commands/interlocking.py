@@ -39,7 +39,7 @@ def _interlocked(
 ) -> list[Path]:
     """Pictures of the first sets of interlocked parts; none, with a warning, on a machine without
     GL."""
-    from factory.importing.labels import file_stem
+    from factory.importing.draft import file_stem
     from factory.rendering.interlocked import InterlockedView
     from factory.support.files import own_names
 

@@ -13,7 +13,7 @@ from factory.exporting.subject import Subject
 from factory.layout.dimensions import CARRIAGE
 from factory.layout.feeding import feeder_of
 from factory.layout.layout import Box, Layout, Point2
-from factory.support.extras import optional
+from factory.support.version import optional
 
 FORMAT, TAKES = "dxf", "pag"
 

@@ -18,7 +18,7 @@ from factory.exporting.motion import BodyMotion, motion_of
 from factory.exporting.subject import Subject
 from factory.geometry.meshes import Array
 from factory.record.log import Log
-from factory.support.extras import optional
+from factory.support.version import optional
 
 FORMAT, TAKES, BINARY = "mcap", "log", True
 

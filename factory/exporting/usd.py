@@ -12,7 +12,7 @@ import numpy as np
 from factory.exporting.motion import BodyMotion, motion_of
 from factory.exporting.subject import Subject
 from factory.record.log import Log
-from factory.support.extras import optional
+from factory.support.version import optional
 
 FORMAT, TAKES, BINARY = "usd", "log", True
 

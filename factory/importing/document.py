@@ -16,7 +16,7 @@ from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedTok
 from factory.lang.source import Source, quoted
 from factory.lang.words import is_number
 from factory.support.errors import Diagnostic, InputError, Position
-from factory.support.extras import optional
+from factory.support.version import optional
 
 Kind = Literal["object", "list", "text", "number", "boolean", "null"]
 

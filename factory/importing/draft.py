@@ -1,13 +1,132 @@
-"""A product as its file describes it, before it is a PAG: nodes with the indices of their
-inputs."""
+"""A product as its file describes it, before it is a PAG: nodes with the indices of their inputs;
+and the PAG of them: labels, and operations with the number of inputs that they take."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import Literal
 
-from factory.problem.pag import Parameter
+from factory.lang.source import where
+from factory.lang.words import is_label
+from factory.problem.pag import PAG, RESERVED, Assembly, Parameter
 from factory.support.errors import Diagnostic, InputError, Position
+
+Mates = Literal["many", "chain"]
+"""How three or more inputs are mated: in one operation, or one after the other."""
+
+
+def assemble(drafts: Sequence[DraftNode], faults: ImportFaults, mates: Mates = "many") -> PAG:
+    """The PAG of drafts, of which the first is the product; sub-assemblies first, then parts.
+
+    A mate of one input is replaced by that input. Raises InputError (DuplicateLabel) if two nodes
+    have the same kept name.
+    """
+    order = postorder(drafts)
+    made = [i for i in order if not (drafts[i].operation == MATE and len(drafts[i].inputs) == 1)]
+    _refuse_twice(drafts, made, faults)
+    labels = Labeller(drafts, made)
+    label = {index: labels.of(drafts[index]) for index in made}
+    for index in order:
+        if index not in label:
+            label[index] = label[drafts[index].inputs[0]]
+    nodes: list[Assembly] = []
+    for index in made:
+        draft = drafts[index]
+        inputs = [label[child] for child in draft.inputs]
+        if mates == "chain" and draft.operation == MATE:
+            nodes += _chain(label[index], inputs, labels)
+        else:
+            nodes.append(Assembly(label[index], draft.operation, tuple(inputs), draft.parameters))
+    nodes.sort(key=lambda node: not node.inputs)
+    return PAG(label[0], tuple(nodes), len(nodes))
+
+
+def _refuse_twice(drafts: Sequence[DraftNode], made: Sequence[int], faults: ImportFaults) -> None:
+    first: dict[str, DraftNode] = {}
+    for draft in (drafts[index] for index in sorted(made) if drafts[index].kept):
+        if draft.name in first:
+            before = where(first[draft.name].position, draft.position)
+            message = f"the name '{draft.name}' is used twice, first {before}"
+            hint = "a part is in the product once: give each node a name of its own"
+            faults.add("DuplicateLabel", message, draft.position, hint)
+        first.setdefault(draft.name, draft)
+    faults.raise_if_any()
+
+
+def _chain(label: str, inputs: list[str], labels: Labeller) -> list[Assembly]:
+    """Mates of two inputs each; the labels but the last one end in the number of inputs joined so
+    far."""
+    piles = [inputs[0], *(labels.within(label, n) for n in range(2, len(inputs))), label]
+    steps = zip(pairwise(piles), inputs[1:], strict=True)
+    return [Assembly(made, MATE, (pile, new)) for (pile, made), new in steps]
+
+
+_FOREIGN = re.compile(r"[^\w.\-]+")
+_LONGEST = 80
+
+
+def label_of(name: str) -> str:
+    """The label that resembles a name most: other characters become `-`; "" if nothing remains.
+
+    >>> label_of("Left wing (2x4).ldr")
+    'Left-wing-2x4-.ldr'
+    """
+    if is_label(name) and name not in RESERVED and not _FOREIGN.search(name):
+        return name[:_LONGEST]
+    label = _FOREIGN.sub("-", name)[:_LONGEST].strip("-.")
+    return f"{label}-" if label in RESERVED else label
+
+
+def file_stem(name: str) -> str:
+    """A file name that is valid on every system: ASCII letters, digits, `_`, `-` and `.`.
+
+    >>> file_stem("../../s\\\\3001 b")
+    's-3001-b'
+    """
+    return re.sub(r"[^A-Za-z0-9_.\-]+", "-", name)[:_LONGEST].strip("-.") or "mesh"
+
+
+class Labeller:
+    """Assigns a unique label to every node: kept names are unchanged, names of several nodes are
+    numbered, nodes without a name become `part1`, `sub1`."""
+
+    def __init__(self, drafts: Sequence[DraftNode], order: Iterable[int]) -> None:
+        self.drafts = drafts
+        self.taken = {drafts[index].name for index in order if drafts[index].kept}
+        named = (label_of(drafts[index].name) for index in order if not drafts[index].kept)
+        self.shared = Counter(named)
+        self.numbers: dict[str, Iterator[int]] = {}
+
+    def of(self, draft: DraftNode) -> str:
+        """The label of a node; to be called once for each."""
+        if draft.kept:
+            return draft.name
+        stem = label_of(draft.name)
+        if not stem:
+            return self._numbered("part" if draft.is_part else "sub")
+        if self.shared[stem] > 1 or stem in self.taken:
+            return self._numbered(f"{stem}-")
+        self.taken.add(stem)
+        return stem
+
+    def _numbered(self, stem: str) -> str:
+        numbers = self.numbers.setdefault(stem, iter(range(1, 10**9)))
+        label = next(name for n in numbers if (name := f"{stem}{n}") not in self.taken)
+        self.taken.add(label)
+        return label
+
+    def within(self, label: str, number: int) -> str:
+        """The label of the first `number` inputs of `label` when they are mated."""
+        name = f"{label}.{number}"
+        if name in self.taken:
+            return self._numbered(f"{name}-")
+        self.taken.add(name)
+        return name
+
 
 PART, MATE = "atomic", "mate"
 

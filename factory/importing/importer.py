@@ -7,11 +7,9 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
-from factory.importing.assembling import Mates, assemble
 from factory.importing.bill import BillReader
 from factory.importing.document import read_json, read_yaml
-from factory.importing.draft import DraftNode, ImportFaults
-from factory.importing.labels import file_stem
+from factory.importing.draft import DraftNode, ImportFaults, Mates, assemble, file_stem
 from factory.importing.ldraw.model import read_ldraw
 from factory.importing.mesh_files import MeshStore
 from factory.importing.part_maker import PartMaker

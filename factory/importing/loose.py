@@ -11,11 +11,9 @@ from factory.geometry.alike import alike, shape_of
 from factory.geometry.mesh_file import ANEW, UnreadableMesh, obj_of
 from factory.geometry.meshes import Array, Indices
 from factory.geometry.solids import colour
-from factory.importing.assembling import assemble
 from factory.importing.bodies import Bodies, FileBody, apart, check_count, unit_of
-from factory.importing.draft import PART, DraftNode, ImportFaults
+from factory.importing.draft import PART, DraftNode, ImportFaults, assemble, file_stem, label_of
 from factory.importing.importer import Imported
-from factory.importing.labels import file_stem, label_of
 from factory.importing.mesh_files import MeshStore
 from factory.importing.part_maker import Placement
 from factory.importing.scene_file import MESHES, SCENES, read_one, read_scene

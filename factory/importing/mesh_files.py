@@ -7,7 +7,7 @@ from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path, PurePosixPath
 
-from factory.importing.labels import file_stem
+from factory.importing.draft import file_stem
 from factory.problem.pag import Assembly
 from factory.support.files import MESH, read_bytes
 

@@ -20,8 +20,8 @@ from factory.geometry.mesh_reader import read_mesh
 from factory.importing import threemf_file
 from factory.importing.bodies import MOST_PARTS, Bodies, FileBody, most_of, solids_of
 from factory.nets.verdict import listing
-from factory.support.extras import optional
 from factory.support.files import MESH, read_bytes
+from factory.support.version import optional
 
 STEP, SCENES = (".step", ".stp"), (".glb", ".3mf", ".step", ".stp")
 """Suffixes of files whose bodies have names."""

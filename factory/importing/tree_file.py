@@ -7,8 +7,15 @@ from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 
 from factory.importing.document import DocumentNode as Node
-from factory.importing.draft import MATE, MOST_NODES, PART, DraftNode, ImportFaults, too_many
-from factory.importing.labels import label_of
+from factory.importing.draft import (
+    MATE,
+    MOST_NODES,
+    PART,
+    DraftNode,
+    ImportFaults,
+    label_of,
+    too_many,
+)
 from factory.importing.part_maker import PartMaker, Placement
 from factory.lang.operations import MESHES, Signature
 from factory.lang.source import quoted

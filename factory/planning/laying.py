@@ -24,7 +24,7 @@ from factory.planning.writing import Screwed, planned_product
 from factory.planning.writing import Tree as LabelTree
 from factory.problem.robot_types import load_catalogue
 from factory.problem.template import Template
-from factory.support.allowance import Allowance
+from factory.support.bounds import Allowance
 from factory.support.errors import FactoryError
 from factory.support.settings import Settings
 from factory.timing.prediction import pace

@@ -29,7 +29,7 @@ from factory.planning.turning import only
 from factory.planning.writing import Tree, planned_product, screws_in
 from factory.problem.pag import PAG
 from factory.problem.template import Template
-from factory.support.allowance import Allowance
+from factory.support.bounds import Allowance
 from factory.support.errors import Diagnostic, InputError, did_you_mean
 from factory.support.settings import Settings
 

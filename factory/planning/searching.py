@@ -18,7 +18,7 @@ from factory.planning.exact import Best, Expected, Tables, TreeTask, tables
 from factory.planning.growing import Site, bettered, divided
 from factory.planning.judging import Judge, Judged
 from factory.planning.subsets import MOST, ROOT_AXIS, Stance, Subsets, stances, subsets
-from factory.support.allowance import Allowance
+from factory.support.bounds import Allowance
 
 Aim = Literal["cycle", "robots", "floor"]
 """The objective of planning."""

@@ -17,8 +17,8 @@ from factory.geometry.product import product_geometry
 from factory.geometry.solids import Solid, rotation
 from factory.importing import Imported, Options, import_product
 from factory.importing.bodies import check_count
+from factory.importing.draft import file_stem
 from factory.importing.importer import LDRAW
-from factory.importing.labels import file_stem
 from factory.importing.loose import bodies_in, loose_product
 from factory.importing.mesh_files import MeshStore
 from factory.importing.scene_file import MESHES, SCENES

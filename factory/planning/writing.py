@@ -16,7 +16,7 @@ from factory.compiler.mating.mating import matings
 from factory.geometry.meshes import Array
 from factory.geometry.overlapping import overlaps_of
 from factory.geometry.product import product_geometry
-from factory.importing.labels import file_stem, label_of
+from factory.importing.draft import file_stem, label_of
 from factory.importing.part_maker import Placement
 from factory.lang.writer import write_pag
 from factory.planning.parts import InPlace

@@ -20,8 +20,7 @@ from factory.mjcf.weld_frames import held_at
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
 from factory.record.monitor.subject import MonitorSubject
-from factory.rendering.action import box_of, placed, shape_of
-from factory.rendering.fading import STANDS, outlines
+from factory.rendering.action import STANDS, box_of, outlines, placed, shape_of
 
 ROOM = 1.3
 """What a label takes of the picture is so many times its size."""

@@ -13,9 +13,8 @@ from factory.mjcf import names
 from factory.mjcf.loose_parts import loose_parts
 from factory.mjcf.replica import SHOWN, Replica
 from factory.record.monitor.subject import MonitorSubject
-from factory.rendering.action import Snapshot
+from factory.rendering.action import Fading, Snapshot
 from factory.rendering.camera import Camera
-from factory.rendering.fading import Fading
 from factory.rendering.following import Viewpoint
 from factory.rendering.ink import Pixels
 from factory.rendering.marks import Mark, Marks

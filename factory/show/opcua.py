@@ -24,7 +24,7 @@ from factory.simulation.driven import DrivenSupervisor
 from factory.simulation.signals import Commands, Refusal, Sensed
 from factory.simulation.simulation import Simulation
 from factory.support.errors import Diagnostic, InputError
-from factory.support.extras import optional
+from factory.support.version import optional
 
 SPACE = "urn:klavins-factory:plant"
 """The namespace of its nodes."""

@@ -1,4 +1,44 @@
-"""The versions of this package, which is that in pyproject.toml, and of others."""
+from collections.abc import Mapping
+from importlib import import_module
+from types import MappingProxyType
+from typing import Any
+
+from factory.support.errors import Diagnostic, MissingError
+from factory.support.interruption import put_off
+
+EXTRAS: Mapping[str, tuple[tuple[str, ...], str]] = MappingProxyType(
+    {
+        "decompose": (("coacd",), "meshes that are not convex collide as convex pieces"),
+        "live": (("websockets",), "`view`, in the browser"),
+        "opcua": (("asyncua",), "`plant`, for a PLC"),
+        "export": (("ezdxf", "foxglove-sdk"), "DXF and MCAP"),
+        "usd": (("usd-core",), "USD"),
+        "yaml": (("pyyaml",), "`import` of trees in YAML"),
+        "step": (("cascadio",), "`plan` of STEP files"),
+    }
+)
+"""Each extra: its packages, and what it is for."""
+
+
+def installs(extra: str) -> str:
+    """The command that installs an extra."""
+    return f"pip install 'klavins-factory[{extra}]'"
+
+
+def optional(module: str, package: str, what: str, extra: str, otherwise: str = "") -> Any:
+    """A module of an optional package, which `what` needs. Raises MissingError with the command
+    that installs it, or with an alternative."""
+    try:
+        with put_off():
+            return import_module(module)
+    except ImportError as error:
+        hint = installs(extra) + (f", or {otherwise}" if otherwise else "")
+        message = f"{what} needs {package}: {error}"
+        raise MissingError(Diagnostic("Missing", message, None, hint)) from error
+
+
+"""The versions of this package, which is that in pyproject.toml, and of others; and the optional
+packages: the extras of this one."""
 
 __version__ = "0.1.0"
 

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 from factory.show.live.commands import command_of
 from factory.show.live.session import LiveEvent, LiveFrame, Session
 from factory.support.errors import Diagnostic, InputError
-from factory.support.extras import optional
 from factory.support.resource import Closing
+from factory.support.version import optional
 
 if TYPE_CHECKING:
     from websockets.http11 import Request, Response

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from math import floor, log10
 
-from factory.study.pareto.front import FrontPoint, ParetoFront
-from factory.study.pareto.point_files import point_name
+from factory.study.pareto.front import FrontPoint, ParetoFront, point_name
 from factory.support.canvas import Canvas, Point
 
 PAGE = (0.0, 640.0, 0.0, 400.0)

@@ -10,8 +10,7 @@ from pathlib import Path
 from factory.exporting.floor_sheet import write_svg
 from factory.show.pareto.chart import cycle_chart, floor_chart
 from factory.show.report.page import filled
-from factory.study.pareto.front import JITTER, SEED, FrontPoint, ParetoFront
-from factory.study.pareto.point_files import point_name
+from factory.study.pareto.front import JITTER, SEED, FrontPoint, ParetoFront, point_name
 
 PLAN_NAME = "floor.svg"
 

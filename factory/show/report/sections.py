@@ -14,7 +14,7 @@ from factory.show.report.pace import MeasuredPace, Predicted, excluded
 from factory.show.report.recording import Recording
 from factory.show.report.words import Proof
 from factory.simulation.run import STEADY
-from factory.study.fidelity.quantities import QUANTITIES
+from factory.study.fidelity.record import QUANTITIES
 from factory.support.errors import Diagnostic
 
 SIGNS = {True: "✓", False: "✗", None: "?"}

@@ -28,7 +28,7 @@ from factory.study.allocation.forms import (
     written_forms,
 )
 from factory.study.allocation.lines import SLACKS, Shift
-from factory.support.allowance import Allowance
+from factory.support.bounds import Allowance
 
 WIDE = 1.3
 """Ratio of successive bounds on cycles for LARGE products (else `aim.STEP`)."""

@@ -20,7 +20,7 @@ from factory.study.allocation.aim import Aim, least_robots, usual_effort
 from factory.study.allocation.bundles import Filling
 from factory.study.allocation.candidate import Candidate
 from factory.study.allocation.estimating import Estimator
-from factory.support.allowance import Allowance
+from factory.support.bounds import Allowance
 from factory.support.errors import Diagnostic, InputError
 
 CHANGES = 60

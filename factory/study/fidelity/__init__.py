@@ -10,7 +10,6 @@ all figures are in `quantities`.
 """
 
 from factory.study.fidelity.comparing import measure, measure_seed
-from factory.study.fidelity.quantities import QUANTITIES
-from factory.study.fidelity.record import SeedRecord
+from factory.study.fidelity.record import QUANTITIES, SeedRecord
 
 __all__ = ["QUANTITIES", "SeedRecord", "measure", "measure_seed"]

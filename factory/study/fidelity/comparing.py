@@ -17,8 +17,7 @@ from factory.simulation.simulation import Simulation
 from factory.study.analysis.flow import steady_units
 from factory.study.analysis.measured import operation_times
 from factory.study.fidelity.measuring import Measurement
-from factory.study.fidelity.quantities import QUANTITIES
-from factory.study.fidelity.record import Fidelity, SeedRecord
+from factory.study.fidelity.record import QUANTITIES, Fidelity, SeedRecord
 from factory.study.pool import over_processes
 from factory.support.engine import mujoco
 from factory.support.errors import Diagnostic, RunError

@@ -1,13 +1,149 @@
-"""Results of a comparison of the worlds: frozen values."""
+"""Results of a comparison of the worlds, and its quantities, each with its unit and definition.
+
+Those that a run measures itself have the name and the value of `run --json`."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
+from types import MappingProxyType
 from typing import Any
 
-from factory.study.fidelity.quantities import QUANTITIES
 from factory.support.errors import Diagnostic
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A figure of one run (or of the two runs of a seed): its key, unit and definition, and the
+    largest size in a good factory, None for no bound."""
+
+    key: str
+    unit: str
+    definition: str
+    limit: float | None = None
+
+    def worst(self, values: Iterable[float | None]) -> float | None:
+        """The largest value by size; None without values."""
+        return max((value for value in values if value is not None), key=abs, default=None)
+
+    def exceeded(self, value: float | None) -> bool:
+        """Whether a value is beyond the limit."""
+        return value is not None and self.limit is not None and abs(value) > self.limit
+
+    def as_json(self) -> dict[str, object]:
+        """The definition as `fidelity --json` lists it."""
+        return {"unit": self.unit, "definition": self.definition, "limit": self.limit}
+
+
+_ALL = (
+    Quantity(
+        "illegal_records",
+        "records",
+        "How many of the two records an independent replay refuses as runs of the net.",
+        0,
+    ),
+    Quantity(
+        "monitor_violations",
+        "violations",
+        "Observations of the independent monitor, which sees only the engine, that contradict the "
+        "net.",
+        0,
+    ),
+    Quantity(
+        "cycle_time_s",
+        "s",
+        "Mean interval between dropoffs in MuJoCo over the last half of the units; none below 4.",
+    ),
+    Quantity(
+        "cycle_from_ideal_percent",
+        "%",
+        "Cycle time in MuJoCo over that in the ideal world, less 1.",
+    ),
+    Quantity(
+        "cycle_from_predicted_percent",
+        "%",
+        "Cycle time in MuJoCo over the one predicted for it before the run, less 1.",
+        2,
+    ),
+    Quantity(
+        "duration_difference_mean_s",
+        "s",
+        "Mean over all operations of (X_e - X_s in MuJoCo) - (X_e - X_s in the ideal world): what "
+        "acceleration and settling add to one operation.",
+    ),
+    Quantity(
+        "tracking_error_max_mm",
+        "mm",
+        "Largest |measured - reference position| of any axis (robots, lifts, the tray) at the end "
+        "of any tick.",
+        1,
+    ),
+    Quantity(
+        "handoffs",
+        "switches",
+        "Grips and holds of a part switched on as another carrier releases it.",
+    ),
+    Quantity(
+        "handoff_gap_max_mm",
+        "mm",
+        "Largest distance between the two frames a weld joins, just before it is switched on.",
+        1,
+    ),
+    Quantity("handoff_angle_max_deg", "deg", "Largest angle between them, likewise.", 0.1),
+    Quantity(
+        "weld_residual_max_mm",
+        "mm",
+        "Largest distance, along an axis, between the frames joined by an active, awake weld.",
+        1,
+    ),
+    Quantity(
+        "product_error_max_mm",
+        "mm",
+        "Largest displacement of any vertex of any part from its place in the product, when it is "
+        "dropped off, after a rigid fit on the first part.",
+        0.1,
+    ),
+    Quantity("product_angle_max_deg", "deg", "Largest angle of a part from its place.", 0.1),
+    Quantity(
+        "hidden_penetration_max_mm",
+        "mm",
+        "Deepest penetration between any two things that are drawn, with all of them solid, every "
+        "20 ms: no contact is left out except between things fixed to each other. Of parts that "
+        "overlap in the finished product, only the penetration beyond that overlap.",
+        0.1,
+    ),
+    Quantity(
+        "grip_gap_max_mm",
+        "mm",
+        "Largest distance between the pads of a robot, a feeder or the tray and the nearest of the "
+        "bodies that it takes, when it takes its first.",
+        0.5,
+    ),
+    Quantity(
+        "grip_strength_share_max",
+        "",
+        "Largest share of the strength of a hand's tips used by the force and moment of its load, "
+        "measured several times a second; none if hands are not chosen (--no-hands). "
+        "Above 1 the hand lets go (Dropped).",
+        1,
+    ),
+    Quantity(
+        "force_saturated_percent",
+        "%",
+        "Share of timesteps in which a drive's force is at least 99.9 % of its limit; the worst "
+        "drive.",
+        1,
+    ),
+    Quantity("force_peak_percent", "%", "Largest force of a drive over its limit.", 100),
+    Quantity("drive_work_J", "J", "Work of all drives: the integral of |force x speed|."),
+    Quantity("moved_mass_kg", "kg", "Mass of everything that can move: carriages, tray, parts."),
+    Quantity("unintended_contacts", "onsets", "Onsets of unintended contact.", 0),
+    Quantity("engine_warnings", "warnings", "Warnings of the engine.", 0),
+)
+
+QUANTITIES: Mapping[str, Quantity] = MappingProxyType({q.key: q for q in _ALL})
+"""Every quantity by its key, in the order of the reports."""
+
 
 Figures = Mapping[str, float | None]
 """Values by the key of their quantity; None where there is nothing to measure."""

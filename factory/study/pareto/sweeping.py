@@ -30,7 +30,7 @@ from factory.study.pareto.front import (
     candidates_front,
     undominated,
 )
-from factory.support.allowance import Allowance
+from factory.support.bounds import Allowance
 from factory.support.errors import FactoryError
 
 WIDE = 2
