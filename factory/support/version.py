@@ -1,3 +1,8 @@
+"""The versions of this package, which is that in pyproject.toml, and of others; and the optional
+packages: the extras of this one."""
+
+from __future__ import annotations
+
 from collections.abc import Mapping
 from importlib import import_module
 from types import MappingProxyType
@@ -5,6 +10,8 @@ from typing import Any
 
 from factory.support.errors import Diagnostic, MissingError
 from factory.support.interruption import put_off
+
+__version__ = "0.1.0"
 
 EXTRAS: Mapping[str, tuple[tuple[str, ...], str]] = MappingProxyType(
     {
@@ -35,12 +42,6 @@ def optional(module: str, package: str, what: str, extra: str, otherwise: str = 
         hint = installs(extra) + (f", or {otherwise}" if otherwise else "")
         message = f"{what} needs {package}: {error}"
         raise MissingError(Diagnostic("Missing", message, None, hint)) from error
-
-
-"""The versions of this package, which is that in pyproject.toml, and of others; and the optional
-packages: the extras of this one."""
-
-__version__ = "0.1.0"
 
 
 def release(package: str) -> str:

@@ -6,7 +6,7 @@ seeds.
     'mm'
 
 `measure(layout, ...)` gives a `record.Fidelity`, `measure_seed` one seed of it. The definitions of
-all figures are in `quantities`.
+all figures are in `record`.
 """
 
 from factory.study.fidelity.comparing import measure, measure_seed
