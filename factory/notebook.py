@@ -20,7 +20,7 @@ LARGE = 400
 
 
 def _tree(pag: PAG) -> str | None:
-    from factory.exporting.tree_drawing import draw_tree
+    from factory.exporting.svg import draw_tree
 
     return draw_tree(pag) if len(pag) <= LARGE else None
 
@@ -45,7 +45,7 @@ def _floor(layout: Layout) -> str | None:
 
 def _run(run: Run) -> str:
     """The report of a run that was logged; of another its figures."""
-    from factory.show.report.reporting import inline, report_on
+    from factory.show.report.page import inline, report_on
     from factory.simulation.figures import figures
 
     if run.log is not None and run.world == "mujoco" and run.log.is_file():

@@ -13,9 +13,9 @@ from factory.support.settings import Settings
 if TYPE_CHECKING:
     from factory.planning.plan import Planned
     from factory.problem.pag import PAG
+    from factory.rendering.film import Rendered
     from factory.rendering.picture import PanelName
-    from factory.rendering.rendering import Rendered
-    from factory.show.report.reporting import RunReport
+    from factory.show.report.page import RunReport
     from factory.simulation.executing import Tell
     from factory.simulation.run import Run
     from factory.study.analysis import Analysis
@@ -58,9 +58,9 @@ def render(
     The others are those of `run`. Raises InputError, MissingError without GL, RunError.
     """
     from factory.record.log import read_log
+    from factory.rendering.film import Shot
+    from factory.rendering.film import render as taken
     from factory.rendering.picture import Picture
-    from factory.rendering.rendering import Shot
-    from factory.rendering.rendering import render as taken
     from factory.simulation.options import RunOptions
 
     asked = RunOptions("mujoco", units, seed, jitter, wip, max_time=max_time)
@@ -85,7 +85,7 @@ def report(
 ) -> RunReport:
     """The page about a run of a product, or about the run in a log; a notebook shows it. Written to
     `output` where that is given. The others are those of `run`. Raises InputError, RunError."""
-    from factory.show.report.reporting import report_on
+    from factory.show.report.page import report_on
     from factory.simulation.options import RunOptions
     from factory.support.files import write_text
 
@@ -125,7 +125,7 @@ def analyze(
     from factory.simulation.options import RunOptions
     from factory.simulation.run import Run
     from factory.study.analysis import Timing, analyse
-    from factory.study.analysis.changes import change_of
+    from factory.study.analysis.analysing import change_of
     from factory.study.analysis.measured import Conditions, conditions, logged_record, record_of
 
     asked = RunOptions(world, units, seed, jitter, wip)

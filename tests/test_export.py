@@ -30,11 +30,10 @@ from hypothesis import strategies as st
 import factory.exporting
 from factory import to_networkx
 from factory.exporting import Subject, exporters
-from factory.exporting.bodies import file_name
 from factory.exporting.csv import COLUMNS
-from factory.exporting.svg import draw_net
+from factory.exporting.subject import file_name
+from factory.exporting.svg import draw_net, draw_tree
 from factory.exporting.swimlanes import swimlanes
-from factory.exporting.tree_drawing import draw_tree
 from factory.exporting.urdf import roll_pitch_yaw
 from factory.geometry.solids import rotation
 from factory.modes.modes import operation_modes

@@ -23,8 +23,7 @@ from factory.record.state import State
 from factory.show.live import Server, Session
 from factory.show.live.commands import FAULTS, KEYS, Command, command_of
 from factory.show.live.page import page, stage_of
-from factory.show.report.drawings import floor_plan
-from factory.show.report.links import labels_of
+from factory.show.report.drawings import floor_plan, labels_of
 from factory.simulation.disturbance.interventions import Interventions
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation

@@ -31,7 +31,7 @@ from factory.plant.factory import Factory
 from factory.plant.programs import program_of, write_program
 from factory.problem.pag import PAG, Parameter
 from factory.problem.robot_types import load_catalogue
-from factory.show.report.links import about, labels_of, links
+from factory.show.report.drawings import about, labels_of, links
 from factory.simulation.request import RunRequest, WorldName
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation

@@ -29,9 +29,9 @@ from factory.record.monitor.subject import subject_of_run
 from factory.record.state import State
 from factory.rendering import Film, Picture, Still, check_output, render_log
 from factory.rendering.action import Snapshot
-from factory.rendering.camera import from_above, overview
 from factory.rendering.caption import Caption
 from factory.rendering.painter import Painter, Renderer
+from factory.rendering.picture import from_above, overview
 from factory.rendering.reel import HOLD
 from factory.rendering.video import VideoFile
 from factory.simulation.request import RunRequest

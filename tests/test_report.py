@@ -18,8 +18,7 @@ import factory
 from factory.problem.pag import PAG, Assembly
 from factory.record.log import LogWriter, read_log
 from factory.show.report import page, recording_of
-from factory.show.report.drawings import floor_plan
-from factory.show.report.links import data, labels_of, links
+from factory.show.report.drawings import data, floor_plan, labels_of, links
 from factory.show.report.pace import fidelity, measured
 from factory.show.report.page import SCRIPTS, json_inside
 from factory.show.report.sections import assembly_tree

@@ -39,7 +39,7 @@ VALUES = (
     *("problem.template.Template", "plant.factory.Factory", "plant.factory.Operation"),
     *("plant.factory.Robot", "nets.verdict.Verdict", "layout.layout.Layout"),
     *("simulation.run.Run", "record.figures.PhysicsFigures", "exporting.build.Built"),
-    *("rendering.rendering.Rendered", "show.report.reporting.RunReport"),
+    *("rendering.film.Rendered", "show.report.page.RunReport"),
     *("study.analysis.Analysis", "study.sweep.summary.Summary", "studies.PlannedAssembly"),
 )
 """What the calls take and give."""

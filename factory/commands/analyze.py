@@ -45,7 +45,7 @@ class AnalyzeOptions:
 
     def change(self, factory: Factory) -> tuple[str, Change] | None:
         """The change of a what-if question and its description; None without. Raises InputError."""
-        from factory.study.analysis.changes import change_of
+        from factory.study.analysis.analysing import change_of
 
         faster = dict(_percent(text, "--faster") for text in self.faster)
         shorter = dict(_percent(text, "--shorter") for text in self.shorter)

@@ -47,7 +47,7 @@ def pag_files(ctx: click.Context, param: click.Parameter, begun: str) -> list[Co
 
 def cameras(ctx: click.Context, param: click.Parameter, begun: str) -> list[str]:
     """Completions of --camera in a shell: those of FILE, if that can be read."""
-    from factory.rendering.camera import camera_names
+    from factory.rendering.picture import camera_names
 
     # Of a line that is not complete click keeps the arguments apart, and sets no parameter.
     files = [ctx.params.get("file"), *map(Path, ctx.args)]

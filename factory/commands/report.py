@@ -42,7 +42,7 @@ def report(options: ProjectOptions, asked: RunOptions, out: OutputOptions, outpu
     The page is always written. The exit status is 1 if the run failed, or was cut off before its
     units were made; --lenient ignores what its bodies do."""
     from factory.record.log import is_log
-    from factory.show.report.reporting import report_on
+    from factory.show.report.page import report_on
     from factory.support.files import write_text
 
     file = options.file

@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from factory.exporting.subject import Subject
+from factory.exporting.svg import pag_of, view_of
 from factory.exporting.swimlanes import colour
-from factory.exporting.tree_drawing import pag_of, view_of
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked
 from factory.problem.pag import PAG

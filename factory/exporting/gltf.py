@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from factory.exporting.bodies import triangles, wanted
-from factory.exporting.subject import Subject
+from factory.exporting.subject import Subject, triangles, wanted
 from factory.geometry.meshes import Array, Indices, Mesh
 from factory.geometry.solids import Product, rotation
 from factory.mjcf.mesh_files import corner_normals

@@ -5,8 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from factory.exporting.bodies import triangles, wanted
-from factory.exporting.subject import Subject
+from factory.exporting.subject import Subject, triangles, wanted
 from factory.geometry.meshes import Mesh
 from factory.geometry.pieces import joined
 from factory.geometry.solids import rotation

@@ -1,8 +1,7 @@
 """Pictures without a screen: films and stills of a run, or of its log."""
 
-from factory.rendering.camera import camera_named
 from factory.rendering.film import Film, Still, render_log
-from factory.rendering.picture import Picture, panels_named
+from factory.rendering.picture import Picture, camera_named, panels_named
 from factory.rendering.video import check_output
 
 __all__ = [

@@ -17,8 +17,8 @@ from factory.mjcf import names
 from factory.mjcf.replica import Replica
 from factory.record.monitor.subject import MonitorSubject
 from factory.rendering.action import SIGNS, Snapshot, action_of, corners
-from factory.rendering.camera import HANDOVER, PART, Camera, from_above, orbit, overview
 from factory.rendering.junction import handover_view
+from factory.rendering.picture import HANDOVER, PART, Camera, from_above, orbit, overview
 from factory.support.engine import mujoco
 
 LAG = 0.25

@@ -14,11 +14,10 @@ from factory.mjcf.loose_parts import loose_parts
 from factory.mjcf.replica import SHOWN, Replica
 from factory.record.monitor.subject import MonitorSubject
 from factory.rendering.action import Fading, Snapshot
-from factory.rendering.camera import Camera
 from factory.rendering.following import Viewpoint
 from factory.rendering.ink import Pixels
 from factory.rendering.marks import Mark, Marks
-from factory.rendering.picture import Size
+from factory.rendering.picture import Camera, Size
 from factory.support import gl
 from factory.support.engine import mujoco
 from factory.support.resource import Closing

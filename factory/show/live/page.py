@@ -14,8 +14,7 @@ from factory.plant.factory import Operation
 from factory.record.monitor.subject import subject_of_run
 from factory.show.live.commands import FACTORS, SPEEDS
 from factory.show.live.session import Session
-from factory.show.report.drawings import floor_plan, net_drawing
-from factory.show.report.links import data, labels_of
+from factory.show.report.drawings import data, floor_plan, labels_of, net_drawing
 from factory.show.report.page import counts, filled, options
 from factory.show.report.scene import DrawnFactory, Pack, scene, stations
 from factory.show.report.sections import assembly_tree

@@ -1,4 +1,5 @@
-"""The page of a report: one HTML file that refers to nothing outside itself."""
+"""The page of a report, about a run that is made for it or is in a log: one HTML file that refers
+to nothing outside itself."""
 
 from __future__ import annotations
 
@@ -6,18 +7,21 @@ import hashlib
 import json
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from html import escape
 from importlib.resources import files
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
+from factory.pipeline import Project
 from factory.plant.factory import Factory
 from factory.show.report.approaches import approaches_section
-from factory.show.report.drawings import floor_plan, net_drawing
+from factory.show.report.drawings import data, floor_plan, labels_of, net_drawing
 from factory.show.report.failures import failures_data, failures_section
 from factory.show.report.frames import frames
-from factory.show.report.links import data, labels_of
 from factory.show.report.pace import fidelity, measured, predicted
-from factory.show.report.recording import Recording
+from factory.show.report.recording import Recording, recording_of
 from factory.show.report.scene import Pack, scene
 from factory.show.report.sections import (
     assembly_tree,
@@ -30,6 +34,9 @@ from factory.show.report.sections import (
     utilisation,
 )
 from factory.show.report.words import proof
+from factory.simulation.executing import Tell, run_project
+from factory.simulation.options import RunOptions
+from factory.simulation.run import Run
 
 SCRIPTS = (
     "report/three.min.js",
@@ -159,3 +166,45 @@ def _policy(scripts: list[str], connects: str) -> str:
 def _asset(name: str) -> str:
     room, _, file = name.partition("/")
     return (files(f"factory.show.{room}") / "assets" / file).read_text("utf-8")
+
+
+HEIGHT = 800
+"""Height of a page that is shown within another [px]."""
+
+
+@dataclass(frozen=True)
+class RunReport:
+    """The `text` of a page, the recording that it is about, and the run where it was made for
+    it."""
+
+    text: str = field(repr=False)
+    recording: Recording = field(repr=False)
+    run: Run | None = None
+
+    def _repr_html_(self) -> str:
+        return inline(self.text)
+
+
+def inline(text: str) -> str:
+    """A page as an element of another one, with scripts and styles of its own."""
+    style = f"width:100%;height:{HEIGHT}px;border:1px solid #cbd2d9"
+    return f'<iframe srcdoc="{escape(text)}" style="{style}"></iframe>'
+
+
+def report_on(
+    source: Path | Project,
+    asked: RunOptions = RunOptions(),  # noqa: B008 (frozen)
+    silent: bool = True,
+    progress: Tell | None = None,
+) -> RunReport:
+    """The report on the run in a log or, of a project, on one that is made as `asked`, whose log is
+    temporary; its parts are not fused, since the page follows each. Raises InputError, RunError."""
+    if isinstance(source, Path):
+        recording = recording_of(source)
+        return RunReport(page(recording), recording)
+    with TemporaryDirectory(prefix="factory-") as folder:
+        log, layout = Path(folder) / "run.log", source.layout
+        made = replace(asked, fuse=False)
+        run = run_project(source, made, silent, log, progress=progress)
+        recording = recording_of(log, layout)
+    return RunReport(page(recording), recording, replace(run, log=None))

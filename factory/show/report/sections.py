@@ -9,7 +9,7 @@ from math import comb
 from factory.plant.factory import Factory
 from factory.problem.pag import PAG
 from factory.record.ending import CutOff
-from factory.show.report.links import words_of
+from factory.show.report.drawings import words_of
 from factory.show.report.pace import MeasuredPace, Predicted, excluded
 from factory.show.report.recording import Recording
 from factory.show.report.words import Proof

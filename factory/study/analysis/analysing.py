@@ -1,16 +1,64 @@
-"""The analysis of a factory's pace by its timed net, as it is and under changes."""
+"""The analysis of a factory's pace by its timed net, as it is and under the changes of a what-if
+question."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from factory.plant.factory import Factory
 from factory.study.analysis.firing import slacks
 from factory.study.analysis.flow import Flow, flow
 from factory.study.analysis.measured import Comparison, RunRecord, compare
 from factory.study.analysis.timed import Circuit, TimedNet, timed_net
+from factory.support.errors import Diagnostic, InputError, did_you_mean, usage_error
 from factory.timing.pool import part_pool
 from factory.timing.timed import SAME
 from factory.timing.timing import AS_IT_IS, Change, Timing
+
+MOST: Mapping[str, float] = {"faster": 1e6, "shorter": 100.0}
+"""The most that a robot is faster, and its ways are shorter [percent]."""
+
+
+def change_of(
+    factory: Factory,
+    second: Sequence[str] = (),
+    faster: Mapping[str, float] | None = None,
+    shorter: Mapping[str, float] | None = None,
+) -> tuple[str, Change] | None:
+    """The change in which each robot named in `second` has one more beside it, and those of
+    `faster` and `shorter` are faster or have shorter ways by so many percent, with its description;
+    None without any. Raises InputError: Usage for a name that no robot has, BadValue for a
+    number."""
+    robots = {robot.name: robot.index for robot in factory.robots}
+    for name in (*second, *(faster or {}), *(shorter or {})):
+        if name not in robots:
+            hint = did_you_mean(name, list(robots), "robots")
+            raise usage_error(f"there is no robot '{name}'", hint)
+    copies = {robots[name]: 1 + second.count(name) for name in second}
+    speed, way = _shares("faster", faster), _shares("shorter", shorter)
+    words = [f"{count} × {factory.robots[r].name}" for r, count in copies.items()]
+    words += [f"{name} {100 * share:g} % faster" for name, share in speed.items()]
+    words += [f"ways of {name} {100 * share:g} % shorter" for name, share in way.items()]
+    if not words:
+        return None
+    change = Change(
+        speed={robots[name]: 1 + share for name, share in speed.items()},
+        way={robots[name]: 1 - share for name, share in way.items()},
+        copies=copies,
+    )
+    return ", ".join(words), change
+
+
+def _shares(kind: str, percents: Mapping[str, float] | None) -> dict[str, float]:
+    """Percent as shares. Raises InputError (BadValue)."""
+    for name, percent in (percents or {}).items():
+        if not 0 < percent <= MOST[kind]:
+            most, text = f"{MOST[kind]:g}", f"{name}={percent:g}"
+            message = f"{kind} takes a robot and percent above 0, at most {most}, not '{text}'"
+            raise InputError(Diagnostic("BadValue", message, None, f"for example {name}=20"))
+    return {name: percent / 100 for name, percent in (percents or {}).items()}
+
 
 STEP = 0.1
 """Relative change of a speed or a way."""
