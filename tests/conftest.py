@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import signal
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,9 @@ from hypothesis import HealthCheck, settings
 
 from factory.lang import load_templates
 from factory.problem.template import Template
+from factory.study.sweep import Recipe, sweeping
+from factory.study.sweep.grid import Point
+from factory.study.sweep.work import Outcome, Runner
 from tests.command_line import Terminal
 from tests.once import ANEW, Stages, stages_once
 
@@ -39,18 +43,26 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
 
 
+@pytest.fixture(scope="session")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of all processes of a session."""
+    folder = tmp_path_factory.getbasetemp()
+    return folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder
+
+
 @pytest.fixture(scope="session", autouse=True)
-def _a_cache_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+def _a_cache_of_its_own(shared: Path) -> Iterator[None]:
     """Tests leave the user's cache alone."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        patch.setenv("XDG_CACHE_HOME", str(shared / "cache"))
         yield
 
 
 @pytest.fixture(scope="session")
-def stages() -> Iterator[Stages]:
-    """The stages that tests of a process share."""
-    with stages_once() as stages:
+def stages(shared: Path) -> Iterator[Stages]:
+    """The stages that tests of a session share."""
+    (shared / "stages").mkdir(exist_ok=True)
+    with stages_once(shared / "stages") as stages:
         yield stages
 
 
@@ -101,6 +113,18 @@ def templates() -> Mapping[str, Template]:
 def run(capsys: pytest.CaptureFixture[str]) -> Terminal:
     """`run("check", file, "--json")` runs a command of the command line in this process."""
     return Terminal(capsys)
+
+
+@pytest.fixture
+def here() -> Iterator[None]:
+    """Runs of a sweep are done in this process, which starts at once."""
+
+    def run_here(recipe: Recipe, wanted: Sequence[Point], jobs: int) -> Iterator[Outcome]:
+        yield from map(Runner(recipe), wanted)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sweeping, "run_local", run_here)
+        yield
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import pytest
 
 import factory
 from factory.exporting import exporters
-from factory.lang import read_template, write_template
+from factory.lang import read_pag, read_template, write_template
 from factory.mjcf.robots import load_robot_model
 from factory.pipeline import all_templates
 from factory.problem.robot_types import load_catalogue
@@ -56,10 +56,9 @@ def test_templates_read_and_write_back(file: Path) -> None:
 
 @pytest.mark.parametrize("world", ["ideal", "mujoco"])
 @pytest.mark.parametrize("file", TEMPLATES, ids=lambda p: p.stem)
-def test_templates_run(file: Path, world: str, tmp_path: Path) -> None:
-    product = tmp_path / "p.pag"
-    product.write_text(smallest_product(all_templates()[file.stem]))
-    plan = factory.compile(factory.load_pag(product))
+def test_templates_run(file: Path, world: str) -> None:
+    templates = all_templates()
+    plan = factory.compile(read_pag(smallest_product(templates[file.stem]), templates))
     assert file.stem in {operation.template.name for operation in plan.operations}
     assert factory.verify(plan).holds
     run = factory.run(factory.lay_out(plan), world=world, units=1)

@@ -8,7 +8,6 @@ import sqlite3
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -25,8 +24,8 @@ from factory.pipeline import read
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.study import pool
-from factory.study.sweep import Recipe, points, read_axes, summarise, sweeping
-from factory.study.sweep.grid import Point, Value
+from factory.study.sweep import Recipe, points, read_axes, summarise
+from factory.study.sweep.grid import Value
 from factory.study.sweep.store import COLUMNS, Store
 from factory.study.sweep.sweeping import run_local, sweep
 from factory.study.sweep.work import FIGURES, Outcome, Runner
@@ -60,18 +59,6 @@ def has_rows(path: Path, least: int) -> bool:
         return len(rows_of(path)) >= least
     except sqlite3.OperationalError:
         return False
-
-
-@pytest.fixture
-def here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Runs are done in this process, which starts at once."""
-
-    def run_here(recipe: Recipe, wanted: Sequence[Point], jobs: int) -> Iterator[Outcome]:
-        runner = Runner(recipe)
-        for point in wanted:
-            yield runner(point)
-
-    monkeypatch.setattr(sweeping, "run_local", run_here)
 
 
 # The grid
@@ -441,7 +428,7 @@ def test_a_stopped_sweep_keeps_its_rows_and_goes_on(
     words += ["--units", "10", "-o", str(database)]
     kept: list[tuple[Any, ...]] = []
     for number, status in ((signal.SIGINT, 130), (signal.SIGKILL, -9)):
-        process = subprocess.Popen([*FACTORY, *words, "--jobs", "2"], cwd=ROOT, stderr=PIPE)
+        process = subprocess.Popen([*FACTORY, *words, "--jobs", "1"], cwd=ROOT, stderr=PIPE)
         until(partial(has_rows, database, len(kept) + 3))
         workers = children(process.pid)
         process.send_signal(number)

@@ -29,11 +29,11 @@ VARIANTS = {
 OF_RUNS = {"staged": ("--stage",), "little inside": ("--wip", "1")}
 """Options that make no other factory, but other runs of it."""
 
-PROVED = ("live", "safe", "reversible", "legal")
-
 
 @pytest.mark.parametrize("name", [*VARIANTS, *OF_RUNS])
-def test_all_commands_make_the_same_factory(name: str, run: Terminal, out: Path) -> None:
+def test_all_commands_make_the_same_factory(
+    name: str, run: Terminal, out: Path, here: None
+) -> None:
     text, options = VARIANTS.get(name, VARIANTS["as written"])
     file, log, net, rows = (out / x for x in ("p.pag", "run.log", "net.pnml", "rows.db"))
     file.write_text(text)
