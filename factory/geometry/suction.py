@@ -101,7 +101,8 @@ def _at(place: Corner, top: float, radius: float) -> PadPlace:
 def height_in(triangles: Array, low: Corner, high: Corner) -> float:
     """The greatest height of triangles (n, 3, 3) over a rectangle in plan, -inf if there are none:
     at the corners of the rectangle, at theirs, and where edges cross its sides."""
-    kept = (triangles[:, :, :2].min(axis=1) <= high) & (triangles[:, :, :2].max(axis=1) >= low)
+    a, b, c = triangles[:, 0, :2], triangles[:, 1, :2], triangles[:, 2, :2]
+    kept = (np.minimum(np.minimum(a, b), c) <= high) & (np.maximum(np.maximum(a, b), c) >= low)
     near = triangles[kept.all(axis=1)]
     if not len(near):
         return -np.inf
