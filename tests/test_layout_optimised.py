@@ -38,6 +38,7 @@ from tests.layout_values import (
     stations_of,
     table_pag,
 )
+from tests.once import Stages
 from tests.pag_values import SHAPES, factory_of
 
 PACE = Pace.of(Settings())
@@ -206,7 +207,8 @@ def test_a_slow_pace_takes_longer() -> None:
     assert PACE.staged(1.0, 0.2, 9.0) == pytest.approx(9.0 + PACE.rest(0.2))
 
 
-def test_build_tells_what_was_gained(run: Terminal) -> None:
+def test_build_tells_what_was_gained(run: Terminal, stages: Stages) -> None:
+    stages.on = True
     chest = EXAMPLES / "chest.pag"
     told = run("build", chest)
     assert told.status == 0

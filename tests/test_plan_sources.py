@@ -358,7 +358,7 @@ def test_a_hull_that_stands_for_a_mesh_is_told(
     monkeypatch.setattr("factory.geometry.decomposition.release", lambda package: "")
     ring = trimesh.creation.annulus(20, 40, 30)
     ring.apply_translation((300, 200, 440))
-    parts = folder_of(tmp_path / "parts", {**table(), "ring": ring})
+    parts = folder_of(tmp_path / "parts", {"top": table()["top"], "ring": ring})
     done = run("plan", parts, "-o", tmp_path / "out", "--no-look", "--json")
     (warning,) = done.json["warnings"]
     assert "ring.obj is not convex" in warning["message"]

@@ -31,7 +31,7 @@ from factory.plant.factory import Operation
 from factory.problem.robot_types import load_catalogue
 from factory.support.settings import Settings
 from factory.timing.prediction import pace
-from tests.command_line import ROOT, Terminal
+from tests.command_line import Terminal
 from tests.test_hands import AT_MOST_MM, GRIP_MM, looked_at
 from tests.test_relay import templates_of
 
@@ -206,8 +206,6 @@ def test_what_hands_cannot_relay_is_not_cut() -> None:
 
 def test_by_the_command_line(run: Terminal, tmp_path: Path) -> None:
     words = ("--relay", "--jitter", "0.3", "--units", "3", "--json")
-    truck = run("run", ROOT / "examples" / "truck.pag", *words)
-    assert truck.status == 0 and truck.json["verdict"]["succeeded"]
     file = tmp_path / "slab.pag"
     file.write_text(sawn(4))
     slab = run("run", file, *words)
