@@ -114,8 +114,9 @@ class Ways:
 
     def pieces(self, row: int, low: float, high: float) -> Iterator[Array]:
         """A way between two coordinates [m] piece by piece: the two ends of a straight one, the
-        three control points of a parabola. Each piece lies in the hull of its points (k, 2)."""
-        cuts = [low, *(cut for cut in self.ends[row].tolist() if low < cut < high), high]
+        three control points of half a corner. Each lies in the hull of its points (k, 2)."""
+        every = sorted([*self.ends[row].tolist(), *self.middle[row, 1::2].tolist()])
+        cuts = [low, *(cut for cut in every if low < cut < high), high]
         middle, half = np.add(cuts[:-1], cuts[1:]) / 2, np.diff(cuts)[:, None] / 2
         place, first, second = self.at(np.full(len(middle), row), middle)
         lift = second * half**2 / 2
