@@ -107,12 +107,14 @@ def test_what_is_placed_comes_from_above(tmp_path: Path) -> None:
 def test_a_mix_shares_its_manipulators(tmp_path: Path) -> None:
     """What is made twice in a period has one, fixed still, at a station with two guests."""
     text = TWO.replace("root = cell; cell = place ( base, peg, key )", MIX)
-    made = read(written(tmp_path, text)).factory
+    layout = read(written(tmp_path, text)).layout
+    made = layout.factory
     assert [robot.type for robot in made.robots].count("manipulator") == 2
     assert [robot.fixed for robot in made.robots] == [r.type == "manipulator" for r in made.robots]
     guests = [stop.guests for stop in stops_of(made, 0)[0] if stop.joins]
     assert sorted(map(len, guests)) == [2, 2]
     assert len({robot for pair in guests for robot in pair}) == 4
+    assert_good(Simulation(layout, RunRequest(units=3, seed=1, jitter=0.3)).run())
 
 
 def test_a_fold_keeps_robots_fixed(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from factory.exporting.ways import ways
+from factory.layout import presence
 from factory.layout.clearance import certify
 from factory.layout.coordinating import with_machines
 from factory.layout.exclusions import awaited_positions, coordinated
@@ -130,6 +131,25 @@ def test_a_clear_point_that_is_5_mm_short_is_refused() -> None:
 
 
 # --- presences ------------------------------------------------------------------------------------
+
+
+def test_pairs_that_are_alike_are_judged_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the same answer as each by itself, and as by all facets where faces tell enough."""
+    layout, clearance = read("examples/lamp.pag").layout, 0.05
+    net, back, judge = coordinated(layout), awaited_positions(layout), presence.Judge(clearance)
+    pairs = [*presence.near([*presences(layout, net, back)], clearance)]
+    judged = [judge.nearer(pair) for pair in pairs]
+    assert any(judged) and not all(judged)
+    monkeypatch.setattr(presence, "rough", presence.exact)
+    assert judged == [presence.nearer(pair, clearance) for pair in pairs]
+    monkeypatch.setattr(presence, "exact", None)
+    again = [*presences(layout, net, back)]
+    for pair in presence.near(again, clearance):
+        judge.nearer(pair)
+    moved = [replace(one, bodies=one.bodies.moved(np.full(3, 1e-4))) for one in again]
+    with pytest.raises(TypeError):
+        for pair in presence.near(moved, clearance):
+            judge.nearer(pair)
 
 
 def marked_at_random(layout: Layout, steps: int, seed: int) -> set[int]:

@@ -9,7 +9,7 @@ pair of robots whose hands collide where their common operation ends.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from heapq import heapify, heappop, heappush
 from itertools import product
@@ -29,7 +29,7 @@ from factory.layout.hands.leaving import SPARE, before_next, farther, gone_by, h
 from factory.layout.hands.limbs import rises_first
 from factory.layout.layout import Layout
 from factory.layout.machines import presences
-from factory.layout.presence import Near, Presence, near, nearer, nearest
+from factory.layout.presence import Judge, Near, Presence, alike, near, nearer, nearest
 from factory.layout.staying import Staying
 from factory.nets.coordinated import CoordinatedNet, Past
 from factory.nets.exclusion import (
@@ -102,7 +102,7 @@ def exclusions(layout: Layout, further: Presences | None = None) -> Exclusions:
     """Find what keeps the machines of a layout apart, with `further` presences if there are any:
     ways home are cut where they are clear of what comes near, until there is no new cut; what the
     net does not exclude then is ordered."""
-    backs, passes = homes(layout), dict[Past, None]()
+    backs, passes, judge = homes(layout), dict[Past, None](), _Judge(layout)
     for rounds in range(ROUNDS, -1, -1):
         net = with_machines(layout, passes)
         if net.deadlock:
@@ -115,9 +115,9 @@ def exclusions(layout: Layout, further: Presences | None = None) -> Exclusions:
         needed = {
             n: pair
             for n, boxed in enumerate(pairs)
-            if n not in circuits and (pair := _nearer(layout, boxed)) is not None
+            if n not in circuits and (pair := judge.nearer(boxed)) is not None
         }
-        cuts = _cuts(layout, net.net, sequence, needed.values()) if rounds else []
+        cuts = _cuts(judge, net.net, sequence, needed.values()) if rounds else []
         if passes.keys() >= {*cuts}:
             break
         passes |= dict.fromkeys(cuts)
@@ -140,14 +140,49 @@ def exclusions(layout: Layout, further: Presences | None = None) -> Exclusions:
     )
 
 
-def _nearer(layout: Layout, pair: Near) -> Near | None:
-    """A pair whose boxes are near, judged by bodies; of robots that go along one stem, which are
-    alike, by the boxes of bodies."""
-    robots = [side.robot for side in (pair.one, pair.other) if not side.bears]
-    if len({*robots}) == 2 and layout.share_stem(*robots):
-        one, other = (replace(p, bodies=p.bodies.as_boxes) for p in (pair.one, pair.other))
-        pair = replace(pair, one=one, other=other)
-    return nearer(pair, layout.clearance)
+class _Judge(Judge):
+    """That of a layout, which cuts ways home."""
+
+    def __init__(self, layout: Layout) -> None:
+        super().__init__(layout.clearance)
+        self.layout, self._cuts = layout, dict[Hashable, float | None]()
+
+    def nearer(self, found: Near) -> Near | None:
+        """As any does; of robots that go along one stem by boxes, since these are alike."""
+        robots = [side.robot for side in (found.one, found.other) if not side.bears]
+        if len({*robots}) == 2 and self.layout.share_stem(*robots):
+            one, other = (replace(p, bodies=p.bodies.as_boxes) for p in (found.one, found.other))
+            found = replace(found, one=one, other=other)
+        return super().nearer(found)
+
+    def cut(self, own: Presence, other: Presence) -> Past | None:
+        """The pass by which a robot that goes home is clear of another machine; None where it never
+        is, or always."""
+        begin = self.layout.visits[own.since // 2, own.robot].at
+        pair = own.robot, other.robot, begin, alike(own, other)
+        if pair not in self._cuts:
+            self._cuts[pair] = self._cut(own, other, begin)
+        at = self._cuts[pair]
+        return None if at is None else Past(own.since, own.robot, at)
+
+    def _cut(self, own: Presence, other: Presence, begin: float) -> float | None:
+        robot, layout = own.robot, self.layout
+        home = layout.guidepaths[robot].length
+        heights = [z for _, span in own.sweeps for z in span]
+        low = max(heights) if rises_first(layout, robot) else min(heights)
+
+        def clear(at: float) -> bool:
+            there = replace(own, sweeps=(((at, home), (low, max(heights))),))
+            pair = nearest(there, other, layout.clearance)
+            return pair is None or self.nearer(pair) is None
+
+        short, far = begin, home - SPARE
+        if layout.guidepaths[robot].fixed or begin >= home or not clear(far) or clear(short):
+            return None
+        for _ in range(BISECTIONS):
+            middle = (short + far) / 2
+            short, far = (short, middle) if clear(middle) else (middle, far)
+        return round(min(far + SPARE, home - SPARE), 6)
 
 
 def _met(layout: Layout, robots: Staying) -> Iterator[Fault]:
@@ -174,7 +209,7 @@ def _stuck(layout: Layout, net: CoordinatedNet) -> Fault:
 
 
 def _cuts(
-    layout: Layout, net: MarkedNet, sequence: Sequence[int], pairs: Iterable[Near]
+    judge: _Judge, net: MarkedNet, sequence: Sequence[int], pairs: Iterable[Near]
 ) -> list[Past]:
     """Where ways home are clear of what they come near, for each pair that allows it: the shortest
     way of both."""
@@ -186,34 +221,12 @@ def _cuts(
             for own, other in sides
             if own.since >= 0
             and not all(marked_after(net, when, place, own.since) for place in other.places)
-            and (cut := _cut(layout, own, other)) is not None
+            and (cut := judge.cut(own, other)) is not None
         ]
         if ways:
-            visits = layout.visits
+            visits = judge.layout.visits
             cuts.append(min(ways, key=lambda past: past.at - visits[past.after // 2, past.axis].at))
     return cuts
-
-
-def _cut(layout: Layout, own: Presence, other: Presence) -> Past | None:
-    """The pass by which a robot that goes home is clear of another machine; None where it never
-    is, or always."""
-    robot, since = own.robot, own.since
-    begin, home = layout.visits[since // 2, robot].at, layout.guidepaths[robot].length
-    heights = [z for _, span in own.sweeps for z in span]
-    low = max(heights) if rises_first(layout, robot) else min(heights)
-
-    def clear(at: float) -> bool:
-        there = replace(own, sweeps=(((at, home), (low, max(heights))),))
-        pair = nearest(there, other, layout.clearance)
-        return pair is None or _nearer(layout, pair) is None
-
-    short, far = begin, home - SPARE
-    if layout.guidepaths[robot].fixed or begin >= home or not clear(far) or clear(short):
-        return None
-    for _ in range(BISECTIONS):
-        middle = (short + far) / 2
-        short, far = (short, middle) if clear(middle) else (middle, far)
-    return Past(since, robot, round(min(far + SPARE, home - SPARE), 6))
 
 
 def _orders(

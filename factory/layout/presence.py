@@ -8,15 +8,16 @@ drives and grips need, and both are not one and the same mode, whose field keeps
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from hashlib import sha256
 from itertools import product
 
 import numpy as np
 import shapely
 
-from factory.compiler.mating.depth import Polytope, exact, polytope
+from factory.compiler.mating.depth import Polytope, exact, polytope, rough
 from factory.control.mode import Index, Truth
 from factory.geometry.meshes import Array
 from factory.layout.crossings import near as near_boxes
@@ -158,18 +159,39 @@ class Presence:
         """The box (2, 3) of all of them [m]."""
         return np.array([self.boxes[:, 0].min(axis=0), self.boxes[:, 1].max(axis=0)])
 
+    @cached_property
+    def filled(self) -> Hashable:
+        """What is the same for presences that fill the same places."""
+        own = self.bodies
+        arrays = own.boxes, own.origins, own.layers, own.rise, own.way, *own.corners
+        told = repr((self.sweeps, *map(len, own.corners))).encode()
+        return sha256(told + b"".join(one.tobytes() for one in arrays)).digest(), own.bent
+
     def name(self, number: int) -> str:
         """The body that sweeps one of the boxes."""
         return self.bodies.names[number % len(self.bodies.names)]
 
     def solid(self, number: int) -> Polytope:
         """What is really in one of the boxes."""
+        if number not in self._solids:
+            self._solids[number] = self._solid(number)
+        return self._solids[number]
+
+    @cached_property
+    def _solids(self) -> dict[int, Polytope]:
+        return {}
+
+    def _solid(self, number: int) -> Polytope:
         leg, body = divmod(number, len(self.bodies.names))
         points, second = self.legs[leg]
         rise = UP * bool(self.bodies.rise[body])
         ends = [point + rise * z for point in points for z in {*second}]
         corners = self.bodies.corners[body] + self.bodies.origins[body]
         return polytope(np.concatenate([corners + end for end in ends]))
+
+
+Lacking = tuple[float, int, int]
+"""By how much nearer than they may two boxes come [m], and their numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,16 +232,49 @@ def nearest(one: Presence, other: Presence, clearance: float) -> Near | None:
 
 def nearer(found: Near, clearance: float) -> Near | None:
     """The same of the bodies themselves, which may be apart where their boxes are not."""
-    one, other = found.one, found.other
+    judged = _judged(found.one, found.other, clearance)
+    return judged and _named(found, judged)
+
+
+class Judge:
+    """Says which pairs come near by their bodies, and does it once for all that are alike: turns of
+    a period, and what is found again and again in a search."""
+
+    def __init__(self, clearance: float) -> None:
+        self._clearance, self._known = clearance, dict[Hashable, Lacking | None]()
+
+    def nearer(self, found: Near) -> Near | None:
+        """As the function does."""
+        if (pair := alike(found.one, found.other)) not in self._known:
+            self._known[pair] = _judged(found.one, found.other, self._clearance)
+        judged = self._known[pair]
+        return judged and _named(found, judged)
+
+
+def alike(one: Presence, other: Presence) -> Hashable:
+    """What is the same for pairs of which all come near, or none."""
+    apart = one.partners.isdisjoint(other.partners)
+    return one.filled, other.filled, apart, one.bears or other.bears
+
+
+def _named(found: Near, judged: Lacking) -> Near:
+    lacking, i, j = judged
+    return replace(found, bodies=(found.one.name(i), found.other.name(j)), lacking=lacking)
+
+
+def _judged(one: Presence, other: Presence, clearance: float) -> Lacking | None:
+    """Which bodies in two boxes come near: edges are looked at where faces do not tell."""
     for lacking, i, j in sorted(_pairs(one, other, clearance), reverse=True):
         need = lacking - float(_overlap(one.boxes[i], other.boxes[j]))
-        deep = float(exact(one.solid(i), other.solid(j)).bounds.min())
-        if (lacks := min(lacking, need + deep)) > ROUNDING:
-            return Near(one, other, (one.name(i), other.name(j)), lacks)
+        solids = one.solid(i), other.solid(j)
+        if need + float(rough(*solids).bounds.min()) <= ROUNDING:
+            continue
+        if (lacks := min(lacking, need + float(exact(*solids).bounds.min()))) > ROUNDING:
+            return lacks, i, j
     return None
 
 
-def _pairs(one: Presence, other: Presence, clearance: float) -> list[tuple[float, int, int]]:
+def _pairs(one: Presence, other: Presence, clearance: float) -> list[Lacking]:
     """The pairs of boxes of two presences that come near, and by how much nearer than they may."""
     across = 0.0 if one.bears or other.bears else ACROSS
     apart = across if one.partners & other.partners else clearance - 2 * (ALONG + ROUNDING)
