@@ -68,7 +68,7 @@ def with_machines(
     every |= dict.fromkeys([*(past for past, _ in lifted), *passes])
     by_way = sorted(every, key=lambda past: _way_of(layout, past))
     for (after, robot, _), along in groupby(by_way, key=lambda past: _way_of(layout, past)[:3]):
-        _chain(layout, build, (factory.operations[after // 2], robot), [*along])
+        _chain(layout, build, (factory.operations[after // 2], robot), [*along], orders)
     for past, number in lifted:
         before, operation = factory.operations[past.after // 2], factory.operations[number]
         robot = layout.factory.robot_of(past.axis)
@@ -119,10 +119,15 @@ def _axis(layout: Layout, past: Past) -> str:
 
 
 def _chain(
-    layout: Layout, build: Coordination, who: tuple[Operation, int], passes: list[Past]
+    layout: Layout,
+    build: Coordination,
+    who: tuple[Operation, int],
+    passes: list[Past],
+    orders: Sequence[Precedence],
 ) -> None:
     """The passes of a robot that follow one transition of an operation: in that, or after its end
-    until the start of the robot's next, or its end where that leads beyond them all."""
+    until the start of the robot's next, or its end where that leads beyond them all and waits for
+    none of them."""
     factory, (operation, robot) = layout.factory, who
     names = {p: f"past:{_axis(layout, p)}:{p.at:.3f}:{operation.label}" for p in passes}
     name = factory.robots[robot].name
@@ -135,7 +140,9 @@ def _chain(
     step = (gear.index(operation.index) + 1) % len(gear)
     then, wait = factory.operations[gear[step]], factory.net.gears[robot].places[2 * step]
     goals = dict(zip(factory.axes[then.index], layout.goals(then.index), strict=True))
-    beyond = all(past.axis in goals and past.holds(goals[past.axis]) for past in passes)
+    start, events = build.transitions[then.start].name, {*names.values()}
+    waits = any(order.start == start and order.before in events for order in orders)
+    beyond = not waits and all(p.axis in goals and p.holds(goals[p.axis]) for p in passes)
     build.chain(names, kind, then.end if beyond else then.start, wait)
 
 

@@ -24,7 +24,7 @@ from factory.layout.certificate import (
     Precedence,
     fault,
 )
-from factory.layout.coordinating import Coordinated, with_machines
+from factory.layout.coordinating import HOME, Coordinated, with_machines
 from factory.layout.hands.leaving import SPARE, before_next, farther, gone_by, homes
 from factory.layout.hands.limbs import rises_first
 from factory.layout.layout import Layout
@@ -100,14 +100,17 @@ def kept(layout: Layout) -> Exclusions:
 
 def exclusions(layout: Layout, further: Presences | None = None) -> Exclusions:
     """Find what keeps the machines of a layout apart, with `further` presences if there are any:
-    ways home are cut where they are clear of what comes near, until there is no new cut; what the
-    net does not exclude then is ordered."""
+    ways home are cut where they are clear of what comes near, until there is no new cut; a lift
+    that is not clear where it is set on the way is set at home; what the net does not exclude then
+    is ordered."""
     backs, passes, judge = homes(layout), dict[Past, None](), _Judge(layout)
+    at_home = dict[Precedence, None]()
     for rounds in range(ROUNDS, -1, -1):
-        net = with_machines(layout, passes)
+        net = with_machines(layout, passes, [*at_home])
         if net.deadlock:
             return Exclusions(faults=(_stuck(layout, net),))
         sequence = one_unit(net.net, layout.factory)
+        when = times(net.net, sequence)
         more = further(layout, net, backs) if further else Further()
         every = [*presences(layout, net, backs), *more.presences]
         pairs = [p for p in near(every, layout.clearance) if more.counts(p)]
@@ -117,15 +120,20 @@ def exclusions(layout: Layout, further: Presences | None = None) -> Exclusions:
             for n, boxed in enumerate(pairs)
             if n not in circuits and (pair := judge.nearer(boxed)) is not None
         }
-        cuts = _cuts(judge, net.net, sequence, needed.values()) if rounds else []
+        cuts = _cuts(judge, net.net, when, needed.values()) if rounds else []
         if passes.keys() >= {*cuts}:
-            break
+            stuck = (pair for pair in needed.values() if _orderable(net.net, when, pair) is None)
+            setting = dict.fromkeys(_set_at_home(layout, net, stuck)) if rounds else {}
+            if at_home.keys() >= setting.keys():
+                break
+            at_home |= setting
         passes |= dict.fromkeys(cuts)
         for past in cuts:
             at = gone_by(layout, past.axis, past.at)
             backs[past.axis] = max(at, backs.get(past.axis, 0.0))
     orders, ordered_net = _orders(net, layout.factory, sequence, needed.values())
     circuits |= _circuits(ordered_net, needed)
+    orders = (*at_home, *orders)
     if (whole := with_machines(layout, passes, orders)).deadlock:
         return Exclusions(faults=(_stuck(layout, whole),))
     return Exclusions(
@@ -208,12 +216,10 @@ def _stuck(layout: Layout, net: CoordinatedNet) -> Fault:
     return fault(layout.factory, f"these wait for each other for ever: {names}", *robots)
 
 
-def _cuts(
-    judge: _Judge, net: MarkedNet, sequence: Sequence[int], pairs: Iterable[Near]
-) -> list[Past]:
+def _cuts(judge: _Judge, net: MarkedNet, when: Sequence[int], pairs: Iterable[Near]) -> list[Past]:
     """Where ways home are clear of what they come near, for each pair that allows it: the shortest
     way of both."""
-    when, cuts = times(net, sequence), list[Past]()
+    cuts = list[Past]()
     for pair in pairs:
         sides = ((pair.one, pair.other), (pair.other, pair.one))
         ways = [
@@ -227,6 +233,24 @@ def _cuts(
             visits = judge.layout.visits
             cuts.append(min(ways, key=lambda past: past.at - visits[past.after // 2, past.axis].at))
     return cuts
+
+
+def _set_at_home(
+    layout: Layout, net: CoordinatedNet, pairs: Iterable[Near]
+) -> Iterator[Precedence]:
+    """The order places by which lifts that are set for each tour are set at home, of robots that go
+    there by themselves and would come near another on their ways."""
+    factory, transitions = layout.factory, net.net.net.transitions
+    for own in (side for pair in pairs for side in (pair.one, pair.other)):
+        home = Past(own.since, own.robot, layout.guidepaths[own.robot].length - HOME)
+        if own.robot not in factory.adjusted or home not in net.passes:
+            continue
+        gear = factory.robots[own.robot].operations
+        then = factory.operations[gear[(gear.index(own.since // 2) + 1) % len(gear)]]
+        if then.place in own.places and factory.begins(own.robot, then.index):
+            before = transitions[net.net.right[net.passes[home][0]]].name
+            start, tokens = transitions[then.start].name, int(then.index == gear[0])
+            yield Precedence(f"order:{before}:{start}", before, start, tokens)
 
 
 def _orders(
