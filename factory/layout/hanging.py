@@ -41,8 +41,15 @@ class Hanging:
 
     @classmethod
     def of(cls, layout: Layout) -> Hanging:
-        """That of a layout. Parts of one line hang from as few sliders as can be, whose pads are
-        apart; where there is no place for these, each from its own."""
+        """That of a layout, found once. Parts of one line hang from as few sliders as can be, whose
+        pads are apart; where there is no place for these, each from its own."""
+        found: Hanging | None = layout.__dict__.get("hanging")
+        if found is None:
+            found = layout.__dict__["hanging"] = cls._found(layout)
+        return found
+
+    @classmethod
+    def _found(cls, layout: Layout) -> Hanging:
         pads, slider = _FeederPads(), dict[str, str]()
         places: dict[str, PadPlace] = {}
         for line in lines_of(layout):
