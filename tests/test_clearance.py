@@ -102,6 +102,10 @@ def every_pair(document: dict[str, Any]) -> list[tuple[Any, Any]]:
     return wrong
 
 
+def test_boxes_are_as_far_apart_as_their_corners() -> None:
+    assert separation((0, 1, 0, 1), (4, 6, 5, 6)) == separation((4, 6, 5, 6), (0, 1, 0, 1)) == 5
+
+
 def test_the_paper_s_example_shares_its_junctions() -> None:
     found = paper_layout().certificate
     assert found is not None

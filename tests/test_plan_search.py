@@ -101,6 +101,14 @@ def judged(found: Blocking, stance: Stance, all_: Iterator[Tree]) -> list[Judged
     return [one for one in map(judge.judged, all_) if not one.count(LOCKED)]
 
 
+@settings(max_examples=20, deadline=None)
+@given(graphs(least=3))
+def test_a_group_takes_the_room_of_its_units(found: Blocking) -> None:
+    group = found.grouped([(0, 2), *((n,) for n in range(len(found)) if n not in (0, 2))])
+    assert (group.low[0] == np.minimum(found.low[0], found.low[2])).all()
+    assert (group.high[0] == np.maximum(found.high[0], found.high[2])).all()
+
+
 def test_estimated_times_are_those_of_the_trapezoid() -> None:
     ways = np.linspace(0.0, 1.0, 101)
     times = [EXPECTED.pace.rest(way) for way in ways.tolist()]

@@ -128,7 +128,7 @@ def test_friction_is_that_of_the_robot_types_and_the_tray() -> None:
         (Settings(clearance=0.01), 0.0, 0.005),  # the tray goes 10 mm in 10 ms
         (Settings(clearance=0.0005), 0.0, 0.0005),
         (Settings(clearance=0.0001), 0.0, 0.0005),
-        (Settings(speed=2.0), 0.3, 0.005),
+        (Settings(speed=1.5), 0.5, 0.005),  # the fastest robot goes 22.5 mm in 10 ms
         (Settings(eps=2e-5), 0.0, 0.005),
         (Settings(substeps=3), 0.0, 0.0025),
         (Settings(substeps=5), 0.0, 0.002),

@@ -343,6 +343,10 @@ def test_a_deadlock_is_shown_by_a_firing_sequence() -> None:
     assert told == "after takeA1, takeB1 nothing is enabled any more, with tokens in p4, p5"
 
 
+def test_what_needs_what_it_gives_back_never_fires() -> None:
+    assert explore(net_from([("a", "b", 1), ("b", "a", 0), ("b", "b", 1)])).deadlock == ()
+
+
 def test_a_marked_graph_says_how_it_comes_to_a_stop() -> None:
     """One with a circuit that never fires; and nothing of a stop where the rest goes on."""
     stuck = [("a", "b", 0), ("b", "a", 0)]
