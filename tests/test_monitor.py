@@ -31,7 +31,7 @@ from factory.support.errors import InputError
 from factory.support.settings import Settings
 from tests.command_line import PAPER, ROOT, Terminal
 from tests.examples import with_hands
-from tests.good_runs import random_marking
+from tests.good_runs import assert_good, random_marking
 from tests.layout_values import random_layout
 from tests.pag_texts import PRODUCTS, UNARY, laid_out
 from tests.planted import Acts, both, displaced, reframed, welded
@@ -44,8 +44,10 @@ def watched(simulation: Simulation, max_time: float | None = None) -> tuple[Any,
 
 
 def assert_explained(simulation: Simulation, run: Any, report: Report) -> None:
-    """The verdict is good, and the firings are those of the supervisor, each in its interval."""
-    assert run.trouble is None and run.refines_net
+    """The run and the verdict are good, and the firings are those of the supervisor, each in its
+    interval."""
+    assert_good(run)
+    assert run.products == simulation.request.units
     assert report.refines_net, report.violations
     firings = {(f.transition, f.unit): f for f in (*report.seen, *report.inferred)}
     assert len(firings) == len(report.seen) + len(report.inferred) == len(run.events)

@@ -29,47 +29,20 @@ def paper() -> Layout:
     return laid_out(PAPER)
 
 
-@pytest.mark.parametrize("name", PRODUCTS)
-def test_every_shape_of_product_is_made_in_mujoco(name: str) -> None:
-    run = factory.run(laid_out(PRODUCTS[name]), units=3)
-    assert run.products == 3
-    assert_good(run)
-
-
-@pytest.mark.parametrize("seed", range(5))
-@pytest.mark.parametrize("world", ["mujoco", "ideal"])
-def test_the_papers_example_under_jitter(paper: Layout, world: str, seed: int) -> None:
-    run = factory.run(paper, world=world, units=3, jitter=0.3, seed=seed)
-    assert run.products == 3
-    assert run.refines_net
-    if world == "mujoco":
-        assert_good(run)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_distributed_runs_refine_the_net(paper: Layout, seed: int) -> None:
-    run = factory.run(paper, units=3, jitter=0.3, seed=seed, distributed=True)
-    assert run.products == 3
-    assert_good(run)
-
-
-def test_a_hundred_units_of_the_papers_example(paper: Layout) -> None:
-    run = factory.run(paper, units=100)
-    assert run.products == 100
+def test_forty_units_of_the_papers_example(paper: Layout) -> None:
+    run = factory.run(paper, units=40)
+    assert run.products == 40
     assert_good(run)
     assert run.cycle_time_s == pytest.approx(run.predicted_cycle_time_s, rel=0.02)
 
 
-@pytest.mark.parametrize("world", ["mujoco", "ideal"])
 @pytest.mark.parametrize("seed", range(6))
-def test_a_run_can_start_from_any_legal_marking(paper: Layout, world: str, seed: int) -> None:
-    """Theorem 5.2: dropoff runs again and again, whatever the marking."""
+def test_a_run_can_start_from_any_legal_marking(paper: Layout, seed: int) -> None:
+    """Theorem 5.2: dropoff runs again and again, whatever the marking; in MuJoCo in
+    `test_monitor`."""
     start = random_marking(paper, seed)
-    run = factory.run(paper, world=world, units=2, start=start)
-    assert run.products == 2
-    assert run.refines_net
-    if world == "mujoco":
-        assert_good(run)
+    run = factory.run(paper, world="ideal", units=2, jitter=0.3, seed=seed, start=start)
+    assert (run.products, run.refines_net) == (2, True)
 
 
 def test_wip_bounds_what_is_inside(paper: Layout) -> None:
