@@ -128,6 +128,8 @@ class _Processes(Generic[Item, Result]):
                 _send(process.stdin, item)
                 result, error = pickle.load(process.stdout)  # type: ignore[arg-type]
             except DIED:
+                if self.ended:
+                    raise
                 status = process.wait()
                 continue
             self.free.append(process)
@@ -150,6 +152,8 @@ class _Processes(Generic[Item, Result]):
                 pickle.load(process.stdout)  # type: ignore[arg-type]
                 return process
             except DIED:
+                if self.ended:
+                    raise
                 status = process.wait()
         message = f"the processes die as they start (exit status {status})"
         raise RunError(Diagnostic("Killed", message, None, "use fewer --jobs, or more memory"))
