@@ -31,8 +31,7 @@ from factory.simulation.simulation import Simulation
 from factory.study.analysis import Change, Timing, analyse
 from factory.study.analysis.analysing import least_wip
 from factory.study.analysis.firing import circuits, earliest_firings, slacks
-from factory.study.analysis.flow import flow, reached
-from factory.study.analysis.timed import timed_net
+from factory.study.analysis.timed import flow, reached, timed_net
 from factory.support.settings import Settings
 from factory.timing.prediction import duration
 from factory.timing.timed import timed

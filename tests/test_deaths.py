@@ -24,7 +24,7 @@ from factory.rendering.history import History
 from factory.rendering.ink import DEAD
 from factory.rendering.marks import LeftOut
 from factory.rendering.net_panel import NetPanel
-from factory.rendering.rows import Rows
+from factory.rendering.sheet import Rows
 from factory.show.report.failures import failures_data
 from factory.show.report.recording import recording_of
 from factory.simulation.recovery import Campaign, WorldFault

@@ -37,8 +37,7 @@ from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from factory.simulation.watched import watched
 from factory.study.analysis.analysing import least_wip
-from factory.study.analysis.flow import flow
-from factory.study.analysis.timed import timed_net
+from factory.study.analysis.timed import flow, timed_net
 from factory.support.errors import InputError
 from factory.support.settings import Settings
 from factory.timing.cycle_time import cycle_time

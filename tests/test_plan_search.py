@@ -19,10 +19,9 @@ from factory.layout.durations import Pace
 from factory.pipeline import all_templates
 from factory.planning.blocking import CLASHES, DEEPER, FREE, LOCKED, SCRAPES, Blocking, blocking
 from factory.planning.cannot import cores, interlocks, removal
-from factory.planning.dividing import Divider
 from factory.planning.divisions import divisions
 from factory.planning.exact import Best, Expected, Tree, TreeTask, tables
-from factory.planning.growing import Site, bettered, divided, units_of
+from factory.planning.growing import Divider, Site, bettered, divided, units_of
 from factory.planning.judging import Judge, Judged
 from factory.planning.parts import InPlace
 from factory.planning.searching import Sought, budget_of, trees

@@ -25,7 +25,7 @@ from factory.rendering.history import History
 from factory.rendering.ink import AMBER, DEAD, FLASH, Ink
 from factory.rendering.marks import Mark, Marks
 from factory.rendering.net_panel import NetPanel
-from factory.rendering.rows import Rows
+from factory.rendering.sheet import Rows
 from factory.support.settings import Settings
 from tests.failing_runs import failing, paper_layout
 from tests.token_game import enabled, follower

@@ -28,8 +28,17 @@ from factory.rendering.ink import GROUND, Ink, fitted, operation_colours, robot_
 from factory.rendering.net_panel import NetPanel
 from factory.rendering.picture import PANELS, shared
 from factory.rendering.reel import Poster
-from factory.rendering.rows import CLOSE, EASY, ROOM, Rows, neighbourhood
-from factory.rendering.sheet import BOTTOM, FOOT, OUTSIDE, TALLEST
+from factory.rendering.sheet import (
+    BOTTOM,
+    CLOSE,
+    EASY,
+    FOOT,
+    OUTSIDE,
+    ROOM,
+    TALLEST,
+    Rows,
+    neighbourhood,
+)
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError

@@ -37,8 +37,7 @@ from factory.simulation.simulation import Simulation
 from factory.study.analysis import Timing
 from factory.study.analysis.analysing import operation_slacks
 from factory.study.analysis.firing import earliest_firings
-from factory.study.analysis.flow import flow
-from factory.study.analysis.timed import timed_net
+from factory.study.analysis.timed import flow, timed_net
 from factory.support.settings import Settings
 from factory.timing.cycle_time import cycle_time
 from factory.timing.timed import timed

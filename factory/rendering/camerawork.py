@@ -20,8 +20,7 @@ from factory.rendering.marks import LeftOut, Marks
 from factory.rendering.net_panel import NetPanel
 from factory.rendering.painter import Painter
 from factory.rendering.picture import Area, PanelName, Picture, Size, shared
-from factory.rendering.rows import Rows
-from factory.rendering.sheet import OUTSIDE
+from factory.rendering.sheet import OUTSIDE, Rows
 from factory.support.engine import mujoco
 from factory.support.errors import Diagnostic, InputError
 from factory.support.resource import Closing

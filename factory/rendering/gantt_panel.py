@@ -21,8 +21,7 @@ from factory.rendering.ink import (
     template_colours,
     width,
 )
-from factory.rendering.rows import PanelRow, Rows
-from factory.rendering.sheet import FOOT, PanelSheet
+from factory.rendering.sheet import FOOT, PanelRow, PanelSheet, Rows
 
 CYCLES = 2.2
 """How many rounds of the busiest robot are shown."""

@@ -32,8 +32,7 @@ from factory.rendering.ink import (
     pale,
     robot_colours,
 )
-from factory.rendering.rows import PanelRow, Rows
-from factory.rendering.sheet import PanelSheet, robots_shown
+from factory.rendering.sheet import PanelRow, PanelSheet, Rows, robots_shown
 
 WORK = 0.66
 """Share of a column that an operation takes; the rest is for the place before it."""

@@ -17,9 +17,8 @@ from factory.record.verdict import LIMITS, STRENGTH
 from factory.show.report.recording import Recording
 from factory.simulation.run import busy_times, mean_interval
 from factory.study.analysis import Timing
-from factory.study.analysis.flow import flow
 from factory.study.analysis.measured import conditions, dropoff_times, operation_times
-from factory.study.analysis.timed import timed_net
+from factory.study.analysis.timed import flow, timed_net
 
 
 def fidelity(recording: Recording) -> dict[str, float | None]:

@@ -8,9 +8,8 @@ from dataclasses import dataclass, field
 
 from factory.plant.factory import Factory
 from factory.study.analysis.firing import slacks
-from factory.study.analysis.flow import Flow, flow
 from factory.study.analysis.measured import Comparison, RunRecord, compare
-from factory.study.analysis.timed import Circuit, TimedNet, timed_net
+from factory.study.analysis.timed import Circuit, Flow, TimedNet, flow, timed_net
 from factory.support.errors import Diagnostic, InputError, did_you_mean, usage_error
 from factory.timing.pool import part_pool
 from factory.timing.timed import SAME

@@ -17,8 +17,7 @@ from factory.record.project_table import settings_of
 from factory.record.state import Event
 from factory.simulation.run import Run, mean_interval
 from factory.study.analysis.firing import Floats
-from factory.study.analysis.flow import Flow
-from factory.study.analysis.timed import TimedNet
+from factory.study.analysis.timed import Flow, TimedNet
 from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import Settings
 from factory.timing.timing import Timing

@@ -14,8 +14,8 @@ from factory.plant.factory import Factory
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
-from factory.study.analysis.flow import steady_units
 from factory.study.analysis.measured import operation_times
+from factory.study.analysis.timed import steady_units
 from factory.study.fidelity.measuring import Measurement
 from factory.study.fidelity.record import QUANTITIES, Fidelity, SeedRecord
 from factory.study.pool import over_processes

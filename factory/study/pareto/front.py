@@ -23,7 +23,7 @@ from factory.simulation.watched import watched
 from factory.study.allocation.aim import Least
 from factory.study.allocation.candidate import Candidate
 from factory.study.allocation.estimating import Estimate
-from factory.study.analysis.flow import steady_units
+from factory.study.analysis.timed import steady_units
 from factory.timing.timing import Timing
 
 MESHES = "meshes"
