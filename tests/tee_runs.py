@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.control import reservation
 from factory.control.mode import Array, Truth
-from factory.control.ring import SPARE, Spots, Tee, TeeState
+from tests import reservation
+from tests.ring import SPARE, Spots, Tee, TeeState
 
 DT = 0.01
 """The tick [s]."""

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from factory.control.mode import Array
-from factory.control.ring import TeeState
 from factory.support.engine import mujoco
+from tests.ring import TeeState
 from tests.tee_runs import DT, TEE, arrived, reachable
 
 CARRIAGE, MASS, TIMESTEP = 0.06, 1.6, 0.005
@@ -99,7 +99,7 @@ def test_three_hundred_pairs_touch_nothing() -> None:
 
 def test_robots_that_ignore_each_other_touch(monkeypatch: pytest.MonkeyPatch) -> None:
     """A planted fault: no reservations."""
-    every = "factory.control.reservation.admitted"
+    every = "tests.reservation.admitted"
     monkeypatch.setattr(every, lambda present, *_: np.ones(len(present), dtype=bool))
     m, ticks = model(), planned(30)
     assert sum(driven(m, ticks[:, :, pair])[0] > 0 for pair in range(ticks.shape[2])) > 5

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from factory.control import reservation
-from factory.control.ring import ARRIVED, NO_WAY, Spots, Tee, TeeState
+from tests import reservation
+from tests.ring import ARRIVED, NO_WAY, Spots, Tee, TeeState
 from tests.tee_runs import DT, TEE, run
 
 SQUARES = [3 * one + other for one in range(3) for other in range(3) if one != other]

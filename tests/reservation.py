@@ -8,7 +8,7 @@ comes no nearer to them than its present one; else it brakes by a·dt, and its r
 Theorem 9: if all reservations are clear at first, no configuration is ever in Δ, whatever fields,
 markings, speeds and order of updates. Each case keeps reservations clear, and a robot stays in its
 own during a tick. That takes no mode, no net and no agreement between robots. It does not make
-progress by itself; on a tee `factory.control.ring` does.
+progress by itself; on a tee `tests.ring` does.
 
 Ways are pieces along the axes of the floor, so a reservation is boxes (p, 4): xlo, xhi, ylo, yhi
 [m]. Robots do not turn, so Δ is a set of displacements: robots at p and q are in Δ where p - q is

