@@ -137,7 +137,7 @@ def looked_into(layout: Layout, distributed: bool = False) -> tuple[Run, HiddenP
         ("paper", "behind", None),
         ("blocks", "below", None),
         ("shelf", "behind", 0.08),
-        ("tub", "above", 0.05),
+        ("tub", "above", 0.06),
     ],
 )
 def test_one_hand_holds_all_labels_of_a_line(name: str, kind: str, lift: float | None) -> None:

@@ -315,6 +315,48 @@ s5v = mate ( s2v, s3v );
 s6v = mate ( s4, s5v );
 p3v = atomic ( sphere = 0.00700, pos = ( 0.09700, -0.01600, 0.05200 ) );
 p4v = atomic ( box = (0.02800,0.04200,0.00700), pos = ( -0.03950, -0.01000, 0.01600 ) );""",
+    "a part without a lift of its own is shown at two heights": """mix = 2 s6, 1 s6.b;
+s1 = mate ( p0, p1 );
+s2 = mate ( p2, p3 );
+s3 = mate ( p5, p4 );
+s4 = mate ( p6, s1 );
+s5 = mate ( s2, s3 );
+s6 = mate ( s4, s5 );
+p0 = atomic ( sphere = 0.015, pos = ( 0, 0, 0.015 ) );
+p1 = atomic ( sphere = 0.01, pos = ( 0.001, -0.0255, 0.01 ) );
+p2 = atomic ( box = ( 0.01, 0.01, 0.02 ), pos = ( -0.0205, -0.005, 0.01 ) );
+p3 = atomic ( box = ( 0.02, 0.06, 0.1 ), pos = ( -0.009, 0.046, 0.05 ) );
+p4 = atomic ( sphere = 0.015, pos = ( 0.01, -0.051, 0.015 ) );
+p5 = atomic ( cylinder = ( 0.02, 0.02 ), pos = ( 0.006, 0.044, 0.1105 ) );
+p6 = atomic ( box = ( 0.04, 0.01, 0.03 ), pos = ( 0.013, -0.01, 0.0455 ) );
+s3.b = mate ( p5.b, p4.b );
+s5.b = mate ( s2, s3.b );
+s6.b = mate ( s4, s5.b );
+p4.b = atomic ( sphere = 0.0135, pos = ( 0.01, -0.051, 0.015 ) );
+p5.b = atomic ( cylinder = ( 0.018, 0.018 ), pos = ( 0.006, 0.044, 0.1105 ) );""",
+    "a carrier stands behind its first junction for one of two": """mix = 2 s7, 1 s7.b;
+s1 = mate ( p2, p1 );
+s2 = mate ( p6, p7 );
+s3 = mate ( p5, p4 );
+s4 = mate ( s1, p3 );
+s5 = mate ( p0, s4 );
+s6 = mate ( s3, s2 );
+s7 = mate ( s5, s6 );
+p0 = atomic ( box = ( 0.06, 0.01, 0.06 ), pos = ( 0, 0, 0.03 ) );
+p1 = atomic ( box = ( 0.04, 0.06, 0.06 ), pos = ( -0.051, 0.027, 0.03 ) );
+p2 = atomic ( box = ( 0.02, 0.01, 0.1 ), pos = ( -0.0205, 0.011, 0.05 ) );
+p3 = atomic ( box = ( 0.01, 0.06, 0.04 ), pos = ( -0.072, -0.0335, 0.02 ) );
+p4 = atomic ( box = ( 0.01, 0.01, 0.01 ), pos = ( -0.0615, -0.0385, 0.005 ) );
+p5 = atomic ( box = ( 0.1, 0.02, 0.03 ), pos = ( -0.0145, -0.0335, 0.026 ) );
+p6 = atomic ( cylinder = ( 0.02, 0.06 ), pos = ( 0.0565, -0.0195, 0.041 ) );
+p7 = atomic ( box = ( 0.04, 0.02, 0.01 ), pos = ( -0.057, 0.034, 0.0655 ) );
+s2.b = mate ( p6, p7.b );
+s4.b = mate ( s1, p3.b );
+s5.b = mate ( p0, s4.b );
+s6.b = mate ( s3, s2.b );
+s7.b = mate ( s5.b, s6.b );
+p3.b = atomic ( box = ( 0.007, 0.042, 0.028 ), pos = ( -0.072, -0.0335, 0.02 ) );
+p7.b = atomic ( box = ( 0.0196, 0.0098, 0.0049 ), pos = ( -0.057, 0.034, 0.0655 ) );""",
 }
 """Families whose layouts were refused, each for a cause of its own."""
 

@@ -142,8 +142,9 @@ def cleared(layout: Layout, robot: int, sideways: float) -> float:
 
 def _with_all(layout: Layout, leaf: Operation) -> tuple[Layout, Operation]:
     """An operation in which a part is taken, in the layout of all that its robot may do."""
-    whole = layout.whole
-    return whole, whole.fed[leaf.written, layout.factory.robots[leaf.carrier].name]
+    if layout.whole is layout:
+        return layout, leaf
+    return layout.whole, layout.whole.fed[leaf.written, layout.factory.robots[leaf.carrier].name]
 
 
 def _shown(layout: Layout, robot: int) -> Extent:

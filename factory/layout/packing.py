@@ -127,7 +127,9 @@ class Packing:
             alternatives = (self._guests(way, stop, r, side) for r, side in sides.items())
             for guests in product(*alternatives):
                 if not way.piles:
-                    yield self._added(way, stop, up(self._back(stop, guests)), guests)
+                    first = up(self._back(stop, guests))
+                    there = [replace(guest, station=first) for guest in guests]
+                    yield self._added(way, stop, first, there)
                 else:
                     yield from self._stations(way, stop, guests, least)
 
@@ -303,7 +305,7 @@ class Packing:
         to the way of the one it delivers to."""
         task, pace, weights = self.task, self.task.pace, self.task.weights
         travel = max(outline.ahead, 0.0)
-        first = (guest.travel for guest in way.guests if not guest.station)
+        first = (g.travel for g in way.guests if g.station == way.stations[0])
         back = pace.rest(travel) - max(map(pace.rest, first), default=0.0)
         time = way.time + max(back, 0.0) + pace.rest(max(travel - way.station, 0.0))
         factory = task.factory

@@ -113,7 +113,8 @@ def _levels(
 ) -> Iterator[list[tuple[float, float, float]]]:
     """For each robot and each of its tours: how far up its lift is where it delivers, and before
     that, and how far above its place in the product it carries what it brings [m]: what its own
-    lift has to lower it, over the height at which the robot that it delivers to carries it."""
+    lift has to lower it, on all tours alike, so that those that deliver to it come at one height;
+    over that at which the robot that it delivers to carries it."""
     elevations: list[list[float]] = []
     for robot, tours in enumerate(factory.tours):
         ends = [factory.operations[tour[-1]] for tour in tours]
@@ -125,7 +126,7 @@ def _levels(
             over = [d - z for d, (_, _, z) in zip(below, shifts[robot], strict=True)]
             downs = [round(at - min(over), 6) for at in over]
             needed = (o.approach.stroke if o.approach else 0.0 for o in ends)
-            stroke = max(at + far for at, far in zip(downs, needed, strict=True))
-        ups = downs if robot in factory.adjusted else [stroke] * len(ends)
+            stroke = max(needed)
+        ups = downs if robot in factory.adjusted else [at + stroke for at in downs]
         elevations.append([d + (up - down) for d, up, down in zip(below, ups, downs, strict=True)])
         yield [*zip(downs, ups, elevations[-1], strict=True)]

@@ -152,7 +152,8 @@ def _with_lifts(mode: Mode, layout: Layout, operation: Operation) -> Mode:
     robots = [*map(factory.robot_of, axes)]
     strokes = np.array([layout.strokes[robot] for robot in robots])
     goals = np.array(layout.goals(operation.index)[count:])
-    lowers = np.array([factory.lowers(robot) for robot in robots]) & (goals < strokes)
+    ups = np.array([layout.visits[operation.index, robot].up for robot in robots])
+    lowers = np.array([factory.lowers(robot) for robot in robots]) & (goals < ups)
     own = np.array([_gate(layout, operation, robot) for robot in robots])
     return replace(
         mode,
@@ -160,7 +161,7 @@ def _with_lifts(mode: Mode, layout: Layout, operation: Operation) -> Mode:
         lower=np.append(mode.lower, np.zeros(len(axes))),
         upper=np.append(mode.upper, strokes),
         gate=np.append(mode.gate, np.where(lowers, own, -1)),
-        standoff=np.append(mode.standoff, np.where(lowers, strokes - goals, 0.0)),
+        standoff=np.append(mode.standoff, np.where(lowers, ups - goals, 0.0)),
     )
 
 

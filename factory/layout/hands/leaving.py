@@ -47,8 +47,10 @@ def before_next(layout: Layout, robot: int) -> float:
 
 
 def raised(layout: Layout, robot: int, after: int) -> Past:
-    """When a robot's lift is up after an operation (index)."""
-    return Past(2 * after + 1, layout.factory.lift_axis[robot], layout.strokes[robot] - SPARE)
+    """When a robot's lift is up for its next tour after an operation (index)."""
+    gear = layout.factory.robots[robot].operations
+    up = layout.visits[gear[(gear.index(after) + 1) % len(gear)], robot].up
+    return Past(2 * after + 1, layout.factory.lift_axis[robot], up - SPARE)
 
 
 def farther(layout: Layout, robot: int, by: float) -> float:
