@@ -136,7 +136,7 @@ def test_a_clear_point_that_is_5_mm_short_is_refused() -> None:
 def test_pairs_that_are_alike_are_judged_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """With the same answer as each by itself, and as by all facets where faces tell enough."""
     layout, clearance = read("examples/lamp.pag").layout, 0.05
-    net, back, judge = coordinated(layout), awaited_positions(layout), presence.Judge(clearance)
+    net, back, judge = coordinated(layout), awaited_positions(layout), presence.Nearness(clearance)
     pairs = [*presence.near([*presences(layout, net, back)], clearance)]
     judged = [judge.nearer(pair) for pair in pairs]
     assert any(judged) and not all(judged)

@@ -29,7 +29,7 @@ from factory.layout.hands.leaving import SPARE, before_next, farther, gone_by, h
 from factory.layout.hands.limbs import rises_first
 from factory.layout.layout import Layout
 from factory.layout.machines import presences
-from factory.layout.presence import Judge, Near, Presence, alike, near, nearer, nearest
+from factory.layout.presence import Near, Nearness, Presence, alike, near, nearer, nearest
 from factory.layout.staying import Staying
 from factory.nets.coordinated import CoordinatedNet, Past
 from factory.nets.exclusion import (
@@ -148,7 +148,7 @@ def exclusions(layout: Layout, further: Presences | None = None) -> Exclusions:
     )
 
 
-class _Judge(Judge):
+class _Judge(Nearness):
     """That of a layout, which cuts ways home."""
 
     def __init__(self, layout: Layout) -> None:

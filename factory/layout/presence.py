@@ -236,8 +236,8 @@ def nearer(found: Near, clearance: float) -> Near | None:
     return judged and _named(found, judged)
 
 
-class Judge:
-    """Says which pairs come near by their bodies, and does it once for all that are alike: turns of
+class Nearness:
+    """Which pairs come near by their bodies, judged once for all that are alike: turns of
     a period, and what is found again and again in a search."""
 
     def __init__(self, clearance: float) -> None:
