@@ -14,6 +14,7 @@ from factory.exporting.ways import ways
 from factory.geometry.solids import rotation
 from factory.geometry.turning import axis_of, presented, turning_box, turning_pieces
 from factory.layout.layout import Layout, carriers, delivery
+from factory.layout.request import Ground
 from factory.layout.stops import stops_of
 from factory.mjcf import stock
 from factory.mjcf.loading import load
@@ -122,6 +123,10 @@ def test_a_fold_keeps_robots_fixed(tmp_path: Path) -> None:
     again = folded(made, [], load_catalogue())
     assert [r.fixed for r in again.robots] == [r.fixed for r in made.robots]
     assert sum(r.fixed for r in again.robots) == 2
+
+
+def test_a_manipulator_goes_no_way_that_can_be_relayed(cell: Layout) -> None:
+    assert read(PEG).with_ground(Ground(relay=True)).layout.factory == cell.factory
 
 
 # --- the turned part ------------------------------------------------------------------------------

@@ -54,8 +54,9 @@ class Way:
 
 
 def ways(layout: Layout) -> dict[str, Way]:
-    """The way of every label, of those that can be cut."""
-    found = (way for robot in range(len(layout.guidepaths)) for way in _ways(layout, robot))
+    """The way of every label, of those that can be cut. A robot that is fixed goes none."""
+    along = (robot for robot, path in enumerate(layout.guidepaths) if not path.fixed)
+    found = (way for robot in along for way in _ways(layout, robot))
     return {way.label: way for way in found if way.most}
 
 
