@@ -129,6 +129,12 @@ def test_a_manipulator_goes_no_way_that_can_be_relayed(cell: Layout) -> None:
     assert read(PEG).with_ground(Ground(relay=True)).layout.factory == cell.factory
 
 
+def test_a_manipulator_needs_a_hand() -> None:
+    layout = read(PEG, settings=Settings(hands=False)).layout
+    with pytest.raises(InputError, match="NoGrip r2 has no hand to turn 'peg/pick' with"):
+        Simulation(layout, RunRequest())
+
+
 # --- the turned part ------------------------------------------------------------------------------
 
 

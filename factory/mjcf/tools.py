@@ -14,6 +14,7 @@ import numpy as np
 from factory.layout.hands.limbs import Limb
 from factory.layout.layout import Layout
 from factory.mjcf.elements import number, numbers
+from factory.support.errors import Diagnostic, InputError
 
 LIFTED = 0.4
 """Mass of a lift's head without what stands for a hand, and of the tool in it [kg]."""
@@ -57,10 +58,15 @@ def mount_tool(body: Element, joint: Element, turn: float, limbs: Iterable[Limb]
 
 
 def gyration(layout: Layout, robot: int) -> float:
-    """Radius of gyration [m] of what a fixed robot holds, about the axis of its tool."""
+    """Radius of gyration [m] of what a fixed robot holds, about the axis of its tool. Raises
+    InputError (NoGrip) where it has no hand."""
     label, *_ = layout.factory.deliveries(robot)
     hand, parts = layout.hand(robot), layout.factory.contents[label]
-    assert hand is not None, "a fixed robot holds what it turns"
+    if hand is None or hand.kind == "none":
+        message = f"{layout.factory.robots[robot].name} has no hand to turn '{label}' with"
+        position = layout.factory.by_label[label].position
+        hint = "give the part a flat place above, and the robots hands (--hands)"
+        raise InputError(Diagnostic("NoGrip", message, position, hint))
     solids = [layout.product.solids[part] for part in parts]
     axis = np.array(hand.places[0][:2])
     moments = (s.inertia[2, 2] + s.mass * ((s.centre[:2] - axis) ** 2).sum() for s in solids)
