@@ -18,7 +18,7 @@ from factory.exporting.ways import ways
 from factory.layout import presence
 from factory.layout.clearance import certify
 from factory.layout.coordinating import with_machines
-from factory.layout.exclusions import awaited_positions, coordinated
+from factory.layout.exclusions import awaited_positions, coordinated, exclusions
 from factory.layout.layout import Layout
 from factory.layout.machines import presences
 from factory.layout.presence import Presence
@@ -128,6 +128,16 @@ def test_a_clear_point_that_is_5_mm_short_is_refused() -> None:
         for span in way["spans"]:
             span[0][1] += 0.005
     refused(check(m, machines, clearance), "r9/pad", "magazine down:p3", "no circuit")
+
+
+def test_what_a_unit_made_alone_needs_at_once_is_refused() -> None:
+    """The guidepath of r3 is moved to where r1 begins."""
+    paths = [*laid_out(0).guidepaths]
+    x, y = paths[2].a
+    paths[2] = replace(paths[2], a=(x, y + 0.1))
+    moved = replace(laid_out(0), guidepaths=tuple(paths), certificate=None)
+    faults = [fault.message for fault in exclusions(moved).faults]
+    refused(faults, "carriage of r1, in r1:nopart,", "of r3, in sub2,", "needs both at once")
 
 
 # --- presences ------------------------------------------------------------------------------------
