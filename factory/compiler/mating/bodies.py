@@ -31,7 +31,7 @@ class ConvexBodies:
     product: Product = field(repr=False)
 
 
-class Shapes:
+class BodyShapes:
     """The shapes of a product's bodies: the `keys` of those of each part, the same for bodies of
     one shape that are turned the same way; of each its vertices (n, 3) from the low corner of its
     box [m]; and the Minkowski differences of two."""

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.compiler.mating.bodies import ConvexBodies, Shapes
+from factory.compiler.mating.bodies import BodyShapes, ConvexBodies
 from factory.compiler.mating.drawn import DrawnWays
 from factory.compiler.mating.meetings import Ints, Meetings
 from factory.compiler.mating.paths import (
@@ -112,7 +112,7 @@ class Finder:
     def __init__(self, convex: ConvexBodies, where: Meetings) -> None:
         self.bodies, self.meetings = convex, where
         self.drawn = DrawnWays(convex)
-        self._shapes = convex.product.kept(Shapes)
+        self._shapes = convex.product.kept(BodyShapes)
 
     def along(self, axis: int, wanted: NDArray[np.bool_]) -> Overlaps:
         """The overlaps of the wanted meetings when their inputs come along an axis: x, y or z."""
