@@ -7,16 +7,20 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 import pytest
 
+from factory.geometry.solids import Product
 from factory.layout import hanging
 from factory.layout.clearance import certify
 from factory.layout.feeding import feeder_of
+from factory.layout.hands import holding
 from factory.layout.hands.choosing import Hands
 from factory.layout.hands.hand import AIR, Hand
 from factory.layout.hands.limbs import limbs
+from factory.layout.hands.places import Places
 from factory.layout.hanging import Hanging
 from factory.layout.layout import Layout
 from factory.pipeline import Project, read
@@ -216,6 +220,36 @@ b = atomic ( box = ( 0.02, 0.02, 0.03 ), pos = ( 0.04, 0.06, 0.015 ) )"""
     assert run.succeeded
     inside = [p for p in hidden.found() if any(g.startswith("feeder/") for g in p.geoms)]
     assert not inside
+
+
+def test_a_lift_is_set_at_home_where_its_hand_would_meet_what_waits() -> None:
+    """Part a is put onto a slab, b beside it: the pad is over the slab when it has let go of a, and
+    comes down to where b is."""
+    text = """root = s2; s1 = insert ( base, a ); s2 = insert ( s1, b );
+base = atomic ( box = ( 0.1, 0.1, 0.02 ), pos = ( 0, 0, 0.01 ) );
+a = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( 0, 0.02, 0.0302 ) );
+b = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( 0, 0.0602, 0.01 ) )"""
+    layout = planned(text, ("a", "b")).layout
+    assert layout.factory.adjusted == {1} and layout.certificate is not None
+    (order,) = layout.certificate.apart.orders
+    assert order.before.startswith("past:r2:") and order.start == "b_s" and order.kept
+    run = run_of(layout)
+    assert run.succeeded, run.verdict.failures
+    assert run.physics is not None and run.physics.unintended_contacts == 0
+
+
+def test_places_of_hands_are_found_once_for_all_plans(monkeypatch: pytest.MonkeyPatch) -> None:
+    looked, real = list[tuple[object, ...]](), holding.places
+
+    def places(_: Product, *of: Any) -> Places:
+        looked.append(of)
+        return real(_, *of)
+
+    monkeypatch.setattr(holding, "places", places)
+    shared = planned(*PRODUCTS["shelf"], shared=False).with_lines([PRODUCTS["shelf"][1]])
+    visits = shared.layout.visits
+    assert looked and len(looked) == len({*looked})
+    assert visits == planned(*PRODUCTS["shelf"]).layout.visits, "whatever was looked at before"
 
 
 def test_without_hands_front_ends_are_in_one_place() -> None:
