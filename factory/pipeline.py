@@ -105,7 +105,6 @@ class Project:
         InputError (BadLine)."""
         from factory.compiler.folding import fold, lines_of_labels
 
-        self.pag.check_alone("[lines]")
         factory = self.planned
         made = fold(factory, lines_of_labels(factory, lines), self.catalogue)
         return self.with_plan(made.plan)

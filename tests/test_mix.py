@@ -25,6 +25,8 @@ from factory.nets.verify import verify
 from factory.pipeline import Project, all_templates, read
 from factory.problem.pag import PAG, Mix
 from factory.problem.plan import NOBODY, Plan
+from factory.simulation.request import RunRequest
+from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
 from factory.timing.cycle_time import cycle_time
 from tests.command_line import Terminal
@@ -409,6 +411,19 @@ def test_options_for_one_product_are_refused(
 ) -> None:
     done = run("run", file, "--world", "ideal", *options, "--json")
     assert (done.status, done.codes) == (2, ["BadMix"])
+
+
+def test_labels_of_a_mix_share_a_robot_where_asked(tmp_path: Path) -> None:
+    """In all units of a period, as in a factory of one product; what cannot is refused as there."""
+    file = tmp_path / "family.pag"
+    file.write_text(LITTLE.replace("x, y )", "x, y, w )") + "; w = atomic()")
+    project = read(file)
+    made = project.with_lines([["y", "w"]])
+    assert len(made.planned.robots) == len(project.planned.robots) - 1
+    done = Simulation(made.layout, RunRequest(units=6, jitter=0.3)).run()
+    assert done.succeeded and done.by_product == {"a": 4, "b": 2}
+    with pytest.raises(InputError, match="'y' and 'base' cannot share a robot: they begin or end"):
+        project.with_lines([["y", "base"]])
 
 
 def test_branches_of_a_mix_may_be_parallel(file: Path, run: Terminal) -> None:

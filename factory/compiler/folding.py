@@ -1,10 +1,11 @@
 """Folds: robots of a factory that come to the same place from the same side become one robot, on
 one *line*. Tools of one kind that come to one line become one, too.
 
-In a factory as Compile makes it each robot has one *tour*, from empty hands to empty hands. The
-tours form a tree: a *kid* of a tour is one that delivers to it. A fold assigns tours to lines: the
-output robot's tour to a line of its own, kids of tours of one line to lines that deliver to it, the
-inputs of one operation to different lines. One robot serves a line.
+In a factory as Compile makes it each robot has one *tour*, from empty hands to empty hands; in that
+of a mix the tours of a robot are of one kind, and are assigned together. The tours form a tree: a
+*kid* of a tour is one that delivers to it. A fold assigns tours to lines: the output robot's tour
+to a line of its own, kids of tours of one line to lines that deliver to it, the inputs of one
+operation to different lines. One robot serves a line.
 
 A fold has exactly one live choice of programs: each robot does its tours in the order in which the
 program of the robot that it delivers to asks for them. That order is live, for below a pile that
@@ -108,8 +109,8 @@ def lines_of_labels(factory: Factory, sides: Iterable[Sequence[str]]) -> tuple[L
     """Lines given by the labels that their robots bring. Raises InputError (BadLine) for a label
     that no robot brings, or that is on two lines."""
     brings = {
-        label: robot
-        for o in factory.operations[:-1]
+        factory.by_label[label].written: robot
+        for o in factory.making
         for robot, label in zip(o.robots, o.before, strict=True)
         if label != NOPART and robot != o.carrier
     }
@@ -154,7 +155,7 @@ def line_faults(
             names = f"{_named(factory, first)} and {_named(factory, other)} cannot share a robot"
             position = factory.robots[other].position
             yield _fault(f"{names}: {message}", position=position)
-    deliveries = [delivery(factory, robot).index for robot in line]
+    deliveries = [tour[-1] for robot in line for tour in factory.tours[robot]]
     if not set.intersection(*(sides_of(factory, robot) for robot in line)):
         message = f"{_named(factory, first)} and others cannot all come from one side"
         yield _fault(message, position=factory.robots[first].position)
@@ -164,7 +165,7 @@ def line_faults(
         yield _fault(message, position=factory.robots[first].position)
     if len(set(deliveries)) < len(deliveries):
         both = next(n for n in deliveries if deliveries.count(n) > 1)
-        message = f"'{factory.operations[both].label}' needs two inputs of one robot at once"
+        message = f"'{factory.operations[both].written}' needs two inputs of one robot at once"
         yield _fault(message, position=factory.operations[both].position)
 
 
@@ -227,8 +228,9 @@ def begun_by(factory: Factory, robot: int) -> list[int]:
 
 
 def sides_of(factory: Factory, robot: int) -> set[int]:
-    """Sides of the approach axis from which a robot may come to its last operation."""
-    return sides_at(delivery(factory, robot), robot)
+    """Sides of the approach axis from which a robot may come to what it delivers."""
+    ends = (factory.operations[tour[-1]] for tour in factory.tours[robot])
+    return set.intersection(*(sides_at(o, robot) for o in ends))
 
 
 def sides_at(o: Operation, robot: int) -> set[int]:
@@ -243,7 +245,9 @@ def sides_at(o: Operation, robot: int) -> set[int]:
 def _named(factory: Factory, robot: int) -> str:
     last = delivery(factory, robot)
     label = last.before[last.robots.index(robot)]
-    return f"the tool of '{last.label}'" if label == NOPART else f"'{label}'"
+    if label == NOPART:
+        return f"the tool of '{last.written}'"
+    return f"'{factory.by_label[label].written}'"
 
 
 def _fault(message: str, position: Position | None = None, hint: str = "") -> Diagnostic:
