@@ -222,8 +222,9 @@ def test_build_tells_what_was_gained(run: Terminal, stages: Stages) -> None:
     assert found["area_m2"] < found["first_feasible"]["area_m2"]
 
 
-def test_a_factory_is_laid_out_at_the_pace_of_its_settings() -> None:
+def test_a_factory_is_laid_out_at_the_pace_of_its_settings(stages: Stages) -> None:
     """At a crawl, ways cost more than gates: the gearbox's factory is another one then."""
+    stages.on = True
     project = read(ROOT / "examples" / "gearbox.pag", ())
     usual, slow = (
         Ground().lay_out(project.plain, project.product, Settings(speed=speed))

@@ -438,8 +438,8 @@ def test_the_option_and_the_table_say_the_same(run: Terminal, file: Path) -> Non
 
 def test_a_branch_that_gains_nothing_is_named(run: Terminal, file: Path) -> None:
     """`analyze` says so where one branch would keep the pace, and only there."""
-    truck = run("analyze", "examples/truck.pag", "--parallel", "log2=2").out
-    assert "one branch for log2 would do: its robots take 1.623 s a unit" in truck
+    paper = run("analyze", "examples/paper.pag", "--parallel", "part3=2").out
+    assert "one branch for part3 would do: its robots take 0.594 s a unit" in paper
     file.write_text(TEXT.replace("dwell = 2", f"dwell = {DWELL}"))
     assert "would do" not in run("analyze", file, "--no-hands", "--parallel", "sub2=2").out
 

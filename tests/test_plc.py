@@ -72,8 +72,9 @@ def agree(name: str, scan: int = 10, monitor: bool = True, **asked: Any) -> None
         assert run.physics.unintended_contacts == 0
 
 
-@pytest.mark.parametrize("world", ["ideal", "mujoco"])
-@pytest.mark.parametrize("name", PRODUCTS)
+@pytest.mark.parametrize(
+    ("name", "world"), [*((n, "ideal") for n in PRODUCTS), ("paper", "mujoco"), ("truck", "mujoco")]
+)
 def test_a_plc_fires_what_the_supervisor_fires(name: str, world: str) -> None:
     agree(name, units=3, world=world, jitter=0.3, seed=1)
 

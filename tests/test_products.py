@@ -61,7 +61,8 @@ def test_small_products_are_made(run: Terminal, name: str) -> None:
     assert_well_made(run, name, 2)
 
 
-@pytest.mark.parametrize("name", ONE_LARGE)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LARGE)
 def test_large_products_are_made(run: Terminal, name: str) -> None:
     assert_well_made(run, name, 1)
 
