@@ -279,7 +279,9 @@ def _pairs(one: Presence, other: Presence, clearance: float) -> list[Lacking]:
     across = 0.0 if one.bears or other.bears else ACROSS
     apart = across if one.partners & other.partners else clearance - 2 * (ALONG + ROUNDING)
     here = _within(one.boxes, other.hull, apart)
-    there = _within(other.boxes, one.hull, apart)
+    there = _within(other.boxes, one.hull, apart) if len(here) else here
+    if not len(there):
+        return []
     a, b = one.boxes[here][:, None], other.boxes[there][None]
     layer, beside = one.layers[here][:, None], other.layers[there][None]
     alike = (layer == beside) | (layer == ANY) | (beside == ANY)
