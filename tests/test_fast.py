@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from factory.geometry.product import product_geometry
 from factory.layout.layout import Layout
 from factory.simulation.disturbance import Gain, Mass, Noise, Push
 from factory.simulation.disturbance.interventions import Interventions
@@ -19,7 +20,7 @@ from factory.simulation.mujoco.world import MujocoWorld
 from factory.support.engine import mujoco
 from factory.support.settings import LOOK, MOST, Settings
 from tests.command_line import PAPER, Terminal
-from tests.pag_texts import OVERLAP, laid_out
+from tests.pag_texts import OVERLAP, compiled, laid_out
 from tests.simulation_values import FINE, gone_wild, ready, state, states, stepping
 
 
@@ -71,8 +72,8 @@ BLOCKS = OVERLAP.replace("mate(u, v)", "mate(u, v, w, x)") + (
 def too_tight() -> Layout:
     """Two parts are wider than the floor was laid out for."""
     layout = laid_out(BLOCKS)
-    wide = laid_out(BLOCKS.replace("box = (0.05, 0.05", "box = (0.12, 0.12"))
-    return with_parts(layout, {label: wide.product.solids[label] for label in ("w", "x")})
+    wide = product_geometry(compiled(BLOCKS.replace("(0.05, 0.05", "(0.12, 0.12")).pag)
+    return with_parts(layout, {label: wide.solids[label] for label in ("w", "x")})
 
 
 def on_the_wrong_side() -> Layout:
