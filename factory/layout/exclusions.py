@@ -9,8 +9,8 @@ pair of robots whose hands collide where their common operation ends.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from heapq import heapify, heappop, heappush
 from itertools import product
 
@@ -24,19 +24,18 @@ from factory.layout.certificate import (
     Precedence,
     fault,
 )
-from factory.layout.coordinating import HOME, Coordinated, with_machines
-from factory.layout.hands.leaving import SPARE, before_next, farther, gone_by, homes
-from factory.layout.hands.limbs import rises_first
+from factory.layout.coordinating import Coordinated, with_machines
+from factory.layout.hands.leaving import before_next, farther, gone_by, homes
+from factory.layout.homeward import Homeward
 from factory.layout.layout import Layout
 from factory.layout.machines import presences
-from factory.layout.presence import Near, Nearness, Presence, alike, near, nearer, nearest
+from factory.layout.presence import Near, Presence, near, nearer, nearest
 from factory.layout.staying import Staying
 from factory.nets.coordinated import CoordinatedNet, Past
 from factory.nets.exclusion import (
     Circuit,
     Pair,
     excluding,
-    marked_after,
     ordered,
     overlap,
     times,
@@ -59,9 +58,6 @@ Presences = Callable[[Layout, Coordinated, Mapping[int, float]], Further]
 
 ROUNDS = 8
 """Most rounds in which ways home are cut."""
-
-BISECTIONS = 12
-"""Bisection steps to the point from which on a way home is clear."""
 
 
 def coordinated(layout: Layout) -> Coordinated:
@@ -103,7 +99,7 @@ def exclusions(layout: Layout, further: Presences | None = None) -> Exclusions:
     ways home are cut where they are clear of what comes near, until there is no new cut; a lift
     that is not clear where it is set on the way is set at home; what the net does not exclude then
     is ordered."""
-    backs, passes, judge = homes(layout), dict[Past, None](), _Judge(layout)
+    backs, passes, homeward = homes(layout), dict[Past, None](), Homeward(layout)
     at_home = dict[Precedence, None]()
     for rounds in range(ROUNDS, -1, -1):
         net = with_machines(layout, passes, [*at_home])
@@ -118,12 +114,12 @@ def exclusions(layout: Layout, further: Presences | None = None) -> Exclusions:
         needed = {
             n: pair
             for n, boxed in enumerate(pairs)
-            if n not in circuits and (pair := judge.nearer(boxed)) is not None
+            if n not in circuits and (pair := homeward.nearer(boxed)) is not None
         }
-        cuts = _cuts(judge, net.net, when, needed.values()) if rounds else []
+        cuts = homeward.cuts(net.net, when, needed.values()) if rounds else []
         if passes.keys() >= {*cuts}:
             stuck = (pair for pair in needed.values() if _orderable(net.net, when, pair) is None)
-            setting = dict.fromkeys(_set_at_home(layout, net, stuck)) if rounds else {}
+            setting = dict.fromkeys(homeward.adjusted(net, stuck)) if rounds else {}
             if at_home.keys() >= setting.keys():
                 break
             at_home |= setting
@@ -148,51 +144,6 @@ def exclusions(layout: Layout, further: Presences | None = None) -> Exclusions:
     )
 
 
-class _Judge(Nearness):
-    """That of a layout, which cuts ways home."""
-
-    def __init__(self, layout: Layout) -> None:
-        super().__init__(layout.clearance)
-        self.layout, self._cuts = layout, dict[Hashable, float | None]()
-
-    def nearer(self, found: Near) -> Near | None:
-        """As any does; of robots that go along one stem by boxes, since these are alike."""
-        robots = [side.robot for side in (found.one, found.other) if not side.bears]
-        if len({*robots}) == 2 and self.layout.share_stem(*robots):
-            one, other = (replace(p, bodies=p.bodies.as_boxes) for p in (found.one, found.other))
-            found = replace(found, one=one, other=other)
-        return super().nearer(found)
-
-    def cut(self, own: Presence, other: Presence) -> Past | None:
-        """The pass by which a robot that goes home is clear of another machine; None where it never
-        is, or always."""
-        begin = self.layout.visits[own.since // 2, own.robot].at
-        pair = own.robot, other.robot, begin, alike(own, other)
-        if pair not in self._cuts:
-            self._cuts[pair] = self._cut(own, other, begin)
-        at = self._cuts[pair]
-        return None if at is None else Past(own.since, own.robot, at)
-
-    def _cut(self, own: Presence, other: Presence, begin: float) -> float | None:
-        robot, layout = own.robot, self.layout
-        home = layout.guidepaths[robot].length
-        heights = [z for _, span in own.sweeps for z in span]
-        low = max(heights) if rises_first(layout, robot) else min(heights)
-
-        def clear(at: float) -> bool:
-            there = replace(own, sweeps=(((at, home), (low, max(heights))),))
-            pair = nearest(there, other, layout.clearance)
-            return pair is None or self.nearer(pair) is None
-
-        short, far = begin, home - SPARE
-        if layout.guidepaths[robot].fixed or begin >= home or not clear(far) or clear(short):
-            return None
-        for _ in range(BISECTIONS):
-            middle = (short + far) / 2
-            short, far = (short, middle) if clear(middle) else (middle, far)
-        return round(min(far + SPARE, home - SPARE), 6)
-
-
 def _met(layout: Layout, robots: Staying) -> Iterator[Fault]:
     """Robots that collide at the end of an operation of both."""
     for one, other in robots.ends():
@@ -214,43 +165,6 @@ def _stuck(layout: Layout, net: CoordinatedNet) -> Fault:
     robots = sorted({operations[n].carrier for n in events if n < len(operations)})
     names = listing(net.net.net.places[place].name for place in circuit)
     return fault(layout.factory, f"these wait for each other for ever: {names}", *robots)
-
-
-def _cuts(judge: _Judge, net: MarkedNet, when: Sequence[int], pairs: Iterable[Near]) -> list[Past]:
-    """Where ways home are clear of what they come near, for each pair that allows it: the shortest
-    way of both."""
-    cuts = list[Past]()
-    for pair in pairs:
-        sides = ((pair.one, pair.other), (pair.other, pair.one))
-        ways = [
-            cut
-            for own, other in sides
-            if own.since >= 0
-            and not all(marked_after(net, when, place, own.since) for place in other.places)
-            and (cut := judge.cut(own, other)) is not None
-        ]
-        if ways:
-            visits = judge.layout.visits
-            cuts.append(min(ways, key=lambda past: past.at - visits[past.after // 2, past.axis].at))
-    return cuts
-
-
-def _set_at_home(
-    layout: Layout, net: CoordinatedNet, pairs: Iterable[Near]
-) -> Iterator[Precedence]:
-    """The order places by which lifts that are set for each tour are set at home, of robots that go
-    there by themselves and would come near another on their ways."""
-    factory, transitions = layout.factory, net.net.net.transitions
-    for own in (side for pair in pairs for side in (pair.one, pair.other)):
-        home = Past(own.since, own.robot, layout.guidepaths[own.robot].length - HOME)
-        if own.robot not in factory.adjusted or home not in net.passes:
-            continue
-        gear = factory.robots[own.robot].operations
-        then = factory.operations[gear[(gear.index(own.since // 2) + 1) % len(gear)]]
-        if then.place in own.places and factory.begins(own.robot, then.index):
-            before = transitions[net.net.right[net.passes[home][0]]].name
-            start, tokens = transitions[then.start].name, int(then.index == gear[0])
-            yield Precedence(f"order:{before}:{start}", before, start, tokens)
 
 
 def _orders(
