@@ -274,8 +274,7 @@ class Simulation:
         return None
 
     def _unseen(self, max_time: float | None) -> int:
-        """Number of ticks that may pass in one call: nobody observes them or acts between two
-        steps."""
+        """Number of ticks that may pass unobserved in one call."""
         if self.world.hooks.each_step or self.world.hooks.ticks:
             return 1
         if max_time is None:
