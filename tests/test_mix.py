@@ -403,9 +403,19 @@ def test_a_log_a_plan_and_a_report_of_a_mix(file: Path, run: Terminal, tmp_path:
     assert done.json["sequence"] == run("check", file, "--json").json["sequence"]
 
 
-@pytest.mark.parametrize(
-    "options", [("--robots", "least"), ("--cycle", "1"), ("--relay",), ("--deputies",)]
-)
+def test_few_robots_make_a_mix(tmp_path: Path, run: Terminal) -> None:
+    """Forms and lines are chosen for all products at once; no more robots than the bound of each
+    product allows are asked for."""
+    file = tmp_path / "family.pag"
+    file.write_text(LITTLE.replace("x, y )", "x, y, w )") + "; w = atomic()")
+    done = run("run", file, "--robots", "least", "--units", 6, "--jitter", 0.3, "--json")
+    assert (done.status, done.json["robots"], done.json["unintended_contacts"]) == (0, 2, 0)
+    assert done.json["units_by_product"] == {"a": 4, "b": 2}
+    refused = run("check", file, "--robots", 1, "--json")
+    assert (refused.status, refused.codes) == (2, ["TooFewRobots"])
+
+
+@pytest.mark.parametrize("options", [("--relay",), ("--deputies",)])
 def test_options_for_one_product_are_refused(
     file: Path, run: Terminal, options: tuple[str, ...]
 ) -> None:

@@ -65,11 +65,19 @@ class SizeTiming:
             return TOOL_WAY
         return (self.sizes[label] + self.sizes.get(last.label, self.sizes[label])) / 2 + BETWEEN
 
+    @property
+    def outputs(self) -> list[int]:
+        """The output robot of each product."""
+        return [dropoff.carrier for dropoff in self.factory.dropoffs]
+
     @cached_property
     def tours(self) -> tuple[_Tour, ...]:
         """The tour of each robot of a factory with a robot for each label, tools apart."""
         robots = range(len(self.factory.robots))
-        kinds = [kind_of(self.factory, robot) if robot else ("output",) for robot in robots]
+        kinds = [
+            ("output",) if robot in self.outputs else kind_of(self.factory, robot)
+            for robot in robots
+        ]
         chosen = (robot for robot in robots if kinds[robot][0] != "tool")
         return tuple(_Tour.of(self, robot, kinds[robot]) for robot in chosen)
 
@@ -189,16 +197,16 @@ class _Tour:
     def of(cls, timing: SizeTiming, robot: int, kind: tuple[object, ...]) -> _Tour:
         """That of a robot of a factory with a robot for each label."""
         factory = timing.factory
-        numbers = factory.robots[robot].operations
+        numbers, is_output = factory.robots[robot].operations, kind == ("output",)
         inserted = {n: _inserted(factory, robot, factory.operations[n]) for n in numbers}
         kids = [kid for robots in inserted.values() for kid in robots]
         return cls(
             robot,
             kind,
-            frozenset(sides_of(factory, robot)) if robot else frozenset({1}),
+            frozenset({1}) if is_output else frozenset(sides_of(factory, robot)),
             timing.past(robot, numbers),
             tuple(kid for kid in begun_by(factory, robot) if kind_of(factory, kid)[0] != "tool"),
-            tuple((n, inserted[n]) for n in (numbers[1:-1] if robot else numbers[1:])),
+            tuple((n, inserted[n]) for n in (numbers[1:] if is_output else numbers[1:-1])),
             tuple((kid, delivery(factory, kid).index) for kid in kids),
         )
 
@@ -229,12 +237,12 @@ class _Tour:
         return TourBundle(tours, now, self.kind, self.sides, below, first, self.past, pace)
 
 
-def bundled(timing: SizeTiming, filling: Filling) -> TourBundle:
-    """The bundle of the output robot of a factory with a robot for each label."""
+def bundled(timing: SizeTiming, filling: Filling) -> list[TourBundle]:
+    """The bundle of the output robot of each product of a factory with a robot for each label."""
     made = dict[int, TourBundle]()
     for tour in reversed(timing.tours):
         made[tour.robot] = tour.bundle(timing, filling, made)
-    return made[0]
+    return [made[robot] for robot in timing.outputs]
 
 
 def _least(

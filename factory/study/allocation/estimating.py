@@ -11,8 +11,11 @@ from factory.compiler.expanding import expand
 from factory.compiler.folding import Line
 from factory.compiler.mating.mating import admitted
 from factory.compiler.parallel import Branches
+from factory.geometry.solids import Product
 from factory.layout.durations import Pace
+from factory.layout.guidepath import Box
 from factory.layout.hands.misses import NoGrip
+from factory.layout.repeated import repeated
 from factory.layout.shapes import payload_boxes
 from factory.pipeline import Project
 from factory.plant.factory import Factory, Operation
@@ -47,6 +50,9 @@ FEWER = 0.7
 
 SHARED = 8.0
 """Greatest duration of a tour over its share of the work, where a number of robots is asked for."""
+
+ORDERS: tuple[Order, ...] = ("lines", "fewest", "robots")
+"""The orders in which forms are compared."""
 
 NEAR = 1.3
 """Ratio of cycle times from which one estimate is clearly faster; layouts hide smaller ones."""
@@ -85,24 +91,31 @@ class Estimator:
     _alone: dict[tuple[int, ...], Project] = field(default_factory=dict, compare=False)
 
     @cached_property
-    def task(self) -> FormsTask:
-        """The task by which forms are estimated."""
-        project = self.project
-        pag, templates, product = project.pag, project.templates, project.product
-        admits = admitted(expand(pag, templates), product) if is_shaped(pag) else {}
-        boxes = payload_boxes(project.compiled, product)
-        return FormsTask(pag, templates, admits, boxes, Pace.of(project.settings))
+    def tasks(self) -> tuple[FormsTask, ...]:
+        """The tasks by which forms are estimated, one for each product."""
+        return tuple(_task(one) for one in self.project.each)
+
+    @cached_property
+    def is_free(self) -> bool:
+        """Whether some join may have another form."""
+        return any(task.free for task in self.tasks)
 
     @cached_property
     def written(self) -> Candidate:
         """The product as written."""
-        return self.candidate(written_forms(self.task))
+        return self.candidate(self._written)
+
+    @cached_property
+    def _written(self) -> dict[str, int]:
+        return {x: pile for task in self.tasks for x, pile in written_forms(task).items()}
 
     def candidate(self, forms: Mapping[str, int], filling: Filling | None = None) -> Candidate:
         """The product with these forms, and with lines if a filling is given."""
-        alone = project = self.alone(forms)
-        if filling is not None:
-            project = project.with_plan(self._shift(project).plan(filling))
+        alone = self.alone(forms)
+        one = Candidate(alone, forms, None, self.branches, alone)
+        if filling is None or not one.is_possible:
+            return one
+        project = alone.with_plan(self._shift(alone).plan(filling))
         return Candidate(project, forms, filling, self.branches, alone)
 
     def front(self, budget: Allowance, robots: float = inf) -> list[Estimate]:
@@ -119,27 +132,29 @@ class Estimator:
         each, the one with one robot for each label, then those with lines."""
         tried = {tuple(self.written.forms.values())}
         yield from self.of(self.written, robots)
-        for task in self._tasks():
-            for one in self.held(task, budget, robots=robots):
+        for order in ORDERS if self.is_free else ():
+            for one in self.held(order, budget, robots=robots):
                 key = tuple(one.forms.values())
                 if key not in tried:
                     tried.add(key)
                     yield from self.of(one, robots)
 
     def held(
-        self, task: FormsTask, budget: Allowance, share: float = 1.0, robots: float = inf
+        self, order: Order, budget: Allowance, share: float = 1.0, robots: float = inf
     ) -> Iterator[Candidate]:
         """Those with the best forms under each bound, as long as no more than a `share` of the
         budget is used. Forms that leave more labels without a hand than those of the product as
         written are refused from then on, and chosen again."""
         before: Mapping[str, int] = {}
-        for bound in self.bounds(task, robots):
+        for bound in self.bounds(order, robots):
             for _ in range(ROUNDS):
-                forms, _ = best_forms(replace(task, refused=frozenset(self.refused)), bound)
+                forms, _ = self._best(order, bound, frozenset(self.refused))
                 if forms == before or budget.over(share):
                     break
                 budget.spend()
                 one, before = self.candidate(forms), forms
+                if not one.is_possible:
+                    break
                 blame = {*blamed(one.single, forms)} if one.bare > self.written.bare else set()
                 if blame <= self.refused:
                     yield one
@@ -153,28 +168,44 @@ class Estimator:
             bare = max(0, one.bare - self.written.bare)
             yield from (replace(e, bare=bare) for e in self._filled(one, robots))
 
-    def _tasks(self) -> Iterator[FormsTask]:
-        orders: tuple[Order, ...] = ("lines", "fewest", "robots")
-        for order in orders if self.task.free else orders[:1]:
-            yield replace(self.task, order=order)
-
-    def bounds(self, task: FormsTask, robots: float = inf) -> Iterator[float]:
+    def bounds(self, order: Order, robots: float = inf) -> Iterator[float]:
         """Bounds on estimated cycles: none, then those that can be kept, the longest first. Where a
         number of `robots` is asked for, they begin at SHARED times the work of each."""
         yield inf
-        bound = sum(task.pace.rest(task.size(label)) + task.pace.lost for label in task.nodes)
+        pace, pairs = self.tasks[0].pace, [(task, x) for task in self.tasks for x in task.nodes]
+        bound = sum(pace.rest(task.size(label)) + pace.lost for task, label in pairs)
         bound = min(bound, SHARED * 2 * bound / robots) if robots < inf else bound
-        step = STEP if len(task.nodes) < LARGE else WIDE
-        while best_forms(task, bound)[1] == 0.0:
+        step = STEP if len(pairs) < LARGE else WIDE
+        while self._best(order, bound)[1] == 0.0:
             yield bound
             bound /= step
+
+    @cached_property
+    def _alike(self) -> frozenset[tuple[str, int]]:
+        """Forms that no mix has: with them products that begin alike would not any more."""
+        forest = self.project.approached
+        outputs = (forest.robots[o.carrier].operations for o in forest.dropoffs)
+        begins = (forest.operations[numbers[0]].written for numbers in outputs)
+        is_mix = self.project.pag.mix is not None
+        return frozenset((x, pile) for x in begins for pile in (0, 1) if is_mix)
+
+    def _best(
+        self, order: Order, bound: float, refused: frozenset[tuple[str, int]] = frozenset()
+    ) -> tuple[dict[str, int], float]:
+        """The best forms of the joins of all products, those of what is common as the first product
+        has them; and the sum of estimated cycles above a bound [s]."""
+        refused |= self._alike
+        tasks = (replace(task, order=order, refused=refused) for task in self.tasks)
+        found = [best_forms(task, bound) for task in tasks]
+        chosen = {x: pile for piles, _ in reversed(found) for x, pile in piles.items()}
+        return chosen, sum(over for _, over in found)
 
     def _filled(self, one: Candidate, robots: float) -> Iterator[Estimate]:
         """The estimates of a candidate with one robot for each label, and with lines for each
         filling."""
         forms = one.forms
         shift, tried = self._shift(one.single), set[tuple[Line, ...]]()
-        large = len(self.task.nodes) >= LARGE
+        large = len(shift.timing.factory.making) >= LARGE
         if shift.count(()) <= robots:
             yield Estimate(shift.count(()), shift.seconds(()), forms)
         for filling in shift.fillings(FILLED, SLACKS[:1] if large else SLACKS):
@@ -186,18 +217,33 @@ class Estimator:
                 yield Estimate(count, shift.seconds(lines), forms, filling)
 
     def _shift(self, project: Project) -> Shift:
-        factory = project.approached
-        boxes = payload_boxes(factory, project.product)
-        return Shift.of(factory, project.catalogue, boxes, self.task.pace)
+        given = project.catalogue, self.tasks[0].pace
+
+        def of(factory: Factory, forest: Shift | None = None) -> Shift:
+            boxes = _boxes(factory, project.product)
+            return Shift.of(factory, given[0], boxes, given[1], forest)
+
+        alone = of(project.approached)
+        return of(project.planned, alone) if project.pag.mix else alone
 
     def alone(self, forms: Mapping[str, int]) -> Project:
         """The product with these forms, and one robot for each label."""
         key = tuple(forms.values())
         if key not in self._alone:
-            written = written_forms(self.task)
-            other = {label: form for label, form in forms.items() if form != written[label]}
+            other = {x: pile for x, pile in forms.items() if pile != self._written[x]}
             self._alone[key] = self.project.with_plan(Plan(other))
         return self._alone[key]
+
+
+def _task(project: Project) -> FormsTask:
+    pag, templates, product = project.pag, project.templates, project.product
+    admits = admitted(expand(pag, templates), product) if is_shaped(pag) else {}
+    boxes = payload_boxes(project.compiled, product)
+    return FormsTask(pag, templates, admits, boxes, Pace.of(project.settings))
+
+
+def _boxes(factory: Factory, product: Product) -> dict[str, Box]:
+    return payload_boxes(factory, repeated(product, factory))
 
 
 def blamed(project: Project, forms: Mapping[str, int]) -> Iterator[tuple[str, int]]:

@@ -6,7 +6,7 @@ estimated from sizes.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
@@ -27,31 +27,38 @@ SLACKS = (inf, 1.5, 0.6, 0.25, 0.0)
 @dataclass(frozen=True)
 class Shift:
     """A factory with one robot for each label, whose lines are to be chosen, with its `timing`; the
-    estimated time of each robot in operations in a cycle, its `work` [s]."""
+    estimated time of each robot in operations in a cycle, its `work` [s]. `forest`: the shift of
+    the products of a mix, each made by robots of its own."""
 
     timing: SizeTiming
     catalogue: Catalogue
     work: tuple[float, ...]
+    forest: Shift | None = None
 
     @classmethod
     def of(
-        cls, factory: Factory, catalogue: Catalogue, boxes: Mapping[str, Box], pace: Pace
+        cls,
+        factory: Factory,
+        catalogue: Catalogue,
+        boxes: Mapping[str, Box],
+        pace: Pace,
+        forest: Shift | None = None,
     ) -> Shift:
         """The shift of a factory, with the `boxes` of its sub-assemblies."""
         timing = SizeTiming.of(factory, boxes, pace)
         delays = estimated_delays(timing)
         work = tuple(sum(delays[n] for n in robot.operations) for robot in factory.robots)
-        return cls(timing, catalogue, work)
+        return cls(timing, catalogue, work, forest)
 
     def seconds(self, lines: Sequence[Line]) -> float:
-        """The cycle time with these lines, by estimated delays [s]."""
+        """The cycle time with these lines, by estimated delays: the mean of the units [s]."""
         if not lines:
-            return max(self.work)
+            return max(self.work) / self.timing.factory.period
         made = folded(self.timing.factory, lines, self.catalogue)
         delays = estimated_delays(replace(self.timing, factory=made))
         net = marked(made.net)
         idle = [0.0] * (len(net.tokens) - len(delays))
-        return max_cycle_ratio(net, [*delays, *idle]).seconds
+        return max_cycle_ratio(net, [*delays, *idle]).seconds / made.period
 
     def count(self, lines: Sequence[Line]) -> int:
         """Number of robots with these lines, tools included."""
@@ -60,7 +67,8 @@ class Shift:
     def fillings(self, step: float, slacks: Sequence[float] = SLACKS) -> Iterator[Filling]:
         """Fillings to try: limits from the longest work of one robot, each `step` times the one
         before, until all could share one robot."""
-        limit, most = max(self.work), sum(self.work)
+        work = (self.forest or self).work
+        limit, most = max(work), sum(work)
         while limit < most * step:
             for slack in slacks:
                 yield Filling(limit, slack)
@@ -68,12 +76,26 @@ class Shift:
             limit *= step
 
     def lines(self, filling: Filling) -> tuple[Line, ...]:
-        """The lines for a filling."""
-        return tuple(bundled(self.timing, filling).lines())
+        """The lines for a filling. Robots of a mix are on one line where their tours for some
+        product are."""
+        if self.forest is not None:
+            turns = self.timing.factory.plan.turns
+            on = [max(robots) for robots in zip(*turns, strict=True)]
+            return joined({*map(on.__getitem__, line)} for line in self.forest.lines(filling))
+        return tuple(x for bundle in bundled(self.timing, filling) for x in bundle.lines())
 
     def plan(self, filling: Filling) -> Plan:
         """The plan with the lines for a filling."""
         return fold(self.timing.factory, self.lines(filling), self.catalogue).plan
+
+
+def joined(sets: Iterable[set[int]]) -> tuple[Line, ...]:
+    """The lines of robots that are in one of some sets together, or in a row of them."""
+    lines = list[set[int]]()
+    for one in sets:
+        whole = one.union(*(other for other in lines if one & other))
+        lines = [other for other in lines if not one & other] + [whole]
+    return tuple(tuple(sorted(line)) for line in lines if len(line) > 1)
 
 
 def _ways(timing: SizeTiming) -> tuple[list[float], list[float]]:

@@ -47,9 +47,9 @@ def allocated(
     robots are needed, or none of the factories found has as few."""
     if not aim.asks:
         return project
-    project.pag.check_alone("a search for few robots (--robots, --cycle)")
     if isinstance(aim.robots, int):
-        least = least_robots(project.pag, project.templates)
+        bounds = (least_robots(one.pag, project.templates) for one in project.each)
+        least = max(bounds, key=lambda bound: bound.total)
         if aim.robots < least.total:
             hint = f"--robots {least.total}"
             raise InputError(Diagnostic("TooFewRobots", str(least), None, hint))
@@ -114,15 +114,16 @@ class Search:
     def why(self) -> str:
         """What keeps two lines of the best apart, in words; "" where nothing is known to."""
         best = self.best.single
+        if best.pag.mix is not None:
+            return ""
         words = next(kept_apart(best.approached, lines_of(best.plan), best.catalogue), "")
         return f"; {words}" if words else ""
 
     def singles(self) -> Iterator[Candidate]:
         """The candidates by estimate with a robot for each label, each forms once, under bounds
         from long to short."""
-        task = self.estimator.task
-        if task.free:
-            yield from self.estimator.held(task, self.budget, SINGLE)
+        if self.estimator.is_free:
+            yield from self.estimator.held("robots", self.budget, SINGLE)
 
     def _shared(self) -> Iterator[Candidate]:
         """The candidates by estimate with robots that serve several labels, the most promising
