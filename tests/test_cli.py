@@ -22,15 +22,6 @@ from tests.command_line import PAPER, ROOT, Terminal, files_in
 NUMBER = (int, float)
 MAYBE = (int, float, type(None))
 
-CHECK: dict[str, Any] = {
-    "product": str,
-    **dict.fromkeys(("labels", "robots", "places", "transitions", "tokens", "largest_mode"), int),
-    **dict.fromkeys(("gear_net", "live", "safe", "reversible", "legal"), bool),
-    "gears": list,
-    "part_pool": dict,
-    "witness": list,
-    "warnings": list,
-}
 BUILD: dict[str, Any] = {
     "mjcf": (str, type(None)),
     **dict.fromkeys(("robots", "parts", "joints", "welds"), int),

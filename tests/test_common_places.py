@@ -17,7 +17,6 @@ from factory.pipeline import all_templates
 NOTHING = np.full(2, np.inf), np.full(2, -np.inf)
 HALF = st.floats(0.004, 0.03).map(lambda x: round(x, 4))
 AT = st.floats(-0.03, 0.03).map(lambda x: round(x, 4))
-LYING = "quat = ( 0.7071068, 0.7071068, 0, 0 )"
 SHAPES = st.one_of(
     st.tuples(HALF, HALF).map(lambda s: f"box = ( {2 * s[0]}, {2 * s[1]}, 0.02 )"),
     st.tuples(HALF).map(lambda s: f"cylinder = ( {s[0]}, 0.02 )"),

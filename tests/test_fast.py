@@ -12,7 +12,6 @@ import pytest
 
 from factory.geometry.product import product_geometry
 from factory.layout.layout import Layout
-from factory.simulation.disturbance import Gain, Mass, Noise, Push
 from factory.simulation.disturbance.interventions import Interventions
 from factory.simulation.mujoco.courses import AHEAD
 from factory.simulation.mujoco.fast import neighbours
@@ -130,14 +129,6 @@ def test_pushed_robots_meet_the_same_without_it(seed: int) -> None:
     """They come back while other modes begin, through what rests there."""
     fast, plain = pushed(seed, True, MOST), pushed(seed, False, 1)
     assert fast[1] and fast == plain
-
-
-DISTURBANCES: list[tuple[Any, ...]] = [
-    (Gain(0.5),),
-    (Noise(1e-4, 0.0, 1),),
-    (Push("r1/carriage", (3.0, 3.0, 0.0), 0.5, 0.2),),
-    (Mass(6.0),),
-]
 
 
 # --- going back -----------------------------------------------------------------------------------

@@ -55,8 +55,6 @@ ALONG_X = (
 )
 ALONG_X += " pos = (0, 9, 0) ); "
 
-Span = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
-
 
 def block(*spans: tuple[float, float]) -> np.ndarray:
     """The corners of a box from its intervals in x, y and z [mm]."""

@@ -1,12 +1,17 @@
 """Failures in a report: a section of what failed and what was done, undone operations and robots
-that stood over time; nothing of it in a report of any other run."""
+that stood over time; nothing of it in a report of any other run. And in the table of events."""
 
 from __future__ import annotations
 
+import csv
+import io
+from collections import Counter
 from pathlib import Path
 
 import pytest
 
+from factory.exporting import Subject, exporters
+from factory.exporting.csv import rows
 from factory.record.log import LogWriter
 from factory.record.log.failed import failures_of
 from factory.show.report import page, recording_of
@@ -115,3 +120,30 @@ def test_what_is_no_account_of_failures_is_refused(
     told = {**table_of(recording.log.failures), key: value}
     with pytest.raises(ValueError, match=words):
         failures_of(told, frozenset(recording.log.header["robots"]))
+
+
+# --- the table of events ------------------------------------------------------------------------
+
+
+def test_what_is_undone_is_a_row_of_its_own(recording: Recording) -> None:
+    """Rows less those that are undone are what lasts; a unit is counted again after that."""
+    count, undone = Counter[str](), 0
+    for row in rows(recording.log):
+        if row.kind.endswith(" undone"):
+            assert row.unit == count[row.transition]
+            count[row.transition] -= 1
+            undone += 1
+        else:
+            count[row.transition] += 1
+            assert row.unit == count[row.transition]
+    assert undone == sum(len(entry.transitions) for _, entry in recording.log.undone) > 0
+    assert +count == Counter(name for _, name in recording.log.lasting)
+    times = [row.time_s for row in rows(recording.log)]
+    assert times == sorted(times)
+
+
+def test_csv_says_so(recording: Recording) -> None:
+    text = exporters()["csv"].export(Subject(Path("log"), recording.log))
+    assert isinstance(text, str)
+    kinds = Counter(row["kind"] for row in csv.DictReader(io.StringIO(text)))
+    assert kinds.keys() == {"start", "end", "start undone", "end undone"}
