@@ -23,7 +23,7 @@ from factory.layout.exclusions import crowded
 from factory.layout.fork import NO_ARMS, forked
 from factory.layout.guidepath import Point2, hull
 from factory.layout.hands.choosing import Hands
-from factory.layout.layout import Layout, carriers
+from factory.layout.layout import Layout
 from factory.layout.optimising import bounds, optimised
 from factory.layout.way import rounding_for
 from factory.plant.factory import Factory
@@ -88,9 +88,8 @@ def drafted(
 
 def _parted(layout: Layout, certificate: Certificate) -> dict[int, float]:
     """How far robots are to go at the least, from where they deliver, so that what waits there with
-    its payload is clear of all that passes: of two that are too near, the one that needs less, or
-    the one that delivers to the other, by what is lacking [m]."""
-    on = carriers(layout.factory)
+    its payload is clear of all that passes: of two that are too near, the one that needs less [m].
+    """
     carried, found = [r for r in certificate.regions if r.kind in LOADS], dict[int, float]()
     for fault in {*certificate.faults, *certificate.crossing}:
         pair = [r.index for r in layout.factory.robots if r.name in fault.robots]
@@ -103,9 +102,7 @@ def _parted(layout: Layout, certificate: Certificate) -> dict[int, float]:
             if own and passing:
                 further = path.frame(hull(own))[1] - path.frame(hull(passing))[0]
                 ways.append((further + layout.clearance, robot))
-        behind = ((fault.lacking, r) for r, other in permutations(pair) if on[r] == other)
-        away = [way for way in ways if way[0] > 0] or [way for way in behind if way[0] > 0]
-        further, robot = min(away, default=(0.0, -1))
+        further, robot = min((way for way in ways if way[0] > 0), default=(0.0, -1))
         if further:
             travel = up(layout.guidepaths[robot].travel + further)
             found[robot] = max(travel, found.get(robot, 0.0))
