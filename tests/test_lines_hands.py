@@ -21,6 +21,7 @@ from factory.layout.hands.choosing import Hands
 from factory.layout.hands.hand import AIR, Hand
 from factory.layout.hands.limbs import limbs
 from factory.layout.hands.places import Places
+from factory.layout.hands.places import places as found_places
 from factory.layout.hanging import Hanging
 from factory.layout.layout import Layout
 from factory.pipeline import Project, read
@@ -186,7 +187,7 @@ def test_it_makes_units_and_touches_nothing_else(name: str, distributed: bool) -
 
 def test_sliders_in_each_others_way_are_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hanging, "common_places", lambda *_: [])
-    run, hidden = looked_into(project("paper").layout)
+    run, hidden = looked_into(replace(project("paper").layout))  # hangs as is not known yet
     assert run.succeeded
     assert {p.geoms for p in hidden.found() if p.depth_mm > AT_MOST_MM} == {
         ("feeder/part2/pad", "feeder/part3/pad"),
@@ -239,11 +240,11 @@ b = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( 0, 0.0602, 0.01 ) )"""
 
 
 def test_places_of_hands_are_found_once_for_all_plans(monkeypatch: pytest.MonkeyPatch) -> None:
-    looked, real = list[tuple[object, ...]](), holding.places
+    looked = list[tuple[object, ...]]()
 
-    def places(_: Product, *of: Any) -> Places:
+    def places(product: Product, *of: Any) -> Places:
         looked.append(of)
-        return real(_, *of)
+        return found_places(product, *of)
 
     monkeypatch.setattr(holding, "places", places)
     shared = planned(*PRODUCTS["shelf"], shared=False).with_lines([PRODUCTS["shelf"][1]])
