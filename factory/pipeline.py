@@ -62,14 +62,14 @@ class Project:
         they are the default ones, with the clearance and the hands of a layout."""
         layout = None if isinstance(made, Factory) else made
         plain = made if isinstance(made, Factory) else (made.plain or made).factory
-        ground, known = Ground(), dict[str, Any](plain=plain, planned=plain)
+        ground, stages = Ground(), dict[str, Any](plain=plain, planned=plain)
         if layout is not None:
             hands = int(bool(layout.hands))
             settings = settings or Settings(clearance=layout.clearance, hands=hands)
             ground = Ground(relay=layout.plain is not None, deputies=layout.standby is not None)
-            known["layout"] = layout
+            stages["layout"] = layout
             if plain.period == 1:
-                known["product"] = layout.product
+                stages["product"] = layout.product
         used = {o.template.name: o.template for o in plain.operations}
         project = cls(
             plain.pag,
@@ -78,7 +78,7 @@ class Project:
             ground=ground,
             plan=plain.plan,
         )
-        project.__dict__.update(known)
+        project.__dict__.update(stages)
         return project
 
     def with_pag(self, pag: PAG) -> Project:
@@ -92,13 +92,13 @@ class Project:
 
     def with_settings(self, settings: Settings) -> Project:
         """The same factory under other settings."""
-        known = {"product", "matings", "compiled", "approached", "planned"}
-        return self._changed(known, settings=settings)
+        kept = {"product", "matings", "compiled", "approached", "planned"}
+        return self._changed(kept, settings=settings)
 
     def with_ground(self, ground: Ground) -> Project:
         """The same factory on another ground."""
-        known = {"product", "matings", "compiled", "approached", "planned", "plain", "_hands"}
-        return self._changed(known, ground=ground)
+        kept = {"product", "matings", "compiled", "approached", "planned", "plain", "_hands"}
+        return self._changed(kept, ground=ground)
 
     def with_lines(self, lines: Sequence[Sequence[str]]) -> Project:
         """The project in which the robots that bring the labels of a line are one robot. Raises
@@ -123,10 +123,10 @@ class Project:
 
         return self.with_plan(with_tees(self.planned, stems, self.catalogue))
 
-    def _changed(self, known: Collection[str], **values: Any) -> Project:
-        """With other values, and what is `known` of it already."""
+    def _changed(self, kept: Collection[str], **values: Any) -> Project:
+        """With other values, and what is `kept` of it already."""
         made = replace(self, **values, laid=None)
-        made.__dict__.update({name: self.__dict__[name] for name in known & self.__dict__.keys()})
+        made.__dict__.update({name: self.__dict__[name] for name in kept & self.__dict__.keys()})
         return made
 
     @property
@@ -203,7 +203,7 @@ class Project:
         product = () if is_plain(self.pag) else self.product.warnings
         blocked = self.matings.faults(self.pag.allowed) if self.matings else ()
         sized = any(warning.code == "Size" for warning in product)
-        grips = () if sized else tuple(found.warning() for found in self.no_grips)
+        grips = () if sized else tuple(no_grip.warning() for no_grip in self.no_grips)
         overlaps = self.overlaps.faults(self.pag.allowed) if is_shaped(self.pag) else ()
         return (*product, *overlaps, *blocked, *grips)
 
@@ -212,8 +212,8 @@ class Project:
         """The hands to choose from, where they are chosen."""
         if not self.settings.hands:
             return None
-        known = not self.plain.adjusted and "_unlifted" in self.__dict__
-        return self._unlifted if known else hands_of(self.plain, self.product, self.settings)
+        unlifted = not self.plain.adjusted and "_unlifted" in self.__dict__
+        return self._unlifted if unlifted else hands_of(self.plain, self.product, self.settings)
 
     @cached_property
     def _unlifted(self) -> Hands:
@@ -249,8 +249,8 @@ class Project:
             return self.compiled
         from factory.layout.sequencing import sequenced
 
-        given = self.pag.mix, self.product, self.catalogue, self.settings
-        return self._shared(sequenced(self.approached, *given).plan)
+        inputs = self.pag.mix, self.product, self.catalogue, self.settings
+        return self._shared(sequenced(self.approached, *inputs).plan)
 
     def _shared(self, plan: Plan) -> Factory:
         from factory.compiler.assigning import shared
@@ -284,8 +284,8 @@ class Project:
             self.pag, self.templates, self.catalogue, self.approaches, self._single
         )
         check_shapes(factory, is_shaped(self.pag))
-        own = {name for name, template in self.templates.items() if not _is_shipped(template)}
-        tried = own and own & {operation.template.name for operation in factory.operations}
+        users = {name for name, template in self.templates.items() if not _is_shipped(template)}
+        tried = users and users & {operation.template.name for operation in factory.operations}
         if tried:
             from factory.modes.modes import check_modes
 
@@ -299,8 +299,8 @@ class Project:
         factory; RunError (Layout) where there is no room."""
         if self.laid is not None:
             return self._laid_out(self.laid)
-        given = self.plain, self.product, self.settings, self._hands, self.catalogue
-        return self.ground.lay_out(*given, *([self.draft] if "draft" in self.__dict__ else ()))
+        inputs = self.plain, self.product, self.settings, self._hands, self.catalogue
+        return self.ground.lay_out(*inputs, *([self.draft] if "draft" in self.__dict__ else ()))
 
     @cached_property
     def draft(self) -> Layout:

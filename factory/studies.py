@@ -249,8 +249,8 @@ def plan(
     placed = replace(placed, allowed=(*placed.allowed, *meant))
     fast = None if screws is None else tuple(screws)
     search = PlanOptions(aim, seconds, passing, hulls, UPS[up] if up else None, base, fast)
-    found = planned_for(placed, replace(search, templates=operations))
-    if isinstance(found, CannotAssemble):
-        raise InputError(refusal(found))
-    files = write_planned(placed, found, path_of(output), file, passing, operations)
-    return PlannedAssembly(read(files[0], templates).pag, found, files)
+    planned = planned_for(placed, replace(search, templates=operations))
+    if isinstance(planned, CannotAssemble):
+        raise InputError(refusal(planned))
+    files = write_planned(placed, planned, path_of(output), file, passing, operations)
+    return PlannedAssembly(read(files[0], templates).pag, planned, files)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import ast
 import graphlib
 import re
+import tomllib
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -47,6 +48,9 @@ ENGINE_ROOMS = (
     "show/report",
 )
 """Rooms, or parts of rooms, that may import the engine."""
+
+VAGUE = frozenset({"found", "told", "given", "known", "own"})
+"""Names that do not say what a variable is."""
 
 ENGINE_WRITERS = ("simulation/mujoco", "mjcf")
 """Where the engine's model and data are written: those of a run, and those of a replica that no run
@@ -324,6 +328,32 @@ def identifiers(module: Module) -> Iterator[str]:
         elif isinstance(node, ast.ImportFrom):
             names = [*(node.module or "").split("."), *(alias.name for alias in node.names)]
         yield from (re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower() for name in names if name)
+
+
+def vague(house: House) -> Iterator[str]:
+    """Functions with a variable or a parameter whose name does not say what it is."""
+    for module in house.modules.values():
+        for node in ast.walk(module.tree):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                inside = [*ast.walk(node)]
+                names = {one.arg for one in inside if isinstance(one, ast.arg)}
+                names |= {
+                    one.id
+                    for one in inside
+                    if isinstance(one, ast.Name) and isinstance(one.ctx, ast.Store)
+                }
+                for name in sorted(names & VAGUE):
+                    yield f"{module.name}.{node.name}: a variable is called '{name}'"
+
+
+def crowded_rooms(house: House) -> Iterator[str]:
+    """Rooms with more lines than their marks in `tests/lines.toml`, and the whole house."""
+    with (Path(__file__).parent / "lines.toml").open("rb") as file:
+        marks = tomllib.load(file)
+    counted = lines(house)
+    for room, count in sorted({**counted, "house": counted.total()}.items()):
+        if count > (most := marks.get(room, 0)):
+            yield f"{room}: {count} lines; at most {most}, by tests/lines.toml"
 
 
 def variants(house: House) -> Iterator[str]:

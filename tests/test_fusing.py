@@ -296,7 +296,7 @@ def test_a_body_that_has_just_become_free_can_take_the_place_of_others(
 ) -> None:
     """The only copy of a sub-assembly is still joined to something else when the next one is
     made; both become one in the same tick, in either order."""
-    monkeypatch.setattr("factory.simulation.mujoco.joining.SETTLING", np.inf)
+    monkeypatch.setattr("factory.simulation.mujoco.parts.SETTLING", np.inf)
     simulation = Simulation(layout_of("chest"), RunRequest(units=4, fuse=True))
     world, parts = simulation.physical, simulation.physical.parts
     holdings = parts.holdings
@@ -330,7 +330,7 @@ def test_what_has_not_settled_is_not_one_body_yet(monkeypatch: pytest.MonkeyPatc
     operation ends; its misfit is kept, and is part of the product's error."""
     simulation = ready("paper", fuse=True)
     world, joining = simulation.physical, simulation.physical.parts.joining
-    monkeypatch.setattr("factory.simulation.mujoco.joining.RIGID", 0.0)
+    monkeypatch.setattr("factory.simulation.mujoco.parts.RIGID", 0.0)
     waited: list[float] = []
     while not world.delivered():
         simulation.supervisor.step()
@@ -360,7 +360,7 @@ def test_what_has_not_settled_is_left_out_of_contact_too(monkeypatch: pytest.Mon
     layout = laid_out(INTERLOCKED)
     for settles in (True, False):
         if not settles:
-            monkeypatch.setattr("factory.simulation.mujoco.joining.SETTLING", np.inf)
+            monkeypatch.setattr("factory.simulation.mujoco.parts.SETTLING", np.inf)
         run = Simulation(layout, RunRequest(units=2, fuse=True)).run()
         assert run.products == 2 and run.physics and run.physics.excluded == (("b", "c"),)
         assert run.physics.unintended_contacts == 0 and run.physics.mating_force_max_n == 0

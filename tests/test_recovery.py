@@ -21,8 +21,7 @@ from factory.plant.factory import Factory
 from factory.plant.material import joins_of
 from factory.problem.template import Failure
 from factory.record.failures import Failures
-from factory.simulation.mujoco.failing.plant import MujocoPlant
-from factory.simulation.mujoco.failing.sensors import Senses
+from factory.simulation.mujoco.failing.plant import MujocoPlant, Senses
 from factory.simulation.recovery import Campaign, WorldFault, recover
 from factory.simulation.recovery.faults import ASKEW, KINDS, SLIPPED
 from factory.simulation.recovery.standing import Standing

@@ -14,7 +14,7 @@ from factory.pipeline import read
 from factory.record.failures import Failing
 from factory.record.state import State
 from factory.simulation.recovery import Campaign, Recovery, WorldFault, recover
-from factory.simulation.recovery.counting import summed
+from factory.simulation.recovery.recovery import summed
 from factory.simulation.request import RunRequest, WorldName
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation

@@ -13,8 +13,8 @@ import pytest
 from factory.layout.layout import Layout
 from factory.mjcf.loading import load
 from factory.mjcf.model import Model
-from factory.mjcf.plates import DIGITS, STROKES
 from factory.mjcf.replica import SHOWN
+from factory.mjcf.robot_bodies import DIGITS, STROKES
 from factory.simulation.modelling import physical_model
 from tests.examples import with_hands
 

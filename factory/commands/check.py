@@ -92,8 +92,8 @@ def check(
         proof = document(checked.net, checked.verdict)
         write_text(certificate, json.dumps(proof, ensure_ascii=False) + "\n")
     if out.as_json:
-        found = {"certificate": {"file": str(against), **proved}} if proved else {}
-        emit({**checked.as_json(), **found})
+        certified = {"certificate": {"file": str(against), **proved}} if proved else {}
+        emit({**checked.as_json(), **certified})
     else:
         _describe(checked, out.verbose, project.pag.allowed if project else ())
         if proved:
@@ -127,14 +127,14 @@ def _pictures(checked: Checked, folder: Path) -> dict[Path, bytes]:
     no hand can hold."""
     from factory.exporting import clash_picture, grip_picture
 
-    found: dict[Path, bytes] = {}
+    drawn: dict[Path, bytes] = {}
     if checked.product is None:
-        return found
+        return drawn
     if checked.matings is not None:
-        found |= clash_picture.pictures(folder, checked.matings, checked.product)
+        drawn |= clash_picture.pictures(folder, checked.matings, checked.product)
     if checked.no_grips:
-        found |= grip_picture.pictures(folder, checked.no_grips, checked.product)
-    return found
+        drawn |= grip_picture.pictures(folder, checked.no_grips, checked.product)
+    return drawn
 
 
 def _describe(checked: Checked, verbose: bool, allowed: Sequence[AllowedOverlap]) -> None:
@@ -197,10 +197,10 @@ def _describe_coordinated(coordinated: CoordinatedNet) -> None:
 
 def _by_property(faults: Sequence[Witness]) -> list[list[Witness]]:
     """Witnesses grouped by the property that they refute; those of the gear structure last."""
-    found: dict[str, list[Witness]] = {}
+    grouped: dict[str, list[Witness]] = {}
     for witness in faults:
-        found.setdefault(witness.property, []).append(witness)
-    return [found[name] for name in sorted(found, key=lambda name: name.startswith("gear"))]
+        grouped.setdefault(witness.property, []).append(witness)
+    return [grouped[name] for name in sorted(grouped, key=lambda name: name.startswith("gear"))]
 
 
 def _has_places(project: Project) -> bool:
@@ -224,7 +224,7 @@ def _describe_approaches(matings: Matings, allowed: Sequence[AllowedOverlap]) ->
 
 def _describe_deputies(deputies: Mapping[str, Sequence[str]]) -> None:
     """Print the number of robots with a deputy, and the robots that need spares."""
-    alone = [robot for robot, found in deputies.items() if not found]
+    alone = [robot for robot, of_robot in deputies.items() if not of_robot]
     listed = f"{', '.join(alone[:POOLED])}{', ...' if len(alone) > POOLED else ''}"
     say(
         f"deputies: another robot could take over for {len(deputies) - len(alone)} of"

@@ -92,16 +92,16 @@ def _name() -> Finding:
 
 
 def _package(name: str) -> Finding:
-    if found := release(name):
-        return Finding(name, True, found)
+    if version := release(name):
+        return Finding(name, True, version)
     return Finding(name, False, "not installed", f"pip install {name}")
 
 
 def _extra(name: str) -> Finding:
     """Whether all packages of an extra are installed."""
     releases = {package: release(package) for package in EXTRAS[name][0]}
-    found = ", ".join(f"{package} {version}" for package, version in releases.items())
-    return Finding(name, all(releases.values()), found, installs(name))
+    versions = ", ".join(f"{package} {version}" for package, version in releases.items())
+    return Finding(name, all(releases.values()), versions, installs(name))
 
 
 def _assets() -> Finding:
@@ -109,8 +109,8 @@ def _assets() -> Finding:
         from factory.pipeline import all_templates
         from factory.problem.robot_types import load_catalogue
 
-        found = f"{len(all_templates())} operations, {len(load_catalogue().types)} robot types"
-        return Finding("assets", True, found)
+        counts = f"{len(all_templates())} operations, {len(load_catalogue().types)} robot types"
+        return Finding("assets", True, counts)
     except (FactoryError, ImportError) as error:
         return Finding("assets", False, str(error), "install factory again")
 

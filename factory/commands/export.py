@@ -46,10 +46,10 @@ class _Format(click.ParamType[str]):
     ) -> list[CompletionItem]:
         from factory.exporting import exporters
 
-        known = exporters().values()
+        offered = exporters().values()
         return [
             CompletionItem(e.format, help=e.summary.partition(";")[0].partition(":")[0])
-            for e in known
+            for e in offered
             if e.format.startswith(incomplete)
         ]
 

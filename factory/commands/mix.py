@@ -42,15 +42,15 @@ def mix(
     made = family(pags[0], pags[1], counts, output.parent)
     write_all({output: write_pag(made.pag).encode()})
     products, shift = made.pag.products, made.matching.shift
-    own = [len(pags[0]) - len(made.common), len(pags[1]) - len(made.common)]
+    alone = [len(pags[0]) - len(made.common), len(pags[1]) - len(made.common)]
     if out.as_json:
         document = {"products": [*products], "common": [*made.common], "renamed": made.renamed}
         emit({**document, "names": made.names, "moved_by_m": [*shift], "file": str(output)})
         return 0
     say(
         f"{output}: {counts[0]} {products[0]} and {counts[1]} {products[1]};"
-        f" {len(made.common)} labels are common, {own[0]} of {products[0]} alone,"
-        f" {own[1]} of {products[1]} alone"
+        f" {len(made.common)} labels are common, {alone[0]} of {products[0]} alone,"
+        f" {alone[1]} of {products[1]} alone"
     )
     for old, new in made.renamed.items() if out.verbose else ():
         say(f"  {old} is {new}")

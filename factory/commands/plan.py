@@ -135,8 +135,8 @@ def plan(
     project = read(files[0], folders)
     if stopped and not out.silent:
         say("  stopped: the best tree so far, without pictures")
-    known = set(map(id, project.product.warnings))
-    warnings += announced([w for w in project.warnings if id(w) not in known], out)
+    announced_before = set(map(id, project.product.warnings))
+    warnings += announced([w for w in project.warnings if id(w) not in announced_before], out)
     if not out.silent:
         say_allowed(project)
     if not out.as_json:
@@ -227,7 +227,7 @@ def _by_label(placed: InPlace, planned: Planned, project: Project) -> dict[str, 
     that has all its units. A join omits screws that are driven earlier; operations of sub-trees
     that were kept have none."""
     made = {frozenset((*join.pile, *join.come)): join for join in planned.operations}
-    inside = {part.label: frozenset([label]) for label, own in placed.units() for part in own}
+    inside = {part.label: frozenset([label]) for label, parts in placed.units() for part in parts}
     for node in project.pag.postorder():
         if node.inputs:
             inside[node.label] = frozenset[str]().union(*(inside[name] for name in node.inputs))

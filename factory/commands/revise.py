@@ -61,8 +61,8 @@ def revise(
     before = options.project(out.silent)
     after = replace(options, file=new).project(out.silent, before.settings)
     with Waiting("laying out with what stays", out.silent):
-        found = revised(before, after, pin)
-        verdict = proved(found.new.layout.factory.net)
+        revision = revised(before, after, pin)
+        verdict = proved(revision.new.layout.factory.net)
         seconds = pace(after.layout, after.settings)[0].seconds if afresh else None
         change = LiveChange.of(before, after, output or Path()) if live else None
     files: list[str] = []
@@ -70,7 +70,7 @@ def revise(
         from factory.exporting.build import BuildRequest, build
 
         with Waiting("compiling the model", out.silent):
-            built = build(found.new, verdict, BuildRequest(None, output))
+            built = build(revision.new, verdict, BuildRequest(None, output))
         files += map(str, built.files)
     if output is not None and change is not None:
         texts = {output / name: text.encode() for name, text in change.files.items()}
@@ -79,14 +79,16 @@ def revise(
     if picture is not None:
         from factory.exporting.revision_picture import draw_revision
 
-        write_all({picture: draw_revision((before.layout, found.new.layout), found.kept).encode()})
+        write_all(
+            {picture: draw_revision((before.layout, revision.new.layout), revision.kept).encode()}
+        )
         files.append(str(picture))
     if out.as_json:
         also = {"live": change.as_json()} if change else {}
-        emit({**found.as_json(seconds), **also, "files": files})
+        emit({**revision.as_json(seconds), **also, "files": files})
     else:
         in_words = change.words() if change else ()
         listed = (f"  {file}" for file in files if out.verbose)
-        for line in (*found.words(seconds), *in_words, *listed):
+        for line in (*revision.words(seconds), *in_words, *listed):
             say(line)
     return 0

@@ -179,14 +179,14 @@ class _Draft:
 
     def _claim_carrier(self, node: Node, carrier: int) -> None:
         """The carrier takes the role T_j: its type becomes the more special of the two."""
-        wanted, given = node.template.robots[node.template.carrier - 1], self.types[carrier]
-        met = self.catalogue.meet(given, wanted)
+        wanted, present = node.template.robots[node.template.carrier - 1], self.types[carrier]
+        met = self.catalogue.meet(present, wanted)
         if met is None:
             message = (
                 f"robot r{carrier + 1} carries '{node.label}' and must be a '{wanted}' for"
-                f" {node.template.name}, but its next role asks for a '{given}'"
+                f" {node.template.name}, but its next role asks for a '{present}'"
             )
-            hint = f"use an operation whose carrier is a '{given}', or a type that extends both"
+            hint = f"use an operation whose carrier is a '{present}', or a type that extends both"
             self.troubles.append(Diagnostic("TypeMismatch", message, node.position, hint))
         else:
             self.types[carrier] = met

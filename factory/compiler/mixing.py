@@ -102,15 +102,15 @@ def lowered_alike(products: Sequence[Factory]) -> dict[int, dict[str, str]]:
     that one line with a lift can bring both."""
     begins = [one.operations[one.robots[one.dropoff.carrier].operations[0]] for one in products]
     model = next((first for first in begins if first.lowered >= 0), None)
-    found = dict[int, dict[str, str]]()
+    lowered_inputs = dict[int, dict[str, str]]()
     for number, first in enumerate(begins):
         inputs = [label for label in first.before if label != NOPART]
         if model is not None and first.lowered < 0 and len(inputs) == 2:
             lowered = model.before[model.lowered]
             stays = [x for x in inputs if x in model.before and x != lowered]
             others = [x for x in inputs if x not in stays]
-            found[number] = {first.label: lowered if lowered in inputs else others[-1]}
-    return found
+            lowered_inputs[number] = {first.label: lowered if lowered in inputs else others[-1]}
+    return lowered_inputs
 
 
 def _lines(forest: Factory, apart: set[int], catalogue: Catalogue) -> list[int]:

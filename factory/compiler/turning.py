@@ -91,14 +91,14 @@ def check_shapes(factory: Factory, shaped: bool) -> None:
 
 def placed(nodes: Mapping[str, Node], catalogue: Catalogue) -> dict[str, str]:
     """By operations the input that a fixed robot brings to each, and so lowers."""
-    found = dict[str, str]()
+    inputs = dict[str, str]()
     for label, node in nodes.items():
         of = node.template
         for variable, taken in zip(_variables(of), node.inputs, strict=True):
             wanted = catalogue.types.get(of.robots[of.before.index(variable)])
             if wanted is not None and wanted.fixed:
-                found[label] = taken
-    return found
+                inputs[label] = taken
+    return inputs
 
 
 @cache

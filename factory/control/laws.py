@@ -54,11 +54,11 @@ class Setting:
         """
         robot = point.robot - 1
         ends = {"A": self.lower, "B": self.upper, "S": self.station}
-        found = float(ends[point.end][robot] + point.multiple * self.r[robot])
-        if np.isnan(found):
+        arc = float(ends[point.end][robot] + point.multiple * self.r[robot])
+        if np.isnan(arc):
             message = f"{point} names a station, but the guidepath of robot {point.robot} has none"
             raise InputError(Diagnostic("BadTemplate", message, point.position, "use A or B"))
-        return found
+        return arc
 
 
 Law = Callable[[Template, Setting], Mode]

@@ -167,9 +167,9 @@ class Bundle:
         if (gated := self.gates.robot).size:
             inside[gated] &= self._offset(x)[gated] >= -self.eps[gated]
         touching = self.pairs.mode[self.pairs.apart(x) <= self.pairs.touch]
-        found = np.logical_and.reduceat(inside, self.starts)
-        found[touching] = False
-        return found
+        within = np.logical_and.reduceat(inside, self.starts)
+        within[touching] = False
+        return within
 
     def near_goal(self, x: Array, within: float, slow: Truth | None = None) -> bool:
         """Whether any mode's robots are all that near to its goal ball [m]; and all of those that

@@ -74,8 +74,8 @@ def _unwelded(mesh: Mesh) -> tuple[Array, Indices, Array]:
     corners = np.concatenate(
         [mesh.vertices[mesh.faces], np.round(corner_normals(mesh), 6)], axis=2
     ).reshape(-1, 6)
-    found, index = np.unique(corners, axis=0, return_inverse=True)
-    return found[:, :3], index.reshape(-1, 3).astype(np.int64), found[:, 3:]
+    distinct, index = np.unique(corners, axis=0, return_inverse=True)
+    return distinct[:, :3], index.reshape(-1, 3).astype(np.int64), distinct[:, 3:]
 
 
 FORMAT, TAKES, BINARY, FOLDER, OF = "gltf", "pag", True, True, "a label"

@@ -210,20 +210,20 @@ def draw_tree(pag: PAG) -> str:
 def _places(pag: PAG) -> dict[str, Point]:
     """Middle of each label's box: a row for each part; an assembly lies between its inputs, to the
     right of them. In a mix, one that would lie on another lies further to the right."""
-    found: dict[str, Point] = {}
+    middles: dict[str, Point] = {}
     row = 0
     for node in pag.postorder():
-        inputs = [found[label] for label in node.inputs]
+        inputs = [middles[label] for label in node.inputs]
         if inputs:
             x = max(x for x, _ in inputs) + COLUMN
             y = (inputs[0][1] + inputs[-1][1]) / 2
-            while pag.mix and any(x == u and abs(y - v) < ROW for u, v in found.values()):
+            while pag.mix and any(x == u and abs(y - v) < ROW for u, v in middles.values()):
                 x += COLUMN
-            found[node.label] = x, y
+            middles[node.label] = x, y
         else:
-            found[node.label] = MARGIN + BOX / 2, MARGIN + ROW * (row + 0.5)
+            middles[node.label] = MARGIN + BOX / 2, MARGIN + ROW * (row + 0.5)
             row += 1
-    return found
+    return middles
 
 
 def _box(canvas: Canvas, at: Point, node: Assembly) -> None:

@@ -66,12 +66,12 @@ class Swimlanes:
             columns.setdefault(x, []).append((y - CLEAR, y + CLEAR))
         for x, (low, high) in zip(self.x, self.spans, strict=True):
             columns.setdefault(x, []).append((low - AWAY, high + AWAY))
-        found = [start]
+        points = [start]
         for x in sorted(x for x in columns if start[0] < x < end[0]):
-            share = (x - found[-1][0]) / (end[0] - found[-1][0])
-            y = found[-1][1] + share * (end[1] - found[-1][1])
-            found.append((x, _free(y, columns[x])))
-        return [*found, end]
+            share = (x - points[-1][0]) / (end[0] - points[-1][0])
+            y = points[-1][1] + share * (end[1] - points[-1][1])
+            points.append((x, _free(y, columns[x])))
+        return [*points, end]
 
     def forward(self, place: int, before: int) -> bool:
         """Whether a place is to the right of a transition that marks it."""
@@ -157,15 +157,15 @@ def _heights(
     """The y of each place: that of its lane, or of a free row below the lanes."""
     below = max(lanes, default=TOP - LANE) + LANE
     taken: dict[float, int] = {}
-    found = [0.0] * len(owners)
+    heights = [0.0] * len(owners)
     for place in order:
         if gears := owners[place]:
-            found[place] = sorted(lanes[gear] for gear in gears)[(len(gears) - 1) // 2]
+            heights[place] = sorted(lanes[gear] for gear in gears)[(len(gears) - 1) // 2]
             continue
         number = taken.get(across[place], 0)
         taken[across[place]] = number + 1
-        found[place] = below + LANE * number
-    return found
+        heights[place] = below + LANE * number
+    return heights
 
 
 def _rows(net: MarkedNet) -> list[int]:
@@ -187,16 +187,14 @@ def _spans(
         for event in gear.transitions:
             if event >= 0:
                 rows[event].append(lanes[number])
-    alone = {event for event, found in enumerate(rows) if not found}
+    alone = {event for event, row in enumerate(rows) if not row}
     for place, shape in enumerate(net.net.places):
         for event in {*shape.left, *shape.right}:
             if not net.owners[place] or event in alone:
                 rows[event].append(down[place])
     for event, height in _spread(alone, rows, x).items():
         rows[event] = [height]
-    return [
-        (min(found, default=TOP) - OVERHANG, max(found, default=TOP) + OVERHANG) for found in rows
-    ]
+    return [(min(row, default=TOP) - OVERHANG, max(row, default=TOP) + OVERHANG) for row in rows]
 
 
 def _spread(
@@ -214,8 +212,8 @@ def _spread(
 def apart(wanted: Mapping[int, float], least: float) -> dict[int, float]:
     """Heights with at least the distance `least`, in the order of the `wanted` ones and no smaller
     than these."""
-    found: dict[int, float] = {}
+    heights: dict[int, float] = {}
     lowest = -inf
     for key in sorted(wanted, key=lambda key: (wanted[key], key)):
-        found[key] = lowest = max(wanted[key], lowest + least)
-    return found
+        heights[key] = lowest = max(wanted[key], lowest + least)
+    return heights

@@ -19,14 +19,14 @@ from factory.support.files import is_net
 def exporter(form: str, of: str = "", folders: Sequence[Path] = ()) -> Exporter:
     """The exporter of a format, with a choice `of` what it exports; `folders`: of the user's
     exporters. Raises InputError (Usage, BadExtension)."""
-    known = exporters(folders)
-    if form not in known:
-        raise usage_error(f"unknown format '{form}'", did_you_mean(form, list(known), "formats"))
-    if of and not known[form].of:
-        some = ", ".join(f"{e.format} ({e.of})" for e in known.values() if e.of)
+    formats = exporters(folders)
+    if form not in formats:
+        raise usage_error(f"unknown format '{form}'", did_you_mean(form, list(formats), "formats"))
+    if of and not formats[form].of:
+        some = ", ".join(f"{e.format} ({e.of})" for e in formats.values() if e.of)
         message = f"format {form} offers no choice, so no --of"
         raise usage_error(message, f"a choice is offered by {some}")
-    return known[form]
+    return formats[form]
 
 
 def read_source(file: Path) -> Log | GearNet | MarkedNet | None:

@@ -248,27 +248,27 @@ def _one_way(net: MarkedNet, stuck: tuple[int, ...]) -> Iterator[Defect]:
         yield no_way_back(net, event)
 
 
-def _explored(net: MarkedNet, found: Exploration) -> Iterator[Defect]:
+def _explored(net: MarkedNet, exploration: Exploration) -> Iterator[Defect]:
     """The defects that an exploration shows, and the properties that it leaves undecided."""
     names, events = net.net.places, net.net.transitions
-    text = f"undecided: {found.markings} markings were explored, and there are more"
-    if found.deadlock is not None:
-        reason = _stopped(net, found.deadlock)
-        yield Defect("live", "deadlock", reason, transitions=found.deadlock)
-    elif found.starved is not None:
-        firing, event = found.starved
+    text = f"undecided: {exploration.markings} markings were explored, and there are more"
+    if exploration.deadlock is not None:
+        reason = _stopped(net, exploration.deadlock)
+        yield Defect("live", "deadlock", reason, transitions=exploration.deadlock)
+    elif exploration.starved is not None:
+        firing, event = exploration.starved
         reason = f"{_after(net, firing)} {events[event].name} can never fire again"
         yield Defect("live", "dead transition", reason, transitions=firing or (event,))
-    elif not found.complete:
+    elif not exploration.complete:
         yield Defect("live", "undecided", text)
-    if found.unsafe is not None:
-        firing, place = found.unsafe
+    if exploration.unsafe is not None:
+        firing, place = exploration.unsafe
         reason = f"place {names[place].name} holds two tokens {_after(net, firing)}"
         yield Defect("safe", "two tokens", reason, (), (place,), firing)
-    elif not found.complete:
+    elif not exploration.complete:
         yield Defect("safe", "undecided", text)
-    if one_way := found.one_way or found.deadlock:
+    if one_way := exploration.one_way or exploration.deadlock:
         reason = f"{_after(net, one_way)} the initial marking is unreachable"
         yield Defect("reversible", "no way back", reason, transitions=one_way)
-    elif not found.complete:
+    elif not exploration.complete:
         yield Defect("reversible", "undecided", text)

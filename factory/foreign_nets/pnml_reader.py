@@ -112,7 +112,7 @@ class _Reader:
         moves = [_redistribution(self.nodes[name], place_index) for name in events]
         redistribution = tuple(move for move in moves if move is not None)
         pairs = zip(net.net.places, slots, strict=True)
-        sized = all(place.size == len(own) for place, own in pairs)
+        sized = all(place.size == len(owners) for place, owners in pairs)
         if initial is None or len(redistribution) < len(moves) or not sized:
             return loose
         try:
@@ -250,9 +250,9 @@ class _Reader:
     def _names(self, ids: Iterable[str]) -> dict[str, str]:
         """A name for each id: the node's name where it is unique, otherwise the id. Where an id is
         the name of another node, all names are ids."""
-        given = {key: self.nodes[key].content("name", "") or key for key in ids}
-        count = Counter(given.values())
-        names = {key: name if count[name] == 1 else key for key, name in given.items()}
+        written = {key: self.nodes[key].content("name", "") or key for key in ids}
+        count = Counter(written.values())
+        names = {key: name if count[name] == 1 else key for key, name in written.items()}
         return names if len(set(names.values())) == len(names) else {key: key for key in names}
 
     def _source(self, element: Element) -> Position:

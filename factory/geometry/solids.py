@@ -74,12 +74,12 @@ class Product:
     warnings: tuple[Diagnostic, ...] = ()
     _kept: dict[object, Any] = field(init=False, default_factory=dict, compare=False, repr=False)
 
-    def kept(self, make: Callable[..., Kept], *given: object) -> Kept:
-        """What `make` makes of the product and of what is `given`: once for equal values, so that
+    def kept(self, make: Callable[..., Kept], *values: object) -> Kept:
+        """What `make` makes of the product and of what is `values`: once for equal values, so that
         further factories of the product need not make it again."""
-        key = make, *given
+        key = make, *values
         if key not in self._kept:
-            self._kept[key] = make(self, *given)
+            self._kept[key] = make(self, *values)
         made: Kept = self._kept[key]
         return made
 

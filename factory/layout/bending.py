@@ -29,8 +29,8 @@ class Detour:
 
 
 def bent(layout: Layout, detours: Mapping[int, Detour]) -> Layout:
-    """A layout in which guidepaths, by robot (index), are bent; it is not certified. The output
-    robot, before which the outfeed stands, keeps its own."""
+    """A layout in which the guidepaths of some robots (index) are bent; not certified. The output
+    robot keeps its own, since the outfeed stands before it."""
     on, paths = carriers(layout.factory), list(layout.guidepaths)
     moved, longer = list[Point2](), list[float]()
     for robot, path in enumerate(layout.guidepaths):

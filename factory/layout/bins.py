@@ -1,9 +1,9 @@
-"""Bins: where what is scrap falls, beside the B end of a guidepath.
+"""Bins for scrap, beside the B ends of guidepaths.
 
 The carriage passes under the place where its payload is at B, so a bin stands beside its lane, low
-enough for payloads to pass over it. A robot at B opens its hand and a jet of air blows what it held
-over there (`failing/jets.py`). A bin stands clear of all regions of the clearance certificate, and
-so is the way from hand to bin. Where there is no room for one there is none.
+enough for payloads to pass over it. A robot at B opens its hand, and a jet of air blows the payload
+over there (`failing/jets.py`). A bin, and the way from hand to bin, keep clear of all regions of
+the clearance certificate. Where there is no room there is no bin.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ AHEAD, ASIDE = range(-1, 5), range(16)
 
 @dataclass(frozen=True, slots=True)
 class Bin:
-    """The bin of a robot (index): its outer `box`, and the `labels` that it is wide enough for.
+    """The bin of a robot (index): its outer `box`, and the `labels` for which it is wide enough.
     `near`: the side over which things come in, a unit vector from the bin to the lane."""
 
     robot: int
@@ -53,27 +53,27 @@ class Bin:
 
     @property
     def middle(self) -> Point2:
-        """(x, y) [m]."""
+        """Its middle (x, y) [m]."""
         xlo, xhi, ylo, yhi = self.box
         return (xlo + xhi) / 2, (ylo + yhi) / 2
 
     def holds(self, at: Point2) -> bool:
-        """Whether a point is over it."""
+        """Whether a point is over the bin."""
         xlo, xhi, ylo, yhi = self.box
         return xlo <= at[0] <= xhi and ylo <= at[1] <= yhi
 
 
 def bins_of(layout: Layout) -> tuple[Bin, ...]:
-    """The bins for which there is room, one a robot at most: for all that it can carry back to B
-    or, where there is no room for that, for what is smallest."""
+    """The bins for which there is room, at most one for each robot: wide enough for everything that
+    it can carry back to B, else for the smallest."""
     named, layout = layout.named, layout.whole
-    found = piles(layout.factory, layout.product)
-    taken, added = regions(layout, found), list[Region]()
+    by_label = piles(layout.factory, layout.product)
+    taken, added = regions(layout, by_label), list[Region]()
     corners = np.array([region.box for region in taken])
     tree = STRtree(shapely.box(*corners[:, [0, 2, 1, 3]].T))
     barred, made = not_carried_back(layout), list[Bin]()
     for robot in range(len(layout.guidepaths)):
-        held = _held(layout, robot, found, barred)
+        held = _held(layout, robot, by_label, barred)
         held.sort(key=lambda one: (_size(one[1].box), one[0]))
         if not held:
             continue
@@ -88,12 +88,12 @@ def bins_of(layout: Layout) -> tuple[Bin, ...]:
 
 
 def bin_regions(layout: Layout, bins: Iterable[Bin]) -> list[Region]:
-    """What bins take of the floor, and what flies into them."""
+    """The floor that bins take, and the ways of things into them."""
     whole = layout.whole
-    found = piles(whole.factory, whole.product)
+    by_label = piles(whole.factory, whole.product)
     result = list[Region]()
     for one in bins:
-        held = _held(whole, one.robot, found, frozenset())
+        held = _held(whole, one.robot, by_label, frozenset())
         flown = [each for each in held if layout.named(each[0]) in one.labels]
         result += [*_stands(one), *_flights(one, flown)]
     return result
@@ -104,7 +104,7 @@ Held = list[tuple[str, Pile]]
 
 
 def _held(
-    layout: Layout, robot: int, found: dict[str, Pile], barred: frozenset[tuple[int, str]]
+    layout: Layout, robot: int, by_label: dict[str, Pile], barred: frozenset[tuple[int, str]]
 ) -> Held:
     path, result = layout.guidepaths[robot], dict[str, Pile]()
     for number in layout.factory.robots[robot].operations:
@@ -112,13 +112,13 @@ def _held(
         label = operation.after[operation.robots.index(robot)]
         if label == NOPART or (robot, label) in barred:
             continue
-        visit, pile = layout.visits[number, robot], found[label]
+        visit, pile = layout.visits[number, robot], by_label[label]
         result[label] = pile.carried(visit, path.middle(path.length))
     return [*result.items()]
 
 
 def _placed(layout: Layout, robot: int, held: Held, near: Sequence[Region]) -> Bin | None:
-    """The first bin for what is held that is clear of all that is near: the one nearest to B."""
+    """The clear place for a bin that is nearest to B."""
     path, labels = layout.guidepaths[robot], frozenset(label for label, _ in held)
     (ux, uy), (tx, ty) = path.heading, path.side
     search, boxes = ClearanceSearch(layout, []), [pile.box for _, pile in held]
@@ -138,7 +138,7 @@ def _placed(layout: Layout, robot: int, held: Held, near: Sequence[Region]) -> B
 
 
 def _meet(search: ClearanceSearch, one: Region, other: Region) -> bool:
-    """Whether two regions in one layer are nearer than the certificate lets them."""
+    """Whether two regions of one layer are nearer than the certificate allows."""
     is_own = one.robot == other.robot and (one.kind in STATIONS) == (other.kind in STATIONS)
     if is_own or separation(one.box, other.box) >= search.layout.clearance - TOLERANCE:
         return False
@@ -146,7 +146,7 @@ def _meet(search: ClearanceSearch, one: Region, other: Region) -> bool:
 
 
 def _reached(layout: Layout, held: Held) -> tuple[float, float, float, float]:
-    """Least x and y and greatest x and y of all that bins could come near [m]."""
+    """The rectangle that bins could come near: least x and y, greatest x and y [m]."""
     xlo, xhi, ylo, yhi = hull([pile.box for _, pile in held])
     far = 2 * _size((xlo, xhi, ylo, yhi)) + STEP * len(ASIDE) + 2 * (SLACK + PLATE)
     far += layout.clearance
@@ -165,7 +165,7 @@ def _stands(one: Bin) -> list[Region]:
 
 
 def _flights(one: Bin, held: Held) -> Iterator[Region]:
-    """The way of everything from where its robot has it at B to over the bin."""
+    """The ways of payloads from the robot at B to over the bin."""
     for label, pile in held:
         xlo, xhi, ylo, yhi = pile.box
         by = one.middle[0] - (xlo + xhi) / 2, one.middle[1] - (ylo + yhi) / 2

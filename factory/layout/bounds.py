@@ -49,7 +49,7 @@ def least_times(factory: Factory, product: Product, clearance: float, pace: Pace
 
 @dataclass(frozen=True, slots=True)
 class _Interval:
-    """What something takes of one axis of the product [m]."""
+    """The interval that something takes on one axis of the product [m]."""
 
     low: float
     high: float
@@ -59,7 +59,7 @@ class _Interval:
         return (self.low + self.high) / 2
 
     def past(self, other: _Interval) -> float:
-        """How far this is to be moved to come past the other, to the nearer side."""
+        """Least displacement that brings this interval past another, to the nearer side."""
         return min(self.high - other.low, other.high - self.low)
 
 
@@ -141,16 +141,16 @@ class _Bound:
     def _moving(self, operation: Operation) -> float:
         """The least time of an operation by the legs that end in it, and by the way back of a robot
         that begins its gear with it, unless it goes ahead."""
-        pace, found = self.pace, [0.0]
+        pace, times = self.pace, [0.0]
         for slot, robot in enumerate(operation.robots):
             tour = self.factory.tour_of(robot, operation.index)
             begins = len(tour) > 1 and tour[0] == operation.index
             if begins and not pace.goes_ahead(operation, slot):
-                found.append(self._back(robot))
+                times.append(self._back(robot))
             if len(tour) > 1 and tour[-1] == operation.index:
                 leg = self.legs[robot][operation.index]
-                found.append(pace.rest(leg) + self._lowering(operation, slot))
-        return max(*found, self._waiting(operation))
+                times.append(pace.rest(leg) + self._lowering(operation, slot))
+        return max(*times, self._waiting(operation))
 
     def _waiting(self, operation: Operation) -> float:
         """The least time of an operation once its carrier stands."""

@@ -1,5 +1,5 @@
-"""The clearance certificate of a layout, as a value: what was looked at, what is shared, what is
-wrong."""
+"""The clearance certificate of a layout, as a value: the regions compared, the pairs that share
+floor, and the faults."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ ALWAYS = -1
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """A rectangle in one layer: which robot is there (a station counts to the robot it serves),
-    with what, carrying which label, from z low to z high [m], a lift up, and in the mode of which
-    operation, ALWAYS for an uncoupled region."""
+    """A rectangle in one layer: its robot (a station counts to the robot it serves), body, label
+    carried, heights from z low to z high [m] with a lift up, and the operation in whose mode the
+    robot is, ALWAYS for an uncoupled region."""
 
     robot: int
     layer: int
@@ -50,7 +50,7 @@ class Region:
     mode: int = ALWAYS
 
     def named(self, factory: Factory) -> str:
-        """What is there, in words."""
+        """The region in words."""
         if self.kind in (OUTFEED, SHED):
             return "the outfeed" if self.kind == OUTFEED else "the outfeed's shed"
         if self.kind in STATIONS and self.kind != BIN_BODY:
@@ -61,9 +61,8 @@ class Region:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """Something that breaks the certificate: the robots, the labels they carry, `lacking`: by
-    how much [m], the layer ("" for the guidepaths themselves), and where the user's file asks
-    for them."""
+    """A violation of the certificate: the robots, the labels they carry, the distance `lacking`
+    [m], the layer ("" for the guidepaths themselves), and the position in the user's file."""
 
     message: str
     robots: tuple[str, ...]
@@ -91,10 +90,10 @@ class Fault:
         }
 
 
-def fault(factory: Factory, message: str, *found: Region | int, lacking: float = 0.0) -> Fault:
+def fault(factory: Factory, message: str, *machines: Region | int, lacking: float = 0.0) -> Fault:
     """A fault of robots, each given by a region in which it is or by its number."""
-    regions = [region for region in found if isinstance(region, Region)]
-    numbers = (region.robot if isinstance(region, Region) else region for region in found)
+    regions = [region for region in machines if isinstance(region, Region)]
+    numbers = (region.robot if isinstance(region, Region) else region for region in machines)
     robots = [factory.robots[number] for number in numbers]
     return Fault(
         message,
@@ -108,10 +107,9 @@ def fault(factory: Factory, message: str, *found: Region | int, lacking: float =
 
 @dataclass(frozen=True, slots=True)
 class Shared:
-    """Two robots whose regions meet, and why they do not: `operations` are the modes in which
-    they are there, and `point` the junction. One operation: both are in that very mode, which
-    joins their payloads. Two: the modes have a robot in common, which can be in one of them
-    only."""
+    """Two robots whose regions meet, and why the robots do not: `operations` are the modes in which
+    they are there, and `point` the junction. One operation: both are in that mode, which joins
+    their payloads. Two: the modes have a robot in common, which can be in one of them only."""
 
     robots: tuple[str, str]
     operations: tuple[str, ...]
@@ -128,9 +126,9 @@ class Shared:
 
 @dataclass(frozen=True, slots=True)
 class Excluded:
-    """Two machines that would come near in two places of the coordinated net, by which `bodies` of
-    theirs, and the places of a `circuit` through both that carries one token: so they are never
-    in both at once."""
+    """Two machines that would come near in two places of the coordinated net: the `bodies`, and the
+    places of a `circuit` with one token through both places, so that they are never marked
+    together."""
 
     machines: tuple[str, str]
     places: tuple[str, str]
@@ -149,9 +147,9 @@ class Excluded:
 
 @dataclass(frozen=True, slots=True)
 class Precedence:
-    """An order place by `name` that keeps machines apart: `start` has fired at most `tokens` times
-    more often than `before`, transitions of the coordinated net by their names. Whether a run
-    keeps it (`kept`): what a magazine has to do before comes long before."""
+    """An order place by `name` that keeps machines apart: `start` fires at most `tokens` times more
+    often than `before` (names of transitions of the coordinated net). `kept`: whether a run has to
+    enforce it; what a magazine has to do before comes long before."""
 
     name: str
     before: str
@@ -167,8 +165,8 @@ class Precedence:
 @dataclass(frozen=True, slots=True)
 class Exclusions:
     """What keeps the machines of a layout apart: the pairs that come near, each with its circuit;
-    the order places, and the passes on ways home, that are needed for that; the robots (index) that
-    go back by themselves to an arc length [m]; and the pairs for which there is none."""
+    the order places and passes needed for that; the robots (index) that return by themselves, each
+    to an arc length [m]; and the pairs that nothing keeps apart."""
 
     excluded: tuple[Excluded, ...] = field(default=(), repr=False)
     orders: tuple[Precedence, ...] = field(default=(), repr=False)
@@ -203,11 +201,11 @@ class Certificate:
 
     @property
     def holds(self) -> bool:
-        """Whether the layout is clear."""
+        """Whether there is no fault."""
         return not self.faults
 
     def is_of(self, factory: Factory) -> bool:
-        """Whether it is of a factory with these operations and robots."""
+        """Whether the certificate is of a factory with these operations and robots."""
         names = tuple(robot.name for robot in factory.robots)
         return (names, tuple(o.label for o in factory.operations)) == (self.robots, self.operations)
 
@@ -231,8 +229,8 @@ class Certificate:
         }
 
     def summary(self) -> dict[str, object]:
-        """Its figures alone: whether it holds, the clearance [m], how many regions were compared
-        and how many pairs of robots share a junction."""
+        """Its figures: whether it holds, the clearance [m], the number of regions compared and of
+        pairs of robots that share a junction."""
         return {
             "holds": self.holds,
             "clearance_m": self.clearance,

@@ -96,22 +96,22 @@ def certify(layout: Layout) -> Certificate:
 
 
 def searched(layout: Layout) -> tuple[ClearanceSearch, list[Fault]]:
-    """The search among all regions of a layout, and what is wrong with it but for machines that are
-    near each other in two places of the net: the faults of its guidepaths, of regions, of what
-    waits, of what is lowered, and of what is taken away."""
-    found = piles(layout.factory, layout.product)
-    search = ClearanceSearch(layout, regions(layout, found))
+    """The search among all regions of a layout, and all faults except machines that are near each
+    other in two places of the net: of guidepaths, regions, waiting payloads, lowered payloads and
+    the outfeed."""
+    by_label = piles(layout.factory, layout.product)
+    search = ClearanceSearch(layout, regions(layout, by_label))
     return search, [
         *islice(embedding_faults(layout), MOST),
         *islice(search.faults(), MOST),
-        *islice(_standoffs(layout, found), MOST),
-        *islice(_raised(layout, found), MOST),
-        *_uneven(layout, found),
+        *islice(_standoffs(layout, by_label), MOST),
+        *islice(_raised(layout, by_label), MOST),
+        *_uneven(layout, by_label),
     ]
 
 
 def separation(one: Box, other: Box) -> float:
-    """The distance of two boxes [m]; negative by how deep they overlap."""
+    """The distance of two boxes [m]; negative: their depth of overlap."""
     x = max(other[0] - one[1], one[0] - other[1])
     y = max(other[2] - one[3], one[2] - other[3])
     if max(x, y) <= 0:
@@ -120,11 +120,9 @@ def separation(one: Box, other: Box) -> float:
 
 
 class ClearanceSearch:
-    """Finds the pairs of regions that are too near, and why some of them may be.
-
-    `pairs` counts those looked at, to tell how the work grows; `crossing`: the faults of robots
-    without a common operation, which the coordinated net may keep apart.
-    """
+    """Finds the pairs of regions that are too near, and why some may be. `pairs`: number of pairs
+    compared, a measure of work; `crossing`: the faults of robots without a common operation, which
+    the coordinated net may keep apart."""
 
     def __init__(self, layout: Layout, swept: list[Region]) -> None:
         self.layout, self.swept = layout, swept
@@ -134,7 +132,7 @@ class ClearanceSearch:
         self._members = [frozenset(o.robots) for o in layout.factory.operations]
 
     def faults(self) -> Iterator[Fault]:
-        """Every pair that is too near with no reason."""
+        """Every pair that is too near without a reason."""
         for layer in range(len(NAMES)):
             here = [region for region in self.swept if region.layer == layer]
             for one, other in self.near(here):
@@ -145,8 +143,8 @@ class ClearanceSearch:
                     yield near
 
     def near(self, here: list[Region]) -> Iterator[tuple[Region, Region]]:
-        """Pairs in one layer that are less than a clearance apart in plan: of different robots,
-        or of a station and its own robot."""
+        """Pairs of one layer less than a clearance apart in plan: of different robots, or of a
+        station and its own robot."""
         corners = np.array([region.box for region in here], float).reshape(-1, 4)
         cells = shapely.box(corners[:, 0], corners[:, 2], corners[:, 1], corners[:, 3])
         robot = np.array([region.robot for region in here])
@@ -159,8 +157,7 @@ class ClearanceSearch:
                 yield here[i], here[j]
 
     def settled(self, one: Region, other: Region) -> bool:
-        """Whether two regions that are near in plan are never taken at once, or are apart in
-        height."""
+        """Whether two regions near in plan are never taken together, or are apart in height."""
         kinds = {one.kind, other.kind}
         if one.robot == other.robot and OUTFEED in kinds:
             return self._serves(one) and self._serves(other)
@@ -180,13 +177,14 @@ class ClearanceSearch:
         )
 
     def _cross(self, one: Region, other: Region) -> bool:
-        """Whether they are regions of robots, not of stations, that have no operation in common."""
+        """Whether both are regions of robots, not stations, without a common operation."""
         robots = self.layout.factory.robots
         mine, others = (robots[region.robot].operations for region in (one, other))
         return {one.kind, other.kind}.isdisjoint(STATIONS) and {*mine}.isdisjoint(others)
 
     def _serves(self, region: Region) -> bool:
-        """Whether the outfeed takes a region in: itself, the robot under it, the product let go."""
+        """Whether the outfeed may take a region in: itself, the robot under it, the released
+        product."""
         return region.kind not in LOADS or self.layout.factory.drops(region.mode)
 
     def _joined(self, one: Region, other: Region) -> bool:
@@ -197,7 +195,7 @@ class ClearanceSearch:
         return True
 
     def _in_turn(self, one: Region, other: Region) -> bool:
-        """Whether both are coupled, in modes that have a robot in common."""
+        """Whether both are coupled, in modes with a robot in common."""
         if ALWAYS in (one.mode, other.mode):
             return False
         if self._members[one.mode].isdisjoint(self._members[other.mode]):
@@ -206,8 +204,8 @@ class ClearanceSearch:
         return True
 
     def _over(self, one: Region, other: Region) -> bool:
-        """Whether one is that of a fixed robot over a station of the other's: what is there is
-        below its tool, or they are near in space (`exclusions`)."""
+        """Whether one is of a fixed robot over a station of the other's: that is below its tool, or
+        they are near in space (`exclusions`)."""
         end = delivery(self.layout.factory, one.robot)
         if not self.layout.factory.robots[one.robot].fixed or end is None:
             return False
@@ -232,26 +230,28 @@ class ClearanceSearch:
         c = self.layout.clearance
         gap = separation(one.box, other.box)
         names = [region.named(self.layout.factory) for region in (one, other)]
-        found = f"are {gap * 1000:.1f} mm apart" if gap > 0 else f"overlap by {-gap * 1000:.1f} mm"
+        measured = (
+            f"are {gap * 1000:.1f} mm apart" if gap > 0 else f"overlap by {-gap * 1000:.1f} mm"
+        )
         message = (
-            f"{names[0]} and {names[1]} {found} in the layer of {NAMES[one.layer]};"
+            f"{names[0]} and {names[1]} {measured} in the layer of {NAMES[one.layer]};"
             f" {c * 1000:g} mm are needed"
         )
         return fault(self.layout.factory, message, one, other, lacking=c - gap)
 
 
-def _standoffs(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
-    """Where a carrier brings a pile itself: what is brought to it is clear of the pile's way as
-    long as it waits at its standoff, and waits no farther away than where it comes from."""
+def _standoffs(layout: Layout, by_label: Mapping[str, Pile]) -> Iterator[Fault]:
+    """Faults where a carrier brings a pile itself: an input that waits at its standoff must be
+    clear of the pile's way, and wait no farther away than where it comes from."""
     for operation in layout.factory.making:
         carrier = operation.template.carrier - 1
         if operation.before[carrier] == NOPART or len(operation.inputs) == 1:
             continue
-        piles = _way(layout, found, operation, carrier)
+        piles = _way(layout, by_label, operation, carrier)
         for slot, label in enumerate(operation.before):
             if slot == carrier or label == NOPART:
                 continue
-            guests = _way(layout, found, operation, slot)
+            guests = _way(layout, by_label, operation, slot)
             guest = guests[0]
             before, visit = layout.ways[operation.index, guest.robot]
             room = before.at - visit.at - layout.standoff(operation, slot)
@@ -269,33 +269,34 @@ def _standoffs(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
                 )
 
 
-def _raised(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
-    """What is to be lowered comes above all that the others bring."""
+def _raised(layout: Layout, by_label: Mapping[str, Pile]) -> Iterator[Fault]:
+    """Faults where a lowered input does not come above the other inputs."""
     for operation in layout.factory.making:
         if operation.lowered < 0:
             continue
         guest = operation.robots[operation.lowered]
-        low = found[operation.before[operation.lowered]].z[0]
+        low = by_label[operation.before[operation.lowered]].z[0]
         low += layout.visits[operation.index, guest].elevation
         pile = layout.visits[operation.index, operation.carrier].elevation
         for robot, label in zip(operation.robots, operation.before, strict=True):
             if robot == guest or label == NOPART:
                 continue
-            over = low - found[label].z[1] - pile
+            over = low - by_label[label].z[1] - pile
             if over < MARGIN - TOLERANCE:
                 name = layout.factory.robots[guest].name
                 message = (
                     f"{name} comes {over * 1000:.1f} mm over '{label}' in '{operation.label}';"
                     f" {MARGIN * 1000:g} mm are needed"
                 )
-                here = Region(guest, PAYLOADS, PAYLOAD_BODY, found[label].box, found[label].z)
+                here = Region(guest, PAYLOADS, PAYLOAD_BODY, by_label[label].box, by_label[label].z)
                 yield fault(layout.factory, message, here, lacking=MARGIN - over)
 
 
-def _uneven(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
-    """What is higher than the product of another unit: the tray takes all at one height."""
+def _uneven(layout: Layout, by_label: Mapping[str, Pile]) -> Iterator[Fault]:
+    """Faults where products of different units end at different heights: the tray takes all at
+    one."""
     factory = layout.factory
-    lows = {product: found[product].z[0] for product in factory.products}
+    lows = {product: by_label[product].z[0] for product in factory.products}
     lowest = min(lows, key=lows.__getitem__)
     for product, low in lows.items():
         if (above := low - lows[lowest]) > EVEN:
@@ -307,13 +308,13 @@ def _uneven(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
 
 
 def _way(
-    layout: Layout, found: Mapping[str, Pile], operation: Operation, slot: int
+    layout: Layout, by_label: Mapping[str, Pile], operation: Operation, slot: int
 ) -> list[Region]:
-    """What a robot's payload sweeps in a mode before its gate opens."""
+    """The region that a robot's payload sweeps in a mode before its gate opens."""
     robot = operation.robots[slot]
     label = operation.before[slot]
     before, visit = layout.ways[operation.index, robot]
-    pile, end = found[label].carried(visit), visit.at + layout.standoff(operation, slot)
+    pile, end = by_label[label].carried(visit), visit.at + layout.standoff(operation, slot)
     return [
         Region(robot, PAYLOADS, PAYLOAD_BODY, box, pile.z, label, operation.index)
         for box in layout.guidepaths[robot].sweeps(pile.box, before.at, end)

@@ -49,10 +49,9 @@ HEAT = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Reach:
-    """What bounds the detours of a robot, but for roundings: where it may leave its line at the
-    least (`head`), and how much of its guidepath has to be straight at the other end [m], along its
-    heading (`tail`) or where it leads to the side t or the other (`aside`), nothing where it has
-    several stations."""
+    """Bounds on the detours of a robot, apart from roundings: the least coordinate at which it may
+    leave its line (`head`), and the straight stretch that its guidepath needs at the other end [m],
+    along its heading (`tail`) or to either side (`aside`; None if it has several stations)."""
 
     head: float
     tail: float
@@ -60,8 +59,8 @@ class Reach:
 
     @classmethod
     def of(cls, layout: Layout, robot: int) -> Reach:
-        """That of a robot: all its stations are at the end at which it receives, and the next part
-        of a feeder comes down when it is clear of that."""
+        """The bounds of a robot: its stations are at the end at which it receives, and a feeder's
+        next part comes down only when it is clear."""
         path, operations = layout.guidepaths[robot], layout.factory.operations
         gear = [operations[number] for number in layout.factory.robots[robot].operations]
         at = {o.index: layout.visits[o.index, robot].at for o in gear}
@@ -75,11 +74,11 @@ class Reach:
 
 
 def compacted(layout: Layout, pace: Pace) -> list[Layout]:
-    """Layouts with bends in their guidepaths that take less and less floor, none certified."""
+    """Layouts with bends, each taking less floor than the one before; not certified."""
     tries = min(TRIES * len(layout.guidepaths), MOST)
     searches = (_Search(layout, pace, seed).better(tries) for seed in range(SEARCHES))
-    found = [pair for search in searches for pair in search]
-    return [made for _, made in sorted(found, key=lambda pair: -pair[0])]
+    pairs = [pair for search in searches for pair in search]
+    return [made for _, made in sorted(pairs, key=lambda pair: -pair[0])]
 
 
 class _Search:
@@ -100,7 +99,7 @@ class _Search:
         self.middle = np.array([(low + high) / 2, (lowest + highest) / 2])
 
     def better(self, tries: int) -> Iterator[tuple[float, Layout]]:
-        """Floors [m²], less and less, and layouts that take them."""
+        """Floors [m²] in falling order, each with its layout."""
         here, least = self.begin, self.begin.area
         size, robots = least, [*self.reach]
         for step in range(tries):
@@ -125,13 +124,13 @@ class _Search:
                 yield least, made
 
     def worth(self, placing: Placing, size: float) -> float:
-        """What a floor costs, less for a better one."""
+        """The cost of a floor."""
         off = np.abs(placing.hulls - np.repeat(self.middle, 2))
         furthest = off[:, :2].max(axis=1) + off[:, 2:].max(axis=1)
         return placing.area / size + PULL * float(furthest.mean())
 
     def proposed(self, robot: int, before: Detour | None) -> Detour | None:
-        """Another detour of a robot; None for none."""
+        """Another detour for a robot; None for a straight one."""
         rng, reach, path = self.rng, self.reach[robot], self.layout.guidepaths[robot]
         kind = rng.random()
         if kind < 0.1:
@@ -155,8 +154,8 @@ class _Search:
         return self.fitting(robot, lengths, rounding)
 
     def fitting(self, robot: int, lengths: list[float], rounding: float) -> Detour:
-        """The detour of a robot that goes straight, across and straight again for some lengths, or
-        longer where it has to; or across only, where the last is 0 [m]."""
+        """The detour straight, across and straight again by given lengths, or longer ones if
+        needed; across only if the last is 0 [m]."""
         at, across, tail = lengths
         reach, path = self.reach[robot], self.layout.guidepaths[robot]
         at = max(up(at), up(reach.head + rounding))

@@ -1,8 +1,8 @@
-"""The coordinated net of a layout: its compiled net with ways past points, hands that wait for each
-other, magazines and the tray (`nets/coordinated.py`).
+"""The coordinated net of a layout: its compiled net with passes, hands that wait for each other,
+magazines and the tray (`nets/coordinated.py`).
 
-An order between two operations is that in which one unit is made alone. So a sequence in which each
-transition fires once stays possible, and no circuit is free of tokens.
+Operations are ordered as when one unit is made alone. So a sequence in which each transition fires
+once stays possible, and no circuit is free of tokens.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ HOME = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Served:
-    """How a magazine serves the part of an operation (index): the place in which its slider goes up
-    after the part `before`, by the operation (index) that takes that, the one in which it is on
-    `top`, and the place in which it comes down with this one."""
+    """The steps of a magazine for the part of an operation (index): the place in which its slider
+    goes up after the part `before` (by the operation that takes it), the place in which it is on
+    `top`, and the place in which it comes down with this part."""
 
     before: int
     up: int
@@ -39,7 +39,7 @@ class Served:
 @dataclass(frozen=True)
 class Coordinated(CoordinatedNet):
     """The coordinated net of a layout. `served`: by the operation (index) that takes a part;
-    `away`: the place in which the tray is away after a dropoff, by its operation (index)."""
+    `away`: by dropoff (index), the place in which the tray is away."""
 
     served: Mapping[int, Served] = field(default_factory=dict, repr=False)
     away: Mapping[int, int] = field(default_factory=dict, repr=False)
@@ -47,9 +47,9 @@ class Coordinated(CoordinatedNet):
 
 @dataclass(frozen=True, slots=True)
 class _Feeding:
-    """Two parts that a magazine shows one after the other, by the operations in which they are
-    taken; whether a run begins with the second one; and the pass of the robot that has to be out of
-    the way in between, None where it is as soon as it has delivered."""
+    """Two consecutive parts of a magazine, by the operations that take them; whether a run begins
+    with the second; and the pass by which the robot must be out of the way in between, None if it
+    is as soon as it has delivered."""
 
     before: Operation
     leaf: Operation
@@ -60,8 +60,8 @@ class _Feeding:
 def with_machines(
     layout: Layout, passes: Iterable[Past], orders: Sequence[Precedence] = ()
 ) -> Coordinated:
-    """The coordinated net of a layout with bodies: with some passes of robots on their way home,
-    and the order places that keep its machines apart."""
+    """The coordinated net of a layout with bodies: with passes of robots on their way home, and the
+    order places that keep machines apart."""
     factory, build = layout.factory, Coordination(layout.factory.net)
     feedings, lifted = [*_feedings(layout)], [*_lifted(layout)]
     every = dict.fromkeys(feeding.past for feeding in feedings if feeding.past is not None)
@@ -97,15 +97,15 @@ def _of(build: Coordination, served: Mapping[int, Served], away: Mapping[int, in
 
 
 def _way_of(layout: Layout, past: Past) -> tuple[int, int, bool, float]:
-    """The transition that a pass follows, its robot, and in which order the robot comes past
-    points: its lift first, where that has to be up before it goes home."""
+    """The transition that a pass follows, its robot, and the order in which the robot passes
+    points: its lift first if that has to be up before it goes home."""
     robot = layout.factory.robot_of(past.axis)
     return past.after, robot, past.axis == robot, past.at * past.direction
 
 
 def _lifted(layout: Layout) -> Iterator[tuple[Past, int]]:
-    """The lifts that have to be up before their robots go home, since their hands are above what
-    they have let go: the pass, and the operation (index) that leads home."""
+    """The lifts that must be up before their robots go home, since their hands are above what they
+    released: the pass, and the operation (index) that leads home."""
     for robot, tours in enumerate(layout.factory.tours):
         if rises_first(layout, robot):
             for last, tour in zip((*tours[-1:], *tours), tours, strict=False):
@@ -113,7 +113,7 @@ def _lifted(layout: Layout) -> Iterator[tuple[Past, int]]:
 
 
 def _axis(layout: Layout, past: Past) -> str:
-    """The name of a pass's axis: that of its robot, `up` for a lift."""
+    """The name of a pass's axis: that of its robot, with `up` for a lift."""
     robot = layout.factory.robots[layout.factory.robot_of(past.axis)]
     return robot.name if past.axis == robot.index else f"{robot.name} up"
 
@@ -147,8 +147,7 @@ def _chain(
 
 
 def _feedings(layout: Layout) -> Iterator[_Feeding]:
-    """What magazines show, one part after the other. A robot whose hand is there first is at home
-    before a part comes down; any other is past the point where all that it holds is clear."""
+    """The consecutive pairs of parts of all magazines."""
     factory = layout.factory
     for robot, tours in enumerate(factory.tours):
         hand, length = layout.hand(robot), layout.guidepaths[robot].length

@@ -1,10 +1,9 @@
-"""That f embeds the quotient workspace W: guidepaths come together at their junctions, cross
-nowhere.
+"""Whether f embeds the quotient workspace W: guidepaths meet at their junctions and cross nowhere.
 
-What a carriage's centre follows is the segment f([A + 2r, B]): 2r before A it stands, and what is
-joined there is what it holds out. So no two segments have a point in common, and at a junction the
-product's middles are one point. All of it is in whole millimetres, and every comparison is between
-integers.
+A carriage's centre follows the segment f([A + 2r, B]): it stops 2r before A, and its payload
+reaches to the junction. So no two segments may have a point in common, and at a junction the
+product's middles must be one point. All lengths are whole millimetres, and every comparison is
+between integers.
 """
 
 from __future__ import annotations
@@ -88,7 +87,7 @@ def _junction(layout: Layout, robot: int, carrier: int) -> Iterator[Fault]:
 
 
 def _ends_at(layout: Layout, robot: int, operation: Operation) -> Iterator[Fault]:
-    """What a robot's guidepath lacks where it delivers in an operation."""
+    """What is wrong with a robot's guidepath at its A end, in an operation."""
     path, factory, number = layout.guidepaths[robot], layout.factory, operation.index
     carrier, name, (u, t) = operation.carrier, factory.robots[robot].name, (path.heading, path.side)
     on, other = layout.guidepaths[carrier], factory.robots[carrier].name
@@ -137,15 +136,15 @@ def _crossings(layout: Layout) -> Iterator[Fault]:
 
 
 def _legs(path: Guidepath) -> Iterator[tuple[Grid, Grid]]:
-    """The ends of the legs of a guidepath from where its robot delivers to where it receives."""
+    """The ends of the legs of a guidepath between the points of delivering and receiving."""
     corners = map(path.corner, path.corners)
     points = [_grid(p) for p in (path.carriage(path.reach), *corners, path.carriage(path.length))]
     yield from pairwise(points)
 
 
 def _rounded(corners: list[float], path: Guidepath) -> bool:
-    """Whether the corners of a guidepath are so far from each other and its ends as they are
-    round."""
+    """Whether the corners of a guidepath are far enough from each other and its ends for their
+    rounding."""
     apart = np.diff([path.reach - path.rounding, *corners, path.length + path.rounding])
     return bool((apart >= 2 * path.rounding - 1e-9).all())
 
@@ -158,7 +157,7 @@ def touching(low: NDArray[np.int64], high: NDArray[np.int64]) -> Iterator[tuple[
 
 def near(cells: NDArray[np.object_], *predicate: object) -> Iterator[tuple[Index, Index]]:
     """The pairs i < j of shapes whose boxes overlap, or for which a `predicate` of STRtree.query
-    holds, in order and CHUNK shapes at a time."""
+    holds, in order, computed for CHUNK shapes at a time."""
     tree = shapely.STRtree(cells)
     for start in range(0, len(cells), CHUNK):
         first, second = tree.query(cells[start : start + CHUNK], *predicate)

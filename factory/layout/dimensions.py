@@ -82,44 +82,44 @@ def up(length: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Clearance:
-    """c: the least distance between two things that are not meant to touch [m]."""
+    """c: least distance between things that are not meant to touch [m]."""
 
     c: float = 0.02
 
     @property
     def rim(self) -> float:
-        """How far an arm's end stays behind the line of another robot's mast, and of a post."""
+        """Distance of an arm's end from the line of another robot's mast, and of a post."""
         return max(MAST, POST) / 2 + self.c
 
     @property
     def stop(self) -> float:
-        """How far beyond the ends of its guidepath a robot is stopped: two that are pressed against
-        their stops, one towards the other, keep a tenth of the clearance."""
+        """Distance of end stops beyond the ends of a guidepath: two robots pressed against stops
+        that face each other keep a tenth of the clearance."""
         return 0.45 * self.c
 
     @property
     def play(self) -> float:
-        """How far beyond the ends its buffers begin: it stays clear of them unless it is pushed."""
+        """Distance of buffers beyond the ends of a guidepath: a robot reaches them only if it is
+        pushed."""
         return self.c / 20
 
     @property
     def spread(self) -> float:
-        """How far the lanes of robots that relay each other lie to either side of the line on which
-        one robot would run."""
+        """Distance of the lanes of relaying robots, to either side, from the line of a single
+        robot."""
         return up((CARRIAGE + self.c) / 2)
 
     def reach(self, arm: float, lane: float = 0.0) -> float:
-        """How far the carriage stays behind: of the arm's end, and of the other robot's carriage
-        whose line is `lane` nearer than the product's middle."""
+        """Distance that a carriage stays behind the arm's end, and behind the other robot's
+        carriage, whose line is `lane` nearer to the product's middle."""
         return max(arm + STUB, CARRIAGE + self.c + lane)
 
     @property
     def room(self) -> float:
-        """The height between a part that is presented and the lower edge of its housing."""
+        """Height between a presented part and the lower edge of its housing."""
         return self.c
 
     def post(self, reach: float, rear: float) -> float:
-        """How far behind the product's middle the centre of a feeder's post stands: behind the
-        carriage's rear stop, and behind the part and the hand that holds it, whose rear end is at
-        `rear`."""
+        """Distance of a feeder's post, behind the product's middle: behind the carriage's rear
+        stop, and behind the part and the hand that holds it, whose rear end is at `rear`."""
         return max(reach + CARRIAGE / 2, -rear) + self.c + POST / 2

@@ -1,4 +1,4 @@
-"""From lengths to a layout: every guidepath placed on the floor, the outfeed before the output
+"""From lengths to a layout: all guidepaths placed on the floor, and the outfeed before the output
 robot."""
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from factory.plant.factory import Factory
 
 @dataclass(frozen=True, slots=True)
 class LayoutDraft:
-    """All that is needed to place the robots of a factory on a floor."""
+    """The data needed to place the robots of a factory on a floor."""
 
     factory: Factory
     product: Product
@@ -41,8 +41,8 @@ class LayoutDraft:
     stretched: Stretched
 
     def layout(self, least: float = 0.0) -> Layout:
-        """The layout that these lengths give, the output robot's path as short as can be, but of at
-        `least` such a travel [m]; the floor it takes is not known yet."""
+        """The layout of these lengths, with the output robot's path as short as possible, but of at
+        `least` a given travel [m]; its floor is not computed yet."""
         travel = list(self.stretched.travel)
         lanes = (-1, +1) if any(shape.spread for shape in self.shapes) else (0,)
         spare = min(_spare(self._layout(travel, lane)) for lane in lanes)
@@ -50,7 +50,8 @@ class LayoutDraft:
         return self._layout(travel)
 
     def _layout(self, travel: Sequence[float], lane: int = 0) -> Layout:
-        """With every robot that has room for two lanes in the middle of it, or in one of them."""
+        """The layout with each robot that has room for two lanes in their middle, or in one of
+        them."""
         guidepaths = self._guidepaths(travel, lane)
         return Layout(
             self.factory,
@@ -64,7 +65,7 @@ class LayoutDraft:
         )
 
     def _shifts(self) -> tuple[tuple[Point3, ...], ...]:
-        """For each robot those of its tours; none where no robot has any."""
+        """For each robot the shifts of its tours; empty if no robot has any."""
         tours = self.factory.tours
         if not any(shape.shifts for shape in self.shapes):
             return ()
@@ -74,7 +75,7 @@ class LayoutDraft:
         )
 
     def _guidepaths(self, travel: Sequence[float], lane: int) -> tuple[Guidepath, ...]:
-        """Places every robot, carriers first: its A is a station of its carrier."""
+        """All guidepaths, carriers first: A is a station of the carrier."""
         paths: list[Guidepath] = []
         frames = headings(self.factory, self.stretched.sides)
         for robot, carrier in enumerate(carriers(self.factory)):
@@ -93,7 +94,7 @@ class LayoutDraft:
         return tuple(paths)
 
     def _turn(self, robot: int) -> float | None:
-        """How far a fixed robot turns what it takes back to where that belongs [rad]."""
+        """The angle by which a fixed robot turns its payload into place [rad]."""
         if not self.factory.robots[robot].fixed:
             return None
         label, *_ = self.factory.deliveries(robot)  # the same for each unit of a period
@@ -101,16 +102,16 @@ class LayoutDraft:
 
 
 def _outfeed(path: Guidepath, shape: Shape, c: Clearance) -> Box:
-    """The conveyor: under the product at A and ahead to the end of the shed. It is no wider than
-    the product, so that what keeps clear of the one keeps clear of the other."""
+    """The conveyor: under the product at A and ahead to the end of the shed, no wider than the
+    product, so that what keeps clear of the product keeps clear of it."""
     last, grip = shape.last, shape.grip or shape.last
     ahead = 2 * last[1] - last[0] + up(max(0.0, grip[1] - last[1])) + c.c + WALL + BEHIND + SIDE
     return path.world((last[0] - c.c / 2, ahead, last[2], last[3]), path.a)
 
 
 def _spare(layout: Layout) -> float:
-    """How much shorter the output robot's path can be: the outfeed has to be clear of what is
-    beside its own course, of the product in the making, and of no more [whole mm]."""
+    """Length by which the output robot's path can be shortened: the outfeed has to be clear of
+    everything beside its course and of the product in the making [whole mm]."""
     c, spare = layout.clearance, inf
     swept = [
         region
@@ -126,5 +127,5 @@ def _spare(layout: Layout) -> float:
 
 
 def _runs_under(region: Region) -> bool:
-    """Whether a region is that of the output robot itself, which comes as far as A."""
+    """Whether a region belongs to the output robot, which comes as far as A."""
     return region.robot == 0 and region.kind in (CARRIAGE_BODY, MAST_BODY, ARM_BODY)

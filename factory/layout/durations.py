@@ -1,7 +1,6 @@
-"""How long robots take, from lengths alone: what the layout is optimised by.
+"""Durations of operations from lengths alone: the objective of the layout search.
 
-`timing/prediction.py` predicts the run
-itself, from the modes; the tests hold the two together.
+`timing/prediction.py` predicts the run itself, from the modes; tests compare the two.
 """
 
 from __future__ import annotations
@@ -30,21 +29,21 @@ class Pace(SpeedProfile):
 
     @classmethod
     def of(cls, settings: Settings) -> Pace:
-        """That of a run with these settings."""
+        """The pace of a run with these settings."""
         lost, ahead = settings.tick + settings.settle, settings.settle if settings.stage else None
         return cls(settings.speed, settings.acceleration, settings.eps, lost, ahead)
 
     def on(self, path: Guidepath) -> Pace:
-        """That of a robot on a guidepath, whose corners it goes round at its speed."""
+        """The pace on a guidepath, whose corners a robot passes at its speed."""
         fastest = path.fastest(self.speed, self.acceleration)
         return self if fastest == self.speed else replace(self, speed=fastest)
 
     def goes_ahead(self, operation: Operation, slot: int) -> bool:
-        """Whether the robot in a slot need not go its way within an operation."""
+        """Whether the robot in a slot may make its move before the operation starts."""
         return self.ahead is not None and operation.awaits_empty(slot)
 
     def entered(self, rested: float) -> float:
-        """When a robot enters its goal ball that comes to rest at `rested` [s]."""
+        """Time at which a robot enters its goal ball that comes to rest at `rested` [s]."""
         return max(rested - sqrt(2 * self.eps / self.acceleration), 0.0)
 
 
@@ -59,8 +58,8 @@ def gear_times(layout: Layout, pace: Pace) -> list[float]:
         operation = operations[number]
         if pace.ahead is None or not operation.awaits_empty(operation.robots.index(robot)):
             return delays[number]
-        own = pace.on(layout.guidepaths[robot])
-        return max(delays[number], own.rest(ways[number, robot]) + pace.ahead)
+        on_path = pace.on(layout.guidepaths[robot])
+        return max(delays[number], on_path.rest(ways[number, robot]) + pace.ahead)
 
     units = layout.factory.period
     return [
@@ -103,7 +102,7 @@ def operation_times(layout: Layout, pace: Pace) -> list[float]:
 
 
 def _ways(layout: Layout) -> dict[tuple[int, int], float]:
-    """How far a robot goes in an operation, by both [m]."""
+    """Length of a robot's move in an operation, by both [m]."""
     paths = layout.guidepaths
     return {
         (number, robot): abs(visit.at - before.at) * paths[robot].lever

@@ -1,8 +1,8 @@
-"""Lay out a factory: the best layout found, certified, on the floor there is.
+"""Lays out a factory: the best layout found, certified, on the given floor.
 
 Guarantees what `factory.layout.clearance` proves, and carries the proof: no two robots that are not
-coupled by a mode can touch, nor their payloads. All lengths are whole millimetres, so that a
-written model loses nothing.
+coupled by a mode can touch, nor their payloads. All lengths are whole millimetres, so a written
+model loses nothing.
 """
 
 from __future__ import annotations
@@ -47,9 +47,9 @@ def lay_out(
     that is known. Raises RunError (Layout) where it does not fit a floor of the given width and
     depth, saying by how much and where, or where an operation's template asks for what cannot be
     kept clear."""
-    known, c, pace = judged(factory, product), Clearance(clearance), pace or Pace()
-    layout = draft or drafted(known, product, c, pace, floor, hands)
-    place, certificate, arms = on_stems(known)[1], None, dict[int, float]()
+    lifted, c, pace = judged(factory, product), Clearance(clearance), pace or Pace()
+    layout = draft or drafted(lifted, product, c, pace, floor, hands)
+    place, certificate, arms = on_stems(lifted)[1], None, dict[int, float]()
     for _ in range(AGAIN if hands else 0):
         certificate = certify(layout)
         further = crowded(layout, certificate) or _parted(layout, certificate)
@@ -64,7 +64,7 @@ def lay_out(
             else:
                 hands.travels[at] = travel
         arms = longer
-        layout, certificate = drafted(known, product, c, pace, floor, hands, arms), None
+        layout, certificate = drafted(lifted, product, c, pace, floor, hands, arms), None
     return certified(layout, floor, certificate)
 
 
@@ -87,33 +87,32 @@ def drafted(
 
 
 def _parted(layout: Layout, certificate: Certificate) -> dict[int, float]:
-    """How far robots are to go at the least, from where they deliver, so that what waits there with
-    its payload is clear of all that passes: of two that are too near, the one that needs less [m].
-    """
-    carried, found = [r for r in certificate.regions if r.kind in LOADS], dict[int, float]()
+    """Least travels of robots, so that what waits with its payload at a point of delivery is clear
+    of all that passes: of two robots that are too near, the one that needs less [m]."""
+    carried, travels = [r for r in certificate.regions if r.kind in LOADS], dict[int, float]()
     for fault in {*certificate.faults, *certificate.crossing}:
         pair = [r.index for r in layout.factory.robots if r.name in fault.robots]
         ways = list[tuple[float, int]]()
         stem = len(pair) == 2 and layout.share_stem(*pair)
         for robot, other in permutations(pair) if len(pair) == 2 and not stem else ():
             path = layout.guidepaths[robot]
-            own = [r.box for r in carried if r.robot == robot and r.mode == ALWAYS]
+            loads = [r.box for r in carried if r.robot == robot and r.mode == ALWAYS]
             passing = [r.box for r in carried if r.robot == other]
-            if own and passing:
-                further = path.frame(hull(own))[1] - path.frame(hull(passing))[0]
+            if loads and passing:
+                further = path.frame(hull(loads))[1] - path.frame(hull(passing))[0]
                 ways.append((further + layout.clearance, robot))
         further, robot = min((way for way in ways if way[0] > 0), default=(0.0, -1))
         if further:
             travel = up(layout.guidepaths[robot].travel + further)
-            found[robot] = max(travel, found.get(robot, 0.0))
-    return found
+            travels[robot] = max(travel, travels.get(robot, 0.0))
+    return travels
 
 
 def certified(
     layout: Layout, floor: Point2 | None = None, certificate: Certificate | None = None
 ) -> Layout:
-    """A layout with its certificate, made unless it is given, and the floor it takes. Raises
-    RunError (Layout) as `lay_out` does."""
+    """A layout with its certificate, computed unless given, and the floor it takes. Raises RunError
+    (Layout) as `lay_out` does."""
     certificate = certificate or certify(layout)
     if not certificate.holds:
         raise RunError(fault.diagnostic() for fault in certificate.faults)
@@ -124,14 +123,14 @@ def certified(
     return layout
 
 
-def _check_floor(layout: Layout, found: tuple[Region, ...], wanted: Point2) -> None:
+def _check_floor(layout: Layout, occupied: tuple[Region, ...], wanted: Point2) -> None:
     xlo, xhi, ylo, yhi = layout.floor
     size = (xhi - xlo, yhi - ylo)
     if size[0] <= wanted[0] and size[1] <= wanted[1]:
         return
     excess = "; ".join(
-        f"{size[i] - wanted[i]:.3f} m too {word}, from {_at_edge(layout, found, 2 * i)}"
-        f" to {_at_edge(layout, found, 2 * i + 1)}"
+        f"{size[i] - wanted[i]:.3f} m too {word}, from {_at_edge(layout, occupied, 2 * i)}"
+        f" to {_at_edge(layout, occupied, 2 * i + 1)}"
         for i, word in ((0, "wide (along the output robot's path)"), (1, "deep (across it)"))
         if size[i] > wanted[i]
     )
@@ -146,7 +145,7 @@ def _check_floor(layout: Layout, found: tuple[Region, ...], wanted: Point2) -> N
     raise RunError(Diagnostic("Layout", message, robot.position, hint))
 
 
-def _at_edge(layout: Layout, found: tuple[Region, ...], edge: int) -> str:
-    """What reaches the farthest at one edge of the floor, in words."""
+def _at_edge(layout: Layout, occupied: tuple[Region, ...], edge: int) -> str:
+    """The region that reaches farthest at one edge of the floor, in words."""
     outwards = 1 if edge % 2 else -1
-    return max(found, key=lambda r: outwards * r.box[edge]).named(layout.factory)
+    return max(occupied, key=lambda r: outwards * r.box[edge]).named(layout.factory)

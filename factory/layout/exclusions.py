@@ -1,10 +1,10 @@
 """Why machines of a layout never meet: those that come near in two places of its coordinated net
 are never in both at once.
 
-Either a circuit of the net that carries one token goes through both places, or order places are
-added, in the order in which a single unit is made. A pair that is marked together while a single
-unit is made is a fault: a machine stands, or holds something, where another has to pass. So is a
-pair of robots whose hands collide where their common operation ends.
+Either a circuit of the net with one token goes through both places, or order places are added, in
+the order in which a single unit is made. A pair that is marked together while a single unit is made
+is a fault: a machine stands, or holds something, where another has to pass. So is a pair of robots
+whose hands collide at the end of their common operation.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ from factory.plant.factory import Factory
 
 @dataclass(frozen=True)
 class Further:
-    """Further `presences` of machines, and which of the pairs that come near with them `counts`."""
+    """Further `presences` of machines, and which of the pairs near them `counts`."""
 
     presences: tuple[Presence, ...] = ()
     counts: Callable[[Near], bool] = field(default=lambda pair: True)
@@ -61,37 +61,39 @@ ROUNDS = 8
 
 
 def coordinated(layout: Layout) -> Coordinated:
-    """The coordinated net of a layout, with what keeps its machines apart."""
-    known = kept(layout)
-    return with_machines(layout, known.passes, [order for order in known.orders if order.kept])
+    """The coordinated net of a layout, with everything that keeps its machines apart."""
+    apart = kept(layout)
+    return with_machines(layout, apart.passes, [order for order in apart.orders if order.kept])
 
 
 def awaited_positions(layout: Layout) -> dict[int, float]:
-    """Where robots go by themselves as soon as they have let go, by index, arc lengths [m]."""
+    """For robots that return by themselves as soon as they have released their payload, by index,
+    the arc lengths to which they go [m]."""
     return dict(kept(layout).backs) if layout.hands else {}
 
 
 def goes_early(layout: Layout) -> list[tuple[int, int]]:
-    """The operations (index) ahead of which robots go where they are awaited, whatever else."""
+    """The operations (index) before which robots always go to where they are awaited."""
     return [(tour[0], r) for r in awaited_positions(layout) for tour in layout.factory.tours[r]]
 
 
 def crowded(layout: Layout, certificate: Certificate) -> dict[int, float]:
-    """How far robots are to go at the least, from where they deliver, so that hands that hold from
-    above get out of the way before they come to where the next part comes down [m]."""
+    """Least travels of robots, so that hands from above are out of the way before they come to
+    where the next part comes down [m]."""
     more = ((robot, at - before_next(layout, robot)) for robot, at in certificate.apart.backs)
     return {robot: farther(layout, robot, by) for robot, by in more if by > ROUNDING}
 
 
 def kept(layout: Layout) -> Exclusions:
-    """What keeps the machines of a layout apart: by its certificate, if that is of its factory."""
+    """What keeps the machines of a layout apart: from its certificate, if that is of its
+    factory."""
     certificate = layout.certificate
     if certificate is not None and certificate.is_of(layout.factory):
         return certificate.apart
-    known: Exclusions | None = layout.__dict__.get("kept")
-    if known is None:
-        known = layout.__dict__["kept"] = exclusions(layout)
-    return known
+    stored: Exclusions | None = layout.__dict__.get("kept")
+    if stored is None:
+        stored = layout.__dict__["kept"] = exclusions(layout)
+    return stored
 
 
 def exclusions(layout: Layout, further: Presences | None = None) -> Exclusions:
@@ -145,7 +147,7 @@ def exclusions(layout: Layout, further: Presences | None = None) -> Exclusions:
 
 
 def _met(layout: Layout, robots: Staying) -> Iterator[Fault]:
-    """Robots that collide at the end of an operation of both."""
+    """Pairs of robots that collide at the end of a common operation."""
     for one, other in robots.ends():
         boxed = nearest(one, other, layout.clearance)
         if boxed is not None and (pair := nearer(boxed, layout.clearance)) is not None:
@@ -159,7 +161,7 @@ def _met(layout: Layout, robots: Staying) -> Iterator[Fault]:
 
 
 def _stuck(layout: Layout, net: CoordinatedNet) -> Fault:
-    """A circuit of the coordinated net that carries no token: what is on it never moves."""
+    """A circuit of the coordinated net without a token: its machines never move."""
     operations, circuit = layout.factory.operations, net.deadlock
     events = (net.net.right[place] // 2 for place in circuit)
     robots = sorted({operations[n].carrier for n in events if n < len(operations)})
@@ -170,8 +172,8 @@ def _stuck(layout: Layout, net: CoordinatedNet) -> Fault:
 def _orders(
     net: CoordinatedNet, factory: Factory, sequence: Sequence[int], pairs: Collection[Near]
 ) -> tuple[tuple[Precedence, ...], MarkedNet]:
-    """The order places by which pairs that come near are excluded, and the net with them: first
-    those for magazines, which no run keeps."""
+    """The order places that exclude pairs that come near, and the net with them; those of
+    magazines, which no run has to enforce, come first."""
     whole, orders, when = net.net, list[Precedence](), times(net.net, sequence)
     for by_magazine, starts in ((True, {}), (False, _starts(net, factory))):
         asked = (pair for pair in pairs if (pair.one.bears or pair.other.bears) == by_magazine)
@@ -191,25 +193,25 @@ def _precedence(net: MarkedNet, place: int, kept: bool) -> Precedence:
 
 
 def _circuits(net: MarkedNet, pairs: Mapping[int, Near]) -> dict[int, Circuit]:
-    """By the numbers of pairs a circuit with one token through a place of either, if there is
-    one."""
+    """By the numbers of pairs, a circuit with one token through a place of either presence, if
+    there is one."""
     combined = [(n, both) for n, pair in pairs.items() for both in _places(pair)]
     circuits = excluding(net, [both for _, both in combined])
-    found = dict[int, Circuit]()
+    circuit_of = dict[int, Circuit]()
     for (n, _), circuit in zip(combined, circuits, strict=True):
         if circuit is not None:
-            found.setdefault(n, circuit)
-    return found
+            circuit_of.setdefault(n, circuit)
+    return circuit_of
 
 
 def _places(pair: Near) -> Iterable[Pair]:
-    """A place of either presence of a pair."""
+    """One place of each presence of a pair."""
     return product(pair.one.places, pair.other.places)
 
 
 def one_unit(net: MarkedNet, factory: Factory) -> list[int]:
-    """The transitions of a coordinated net as they fire when one period is made operation by
-    operation, everything else as soon as it can."""
+    """The transitions of a coordinated net in the order in which they fire when one period is made
+    operation by operation and everything else fires as soon as it can."""
     when = [-1] * len(net.net.transitions)
     for step, number in enumerate(factory.order):
         when[2 * number], when[2 * number + 1] = 2 * step, 2 * step + 1
@@ -231,15 +233,15 @@ def one_unit(net: MarkedNet, factory: Factory) -> list[int]:
 
 
 def _orderable(net: MarkedNet, when: Sequence[int], pair: Near) -> Pair | None:
-    """Of the places of two presences two that one unit made alone does not mark at once: those that
-    are left last and entered first, None where there are none."""
+    """Of the places of two presences, two that are not marked together while one unit is made
+    alone: those left last and entered first. None if there are none."""
     apart = [both for both in _places(pair) if not overlap(net, when, both)]
     return apart[-1] if apart else None
 
 
 def _starts(net: CoordinatedNet, factory: Factory) -> Mapping[int, int]:
-    """By the transitions that come by themselves, ends of operations and passes, the start of the
-    operation that leads to each."""
+    """For each transition that comes by itself, an end of an operation or a pass: the start of the
+    operation that leads to it."""
     starts = {o.end: o.start for o in factory.operations}
     for past, (place, _) in net.passes.items():
         starts[net.net.right[place]] = past.after - past.after % 2
@@ -258,7 +260,7 @@ def _excluded(net: MarkedNet, pair: Near, circuit: Circuit) -> Excluded:
 
 
 def _fault(layout: Layout, net: MarkedNet, pair: Near) -> Fault:
-    """What no order keeps apart."""
+    """The fault of a pair that no order keeps apart."""
     one, other = (
         f"{body} of {side.machine}, {_named(net, side)},"
         for side, body in zip((pair.one, pair.other), pair.bodies, strict=True)
@@ -272,6 +274,6 @@ def _fault(layout: Layout, net: MarkedNet, pair: Near) -> Fault:
 
 
 def _named(net: MarkedNet, presence: Presence) -> str:
-    """When something is there, in words."""
+    """A presence in words."""
     names = [net.net.places[place].name for place in presence.places]
     return f"in {' and '.join(names)}" if names else "which stands"

@@ -1,4 +1,4 @@
-"""Feeders of a layout: where the magazine of a robot stands, and when it may go on."""
+"""Feeders of a layout: where each robot's magazine stands, and when the robot may go on."""
 
 from __future__ import annotations
 
@@ -50,13 +50,13 @@ def outlets_of(layout: Layout) -> tuple[Outlet, ...]:
     """The outlets of a layout's feeders: of its parts, in the order of the factory's labels, and
     then of those that deputies may have to take."""
     whole, factory = layout.whole, layout.factory
-    found: dict[tuple[str, int], Outlet] = {}
+    outlets: dict[tuple[str, int], Outlet] = {}
     for leaf in whole.factory.leaves:
         label, robot = leaf.within(factory.period), leaf.carrier
-        own = factory.by_label[label].carrier == robot
-        name = label if own else f"{label}@{factory.robots[robot].name}"
-        found.setdefault((label, robot), Outlet(name, label, robot, whole, leaf))
-    return tuple(found.values())
+        is_carriers = factory.by_label[label].carrier == robot
+        name = label if is_carriers else f"{label}@{factory.robots[robot].name}"
+        outlets.setdefault((label, robot), Outlet(name, label, robot, whole, leaf))
+    return tuple(outlets.values())
 
 
 def lines_of(layout: Layout) -> tuple[tuple[Outlet, ...], ...]:
@@ -69,10 +69,10 @@ def lines_of(layout: Layout) -> tuple[tuple[Outlet, ...], ...]:
 
 
 def feeder_of(layout: Layout, label: str) -> Feeder:
-    """The feeder of a part: a housing over the place where it is presented, and the post that
-    carries it, behind the rear stop of the robot that it serves. Parts of one line have one
-    housing, in which they hang with their tops at one height; so have those that the robot takes as
-    a deputy."""
+    """The feeder of a part: a housing over the place where the part is presented, and the post that
+    carries it, behind the rear stop of the robot that it serves. Parts of one line share a housing,
+    in which they hang with their tops at one height, as do those that the robot takes as a
+    deputy."""
     layout, operation = _with_all(layout, layout.factory.by_label[label])
     label, room = operation.label, Clearance(layout.clearance).room
     robot, by_label = operation.carrier, layout.factory.by_label
@@ -118,15 +118,15 @@ def feeder_of(layout: Layout, label: str) -> Feeder:
 
 
 def passing(layout: Layout, leaf: Operation) -> float:
-    """How far the robot of a feeder goes until all that it ever carries is clear of any part that
-    comes down next [m]."""
+    """How far a feeder's robot goes until all its payloads are clear of any part that comes down
+    next [m]."""
     layout, leaf = _with_all(layout, leaf)
     return cleared(layout, leaf.carrier, layout.guidepaths[leaf.carrier].sideways)
 
 
 def cleared(layout: Layout, robot: int, sideways: float) -> float:
-    """The same of a robot that goes straight ahead from its feeder, or to its side t (+1) or to the
-    other (-1)."""
+    """The same for a robot that goes straight ahead from its feeder, or to its side t (+1), or to
+    the other (-1)."""
     path, factory = layout.guidepaths[robot], layout.factory
     rear, _, low, high = hull(
         [
@@ -148,7 +148,7 @@ def _with_all(layout: Layout, leaf: Operation) -> tuple[Layout, Operation]:
 
 
 def _shown(layout: Layout, robot: int) -> Extent:
-    """The box of all that a robot's feeder shows, about the middle that its guidepath tells."""
+    """The box of everything that a robot's feeder presents, about the middle of its guidepath."""
     by_label = layout.factory.by_label
     boxes = [layout.held(robot, by_label[p].index, p) for p in layout.magazine(robot)]
     return layout.guidepaths[robot].frame(hull(boxes))

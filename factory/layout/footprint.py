@@ -1,4 +1,4 @@
-"""The footprint of one robot: what its own path takes of the floor, with its feeder and its piles.
+"""The footprint of one robot: the floor of its own path, with its feeder and its piles.
 
 Frame of a robot: u ahead along its heading, t along the heading of the robot it delivers to, the
 origin at its B station. Everything has half a clearance around it.
@@ -46,7 +46,7 @@ class Footprint:
     corridor: bool = False
 
     def pile(self, stop: Stop) -> Extent:
-        """The box of all that the robot may hold at a stop."""
+        """The box of everything that the robot may hold at a stop."""
         piles = self.shape.piles
         if self.returns and not (self.fed and stop is self.stops[0]):
             return hull(list(piles.values()))
@@ -72,18 +72,18 @@ class Footprint:
 
     @cached_property
     def frontier(self) -> tuple[float, float, float]:
-        """Where along the path, by layer, something may come to it from the side: ahead of the
+        """Where along the path, by layer, other robots may come to it from the side: ahead of the
         housing."""
         return (-inf, -inf, self.housing[1] + self.half)
 
     @cached_property
     def strips(self) -> dict[int, Strip]:
-        """What is taken of the floor on each side, with the last pile."""
+        """The floor taken on each side, with the last pile."""
         last = self.shape.laden(self.shape.last)
         return {side: self.strip(side, last) for side in (-1, +1)}
 
     def strip(self, side: int, pile: Extent) -> Strip:
-        """What is taken of the floor on one side, with a pile on the path."""
+        """The floor taken on one side, with a pile on the path."""
         shape, half = self.shape, self.half
         lane = side * shape.offset + half + shape.spread
         post = side * shape.post + POST / 2 + half if self.fed else -inf
@@ -93,8 +93,8 @@ class Footprint:
         return max(lane + CARRIAGE / 2, post, ahead), max(lane + MAST / 2, post, ahead), load
 
     def strip_at(self, piles: Sequence[Placed]) -> Callable[[int, float], Strip]:
-        """The strip on a side beside what reaches so far ahead on this path. Only the piles that
-        come so far back are beside it: the last of them is the widest."""
+        """The strip on a side beside something that reaches a given distance ahead on this path.
+        Only piles that come back so far are beside it: the last of them is the widest."""
         starts = [at + pile[0] - self.half for at, pile in piles]
         starts = list(accumulate(reversed(starts), min))[::-1]
         widest = list(accumulate((pile for _, pile in piles), lambda *both: hull(both)))
@@ -105,8 +105,8 @@ class Footprint:
         return found
 
     def along(self, piles: Sequence[Placed]) -> list[tuple[float, float]]:
-        """From where to where along the path each layer is taken; (inf, -inf) for nowhere. A post
-        is behind the carriage's rear stop and behind the part."""
+        """The interval along the path that each layer takes; (inf, -inf) for none. A post is behind
+        the carriage's rear stop and behind the part."""
         shape, half = self.shape, self.half
         taken = [(-shape.reach - width / 2 - half, half - shape.arm) for width in (CARRIAGE, MAST)]
         starts = [at + pile[0] - half for at, pile in piles]
@@ -120,15 +120,15 @@ class Footprint:
         return taken
 
     def blocks(self, piles: Sequence[Placed]) -> list[tuple[Block, ...]]:
-        """What it takes of each layer: a block as wide as the strips on both sides, or none."""
+        """The blocks of each layer: one as wide as the strips on both sides, or none."""
         widest = hull([self.shape.laden(self.shape.last), *(pile for _, pile in piles)])
         sides = (self.strip(side, widest) for side in (-1, +1))
         spans = zip(self.along(piles), *sides, strict=True)
         return [((*span, -low, high),) if span[0] <= span[1] else () for span, low, high in spans]
 
     def least(self, stop: Stop, station: float) -> float:
-        """The least station of a stop after another station [m]: what joins the part of a feeder is
-        clear of the housing, and so is what comes back, with the next part in it."""
+        """The least station of a stop after another station [m]: inputs, and payloads that come
+        back, must be clear of the housing and the part in it."""
         if not self.fed or stop is self.stops[0] or not (stop.joins or stop.visits > 1):
             return station
         return max(station, up(self.housing[1] + self.clearance.c - self.pile(stop)[0]))
@@ -140,7 +140,7 @@ class Footprint:
         further: Mapping[int, float],
         guests: Iterable[tuple[int, Shape]],
     ) -> Placed:
-        """The pile that is there at a stop at a station, `further` for some of its operations, with
+        """The pile at a stop at a station, displaced (`further`) for some of its operations, with
         the hands that reach over it, of robots that deliver from a side."""
         rear, front, low, high = self.shape.laden(self.pile(stop))
         if further:
@@ -151,9 +151,9 @@ class Footprint:
         return station + ahead_of(stop.first, self.shape.reach), (rear, front, low, high)
 
     def further(self, stop: Stop, guests: Iterable[tuple[int, Shape]]) -> dict[int, float]:
-        """How much further than at the station of a stop the robot stands for its operations (by
-        their numbers), since it, or one that delivers there, holds in another place what it brings
-        for them [m]; nothing where it always stands there."""
+        """For operations (by number): displacement of the robot beyond the station of a stop [m],
+        because it, or a robot that delivers there, holds its payload in another place; empty if
+        there is none."""
         shapes = sorted(guests, key=lambda guest: guest[1].tool)
         if not shapes or not (self.shape.shifts or shapes[0][1].shifts):
             return {}
@@ -161,8 +161,8 @@ class Footprint:
         return {n: round(far - self.shape.shift(n)[0], 6) for n, far in aside.items()}
 
     def early(self, stop: Stop, side: int, guest: Shape) -> float:
-        """The greatest distance before the end of its guidepath at which a guest from a side
-        delivers at a stop [m]: guest and carrier may hold different parts in different places."""
+        """Greatest distance before the end of its guidepath at which a guest from a side delivers
+        at a stop [m]: guest and carrier may hold different parts in different places."""
         return max(
             guest.shift(o.index)[0] + side * self.shape.shift(o.index)[1] for o in stop.operations
         )
@@ -176,12 +176,12 @@ def footprint(
 
 
 def extent_to(pile: Extent, side: int) -> float:
-    """How far a pile reaches to one side of the product's middle [m]."""
+    """Extent of a pile to one side of the product's middle [m]."""
     return pile[3] if side > 0 else -pile[2]
 
 
 def ahead_of(operation: Operation, reach: float) -> float:
-    """How far ahead of its station a carrier has its goal [m]; 0 where it meets what is brought."""
+    """Distance of a carrier's goal ahead of its station [m]; 0 where it meets its inputs."""
     point = operation.template.law.goals[operation.template.carrier - 1]
     exact = {"B": 0.0, "S": 2.0}.get(point.end, point.multiple)
     return (exact - point.multiple) * reach / 2

@@ -91,7 +91,7 @@ def forked(
 
 @dataclass(frozen=True, slots=True)
 class _Making:
-    """What the layout of a factory with tees is made of, but for the forks; see `forked`."""
+    """The data of a layout with tees, apart from the forks; see `forked`."""
 
     stems: Layout
     factory: Factory
@@ -126,7 +126,7 @@ class _Making:
 
 
 def _is_passed_near(search: ClearanceSearch, pair: set[str]) -> bool:
-    """Whether what a robot of a pair, by names, holds where it waits is in the other one's way."""
+    """Whether the payload of one robot of a pair, where it waits, is in the other's way."""
     robots, least = search.layout.factory.robots, search.layout.clearance - TOLERANCE
     loads = [r for r in search.swept if r.kind in LOADS and robots[r.robot].name in pair]
     return any(
@@ -155,8 +155,8 @@ def _forks(layout: Layout, robot: int, rounding: float, longer: float) -> Iterat
 
 
 def _beside(layout: Layout, robot: int) -> Iterator[tuple[int, Extent]]:
-    """What a robot where it receives, and its branch, take of the floor, by layer, about the
-    product's middle there."""
+    """The floor, by layer, of a receiving robot and its branch, about the product's middle
+    there."""
     path, branch = layout.guidepaths[robot], branch_of(carriers(layout.factory), robot)
     x, y = path.middle(path.length)
     lane = path.offset
@@ -164,15 +164,18 @@ def _beside(layout: Layout, robot: int) -> Iterator[tuple[int, Extent]]:
     yield CARRIAGES, (half - path.reach - CARRIAGE, half - path.reach, lane - half, lane + half)
     yield ARMS, (-path.reach - MAST / 2, -path.arm, lane - MAST / 2, lane + MAST / 2)
     for region in regions(layout, piles(layout.factory, layout.product)):
-        own = region.robot == robot and region.kind in (CARRIAGE_BODY, MAST_BODY, ARM_BODY)
-        if region.robot in branch and not own and (region.robot != robot or region.mode == ALWAYS):
+        is_robots = region.robot == robot and region.kind in (CARRIAGE_BODY, MAST_BODY, ARM_BODY)
+        if (
+            region.robot in branch
+            and not is_robots
+            and (region.robot != robot or region.mode == ALWAYS)
+        ):
             xlo, xhi, ylo, yhi = region.box
             yield region.layer, path.frame((xlo - x, xhi - x, ylo - y, yhi - y))
 
 
 def _behind(layout: Layout, robot: int) -> tuple[float, ...]:
-    """How far behind the product's middle a robot on its way reaches with what it brings, by
-    layer."""
+    """How far behind the product's middle a moving robot with its payload reaches, by layer."""
     path, grip = layout.guidepaths[robot], layout.grip(robot)
     brought = [path.frame(layout.payloads[label])[0] for label in layout.factory.deliveries(robot)]
     loads = min([*brought, *(grip[:1] if grip else ())])

@@ -1,4 +1,4 @@
-"""What optimising gained: a layout against the first feasible one and a lower bound."""
+"""The gain of optimising: a layout compared with the first feasible one and with a lower bound."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from factory.layout.optimising import first_feasible, floor_of
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """What users pay: cycle time [s] of the net from rest to rest, total length of the guidepaths
+    """The objectives: cycle time [s] of the net from rest to rest, total length of the guidepaths
     [m], floor [m²]."""
 
     predicted_cycle_time_s: float
@@ -36,11 +36,11 @@ class LayoutGain:
 
     def as_json(self) -> dict[str, object]:
         """As a part of a document."""
-        found: dict[str, object] = asdict(self.chosen)
+        document: dict[str, object] = asdict(self.chosen)
         if self.plain:
-            found["relays"] = {"robots_added": self.added, "without": asdict(self.plain)}
+            document["relays"] = {"robots_added": self.added, "without": asdict(self.plain)}
         return {
-            **found,
+            **document,
             "bottleneck": self.bottleneck,
             "cycle_time_bound_s": round(self.bound, 6),
             "first_feasible": asdict(self.first),

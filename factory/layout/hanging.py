@@ -1,4 +1,4 @@
-"""From which slider of a feeder each part hangs, and where its pad takes it."""
+"""Sliders of a feeder: from which of them each part hangs, and where its pad takes the part."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ class Hanging:
     def of(cls, layout: Layout) -> Hanging:
         """That of a layout, found once. Parts of one line hang from as few sliders as can be, whose
         pads are apart; where there is no place for these, each from its own."""
-        found: Hanging | None = layout.__dict__.get("hanging")
-        if found is None:
-            found = layout.__dict__["hanging"] = cls._found(layout)
-        return found
+        stored: Hanging | None = layout.__dict__.get("hanging")
+        if stored is None:
+            stored = layout.__dict__["hanging"] = cls._found(layout)
+        return stored
 
     @classmethod
     def _found(cls, layout: Layout) -> Hanging:
@@ -72,7 +72,7 @@ class Hanging:
 
 
 class _FeederPads:
-    """Where the pads of feeders take their parts. Parts that are alike are looked at once."""
+    """Places of feeders' pads on parts, computed once for equal parts."""
 
     def __init__(self) -> None:
         self._found: dict[object, PadPlace] = {}
@@ -88,8 +88,8 @@ class _FeederPads:
             low, high = np.array(taken).reshape(2, 2) + solid.position[:2]
             place = pad_place(solid, heading, (low, high))
             self._found[key] = PadPlace(place.at - solid.position, place.radius)
-        found = self._found[key]
-        return _seen(outlet, found.at + solid.position, found.radius)
+        pad = self._found[key]
+        return _seen(outlet, pad.at + solid.position, pad.radius)
 
     def common(self, line: Sequence[Outlet]) -> dict[str, tuple[str, PadPlace]]:
         """By the outlets of a line, after which of them the slider of each is named, and where that
@@ -100,14 +100,14 @@ class _FeederPads:
             for outlet, at in zip(line, meeting, strict=True)
         ]
         low, high = np.array(_taken(line[0])).reshape(2, 2) + _solid(line[0]).position[:2]
-        found: dict[str, tuple[str, PadPlace]] = {}
+        pads: dict[str, tuple[str, PadPlace]] = {}
         for place in common_places(tops, (low, high)):
             named = place.parts[0]
             at = place.at + meeting[0] - meeting[named]
             above = _solid(line[named]).high[2] + GAP
             pad = _seen(line[0], np.array([*at, above]), place.radius)
-            found.update({line[number].name: (line[named].name, pad) for number in place.parts})
-        return found
+            pads.update({line[number].name: (line[named].name, pad) for number in place.parts})
+        return pads
 
 
 def _seen(outlet: Outlet, at: Array, radius: float) -> PadPlace:
@@ -118,8 +118,8 @@ def _seen(outlet: Outlet, at: Array, radius: float) -> PadPlace:
 
 
 def _taken(outlet: Outlet) -> tuple[float, ...]:
-    """The rectangle (xlo, ylo, xhi, yhi) about the position of an outlet's part through which a
-    hand from above comes: from its tower on the one side, against the heading."""
+    """The rectangle (xlo, ylo, xhi, yhi) about an outlet's part through which a hand from above
+    comes: from its tower, against the heading."""
     hand, path = outlet.layout.hand(outlet.robot), _path(outlet)
     if hand is None or hand.kind != "above":
         return inf, inf, -inf, -inf
@@ -129,8 +129,8 @@ def _taken(outlet: Outlet) -> tuple[float, ...]:
     ends = [at - half, at + half]
     for way in (path.heading, (-path.side[0], -path.side[1])):
         ends += [at + np.array(way) * FAR]
-    found = np.round([*np.minimum.reduce(ends), *np.maximum.reduce(ends)], 6)
-    return tuple(found.tolist())
+    rectangle = np.round([*np.minimum.reduce(ends), *np.maximum.reduce(ends)], 6)
+    return tuple(rectangle.tolist())
 
 
 def _path(outlet: Outlet) -> Guidepath:

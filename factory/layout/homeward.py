@@ -27,32 +27,32 @@ class Homeward(Nearness):
         super().__init__(layout.clearance)
         self._layout, self._cuts = layout, dict[Hashable, float | None]()
 
-    def nearer(self, found: Near) -> Near | None:
+    def nearer(self, pair: Near) -> Near | None:
         """As `Nearness.nearer`; for two robots on one stem by the boxes of their bodies."""
-        robots = [side.robot for side in (found.one, found.other) if not side.bears]
+        robots = [side.robot for side in (pair.one, pair.other) if not side.bears]
         if len({*robots}) == 2 and self._layout.share_stem(*robots):
-            one, other = (replace(p, bodies=p.bodies.as_boxes) for p in (found.one, found.other))
-            found = replace(found, one=one, other=other)
-        return super().nearer(found)
+            one, other = (replace(p, bodies=p.bodies.as_boxes) for p in (pair.one, pair.other))
+            pair = replace(pair, one=one, other=other)
+        return super().nearer(pair)
 
-    def _cut(self, own: Presence, other: Presence) -> Past | None:
+    def _cut(self, one: Presence, other: Presence) -> Past | None:
         """The pass at which a robot that goes home becomes clear of another machine; None if it
         never does, or always is."""
-        begin = self._layout.visits[own.since // 2, own.robot].at
-        pair = own.robot, other.robot, begin, alike(own, other)
+        begin = self._layout.visits[one.since // 2, one.robot].at
+        pair = one.robot, other.robot, begin, alike(one, other)
         if pair not in self._cuts:
-            self._cuts[pair] = self._bisected(own, other, begin)
+            self._cuts[pair] = self._bisected(one, other, begin)
         at = self._cuts[pair]
-        return None if at is None else Past(own.since, own.robot, at)
+        return None if at is None else Past(one.since, one.robot, at)
 
-    def _bisected(self, own: Presence, other: Presence, begin: float) -> float | None:
-        robot, layout = own.robot, self._layout
+    def _bisected(self, one: Presence, other: Presence, begin: float) -> float | None:
+        robot, layout = one.robot, self._layout
         home = layout.guidepaths[robot].length
-        heights = [z for _, span in own.sweeps for z in span]
+        heights = [z for _, span in one.sweeps for z in span]
         low = max(heights) if rises_first(layout, robot) else min(heights)
 
         def clear(at: float) -> bool:
-            there = replace(own, sweeps=(((at, home), (low, max(heights))),))
+            there = replace(one, sweeps=(((at, home), (low, max(heights))),))
             pair = nearest(there, other, layout.clearance)
             return pair is None or self.nearer(pair) is None
 
@@ -72,10 +72,10 @@ class Homeward(Nearness):
             sides = ((pair.one, pair.other), (pair.other, pair.one))
             ways = [
                 cut
-                for own, other in sides
-                if own.since >= 0
-                and not all(marked_after(net, when, place, own.since) for place in other.places)
-                and (cut := self._cut(own, other)) is not None
+                for one, other in sides
+                if one.since >= 0
+                and not all(marked_after(net, when, place, one.since) for place in other.places)
+                and (cut := self._cut(one, other)) is not None
             ]
             if ways:
                 visits = self._layout.visits
@@ -88,13 +88,13 @@ class Homeward(Nearness):
         """The order places by which lifts that are adjusted for each tour are adjusted at home, for
         robots that go there by themselves and would come near a machine of a pair on the way."""
         layout, factory, transitions = self._layout, self._layout.factory, net.net.net.transitions
-        for own in (side for pair in pairs for side in (pair.one, pair.other)):
-            home = Past(own.since, own.robot, layout.guidepaths[own.robot].length - HOME)
-            if own.robot not in factory.adjusted or home not in net.passes:
+        for one in (side for pair in pairs for side in (pair.one, pair.other)):
+            home = Past(one.since, one.robot, layout.guidepaths[one.robot].length - HOME)
+            if one.robot not in factory.adjusted or home not in net.passes:
                 continue
-            gear = factory.robots[own.robot].operations
-            then = factory.operations[gear[(gear.index(own.since // 2) + 1) % len(gear)]]
-            if then.place in own.places and factory.begins(own.robot, then.index):
+            gear = factory.robots[one.robot].operations
+            then = factory.operations[gear[(gear.index(one.since // 2) + 1) % len(gear)]]
+            if then.place in one.places and factory.begins(one.robot, then.index):
                 before = transitions[net.net.right[net.passes[home][0]]].name
                 start, tokens = transitions[then.start].name, int(then.index == gear[0])
                 yield Precedence(f"order:{before}:{start}", before, start, tokens)

@@ -66,24 +66,24 @@ class Layout(Pictured):
 
     @property
     def whole(self) -> Layout:
-        """The layout of all tours that its robots may do, in which they have the same numbers:
-        itself unless deputies may take over."""
+        """The layout of all tours that its robots may do, with the same numbers: itself unless
+        deputies may take over."""
         return self.standby or self
 
     def named(self, label: str) -> str:
-        """What a label of the whole is called in the factory."""
+        """The name in the factory of a label of the whole."""
         return self.whole.factory.by_label[label].within(self.factory.period)
 
     def __repr__(self) -> str:
         return f"<Layout of {self.factory}: {self.area:.2f} m²>"
 
     def hand(self, robot: int) -> Hand | None:
-        """The hand of a robot; None for a tool, and where hands are not chosen."""
+        """The hand of a robot; None for a tool, and if hands are not chosen."""
         return self.hands[robot] if self.hands else None
 
     def held(self, robot: int, operation: int, label: str) -> Box:
-        """The box of a sub-assembly about the middle that a robot's guidepath tells, on the robot's
-        tour that an operation (index) is in."""
+        """The box of a sub-assembly about the middle of a robot's guidepath, on the robot's tour
+        that contains an operation (index)."""
         return moved(self.payloads[label], self.visits[operation, robot].shift)
 
     def stop_offset(self, operation: int, slot: int) -> Point2:
@@ -104,32 +104,32 @@ class Layout(Pictured):
         return Mount(*lies, (x, y), over, stroke or 0.0, stroke is not None)
 
     def grip(self, robot: int) -> Extent | None:
-        """The box about the product's middle, in a robot's frame (u, t), of what its hand and mast
-        take among the payloads; None for nothing."""
+        """The box about the product's middle, in a robot's frame (u, t), that its hand and mast
+        take among the payloads; None for none."""
         hand = self.hand(robot)
         return None if hand is None else grip_of(hand, self.mount(robot))
 
     @cached_property
     def guidepath_length(self) -> float:
-        """Total length of the guidepaths [m]; what is fixed has none."""
+        """Total length of the guidepaths [m]; fixed robots have none."""
         return float(sum(g.length for g in self.guidepaths if not g.fixed))
 
     @cached_property
     def bent(self) -> tuple[tuple[int, ...], Ways]:
-        """The robots (index) whose guidepaths have bends, and the ways that these are."""
+        """The robots (index) with bent guidepaths, and their ways."""
         robots = tuple(n for n, path in enumerate(self.guidepaths) if path.bends)
         paths = [self.guidepaths[robot] for robot in robots]
         return robots, Ways.of([p.bends for p in paths], [p.rounding for p in paths])
 
     @cached_property
     def stems(self) -> frozenset[int]:
-        """The robots (index) whose guidepaths end as that of another one."""
+        """The robots (index) whose guidepaths end at the same point as another's."""
         ends = [(path.a, path.heading) for path in self.guidepaths]
         several = {end for end, count in Counter(ends).items() if count > 1}
         return frozenset(robot for robot, end in enumerate(ends) if end in several)
 
     def share_stem(self, one: int, other: int) -> bool:
-        """Whether the guidepaths of two robots end as one."""
+        """Whether the guidepaths of two robots end at the same point."""
         first, second = self.guidepaths[one], self.guidepaths[other]
         return (first.a, first.heading) == (second.a, second.heading)
 
@@ -140,16 +140,16 @@ class Layout(Pictured):
         return (xhi - xlo) * (yhi - ylo)
 
     def goals(self, operation: int) -> tuple[float, ...]:
-        """Where the axes of an operation are at its end: arc lengths of carriages, heights of lifts
-        [m]. They are in the order of `Factory.axes`."""
+        """Positions of an operation's axes at its end: arc lengths of carriages, heights of lifts
+        [m], in the order of `Factory.axes`."""
         return self._on_axes(operation, 1)
 
     def starts(self, operation: int) -> tuple[float, ...]:
-        """Where the axes of an operation are when it starts: at the visits before it."""
+        """Positions of an operation's axes at its start: at the visits before it."""
         return self._on_axes(operation, 0)
 
     def _on_axes(self, operation: int, end: int) -> tuple[float, ...]:
-        """Where the axes of an operation are at one end of its ways, 0 or 1 [m]."""
+        """Positions of an operation's axes at one end of its ways, 0 or 1 [m]."""
         factory, carriages = self.factory, len(self.factory.robots)
         visits = (
             (axis < carriages, self.ways[operation, factory.robot_of(axis)][end])
@@ -158,19 +158,19 @@ class Layout(Pictured):
         return tuple(visit.at if is_carriage else visit.lift for is_carriage, visit in visits)
 
     def station(self, operation: int) -> float:
-        """Arc length of the station of an operation on its carrier's guidepath [m]."""
+        """Arc length of an operation's station on its carrier's guidepath [m]."""
         chosen = self.factory.operations[operation]
         beyond = beyond_station(chosen) * self.guidepaths[chosen.carrier].r
         return self.visits[operation, chosen.carrier].at - beyond
 
     def meeting(self, operation: Operation) -> Point2:
-        """The product's middle where the carrier of an operation has its goal."""
+        """The product's middle when the carrier of an operation is at its goal."""
         visit = self.visits[operation.index, operation.carrier]
         at, (x, y) = self.guidepaths[operation.carrier].middle(visit.at), visit.shift
         return at[0] + x, at[1] + y
 
     def stops(self, robot: int) -> list[float]:
-        """The arc lengths at which a robot has its goals, in the order of its gear."""
+        """The arc lengths of a robot's goals, in the order of its gear."""
         return [self.visits[number, robot].at for number in self.factory.robots[robot].operations]
 
     def ends(self, robot: int) -> tuple[float, float]:
@@ -180,18 +180,17 @@ class Layout(Pictured):
 
     @cached_property
     def ways(self) -> Mapping[tuple[int, int], tuple[Visit, Visit]]:
-        """For each (operation, robot of it): from which visit to which the robot goes."""
-        found: dict[tuple[int, int], tuple[Visit, Visit]] = {}
+        """For each (operation, robot): the visits between which the robot moves."""
+        ways: dict[tuple[int, int], tuple[Visit, Visit]] = {}
         for robot in self.factory.robots:
             visits = [self.visits[number, robot.index] for number in robot.operations]
             for step, number in enumerate(robot.operations):
-                found[number, robot.index] = visits[step - 1], visits[step]
-        return MappingProxyType(found)
+                ways[number, robot.index] = visits[step - 1], visits[step]
+        return MappingProxyType(ways)
 
     @cached_property
     def strokes(self) -> Mapping[int, float]:
-        """How far up the lift of each robot that has one goes (index), in the order of their axes
-        [m]."""
+        """Stroke of each robot's lift (index), in the order of their axes [m]."""
         programs = {robot: self.factory.robots[robot].operations for robot in self.factory.strokes}
         return MappingProxyType(
             {
@@ -215,12 +214,12 @@ class Layout(Pictured):
     def overlaps(self) -> tuple[Overlap, ...]:
         """The parts that overlap or scrape as their operations join them from the sides chosen, or
         overlap in the finished product."""
-        found: list[Overlap] = []
+        overlaps: list[Overlap] = []
         for operation in self.factory.making:
             approach = operation.approach
             if approach is not None and any(approach.overlaps):
-                found += approach.overlaps[approach.sides.index(self.side(operation))]
-        return tuple(found)
+                overlaps += approach.overlaps[approach.sides.index(self.side(operation))]
+        return tuple(overlaps)
 
     def home(self, robot: int, operation: int) -> float:
         """Arc length at which a robot waits before an operation: the goal of the one before, or B
@@ -237,7 +236,8 @@ class Layout(Pictured):
         return {(leaf.written, robots[leaf.carrier].name): leaf for leaf in leaves}
 
     def magazine(self, robot: int) -> tuple[str, ...]:
-        """The parts that the feeder of a robot shows, in the order of its program; none without."""
+        """The parts that a robot's feeder presents, in the order of its program; empty without
+        one."""
         firsts = (self.factory.operations[tour[0]] for tour in self.factory.tours[robot])
         return tuple(operation.label for operation in firsts if not operation.inputs)
 
@@ -267,8 +267,8 @@ class Layout(Pictured):
         return max(0.0, ahead + towards + self.clearance)
 
     def _beside_hand(self, operation: Operation, slot: int) -> float:
-        """How far short of the meeting point what is brought is clear of the way of the carrier's
-        hand and mast, where that has to be there first [m]; else 0."""
+        """Standoff at which an input is clear of the way of the carrier's hand and mast, if these
+        must be there first [m]; else 0."""
         hand, grip = self.hand(operation.carrier), self.grip(operation.carrier)
         path, on = self.guidepaths[operation.robots[slot]], self.guidepaths[operation.carrier]
         if hand is None or grip is None or on.fixed or not hand.first:
@@ -284,17 +284,17 @@ class Layout(Pictured):
 
     @cached_property
     def outgoing(self) -> Box:
-        """The box of the finished product, of all products of a mix."""
+        """The box of the finished product; in a mix, of all products."""
         return hull([self.payloads[product] for product in self.factory.products])
 
     @property
     def outfeed_way(self) -> float:
-        """How far the outfeed takes a product until it is out of sight [m]."""
+        """Travel of the outfeed's tray until a product is out of sight [m]."""
         return self.product_length + self.hand_ahead + self.clearance + WALL + BEHIND
 
     @property
     def hand_ahead(self) -> float:
-        """How far the hand of the output robot reaches ahead of the product [m]."""
+        """Extent of the output robot's hand ahead of the product [m]."""
         grip, ahead = self.grip(0), self.outgoing[1]
         return 0.0 if grip is None else up(max(0.0, grip[1] - ahead))
 
@@ -309,7 +309,7 @@ class Layout(Pictured):
 
     @property
     def shutter_stroke(self) -> float:
-        """How far the shed's shutter comes down: from above any product to the belt [m]."""
+        """Stroke of the shed's shutter: from above any product to the belt [m]."""
         tall = float(self.product.high[2] - self.product.low[2])
         return tall + PLAY + BELT_GAP + TRAY
 
@@ -328,7 +328,8 @@ def carriers(factory: Factory) -> list[int]:
 
 
 def branch_of(on: Sequence[int], robot: int) -> list[int]:
-    """A robot (index), and all that bring it something, carriers first; `on`: the `carriers`."""
+    """A robot (index) and all robots that bring it something, carriers first; `on`: the
+    `carriers`."""
     branch = [robot]
     for other, carrier in enumerate(on):  # carriers come first
         if carrier in branch:

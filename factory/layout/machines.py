@@ -1,5 +1,5 @@
 """Where all machines of a layout are while places of its coordinated net are marked: robots,
-magazines and the outfeed's tray; and the housings of magazines, which stand."""
+magazines, the outfeed's tray, and the fixed housings of magazines."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from factory.layout.staying import Staying, in_world, upright
 def presences(
     layout: Layout, coordinated: Coordinated, awaited: Mapping[int, float]
 ) -> Iterator[Presence]:
-    """All of them, of robots that go where they are `awaited` by themselves, by index [m]."""
+    """All presences, for robots that go by themselves to where they are `awaited`, by index [m]."""
     robots = Staying(layout, coordinated, awaited)
     yield from robots.presences()
     yield from magazines(layout, coordinated, robots)

@@ -99,10 +99,10 @@ def optimised(
         weights = task.weights if number < UNWEIGHTED else _weights(times)
         way = replace(task, corridor=corridor, breadth=breadth, weights=weights)
         layout = _packed(way, product, payloads)
-        found = gear_times(layout, pace)
+        gear_seconds = gear_times(layout, pace)
         score = _score(layout, cycle_of(layout, pace), floor)
         if score < least:
-            best, times, least = layout, found, score
+            best, times, least = layout, gear_seconds, score
     return best
 
 
@@ -112,16 +112,15 @@ def floor_of(layout: Layout) -> Box:
     return bounds(swept, layout.clearance)
 
 
-def bounds(found: Sequence[Region], clearance: float) -> Box:
+def bounds(occupied: Sequence[Region], clearance: float) -> Box:
     """The floor that regions take."""
-    half, box = clearance / 2, hull([region.box for region in found])
+    half, box = clearance / 2, hull([region.box for region in occupied])
     return box[0] - half, box[1] + half, box[2] - half, box[3] + half
 
 
 def _score(layout: Layout, cycle: float, floor: Point2 | None) -> tuple[float, ...]:
-    """What a layout is judged by, the less the better: how much the floor is too small [m], how
-    many labels on lines have no hand, `cycle` time [s], guidepaths [m], and the floor [m²] on which
-    they lie."""
+    """The objective of a layout, smaller is better: excess over the floor [m], number of labels on
+    lines without a hand, `cycle` time [s], guidepaths [m], floor [m²]."""
     excess = 0.0
     if floor is not None:
         xlo, xhi, ylo, yhi = floor_of(layout)
@@ -130,8 +129,8 @@ def _score(layout: Layout, cycle: float, floor: Point2 | None) -> tuple[float, .
     x, y = zip(*ends, strict=True)
     area = (max(x) - min(x)) * (max(y) - min(y))
     lacking = sum(bare(layout.factory, robot, hand) for robot, hand in enumerate(layout.hands))
-    found = excess, lacking, cycle, layout.guidepath_length, area
-    return tuple(round(value, 6) for value in found)
+    terms = excess, lacking, cycle, layout.guidepath_length, area
+    return tuple(round(value, 6) for value in terms)
 
 
 def _first_sides(factory: Factory, payloads: Mapping[str, Box], c: Clearance) -> Sides:
@@ -147,7 +146,7 @@ def _packed(
 
 
 def _weights(times: Sequence[float]) -> list[float]:
-    """How much the time of each robot matters: 1 for the slowest."""
+    """The weight of each robot's time: 1 for the slowest."""
     longest = max(times)
     return [(1 + (time / longest) ** 4) / 2 for time in times]
 
@@ -187,16 +186,16 @@ def shape_of(
 
 def _frames(on: Sequence[int], sides: Sides | None) -> list[tuple[Frame, ...]]:
     """The frames in which each robot may lie."""
-    found: list[tuple[Frame, ...]] = [(OUTPUT,)]
+    frames_of: list[tuple[Frame, ...]] = [(OUTPUT,)]
     for robot, carrier in list(enumerate(on))[1:]:
         both = (-1, +1) if sides is None else (sides[robot],)
-        frames = [turned(frame, side) for frame in found[carrier] for side in both]
-        found.append(tuple(dict.fromkeys(frames)))
-    return found
+        frames = [turned(frame, side) for frame in frames_of[carrier] for side in both]
+        frames_of.append(tuple(dict.fromkeys(frames)))
+    return frames_of
 
 
 def _chosen(task: Task, table: Sequence[Mapping[Frame, Outline]]) -> tuple[Stretched, list[Shape]]:
-    """What was chosen for the frames that the output robot's gives."""
+    """The choices for the frames that follow from the output robot's."""
     robots, operations = len(table), len(task.factory.operations)
     travel, stations, sides = [0.0] * robots, [0.0] * operations, Sides()
     frames, outlines = [OUTPUT] * robots, list[Outline]()

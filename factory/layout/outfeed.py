@@ -1,5 +1,5 @@
-"""The outfeed: how long its tray takes, which brings a product into the shed, waits until that is
-shut, and comes back; and the slot in it, into which a round bottom dips."""
+"""The outfeed: the duration of its cycle (the tray carries a product into the shed, waits until
+that is shut, and comes back), and the slot in the tray for a round bottom."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ HalfSpace = tuple[int, float, int]
 
 
 def tray_profile(layout: Layout, settings: Settings) -> SpeedProfile:
-    """The tray's speed and acceleration: on a short way less than it is allowed, so that it goes at
-    one speed for a while."""
+    """Speed and acceleration of the tray: below the limits on a short way, so that it moves at
+    constant speed for a while."""
     acceleration = settings.outfeed_acceleration
     reached = sqrt(layout.outfeed_way * acceleration / CRUISE)
     return SpeedProfile(min(settings.outfeed, reached), acceleration)
 
 
 def leaving(layout: Layout, settings: Settings) -> float:
-    """How long a product takes from its dropoff until it is out of sight [s]."""
+    """Time from a product's dropoff until it is out of sight [s]."""
     profile = tray_profile(layout, settings)
     tray = profile.rest(layout.outfeed_way)
     shut = tray - profile.landing(BEHIND - PLAY) + _shutter(layout, settings)
@@ -45,7 +45,7 @@ def leaving(layout: Layout, settings: Settings) -> float:
 
 
 def away(layout: Layout, settings: Settings) -> float:
-    """How long the outfeed takes from a product to the next [s]."""
+    """Time from one product to the next [s]."""
     tray = tray_profile(layout, settings).rest(layout.outfeed_way)
     back = max(tray, _shutter(layout, settings)) + settings.tick
     return leaving(layout, settings) + back
@@ -57,8 +57,8 @@ def _shutter(layout: Layout, settings: Settings) -> float:
 
 def slot_of(layout: Layout) -> tuple[float, float, float] | None:
     """The slot through which the output robot's hand comes up to the product, about the product's
-    middle: how far it reaches, as far as the robot can be pushed, and its sides [m]; None where the
-    hand is not below."""
+    middle: its end, as far as the robot can be pushed, and its sides [m]; None if the hand is not
+    below."""
     path, hand = layout.guidepaths[0], layout.hand(0)
     upright = [limb for limb in limbs(layout, 0) if limb.name.endswith(("column", "pad"))]
     if hand is None or hand.kind != "below":
@@ -70,7 +70,7 @@ def slot_of(layout: Layout) -> tuple[float, float, float] | None:
 
 
 def dip_of(layout: Layout, slot: tuple[float, float, float] | None) -> float:
-    """How far the product dips into the tray's slot [m]."""
+    """Depth of the product in the tray's slot [m]."""
     if slot is None:
         return 0.0
     (_, xhi, ylo, yhi), (end, low, high) = layout.outgoing, slot
@@ -98,8 +98,8 @@ def slotted(plate: Box, slot: tuple[float, float, float] | None) -> list[tuple[P
 
 
 def dip(product: Product, plates: list[HalfSpace]) -> float:
-    """How much higher a product is where it is over some plates, which are level, than where it is
-    lowest [m]: 0 where it is over none."""
+    """Height difference between a product's lowest point and its lowest point over some level
+    plates [m]; 0 where it is over none."""
     bodies = [body for solid in product.solids.values() for body in Body.of(solid)]
     least, bottom = np.inf, float(product.low[2])
     for body in sorted(bodies, key=lambda body: float(body.low[2])):
@@ -111,7 +111,7 @@ def dip(product: Product, plates: list[HalfSpace]) -> float:
 
 
 def _lowest(body: Body, axis: int, bound: float, way: int) -> float:
-    """How low a body is beyond a bound [m]; inf where it is not there."""
+    """Lowest point of a body beyond a bound [m]; inf if it is not there."""
     beyond = way * (np.array([body.low, body.high])[:, axis] - bound)
     if beyond.max() <= 0:
         return np.inf
@@ -122,8 +122,8 @@ def _lowest(body: Body, axis: int, bound: float, way: int) -> float:
     ends = body.edges
     far = way * (ends[:, :, axis] - bound)
     heights: Array = ends[:, :, 2]
-    found = heights[far >= 0].min(initial=np.inf)
+    lowest = heights[far >= 0].min(initial=np.inf)
     crossing = far.prod(axis=1) < 0
     share = far[crossing, 0] / (far[crossing, 0] - far[crossing, 1])
     at = heights[crossing, 0] + share * (heights[crossing, 1] - heights[crossing, 0])
-    return float(min(found, at.min(initial=np.inf)))
+    return float(min(lowest, at.min(initial=np.inf)))

@@ -1,4 +1,4 @@
-"""The outline of a subtree: what a robot, and all that brings it something, take of the floor.
+"""The outline of a subtree: the floor that a robot and all that bring it something take.
 
 Frame of a robot: u ahead along its heading, t along the heading of the robot it delivers to, the
 origin at its B station. Blocks are rectangles of one layer with half a clearance around them.
@@ -24,8 +24,8 @@ DETAILED = 4
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """What was chosen for a robot: the side and the travel [m] of each robot that delivers to it,
-    and the station [m] of each of its operations."""
+    """The choices for a robot: the side and the travel [m] of each robot that delivers to it, and
+    the station [m] of each of its operations."""
 
     sides: dict[int, int] = field(default_factory=dict)
     travels: dict[int, float] = field(default_factory=dict)
@@ -47,7 +47,9 @@ class Outline:
     high: tuple[float, ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        hulls = [hull(found) if len(found) > 1 else (*found, NOWHERE)[0] for found in self.blocks]
+        hulls = [
+            hull(blocks) if len(blocks) > 1 else (*blocks, NOWHERE)[0] for blocks in self.blocks
+        ]
         _, front, low, high = zip(*hulls, strict=True)
         for name, values in (("front", front), ("low", low), ("high", high)):
             object.__setattr__(self, name, values)
@@ -68,19 +70,19 @@ class Outline:
 
     @property
     def crown(self) -> float:
-        """How far ahead what brings it something reaches [m]; less than nothing without any."""
+        """Extent ahead of its guests [m]; negative without any."""
         return max((b[1] for blocks in self.blocks for b in blocks[1:]), default=-inf)
 
     def clear(self, strip: Strip) -> float:
-        """How far the robot comes at the least to a path that takes a strip of the floor on its
-        side, so that all of this is clear of it [m]."""
+        """Least travel to a path that takes a strip of the floor on its side, so that the outline
+        is clear of it [m]."""
         return up(max(self.least, *map(add, self.front, strip)))
 
 
 @dataclass(frozen=True, slots=True)
 class Guest:
-    """A robot that delivers to another: its outline, from which side, how far it comes [m] and how
-    far it is to come at least, at which station."""
+    """A robot that delivers to another: its outline, its side, its travel [m], its least travel
+    [m], and its station."""
 
     robot: int
     outline: Outline
@@ -90,37 +92,37 @@ class Guest:
     station: float = 0.0
 
     def seen(self, layer: int) -> list[Block]:
-        """What it takes of a layer in its carrier's frame: its lane with what is about its B end,
-        and its crown, the box of everything that brings it something."""
+        """The blocks of a layer in its carrier's frame: its lane with what is about its B end, and
+        its crown, the box of its guests."""
         blocks = self.outline.blocks[layer]
         if not blocks:
             return []
-        own = blocks[0]
-        near = min(0.0, self.travel - own[1])
-        found = [(own[2], own[3], near, self.travel - own[0])]
+        lane = blocks[0]
+        near = min(0.0, self.travel - lane[1])
+        blocks_seen = [(lane[2], lane[3], near, self.travel - lane[0])]
         if len(blocks) > 1:
             ulo, uhi, tlo, thi = hull(blocks[1:])
-            found.append((tlo, thi, self.travel - uhi, self.travel - ulo))
+            blocks_seen.append((tlo, thi, self.travel - uhi, self.travel - ulo))
         at = self.station
         if self.side > 0:
-            return [(at + tlo, at + thi, near, far) for tlo, thi, near, far in found]
-        return [(at + tlo, at + thi, -far, -near) for tlo, thi, near, far in found]
+            return [(at + tlo, at + thi, near, far) for tlo, thi, near, far in blocks_seen]
+        return [(at + tlo, at + thi, -far, -near) for tlo, thi, near, far in blocks_seen]
 
 
 def crowns(guests: Sequence[Guest], layer: int) -> list[Block]:
-    """What the guests of a robot take of a layer, in its frame."""
+    """The blocks of a layer that the guests of a robot take, in its frame."""
     if len(guests) <= DETAILED:
         return [block for guest in guests for block in guest.seen(layer)]
-    found = []
+    boxes = []
     for side in (-1, +1):
         blocks = [b for guest in guests if guest.side == side for b in guest.seen(layer)]
         if blocks:
-            found.append(hull(blocks))
-    return found
+            boxes.append(hull(blocks))
+    return boxes
 
 
 def outlined(
-    own: Footprint,
+    footprint: Footprint,
     piles: Sequence[Placed],
     guests: Sequence[Guest],
     choice: Choice,
@@ -128,10 +130,12 @@ def outlined(
 ) -> Outline:
     """The outline of a robot with its piles and with those that deliver to it; with one block a
     layer if it is to be `boxed`."""
-    blocks = tuple(own.blocks(piles))
+    blocks = tuple(footprint.blocks(piles))
     if guests:
         blocks = tuple((*blocks[layer], *crowns(guests, layer)) for layer in LAYERS)
         if boxed:
-            blocks = tuple((hull(found),) if found else () for found in blocks)
-    least = max(TOOL_TRAVEL if own.shape.tool else own.shape.least, own.clearance.c)
-    return Outline(own.shape, choice, blocks, least)
+            blocks = tuple((hull(layer_blocks),) if layer_blocks else () for layer_blocks in blocks)
+    least = max(
+        TOOL_TRAVEL if footprint.shape.tool else footprint.shape.least, footprint.clearance.c
+    )
+    return Outline(footprint.shape, choice, blocks, least)

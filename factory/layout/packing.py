@@ -106,15 +106,15 @@ class Packing:
 
     def packed(self) -> Outline:
         """The best outline found. Raises InputError where a template asks for what cannot be."""
-        found = self._outlines(nested=True) or self._outlines(nested=False)
-        return min(found, key=lambda pair: pair[0])[1]
+        outlines = self._outlines(nested=True) or self._outlines(nested=False)
+        return min(outlines, key=lambda pair: pair[0])[1]
 
     def _outlines(self, nested: bool) -> list[tuple[float, Outline]]:
         empty = dict.fromkeys((-1, +1), Skyline.behind(self.own.frontier, nested))
         ways = [_Way(0.0, empty)]
         for stop in self.own.stops:
-            found = [longer for way in ways for longer in self._placed(way, stop)]
-            ways = sorted(found, key=lambda way: way.cost)[: self.task.width]
+            longer_ways = [longer for way in ways for longer in self._placed(way, stop)]
+            ways = sorted(longer_ways, key=lambda way: way.cost)[: self.task.width]
         return [pair for way in ways if (pair := self._finished(way, empty)) is not None]
 
     def _placed(self, way: _Way, stop: Stop) -> Iterator[_Way]:
@@ -134,21 +134,21 @@ class Packing:
                     yield from self._stations(way, stop, guests, least)
 
     def _options(self, stop: Stop, robots: Sequence[int]) -> list[Sides]:
-        """From which sides they may come: two from opposite ones."""
+        """The possible sides: two guests come from opposite ones."""
         both = [dict(zip(robots, sides, strict=False)) for sides in ((-1, +1), (+1, -1))]
         admitted = [all(self.admits(o, sides) for o in stop.operations) for sides in both]
         return [sides for sides, can in zip(both, admitted, strict=True) if can] or both
 
     def _later(self, way: _Way, count: int) -> Iterator[tuple[int, Outline]]:
-        """From which side which outline may come in so many operations after the next."""
+        """For a number of following operations: which outline may come from which side."""
         for stop in self.own.stops[len(way.piles) + 1 :][:count]:
             for sides in self._options(stop, stop.guests):
                 for robot, side in sides.items():
                     yield side, self.outline(robot, side)
 
     def _guests(self, way: _Way, stop: Stop, robot: int, side: int) -> list[Guest]:
-        """A robot that delivers from a side, as near as can be, or with its crown so far out that
-        robots without one that deliver soon find room before it."""
+        """A robot that delivers from a side, as near as possible, or with its crown so far out that
+        guests without one soon find room before it."""
         outline, strip = self.outline(robot, side), self.own.strips[side]
         early = self.own.early(stop, side, outline.shape)
         wanted = up(outline.least + early) if early > 0 else 0.0
@@ -168,7 +168,7 @@ class Packing:
     def _stations(
         self, way: _Way, stop: Stop, guests: Sequence[Guest], least: float
     ) -> Iterator[_Way]:
-        """The stations at which something comes clear, as long as the way there is worth it."""
+        """The stations at which something becomes clear, as long as the way there is worth it."""
         least = up(least + self._back(stop, guests))
         tried = {least, *self._next(way, least)}
         for guest in guests:
@@ -181,12 +181,12 @@ class Packing:
                 break
             placed = [_came(way.beside, guest, station, guest.travel) for guest in guests]
             if max(guest.travel for guest in placed) < inf:
-                found = self._added(way, stop, station, placed)
-                best = min(best, found.cost)
-                yield found
+                added = self._added(way, stop, station, placed)
+                best = min(best, added.cost)
+                yield added
 
     def _next(self, way: _Way, least: float) -> Iterator[float]:
-        """Where the next stop could be if this one were not: to stop there once saves time."""
+        """The station of the next stop without this one: stopping there once saves time."""
         for side, outline in self._later(way, 1):
             starts = way.beside[side].starts(outline, least)
             yield from (start for start in starts if start < least + ALIGN)
@@ -205,11 +205,11 @@ class Packing:
         )
 
     def _back(self, stop: Stop, guests: Iterable[Guest]) -> float:
-        """How far behind its station it stands for the operation of a stop farthest back [m]."""
+        """Displacement behind its station for the operation of a stop farthest back [m]."""
         return max(0.0, -min(self._further(stop, guests).values(), default=0.0))
 
     def _further(self, stop: Stop, guests: Iterable[Guest]) -> dict[int, float]:
-        """How much further than at its station it stands for the operations of a stop [m]."""
+        """Displacements beyond its station for the operations of a stop [m]."""
         return self.own.further(stop, ((guest.robot, guest.outline.shape) for guest in guests))
 
     def _time(self, way: _Way, stop: Stop, station: float, guests: Sequence[Guest]) -> float:
@@ -237,7 +237,7 @@ class Packing:
     def _longest(
         self, way: _Way, operation: Operation, move: float, guests: Sequence[Guest]
     ) -> float:
-        """How long all that come to a stop are on their ways [s]."""
+        """Duration of the longest way of a guest to a stop [s]."""
         pace = self.task.pace
         longest = rested = pace.rest(move)
         for guest in guests:
@@ -259,8 +259,8 @@ class Packing:
     def _cost(
         self, way: _Way, time: float, station: float, guests: Sequence[Guest], tours: int
     ) -> float:
-        """Of one more stop: its time, the way back from there, and what those that deliver go, in
-        so many tours."""
+        """The cost of one more stop: its time, the way back from there, and the ways of guests,
+        over a number of tours."""
         pace, weights = self.task.pace, self.task.weights
         cost = weights[self.robot] * (time + (station - way.station) / pace.speed)
         if not way.piles and guests:
@@ -318,14 +318,15 @@ class Packing:
 
 
 def bare(factory: Factory, robot: int, hand: Hand | None) -> int:
-    """How many labels a robot brings that one hand for several would hold, but that has none."""
+    """Number of labels that a robot brings without a hand although one hand for several would hold
+    them."""
     count = len(factory.tours[robot])
     return count if hand is not None and hand.kind == "none" and count > 1 else 0
 
 
 def _came(beside: Mapping[int, Skyline], guest: Guest, station: float, least: float) -> Guest:
-    """A robot at a station, with what is beside the path already, at least so far out: nowhere
-    else if it is fixed."""
+    """A robot at a station beside what is there already, with at least a given travel; not
+    elsewhere if it is fixed."""
     travel = beside[guest.side].travel(guest.outline, station, least)
     if guest.outline.shape.fixed and travel > least:
         travel = inf
@@ -333,9 +334,9 @@ def _came(beside: Mapping[int, Skyline], guest: Guest, station: float, least: fl
 
 
 def _taken(beside: Mapping[int, Skyline], guests: Sequence[Guest]) -> dict[int, Skyline]:
-    """What is beside the path with robots that deliver at their stations."""
-    found = dict(beside)
+    """The skylines beside the path with guests at their stations."""
+    skylines = dict(beside)
     for guest in guests:
-        skyline = found[guest.side]
-        found[guest.side] = skyline.taken(guest.outline, guest.station, guest.travel)
-    return found
+        skyline = skylines[guest.side]
+        skylines[guest.side] = skyline.taken(guest.outline, guest.station, guest.travel)
+    return skylines

@@ -1,9 +1,9 @@
-"""Pinned layout: that of a product's next revision, with its robots where those of the old are.
+"""Pinned layout: that of a product's next revision, in which robots stay where they are.
 
-The values of the old layout hold: sides, travels, stations, and the hands that can still hold. A
-robot that is new comes to the station, on either side of its carrier's path, at which least has to
-move. What is too near then moves away, one move at a time, until the layout is clear; of the moves
-that help, the one that displaces the fewest robots. The certificate decides, as of every layout.
+The values of the old layout hold: sides, travels, stations, and the hands that still fit. A new
+robot gets the station, on either side of its carrier's path, at which least has to move. What is
+too near then moves away, one move at a time, until the layout is clear; of the moves that help, the
+one that displaces fewest robots. As for every layout, the certificate decides.
 """
 
 from __future__ import annotations
@@ -157,8 +157,8 @@ class Pinning:
         return self.factory.robots[robot].operations[-1]
 
     def _placed(self, seen: _Seen, robot: int) -> _Seen:
-        """With a new robot where it displaces none, the best of all stations from which its path
-        leads out; else where least is lacking, after moves."""
+        """The stretch with a new robot where it displaces none: the best of all stations with a
+        free path; else where least is lacking, after moves."""
         branch, clear, others = self._branch(robot), list[_Seen](), list[_Seen]()
         for side in (-1, +1):
             sides = {r: s for r, s in enumerate(seen.stretch.sides) if r} | {robot: side}
@@ -178,14 +178,14 @@ class Pinning:
         return min(cleared, key=lambda way: (way.lacking > 0, way.score), default=seen)
 
     def _out(self, stretch: Stretch, robot: int, branch: set[int]) -> _Seen | None:
-        """With a robot as far out as it has to be; None where its path is blocked."""
+        """The stretch with a robot as far out as needed; None if its path is blocked."""
         if self._lacks(self._seen(self._further(stretch, robot, OUT)), branch):
             return None
         ways = (self._seen(self._further(stretch, robot, by)) for by in JUMPS[1:])
         return next((way for way in ways if not self._lacks(way, branch)), None)
 
     def _lacks(self, seen: _Seen, branch: set[int]) -> bool:
-        """Whether a fault is one of some robots."""
+        """Whether a fault concerns some of these robots."""
         names = {self.factory.robots[robot].name for robot in branch}
         return any(not names.isdisjoint(fault.robots) for fault in seen.faults)
 
@@ -195,8 +195,10 @@ class Pinning:
         packed, carrier = self._packed(sides), self.on[robot]
         inside = self._branch(robot)
         travel = [packed.travel[r] if r in inside else t for r, t in enumerate(stretch.travel)]
-        own = {n for r in inside for n in carried(self.factory, r)}
-        stations = [packed.stations[n] if n in own else s for n, s in enumerate(stretch.stations)]
+        carried_by = {n for r in inside for n in carried(self.factory, r)}
+        stations = [
+            packed.stations[n] if n in carried_by else s for n, s in enumerate(stretch.stations)
+        ]
         count = ceil((travel[carrier] + BEYOND) / STEP)
         least = -ceil(BEYOND / STEP) if carrier else 0
         made = carried(self.factory, carrier)
@@ -218,7 +220,7 @@ class Pinning:
         return branch
 
     def _cleared(self, seen: _Seen) -> _Seen:
-        """After moves until it is clear, or none helps."""
+        """The stretch after moves, until it is clear or none helps."""
         for _ in range(MOVES):
             faults = seen.faults
             moves = {move for fault in faults[:3] for move in self._moves(seen.stretch, fault)}
@@ -230,8 +232,8 @@ class Pinning:
         return seen
 
     def _moves(self, stretch: Stretch, fault: Fault) -> Iterator[Stretch]:
-        """The ways in which two robots that are too near can move away from each other: either, or
-        its branch of the path that both come to, goes further out or comes to a later station."""
+        """Moves by which two robots that are too near get apart: either one, or its branch of their
+        common path, goes further out or comes to a later station."""
         names = {r.name: r.index for r in self.factory.robots}
         chains = [self._chain(names[name]) for name in dict.fromkeys(fault.robots)]
         tops = list[int]()

@@ -1,4 +1,4 @@
-"""Pins: what holds of a layout for the factory of the product's next revision."""
+"""Pins: the values of a layout that hold in the factory of the product's next revision."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class StayingRobot:
 
     @property
     def whole(self) -> bool:
-        """Whether it stays as it is."""
+        """Whether it keeps all grades."""
         return self.program and self.contents and self.module and self.place
 
 
@@ -73,7 +73,7 @@ class Pins:
         return bool(away[int(robot == 0) :].max() < SAME)
 
     def displaced(self, layout: Layout) -> int:
-        """How many robots are not in place."""
+        """Number of robots that are not in place."""
         return sum(not self.in_place(layout, robot) for robot in self.ends)
 
 

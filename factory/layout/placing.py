@@ -1,8 +1,8 @@
-"""Where the branches of a layout are as its guidepaths are bent, and which come too near.
+"""The places of a layout's branches as its guidepaths are bent, and which come too near.
 
-A branch is moved as it is, with all of its regions (`sweeps`). So the regions of a robot are
-computed once for each of its detours, and those of two robots are compared anew only where one of
-them has been moved.
+A branch moves as a whole, with all its regions (`sweeps`). So the regions of a robot are computed
+once for each of its detours, and those of two robots are compared again only if one of them has
+moved.
 """
 
 from __future__ import annotations
@@ -51,13 +51,13 @@ class Floor:
         key = robot, detour
         if key not in self._known:
             layout = self.layout if detour is None else bent(self.layout, {robot: detour})
-            found = [*regions_of(layout, robot, self._piles)]
-            kinds = [replace(region, box=(0.0, 0.0, 0.0, 0.0)) for region in found]
+            swept_regions = [*regions_of(layout, robot, self._piles)]
+            kinds = [replace(region, box=(0.0, 0.0, 0.0, 0.0)) for region in swept_regions]
             numbers = [self._kinds.setdefault(kind, len(self._kinds)) for kind in kinds]
             self._regions[:] = self._kinds
             old, new = self.layout.guidepaths[robot], layout.guidepaths[robot]
             (x, y), (x0, y0) = new.middle(new.length), old.middle(old.length)
-            boxes = np.array([region.box for region in found]).reshape(-1, 4)
+            boxes = np.array([region.box for region in swept_regions]).reshape(-1, 4)
             self._known[key] = Swept(boxes, np.array(numbers, np.intp), (x - x0, y - y0))
         return self._known[key]
 
@@ -85,9 +85,9 @@ class Floor:
             *zip(*(k[self._may[one, other] < 0].tolist() for k in (one, other)), strict=True)
         }:
             a, b = (self._regions[kind] for kind in pair)
-            own = a.robot == b.robot and (a.kind in STATIONS) == (b.kind in STATIONS)
+            is_one_robot = a.robot == b.robot and (a.kind in STATIONS) == (b.kind in STATIONS)
             self._may[pair] = self._may[pair[::-1]] = (
-                a.layer != b.layer or own or self._search.settled(a, b)
+                a.layer != b.layer or is_one_robot or self._search.settled(a, b)
             )
         return self._may[one, other] > 0
 

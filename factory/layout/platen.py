@@ -57,10 +57,10 @@ def fill_of(layout: Layout, tiles: list[Box]) -> float:
 
 def _boxes(layout: Layout) -> Array:
     """The regions of a layout (n, 4) [m]."""
-    found = layout.certificate.regions if layout.certificate else None
-    if found is None:
-        found = tuple(regions(layout, piles(layout.factory, layout.product)))
-    return np.array([region.box for region in found])
+    occupied = layout.certificate.regions if layout.certificate else None
+    if occupied is None:
+        occupied = tuple(regions(layout, piles(layout.factory, layout.product)))
+    return np.array([region.box for region in occupied])
 
 
 def _covered(boxes: Array, corner: Point2, size: float) -> list[Box]:

@@ -75,8 +75,8 @@ class MachineBodies:
         return np.asarray(swept)
 
     def legs(self, first: Span, second: Span) -> Iterator[Leg]:
-        """The legs on which bodies move as the axes go over two spans [m], and as far beyond as the
-        first may be off: a slider, which stands out of its way, is not."""
+        """The legs on which bodies move as the axes go over two spans [m], each extended by the
+        greatest error of the first axis, except for a slider, which stands."""
         off = ALONG * (1.0 - abs(self.way[2]))
         low, high = min(first) - off, max(first) + off
         if self.bent is None:
@@ -94,7 +94,7 @@ class MachineBodies:
 
     @property
     def as_boxes(self) -> MachineBodies:
-        """The same, each body the whole of its box."""
+        """The same, with each body filling its box."""
         ends = self.boxes - self.origins[:, None]
         return replace(self, corners=corners_of(ends))
 
@@ -103,11 +103,11 @@ class MachineBodies:
         return replace(self, boxes=self.boxes + by, origins=self.origins + by)
 
     def going(self, way: Array) -> MachineBodies:
-        """The same of a machine whose first axis moves them along another vector (3,)."""
+        """The same for a machine whose first axis moves the bodies along another vector (3,)."""
         return replace(self, way=way, bent=None)
 
     def __add__(self, other: MachineBodies) -> MachineBodies:
-        """Those of both, which move alike."""
+        """The bodies of both, which move together."""
         return MachineBodies(
             self.names + other.names,
             np.concatenate([self.boxes, other.boxes]),
@@ -146,12 +146,12 @@ class Presence:
 
     @cached_property
     def boxes(self) -> Array:
-        """What each body sweeps on each leg, as boxes (m n, 2, 3) [m]."""
+        """The box that each body sweeps on each leg (m n, 2, 3) [m]."""
         return np.concatenate([*map(self.bodies.swept, self.legs)])
 
     @cached_property
     def layers(self) -> Index:
-        """In which layer each of them is (m n,)."""
+        """The layer of each of these boxes (m n,)."""
         return np.tile(self.bodies.layers, len(self.legs))
 
     @cached_property
@@ -162,17 +162,24 @@ class Presence:
     @cached_property
     def filled(self) -> Hashable:
         """What is the same for presences that fill the same places."""
-        own = self.bodies
-        arrays = own.boxes, own.origins, own.layers, own.rise, own.way, *own.corners
-        told = repr((self.sweeps, *map(len, own.corners))).encode()
-        return sha256(told + b"".join(one.tobytes() for one in arrays)).digest(), own.bent
+        bodies = self.bodies
+        arrays = (
+            bodies.boxes,
+            bodies.origins,
+            bodies.layers,
+            bodies.rise,
+            bodies.way,
+            *bodies.corners,
+        )
+        sizes = repr((self.sweeps, *map(len, bodies.corners))).encode()
+        return sha256(sizes + b"".join(one.tobytes() for one in arrays)).digest(), bodies.bent
 
     def name(self, number: int) -> str:
-        """The body that sweeps one of the boxes."""
+        """The body of one of the boxes."""
         return self.bodies.names[number % len(self.bodies.names)]
 
     def solid(self, number: int) -> Polytope:
-        """What is really in one of the boxes."""
+        """The bodies in one of the boxes."""
         if number not in self._solids:
             self._solids[number] = self._solid(number)
         return self._solids[number]
@@ -224,16 +231,17 @@ def near(presences: Sequence[Presence], clearance: float) -> Iterator[Near]:
 
 
 def nearest(one: Presence, other: Presence, clearance: float) -> Near | None:
-    """Two presences with the bodies whose boxes come nearest for what they need, if any do."""
+    """Two presences with the bodies whose boxes come nearest, relative to the distance they need,
+    if any come too near."""
     pairs = _pairs(one, other, clearance)
     lacking, i, j = max(pairs, default=(0.0, 0, 0))
     return Near(one, other, (one.name(i), other.name(j)), lacking) if pairs else None
 
 
-def nearer(found: Near, clearance: float) -> Near | None:
-    """The same of the bodies themselves, which may be apart where their boxes are not."""
-    judged = _judged(found.one, found.other, clearance)
-    return judged and _named(found, judged)
+def nearer(near: Near, clearance: float) -> Near | None:
+    """The same, judged by the bodies themselves, which may be apart where their boxes are not."""
+    judged = _judged(near.one, near.other, clearance)
+    return judged and _named(near, judged)
 
 
 class Nearness:
@@ -243,12 +251,12 @@ class Nearness:
     def __init__(self, clearance: float) -> None:
         self._clearance, self._known = clearance, dict[Hashable, Lacking | None]()
 
-    def nearer(self, found: Near) -> Near | None:
+    def nearer(self, near_pair: Near) -> Near | None:
         """As the function does."""
-        if (pair := alike(found.one, found.other)) not in self._known:
-            self._known[pair] = _judged(found.one, found.other, self._clearance)
+        if (pair := alike(near_pair.one, near_pair.other)) not in self._known:
+            self._known[pair] = _judged(near_pair.one, near_pair.other, self._clearance)
         judged = self._known[pair]
-        return judged and _named(found, judged)
+        return judged and _named(near_pair, judged)
 
 
 def alike(one: Presence, other: Presence) -> Hashable:
@@ -257,9 +265,9 @@ def alike(one: Presence, other: Presence) -> Hashable:
     return one.filled, other.filled, apart, one.bears or other.bears
 
 
-def _named(found: Near, judged: Lacking) -> Near:
+def _named(pair: Near, judged: Lacking) -> Near:
     lacking, i, j = judged
-    return replace(found, bodies=(found.one.name(i), found.other.name(j)), lacking=lacking)
+    return replace(pair, bodies=(pair.one.name(i), pair.other.name(j)), lacking=lacking)
 
 
 def _judged(one: Presence, other: Presence, clearance: float) -> Lacking | None:
@@ -275,7 +283,7 @@ def _judged(one: Presence, other: Presence, clearance: float) -> Lacking | None:
 
 
 def _pairs(one: Presence, other: Presence, clearance: float) -> list[Lacking]:
-    """The pairs of boxes of two presences that come near, and by how much nearer than they may."""
+    """The pairs of boxes of two presences that come too near, and by how much."""
     across = 0.0 if one.bears or other.bears else ACROSS
     apart = across if one.partners & other.partners else clearance - 2 * (ALONG + ROUNDING)
     here = _within(one.boxes, other.hull, apart)
@@ -291,13 +299,13 @@ def _pairs(one: Presence, other: Presence, clearance: float) -> list[Lacking]:
 
 
 def _overlap(one: Array, other: Array) -> Array:
-    """How deep boxes (..., 2, 3) overlap; negative by how far they are apart (...) [m]."""
+    """Depth of overlap of boxes (..., 2, 3); negative: their distance (...) [m]."""
     low = np.maximum(one[..., 0, :], other[..., 0, :])
     return np.asarray((np.minimum(one[..., 1, :], other[..., 1, :]) - low).min(axis=-1))
 
 
 def _within(boxes: Array, hull: Array, apart: float) -> Index:
-    """Which boxes (n, 2, 3) come nearer than so much to a box (2, 3)."""
+    """Which boxes (n, 2, 3) come nearer than a distance to a box (2, 3)."""
     meets = (boxes[:, 0] < hull[1] + apart) & (boxes[:, 1] > hull[0] - apart)
     return np.flatnonzero(meets.all(axis=1))
 

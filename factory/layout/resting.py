@@ -78,12 +78,14 @@ def _robot(layout: Layout, robots: Staying, robot: int) -> Iterator[tuple[Presen
             tours.append((step, number, _rests(layout, robots, robot, step)))
     rests = tuple(dict.fromkeys(sweep for *_, sweeps in tours for sweep in sweeps))
     name, home = factory.robots[robot].name, layout.guidepaths[robot].length
-    for step, number, own in tours:
+    for step, number, tour_rests in tours:
         before = factory.operations[factory.robots[robot].operations[step - 1]]
         wait, begun = factory.net.gears[robot].places[2 * step], factory.operations[number].place
         end = layout.visits[number, robot].at
         ways = tuple(
-            ((min(end, *at), max(end, home)), lift) for at, lift in rests if (at, lift) not in own
+            ((min(end, *at), max(end, home)), lift)
+            for at, lift in rests
+            if (at, lift) not in tour_rests
         )
         turn = before.turn if len(tours) > 1 else -1
         for place, sweeps, unmade in ((wait, rests, turn), (begun, ways, -1)):
@@ -105,7 +107,8 @@ def _rests(layout: Layout, robots: Staying, robot: int, step: int) -> tuple[Swee
 
 
 def _turn(layout: Layout, presence: Presence) -> int:
-    """For which unit of a period a machine is where it is, or was before; -1 for what stands."""
+    """The unit of a period that a machine serves, or has served before, where it is; -1 for what
+    stands."""
     factory = layout.factory
     if not presence.places:
         return -1

@@ -1,4 +1,4 @@
-"""A layout as a table: what was chosen for it, from which all else of it follows again."""
+"""A layout as a table of its choices, from which everything else is derived."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class LayoutTable:
 
     @classmethod
     def of(cls, layout: Layout) -> LayoutTable:
-        """That of a layout."""
+        """The table of a layout."""
         whole = layout.whole
         visits = (
             tuple(whole.visits[o.index, robot] for robot in o.robots)
@@ -107,13 +107,13 @@ class LayoutTable:
             return replace(laid, plain=self.plain.laid_out(plain, product, plain))
         if not self.standby:
             return laid
-        known = replace(laid, product=repeated(product, factory), standby=laid)
-        made = part_of(known, factory)
+        standing = replace(laid, product=repeated(product, factory), standby=laid)
+        made = part_of(standing, factory)
         assert made is not None, "its robots have their own tours"
         return made
 
     def _whole(self, factory: Factory) -> Factory:
-        """The factory whose robots do all that they may do."""
+        """The factory in which robots do all that they may do."""
         if not self.standby:
             return factory
         robots = range(len(factory.robots))
@@ -124,7 +124,7 @@ class LayoutTable:
         return assigned(factory, factory.robots, self.standby)
 
     def _check(self, factory: Factory) -> None:
-        """Raises ValueError where the numbers of values are not those of a factory."""
+        """Raises ValueError if the numbers of values do not fit a factory."""
         robots = len(factory.robots)
         wanted: tuple[tuple[str, tuple[object, ...], int], ...] = (
             ("guidepaths", self.guidepaths, robots),
@@ -138,19 +138,21 @@ class LayoutTable:
     def _visits(self, factory: Factory) -> dict[tuple[int, int], Visit]:
         """The visits of a factory. Raises ValueError where they are not, or where a robot holds its
         payload in several ways on one tour."""
-        found = dict[tuple[int, int], Visit]()
+        visit_of = dict[tuple[int, int], Visit]()
         for o, row in zip(factory.operations, self.visits, strict=True):
             if len(row) != len(o.robots):
                 words = f"a list of {len(o.robots)}, one for each robot, not of {len(row)}"
                 raise ValueError(f"visits[{o.index}] must be {words}")
-            found |= {(o.index, robot): visit for robot, visit in zip(o.robots, row, strict=True)}
+            visit_of |= {
+                (o.index, robot): visit for robot, visit in zip(o.robots, row, strict=True)
+            }
         for robot, tours in enumerate(factory.tours):
             for tour in tours:
-                visits = [found[number, robot] for number in tour]
+                visits = [visit_of[number, robot] for number in tour]
                 if len({(visit.up, visit.elevation, visit.shift) for visit in visits}) > 1:
                     words = f"visits of {factory.robots[robot].name} for one payload"
                     raise ValueError(f"{words} must have the same up, elevation and shift")
-        return found
+        return visit_of
 
 
 def _turns(factory: Factory, whole: Factory) -> tuple[tuple[int, ...], ...]:

@@ -1,4 +1,4 @@
-"""Piles that a robot can carry back to the B end of its guidepath when they are scrap.
+"""Piles that a robot can carry back to the B end of its guidepath as scrap.
 
 A pile is swept from where it is complete back to B, and compared with all regions of the clearance
 certificate, wherever the other robots are. A pile that may come too near to one of them is dropped
@@ -18,10 +18,10 @@ from factory.problem.pag import NOPART
 
 
 def not_carried_back(layout: Layout) -> frozenset[tuple[int, str]]:
-    """The robots (index) with the labels that they cannot carry back to B. Near linear."""
-    found = piles(layout.factory, layout.product)
-    ways = [way for r in layout.factory.present for way in _ways_back(layout, r, found)]
-    here = [region for region in regions(layout, found) if region.layer == PAYLOADS]
+    """The pairs (robot index, label) that the robot cannot carry back to B. Near linear."""
+    by_label = piles(layout.factory, layout.product)
+    ways = [way for r in layout.factory.present for way in _ways_back(layout, r, by_label)]
+    here = [region for region in regions(layout, by_label) if region.layer == PAYLOADS]
     search, back = ClearanceSearch(layout, [*here, *ways]), {id(way) for way in ways}
     barred = set[tuple[int, str]]()
     for one, other in search.near(search.swept):
@@ -31,8 +31,8 @@ def not_carried_back(layout: Layout) -> frozenset[tuple[int, str]]:
     return frozenset(barred)
 
 
-def _ways_back(layout: Layout, robot: int, found: Mapping[str, Pile]) -> Iterator[Region]:
-    """Each pile of a robot, with its hand, from where it is before it is delivered to B."""
+def _ways_back(layout: Layout, robot: int, by_label: Mapping[str, Pile]) -> Iterator[Region]:
+    """The region of each pile of a robot, with its hand, on its way back to B."""
     path, operations = layout.guidepaths[robot], layout.factory.operations
     gear, stops = layout.factory.robots[robot].operations, layout.stops(robot)
     grip = layout.grip(robot)
@@ -43,7 +43,7 @@ def _ways_back(layout: Layout, robot: int, found: Mapping[str, Pile]) -> Iterato
         onward = (step + 1) % len(gear)
         then = operations[gear[onward]]
         leaves = then.after[then.robots.index(robot)] == NOPART
-        pile = found[label].carried(layout.visits[number, robot])
+        pile = by_label[label].carried(layout.visits[number, robot])
         at = stops[step if leaves else onward]
         for box in path.sweeps(pile.box, path.length, at):
             yield Region(robot, PAYLOADS, PAYLOAD_BODY, box, pile.z, label)

@@ -58,8 +58,8 @@ class Shape:
     fixed: bool = False
 
     def shift(self, operation: int) -> Point3:
-        """How far the product's middle is ahead and to the side of where the guidepath has it, and
-        above, on the tour that an operation (index) is in [m]."""
+        """Displacement of the product's middle, ahead, to the side and above, from where the
+        guidepath has it, on the tour that contains an operation (index) [m]."""
         return self.shifts.get(operation, NONE)
 
     def laden(self, pile: Extent) -> Extent:
@@ -88,7 +88,7 @@ def payload_boxes(factory: Factory, product: Product) -> dict[str, Box]:
 
 def symmetric_shapes(factory: Factory, payloads: Mapping[str, Box], c: Clearance) -> list[Shape]:
     """Shapes whose extents are the same in every direction, to choose the sides by."""
-    found = []
+    shapes = []
     for robot in range(len(factory.robots)):
         halves = {
             number: max(map(abs, payloads[factory.operations[number].label]))
@@ -97,8 +97,8 @@ def symmetric_shapes(factory: Factory, payloads: Mapping[str, Box], c: Clearance
         boxes = {number: (-half, half, -half, half) for number, half in halves.items()}
         tool = is_tool(factory, robot)
         last = _last(factory, robot, boxes)
-        found.append(Shape(boxes, last, 0.0, c.rim, c.reach(c.rim), 0.0, tool))
-    return found
+        shapes.append(Shape(boxes, last, 0.0, c.rim, c.reach(c.rim), 0.0, tool))
+    return shapes
 
 
 def oriented_shape(
@@ -209,8 +209,8 @@ def held_shape(
     over = PAYLOAD - float(hands.holding.product.low[2])
     grip, nest = grip_of(hand, Mount(u, t, reach, arm, offset, (x, y), over)), round(max(ahead), 6)
     fixed = factory.robots[robot].fixed
-    least, given = up(least), (offset, arm, reach, nest, False, spread)
-    return Shape(boxes, last, *given, hand, grip, post, least, shifts, fixed)
+    least, extents = up(least), (offset, arm, reach, nest, False, spread)
+    return Shape(boxes, last, *extents, hand, grip, post, least, shifts, fixed)
 
 
 def _moves(hands: Hands, robot: int, carrier: int, frame: Frame) -> tuple[dict[int, Point3], float]:
@@ -218,28 +218,28 @@ def _moves(hands: Hands, robot: int, carrier: int, frame: Frame) -> tuple[dict[i
     has it; and how much further behind it has to stay, since it delivers further ahead than that
     where its carrier's line is [m]."""
     (u, t), factory = frame, hands.factory
-    own = hands.shifts(robot, u, t)
+    of_robot = hands.shifts(robot, u, t)
     carriers = hands.shifts(carrier, t) if carrier >= 0 else ()
-    if not any(map(any, (*own, *carriers))):
+    if not any(map(any, (*of_robot, *carriers))):
         return {}, 0.0
-    found, back = dict[int, Point3](), 0.0
+    moves, back = dict[int, Point3](), 0.0
     for number, tour in enumerate(factory.tours[robot]):
-        x, y, z = own[number] if own else NONE
+        x, y, z = of_robot[number] if of_robot else NONE
         ahead = round(x * u[0] + y * u[1], 6)
-        found |= dict.fromkeys(tour, (ahead, round(x * t[0] + y * t[1], 6), z))
+        moves |= dict.fromkeys(tour, (ahead, round(x * t[0] + y * t[1], 6), z))
         if carriers:
             x, y, _ = carriers[factory.turns[tour[-1], carrier]]
             ahead -= x * u[0] + y * u[1]
         back = max(back, -ahead)
-    return found, up(back)
+    return moves, up(back)
 
 
 def is_tool(factory: Factory, robot: int) -> bool:
-    """Whether a robot never carries anything: a tool."""
+    """Whether a robot is a tool: it never carries anything."""
     return robot > 0 and not factory.deliveries(robot)
 
 
 def _last(factory: Factory, robot: int, boxes: Mapping[int, Extent]) -> Extent:
-    """The box of all that a robot delivers."""
+    """The box of everything that a robot delivers."""
     ends = [n for tour in factory.tours[robot] for n in [m for m in tour if m in boxes][-1:]]
     return hull([boxes[number] for number in ends]) if ends else NOWHERE

@@ -1,9 +1,9 @@
-"""From which side the inputs of an operation come: one from which they can.
+"""The sides from which the inputs of an operation come, such that they can.
 
-They come along the carrier's side t, from either end of it. Which of the two lets them slide
-together without passing through each other is known of each operation (`plant/approaches.py`), in
-the directions of the product; what t is follows from the sides of all carriers on the way to the
-output robot.
+They come along the carrier's side t, from either end of it. From which of the two they can slide
+together without passing through each other is known for each operation (`plant/approaches.py`), in
+the directions of the product; t follows from the sides of all carriers on the way to the output
+robot.
 """
 
 from __future__ import annotations
@@ -16,10 +16,8 @@ from factory.problem.pag import NOPART
 
 
 def admissible(factory: Factory, sides: Sides) -> Sides:
-    """The sides, with the robots of each operation swapped whose inputs cannot come from there.
-
-    Carriers first: a swap turns the frames of all that comes after. Linear.
-    """
+    """The sides, with the robots of an operation swapped where its inputs cannot come from there.
+    Carriers first: a swap turns the frames of all that comes after. Linear."""
     frames: list[Frame] = []
     result = dict(sides)
     for robot, carrier in zip(factory.robots, carriers(factory), strict=True):
@@ -34,7 +32,7 @@ def admissible(factory: Factory, sides: Sides) -> Sides:
 
 
 def admitted(operation: Operation, sides: Sides, t: Point2) -> bool:
-    """Whether the inputs of an operation can come from where they do."""
+    """Whether the inputs of an operation can come from their sides."""
     approach = operation.approach
     if approach is None or len(operation.inputs) < 2:
         return True

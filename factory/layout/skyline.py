@@ -1,7 +1,8 @@
-"""The skyline of one side of a guidepath: what stands there, and how far a further robot must come.
+"""The skyline of one side of a guidepath: what stands there, and how far out the next robot must
+be.
 
 Everything is pushed outwards until it is clear, so a short branch can stand under the crown of a
-long one and a long one can reach past a short one: the contours fit into each other.
+long one, and a long one can reach past a short one: the contours fit into each other.
 """
 
 from __future__ import annotations
@@ -34,12 +35,13 @@ class Skyline:
 
     @classmethod
     def behind(cls, frontier: Sequence[float], nested: bool) -> Skyline:
-        """Nothing but a frontier: where along the path, by layer, something may come to it."""
+        """An empty skyline with a frontier: where along the path, by layer, something may come to
+        it."""
         bars = (((-inf, end, 0.0, 2 * TOUCH),) if end > -inf else () for end in frontier)
         return cls(tuple(bars), nested)
 
     def travel(self, outline: Outline, station: float, least: float) -> float:
-        """How far a robot has to come that ends at a station, at least so far [m]; infinity where
+        """The travel, of at least some length, of a robot that ends at a station [m]; infinity if
         its path is blocked."""
         travel, settled = least, False
         while not settled and travel < inf:
@@ -74,15 +76,15 @@ class Skyline:
 
     def starts(self, outline: Outline, least: float) -> set[float]:
         """The stations after `least` where something of an outline comes clear of something."""
-        found = set[float]()
+        stations = set[float]()
         for layer in LAYERS:
             edges = {block[2] for block in outline.blocks[layer]}
             for _, end, _, _ in self.blocks[layer]:
-                found.update(end - edge for edge in edges if least < end - edge < inf)
-        return found
+                stations.update(end - edge for edge in edges if least < end - edge < inf)
+        return stations
 
     def taken(self, outline: Outline, station: float, travel: float) -> Skyline:
-        """The same with a robot that comes so far to a station."""
+        """The skyline with a robot added at a station."""
         blocks = []
         for layer in LAYERS:
             rear = outline.rear(layer)

@@ -14,14 +14,14 @@ from factory.support.errors import FactoryError
 
 def deputies_in(layout: Layout) -> Mapping[int, int]:
     """The robots of a layout for which a deputy can take over, and that (indices)."""
-    factory, found = layout.factory, dict[int, int]()
+    factory, deputy_of = layout.factory, dict[int, int]()
     for o in layout.whole.factory.operations:
         label = o.within(factory.period)
         pairs = zip(layout.whole.factory.by_label[label].robots, o.robots, strict=True)
-        found |= {
+        deputy_of |= {
             robot: other for robot, other in pairs if robot != other and label in factory.by_label
         }
-    return found
+    return deputy_of
 
 
 def part_of(layout: Layout, factory: Factory) -> Layout | None:
@@ -32,15 +32,15 @@ def part_of(layout: Layout, factory: Factory) -> Layout | None:
     numbers = {
         (o.within(factory.period), o.robots): o.index for o in reversed(whole.factory.operations)
     }
-    found = [numbers.get((o.label, o.robots), -1) for o in factory.operations]
-    if -1 in found:
+    operations = [numbers.get((o.label, o.robots), -1) for o in factory.operations]
+    if -1 in operations:
         return None
     return replace(
         layout,
         factory=factory,
         visits={
             (o.index, robot): whole.visits[number, robot]
-            for o, number in zip(factory.operations, found, strict=True)
+            for o, number in zip(factory.operations, operations, strict=True)
             for robot in o.robots
         },
         payloads={x: box for x, box in whole.payloads.items() if x in factory.by_label},

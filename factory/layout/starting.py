@@ -10,9 +10,9 @@ from factory.nets.petri import Marking
 
 
 def start_positions(layout: Layout, marking: Marking) -> np.ndarray:
-    """Every axis in a marking: a robot where its last operation left it, or at its B end where it
-    waits with no part at the beginning of its cycle, and then its lift is where its last tour
-    leaves it, unless that is set by then, or its hand is above what it takes; 0 for one that is
+    """Every axis in a marking. A robot is where its last operation left it, or at its B end if it
+    waits without a payload at the beginning of its cycle; then its lift is where its last tour left
+    it, unless it is adjusted by then or its hand is above what it takes. 0 for robots that are
     gone."""
     factory, net = layout.factory, layout.factory.net
     positions, lifts = np.zeros(len(factory.robots) + len(layout.strokes)), factory.lift_axis

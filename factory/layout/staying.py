@@ -62,7 +62,7 @@ class Chain:
     beyond: bool = False
 
     def legs(self, begin: float, end: float) -> Iterator[tuple[Places, Span]]:
-        """The way from one point to another, place by place."""
+        """The way between two points, place by place."""
         way = 1.0 if end >= begin else -1.0
         for at, place in self.points:
             if (begin - at) * way >= 0.0 and begin != end:
@@ -89,7 +89,7 @@ class Staying:
         self.partners = _partners(layout)
 
     def presences(self) -> Iterator[Presence]:
-        """All of them, robot by robot."""
+        """All presences, robot by robot."""
         for robot in self.layout.factory.robots:
             index, partners = robot.index, self.partners[robot.index]
             for step, number in enumerate(robot.operations):
@@ -101,15 +101,15 @@ class Staying:
                 for places, sweeps in (*self._waits(index, step), *self._works(index, step)):
                     held = "" if label == NOPART else label
                     since = 2 * robot.operations[step - 1] + 1 if label == NOPART else -1
-                    told = robot.name, places, bodies, sweeps, partners, False, held, since
-                    yield Presence(index, *told)
+                    fields = robot.name, places, bodies, sweeps, partners, False, held, since
+                    yield Presence(index, *fields)
 
     def own(self, robot: int) -> MachineBodies:
         """Carriage, mast, arm and hand of a robot, with its axes at 0."""
         return self._own[robot]
 
     def held(self, robot: int, operation: int, label: str) -> MachineBodies:
-        """What a robot holds on its tour with an operation, with its axes at 0."""
+        """The payload of a robot on its tour with an operation, with its axes at 0."""
         layout, product = self.layout, self.layout.product
         parts = layout.factory.contents[label]
         visit = layout.visits[operation, robot]
@@ -251,15 +251,15 @@ class Staying:
         for past in sorted(coordinated.passes, key=lambda past: past.at * past.direction):
             passes.setdefault((past.after, past.axis), []).append(past)
         net, after = coordinated.net, {coordinated.net.left[p]: p for p in coordinated.beside}
-        found = dict[tuple[int, int], Chain]()
+        chains = dict[tuple[int, int], Chain]()
         for (start, axis), along in passes.items():
             points = [(self._home(axis, p.at), coordinated.passes[p][0]) for p in along]
             last = after[net.right[points[-1][1]]]
-            found[start, axis] = Chain(tuple(points), (last,), net.right[last] % 2 == 1)
-        return found
+            chains[start, axis] = Chain(tuple(points), (last,), net.right[last] % 2 == 1)
+        return chains
 
     def _home(self, axis: int, at: float) -> float:
-        """Where a robot really is that is past a point: at home, where it is as good as there."""
+        """Where a robot is that has passed a point: at home if the point is as good as there."""
         if axis >= len(self.layout.guidepaths):
             return at
         length = self.layout.guidepaths[axis].length
@@ -267,8 +267,8 @@ class Staying:
 
 
 def comes_last(layout: Layout, robot: int, operation: int) -> bool:
-    """Whether a robot comes home when the part of its feeder is down, which it is where a run
-    begins."""
+    """Whether a robot comes home when the part of its feeder is down, as it is at the start of a
+    run."""
     hand = layout.hand(robot)
     is_above = hand is not None and hand.kind == "above"
     return is_above and not layout.factory.operations[operation].inputs
@@ -278,21 +278,21 @@ def _own(layout: Layout, robot: int) -> MachineBodies:
     """Carriage, mast, arm and hand of a robot, with its axes at 0."""
     path, half, mast, arm = layout.guidepaths[robot], CARRIAGE / 2, MAST / 2, ARM_WIDTH / 2
     rim = max(path.reach - path.arm, mast)
-    found = [
+    bodies_of = [
         (Limb("carriage", (-half, -half, 0.0), (half, half, CARRIAGE_TOP)), CARRIAGES),
         (Limb("mast", (-mast, -mast, CARRIAGE_TOP), (mast, mast, ARM_TOP)), ARMS),
         (Limb("arm", (0.0, -arm, ARM_LOW), (rim, arm, ARM_TOP)), ARMS),
         *((limb, PAYLOADS) for limb in limbs(layout, robot)),
     ]
-    ends = np.array([[limb.low, limb.high] for limb, _ in found])
+    ends = np.array([[limb.low, limb.high] for limb, _ in bodies_of])
     boxes = in_world(ends, path.heading, path.carriage(0.0))
     return MachineBodies(
-        tuple(limb.name for limb, _ in found),
+        tuple(limb.name for limb, _ in bodies_of),
         boxes,
-        tuple(map(_shape, boxes, (limb.round for limb, _ in found))),
-        np.zeros((len(found), 3)),
-        np.array([layer for _, layer in found]),
-        np.array([limb.lifted for limb, _ in found]),
+        tuple(map(_shape, boxes, (limb.round for limb, _ in bodies_of))),
+        np.zeros((len(bodies_of), 3)),
+        np.array([layer for _, layer in bodies_of]),
+        np.array([limb.lifted for limb, _ in bodies_of]),
         *_way(layout, robot),
     )
 
@@ -318,8 +318,8 @@ def in_world(boxes: Array, heading: tuple[float, float], at: tuple[float, float]
 
 
 def _way(layout: Layout, robot: int) -> tuple[Array, Guidepath | None]:
-    """How a robot moves as its arc length grows: against its heading, or as its guidepath bends;
-    not at all if it turns."""
+    """How a robot moves with its arc length: against its heading, along its bent guidepath, or not
+    at all if it turns."""
     path = layout.guidepaths[robot]
     ahead = 0.0 if path.fixed else -1.0
     return np.array([*path.heading, 0.0]) * ahead, path if path.bends else None
@@ -328,10 +328,10 @@ def _way(layout: Layout, robot: int) -> tuple[Array, Guidepath | None]:
 def _partners(layout: Layout) -> list[frozenset[int]]:
     """For each robot the carriers that it works with, itself among them; for those on one stem
     themselves, since they are no partners of each other."""
-    found = [{robot} for robot in range(len(layout.guidepaths))]
+    partners = [{robot} for robot in range(len(layout.guidepaths))]
     for operation in layout.factory.operations:
         on_stem = (robot for robot in operation.robots if robot in layout.stems)
         met = next(on_stem, operation.carrier)
         for robot in operation.robots:
-            found[robot].add(met)
-    return [*map(frozenset, found)]
+            partners[robot].add(met)
+    return [*map(frozenset, partners)]

@@ -1,4 +1,4 @@
-"""Where a robot stands for its operations, and in which order along its way."""
+"""The stops of a robot: where it stands for its operations, and their order along its way."""
 
 from __future__ import annotations
 
@@ -39,44 +39,48 @@ class Stop:
 
 
 def stops_of(factory: Factory, robot: int) -> tuple[tuple[Stop, ...], bool]:
-    """Where a robot stands for the operations after which it carries something, in an order in
-    which it goes ahead from one to the next on each of its tours, and whether there is none since
-    it comes back to some: then in the order in which it comes there first. Raises InputError
-    (Layout) as `guests_of`."""
+    """The stops of a robot for the operations after which it carries something, in an order in
+    which it goes ahead from one to the next on each of its tours; and whether there is none because
+    it returns to some: then in the order of first visits. Raises InputError (Layout) as
+    `guests_of`."""
     kept = frozenset(carried(factory, robot))
     tours = [
         [(_where(factory.operations[n], robot), factory.operations[n]) for n in tour if n in kept]
         for tour in factory.tours[robot]
     ]
-    found, arrivals, onward = dict[Hashable, list[Operation]](), set[tuple[Hashable, str]](), set()
+    at_stop, arrivals, onward = (
+        dict[Hashable, list[Operation]](),
+        set[tuple[Hashable, str]](),
+        set(),
+    )
     for tour in tours:
         before: Hashable = None
         for where, operation in tour:
-            found.setdefault(where, []).append(operation)
+            at_stop.setdefault(where, []).append(operation)
             if where != before:
                 arrivals.add((where, operation.written))
             if before is not None:
                 onward.add((before, where))
             before = where
     visits = Counter(where for where, _ in arrivals)
-    order = _ordered(found, onward)
+    order = _ordered(at_stop, onward)
     stops = tuple(
-        Stop(tuple(found[where]), visits[where], guests_of(factory, found[where][0]))
-        for where in order or found
+        Stop(tuple(at_stop[where]), visits[where], guests_of(factory, at_stop[where][0]))
+        for where in order or at_stop
     )
     return stops, not order
 
 
 def _where(operation: Operation, robot: int) -> Hashable:
-    """What tells where a robot stands for an operation: the others that come there, if any do."""
+    """The key of an operation's stop: the others that come there, if any."""
     return frozenset(operation.robots) - {robot} or (operation.written if operation.inputs else "")
 
 
 def _ordered(
     things: Iterable[Hashable], pairs: Iterable[tuple[Hashable, Hashable]]
 ) -> list[Hashable]:
-    """Things in an order in which the first of each pair comes before the second, else as they are;
-    none where there is no such order."""
+    """Things in an order in which the first of each pair precedes the second, otherwise stable;
+    empty if there is none."""
     things = [*things]
     numbers = {thing: number for number, thing in enumerate(things)}
     waits, after = [0] * len(things), list[list[int]]([] for _ in things)

@@ -1,11 +1,10 @@
-"""Stretching: choose free lengths and directions of the guidepaths so that nothing meets that
-should not.
+"""Stretching: choose free lengths and directions of the guidepaths so that nothing collides.
 
 The guidepaths form a tree. A robot's path starts where it receives (B) and runs straight to where
-it delivers (A); the paths of the robots that bring it something end on it, from its left or right.
-A subtree takes a box in each layer beside its carrier's path; boxes on one side follow one another;
-a path is as long as it takes to keep its own subtree clear of the path it ends on, layer by layer.
-Bottom-up, linear in the number of robots.
+it delivers (A); the paths of its guests end on it, from its left or right. A subtree takes a box in
+each layer beside its carrier's path; boxes on one side follow one another; a path is as long as it
+takes to keep its own subtree clear of the path it ends on, layer by layer. Bottom-up, linear in the
+number of robots.
 """
 
 from __future__ import annotations
@@ -42,9 +41,9 @@ def stretch(
     chosen: Sides = {} if sides is None else sides
     outlines: dict[int, Outline] = {}
     for robot in reversed(range(len(factory.robots))):
-        own = footprint(factory, robot, shapes[robot], clearance)
-        builder = _Builder(own, outlines, chosen, sides is None)
-        for stop in own.stops:
+        strip = footprint(factory, robot, shapes[robot], clearance)
+        builder = _Builder(strip, outlines, chosen, sides is None)
+        for stop in strip.stops:
             station = builder.add(stop)
             further = builder.further(stop)
             for operation in stop.operations:
@@ -52,7 +51,7 @@ def stretch(
         guests = builder.attached()
         for guest in guests:
             travel[guest.robot] = guest.travel
-        outlines[robot] = outlined(own, builder.piles, guests, Choice(), boxed=True)
+        outlines[robot] = outlined(strip, builder.piles, guests, Choice(), boxed=True)
     travel[0] = outgoing(outlines[0], clearance)
     return Stretched(travel, stations, chosen)
 
@@ -66,10 +65,10 @@ class _Builder:
     """Adds the stops of one robot from its B end forward."""
 
     def __init__(
-        self, own: Footprint, outlines: Mapping[int, Outline], sides: Sides, choose: bool
+        self, footprint: Footprint, outlines: Mapping[int, Outline], sides: Sides, choose: bool
     ) -> None:
-        self.own, self.outlines, self.sides, self.choose = own, outlines, sides, choose
-        self.frontier = {side: list(own.frontier) for side in (-1, +1)}
+        self.own, self.outlines, self.sides, self.choose = footprint, outlines, sides, choose
+        self.frontier = {side: list(footprint.frontier) for side in (-1, +1)}
         self.station = 0.0
         self.piles: list[Placed] = []
         self.guests: list[tuple[int, float]] = []
@@ -100,14 +99,14 @@ class _Builder:
 
     def attached(self) -> list[Guest]:
         """The robots that deliver, each with its travel."""
-        strip, found = self.own.strip_at(self.piles), []
+        strip, guests = self.own.strip_at(self.piles), []
         for robot, station in self.guests:
             outline, side = self.outlines[robot], self.sides[robot]
             travel = outline.clear(strip(side, station + outline.high[PAYLOADS]))
             if outline.shape.fixed:
                 travel = 0.0
-            found.append(Guest(robot, outline, side, travel, station=station))
-        return found
+            guests.append(Guest(robot, outline, side, travel, station=station))
+        return guests
 
     def _free(self, guest: int, side: int) -> float:
         """The least station for a guest on one side."""

@@ -1,4 +1,4 @@
-"""What robots sweep seen from above: which of them could touch what lies on the floor."""
+"""The floor that robots sweep: which of them could touch what lies there."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ class SweptFloor:
 
     @classmethod
     def of(cls, layout: Layout) -> SweptFloor:
-        """Those of a layout, with what deputies may do."""
+        """The swept floor of a layout, with everything that deputies may do."""
         layout = layout.whole
-        found = regions(layout, piles(layout.factory, layout.product))
-        robots = np.array([region.robot for region in found], np.intp)
-        return cls(np.array([region.box for region in found]), robots)
+        occupied = regions(layout, piles(layout.factory, layout.product))
+        robots = np.array([region.robot for region in occupied], np.intp)
+        return cls(np.array([region.box for region in occupied]), robots)
 
     def near(self, places: Array, radii: Array) -> frozenset[int]:
-        """The robots that come near to balls of some `radii` (k,) about `places` (k, 2) [m]."""
+        """The robots that come near balls with `radii` (k,) about `places` (k, 2) [m]."""
         least, most = places.min(axis=0), places.max(axis=0)
         far = float(radii.max()) + APART + ROUNDING
         about = (self.boxes[:, [1, 3]] > least - far) & (self.boxes[:, [0, 2]] < most + far)

@@ -62,12 +62,12 @@ class Pile:
     z: tuple[float, float]
 
     def moved(self, by: Point2) -> Pile:
-        """The same, elsewhere."""
+        """The pile, displaced."""
         return Pile(moved(self.box, by), self.z)
 
     def carried(self, visit: Visit, middle: Point2 = (0.0, 0.0)) -> Pile:
-        """The same as a robot carries it on its tour with a visit, where its guidepath has the
-        product's middle."""
+        """The pile as a robot carries it on its tour with a visit, about the middle of its
+        guidepath."""
         (x, y), (low, high) = visit.shift, self.z
         box = moved(self.box, (x + middle[0], y + middle[1]))
         return Pile(box, (low + visit.elevation, high + visit.elevation))
@@ -76,9 +76,9 @@ class Pile:
 def piles(factory: Factory, product: Product) -> dict[str, Pile]:
     """The extents of every label from its parts' solids, inputs before what is made of them; of a
     part that is presented turned, in all its orientations until it is joined."""
-    found, turning = dict[str, Pile](), dict[str, Pile]()
+    by_label, turning = dict[str, Pile](), dict[str, Pile]()
     for operation in reversed(factory.making):
-        label, inputs = operation.label, [found[x] for x in operation.inputs]
+        label, inputs = operation.label, [by_label[x] for x in operation.inputs]
         if not inputs:
             solid = product.solids[label]
             inputs = [_pile(product, solid.low, solid.high)]
@@ -86,11 +86,11 @@ def piles(factory: Factory, product: Product) -> dict[str, Pile]:
                 turning[label] = _pile(product, *turning_box(solid))
         elif len(inputs) == 1 and operation.inputs[0] in turning:
             turning[label] = turning[operation.inputs[0]]
-        found[label] = Pile(
+        by_label[label] = Pile(
             hull([pile.box for pile in inputs]),
             (float(min(p.z[0] for p in inputs)), float(max(p.z[1] for p in inputs))),
         )
-    return found | turning
+    return by_label | turning
 
 
 def _pile(product: Product, low: Array, high: Array) -> Pile:
@@ -101,32 +101,32 @@ def _pile(product: Product, low: Array, high: Array) -> Pile:
     return Pile((xlo - x, xhi - x, ylo - y, yhi - y), (zlo - ground, zhi - ground))
 
 
-def regions(layout: Layout, found: Mapping[str, Pile]) -> list[Region]:
+def regions(layout: Layout, by_label: Mapping[str, Pile]) -> list[Region]:
     """Every region of a layout, robot by robot, without those that are gone. Linear in the sum of
     the gears' lengths."""
     result: list[Region] = []
     for robot in layout.factory.present:
         result.extend(_bodies(layout, robot))
-        result.extend(_payloads(layout, robot, found))
+        result.extend(_payloads(layout, robot, by_label))
     for leaf in layout.factory.leaves:
         if leaf.label == layout.magazine(leaf.carrier)[0]:
             result.extend(_feeder(layout, leaf.label, leaf.carrier))
-    result.extend(_outfeed(layout, found))
+    result.extend(_outfeed(layout, by_label))
     return result
 
 
-def regions_of(layout: Layout, robot: int, found: Mapping[str, Pile]) -> Iterator[Region]:
+def regions_of(layout: Layout, robot: int, by_label: Mapping[str, Pile]) -> Iterator[Region]:
     """The regions of one robot, with its feeder, or with the outfeed."""
     yield from _bodies(layout, robot)
-    yield from _payloads(layout, robot, found)
+    yield from _payloads(layout, robot, by_label)
     if shown := layout.magazine(robot):
         yield from _feeder(layout, shown[0], robot)
     if not robot:
-        yield from _outfeed(layout, found)
+        yield from _outfeed(layout, by_label)
 
 
-def _outfeed(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Region]:
-    top = max(pile.z[1] for pile in found.values())
+def _outfeed(layout: Layout, by_label: Mapping[str, Pile]) -> Iterator[Region]:
+    top = max(pile.z[1] for pile in by_label.values())
     yield from _upright(0, OUTFEED, layout.outfeed, top, "")
     yield from _upright(0, SHED, layout.shed, top + layout.shutter_stroke + 2 * SIDE, "")
 
@@ -150,7 +150,7 @@ def _bodies(layout: Layout, robot: int) -> Iterator[Region]:
             yield Region(robot, ARMS, ARM_BODY, box, (ARM_LOW, ARM_TOP))
 
 
-def _payloads(layout: Layout, robot: int, found: Mapping[str, Pile]) -> Iterator[Region]:
+def _payloads(layout: Layout, robot: int, by_label: Mapping[str, Pile]) -> Iterator[Region]:
     """Each pile, with the hand that holds it, from where it is taken or made to where the next
     operation has its goal."""
     path, operations = layout.guidepaths[robot], layout.factory.operations
@@ -161,7 +161,7 @@ def _payloads(layout: Layout, robot: int, found: Mapping[str, Pile]) -> Iterator
         label = operation.after[operation.robots.index(robot)]
         if label == NOPART:
             continue
-        pile, at = found[label].carried(layout.visits[number, robot]), stops[step]
+        pile, at = by_label[label].carried(layout.visits[number, robot]), stops[step]
         step = (step + 1) % len(gear)
         onward = operations[gear[step]]
         leaves = onward.after[onward.robots.index(robot)] == NOPART

@@ -62,7 +62,7 @@ def visits_of(
             (number, robot): _in_world(guidepaths[robot], shifts[robot][turn])
             for (number, robot), turn in factory.turns.items()
         }
-    found: dict[tuple[int, int], Visit] = {}
+    visits: dict[tuple[int, int], Visit] = {}
     for robot, levels in enumerate(_levels(factory, shifts)):
         path = guidepaths[robot]
         for tour, (down, up, elevation) in zip(factory.tours[robot], levels, strict=True):
@@ -75,8 +75,8 @@ def visits_of(
                     short, _ = stop_offset(path, shift, carried)
                     at = operation.template.law.goals[slot].multiple * path.r + short
                 lift = down if number == tour[-1] else up
-                found[number, robot] = Visit(at, lift, up, elevation, shift)
-    return found
+                visits[number, robot] = Visit(at, lift, up, elevation, shift)
+    return visits
 
 
 def stop_offset(path: Guidepath, shift: Point2, carried: Point2) -> Point2:

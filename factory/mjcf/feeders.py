@@ -47,7 +47,7 @@ def add_feeders(
     codes = feeder_codes(layout.factory, outlets)
     housed = {line[0].name for line in lines_of(layout) if line}
     for outlet in outlets:
-        at, found = outlet.name, outlet.feeder
+        at, feeder = outlet.name, outlet.feeder
         if not (at in housed or at in hanging.places):
             continue
         path = layout.guidepaths[outlet.robot]
@@ -60,30 +60,30 @@ def add_feeders(
             quat=heading_quaternion(path),
         )
         if at in housed:
-            _add_housing(body, names.feeder(at), found, path.left)
+            _add_housing(body, names.feeder(at), feeder, path.left)
         if at not in hanging.places:
             continue
-        stops = lift_stops(found.stroke, layout.clearance, hanging.lowest(at))
+        stops = lift_stops(feeder.stroke, layout.clearance, hanging.lowest(at))
         place, code, drive = hanging.places[at], codes[outlet.robot], drives[at]
-        _add_slider(body, at, found.high + OVER, place, code, drive, stops)
+        _add_slider(body, at, feeder.high + OVER, place, code, drive, stops)
         gains, name = drive.attributes(), names.slider(at)
         add(actuator, "pid", name=name, joint=name, **gains)
 
 
-def _add_housing(body: Element, name: str, found: Feeder, left: float) -> None:
+def _add_housing(body: Element, name: str, feeder: Feeder, left: float) -> None:
     """What stands still, in a frame whose x is the heading."""
-    rear, front, near, far = found.inside
+    rear, front, near, far = feeder.inside
     ahead, across = (rear + front) / 2, (near + far) / 2 * left
     length, width = front - rear, far - near
-    low, top = found.low, found.high
+    low, top = feeder.low, feeder.high
     middle, half = (low + top - WALL) / 2, (top - WALL - low) / 2
-    across_post = found.across * left
-    boom = rear - WALL - found.back - POST / 2
+    across_post = feeder.across * left
+    boom = rear - WALL - feeder.back - POST / 2
     shapes: list[tuple[str, Point3, Point3, str]] = [
-        ("post", (found.back, across_post, top / 2), (POST / 2, POST / 2, top / 2), "post"),
+        ("post", (feeder.back, across_post, top / 2), (POST / 2, POST / 2, top / 2), "post"),
         (
             "boom",
-            (found.back + (POST + boom) / 2, across_post, top - BOOM_HEIGHT / 2),
+            (feeder.back + (POST + boom) / 2, across_post, top - BOOM_HEIGHT / 2),
             (boom / 2, BOOM / 2, BOOM_HEIGHT / 2),
             "post",
         ),

@@ -58,10 +58,10 @@ def grips_of(layout: Layout, bodies: FusedBodies) -> Iterator[Grip]:
     if every is not layout:
         bodies = bodies_of(factory, every.product, bool(bodies.wholes))
     for robot in range(len(factory.robots)):
-        found = dict[str, str]()
+        label_of = dict[str, str]()
         for label in bodies.handled(factory, robot):
-            found.setdefault(layout.named(label), label)
-        for name, label in found.items():
+            label_of.setdefault(layout.named(label), label)
+        for name, label in label_of.items():
             turn = factory.tour_with(robot, label)
             begins, *_ = factory.tours[robot][turn]
             brought = factory.deliveries(robot)[turn : turn + 1]

@@ -45,12 +45,16 @@ def insets_of(layout: Layout, overlap: float) -> Insets:
     thickness = _Thickness(layout.product)
     depths: dict[str, dict[int, float]] = {}
     excluded: list[Pair] = []
-    for found in layout.overlaps:
-        if not overlap or found.deep > overlap + TOLERANCE or not thickness.allows(found):
-            excluded.append(found.parts)
+    for overlapping in layout.overlaps:
+        if (
+            not overlap
+            or overlapping.deep > overlap + TOLERANCE
+            or not thickness.allows(overlapping)
+        ):
+            excluded.append(overlapping.parts)
             continue
-        for one, other, far in found.bodies:
-            for part, number in zip(found.parts, (one, other), strict=True):
+        for one, other, far in overlapping.bodies:
+            for part, number in zip(overlapping.parts, (one, other), strict=True):
                 mine = depths.setdefault(part, {})
                 mine[number] = max(mine.get(number, 0.0), _half(far))
     return Insets(depths, tuple(excluded))

@@ -37,11 +37,11 @@ def mesh_file(mesh: Mesh) -> tuple[str, bytes]:
 def piece_files(mesh: Mesh) -> list[tuple[str, bytes]]:
     """The files of the convex bodies that collide in a mesh's place: names, counted from 1, and
     contents."""
-    found = []
+    files = []
     for number, vertices in enumerate(mesh.pieces, 1):
         name = f"{mesh.name}.{number}"
-        found.append((f"{name}.stl", stl(hull_mesh(name, vertices))))
-    return found
+        files.append((f"{name}.stl", stl(hull_mesh(name, vertices))))
+    return files
 
 
 def inset_name(mesh: Mesh, number: int, depth: float) -> str:
@@ -118,8 +118,8 @@ def corner_normals(mesh: Mesh) -> Array:
         [np.bincount(here, weight * normal[there // 3, k], 3 * count) for k in range(3)], axis=1
     )
     length = np.linalg.norm(total, axis=1, keepdims=True)
-    own = np.repeat(normal, 3, axis=0)
-    own[np.linalg.norm(own, axis=1) == 0] = (0.0, 0.0, 1.0)
-    return np.asarray(np.where(length > 0, total / np.maximum(length, 1e-300), own)).reshape(
+    at_corner = np.repeat(normal, 3, axis=0)
+    at_corner[np.linalg.norm(at_corner, axis=1) == 0] = (0.0, 0.0, 1.0)
+    return np.asarray(np.where(length > 0, total / np.maximum(length, 1e-300), at_corner)).reshape(
         -1, 3, 3
     )

@@ -188,7 +188,7 @@ def build_model(
     factory, product = layout.factory, layout.product
     bodies = bodies or bodies_of(factory, product)
     masses = {
-        label: sum(bodies.mass[body] for body in found) for label, found in bodies.carried.items()
+        label: sum(bodies.mass[body] for body in inner) for label, inner in bodies.carried.items()
     }
     drives = tuple(
         _drive(layout, robot, load, settings) for robot, load in enumerate(heaviest(layout, masses))
@@ -278,7 +278,7 @@ def lifted(layout: Layout, masses: Mapping[str, float]) -> dict[int, float]:
 
 
 def drive_for(
-    own: float,
+    empty_mass: float,
     load: float,
     acceleration: float,
     settings: Settings,
@@ -286,8 +286,8 @@ def drive_for(
 ) -> Drive:
     """Critically damped gains for what moves a load, and the load [kg]; the force that their
     acceleration [m/s²] takes; the inertia that the motor adds."""
-    inertia = max(0.0, LEAST * load - own)
-    empty, rate = own + inertia, 1 / settings.step
+    inertia = max(0.0, LEAST * load - empty_mass)
+    empty, rate = empty_mass + inertia, 1 / settings.step
     mass = empty + load
     kp = min(mass * stiffness**2, PUSHED * empty * rate**2)
     kv = min(2 * mass * stiffness, DAMPED * empty * rate)
@@ -306,12 +306,12 @@ def _drive(layout: Layout, robot: int, load: float, settings: Settings) -> Drive
 
 def _hoists(layout: Layout, masses: Mapping[str, float], settings: Settings) -> dict[int, Hoist]:
     """The lifts, for the heaviest load of each: what it delivers."""
-    loads, found = lifted(layout, masses), {}
+    loads, hoists = lifted(layout, masses), {}
     for robot, stroke in layout.whole.strokes.items():
         most = settings.acceleration + GRAVITY
         drive = drive_for(HOIST_MASS, loads[robot], most, settings, HOIST_STIFFNESS)
-        found[robot] = Hoist(stroke, drive, lift_stops(stroke, layout.clearance))
-    return found
+        hoists[robot] = Hoist(stroke, drive, lift_stops(stroke, layout.clearance))
+    return hoists
 
 
 def _sliders(

@@ -47,12 +47,12 @@ class Pads:
         welds hold, of those whose other welds are not among the `active`; None for no such."""
         holder, body = self._m.eq_obj1id, self._m.eq_obj2id
         busy = np.isin(holder[fresh], holder[np.setdiff1d(active, fresh)])
-        found = [
+        gaps = [
             self.apart(d, one, self.geoms(body[fresh[holder[fresh] == one]].tolist()))
             for one in np.unique(holder[fresh[~busy]]).tolist()
             if one in self.of
         ]
-        return max(found, default=None)
+        return max(gaps, default=None)
 
     def geoms(self, bodies: Iterable[int]) -> Index:
         """The geoms that collide of the bodies of parts, one after the other."""

@@ -88,12 +88,12 @@ def add_wholes(
             at = parked_at(layout, label, number)
             body = _add_body(world, name, at, whole.mass, whole.inertia)
             for inside in whole.parts:
-                own = body
+                inner = body
                 if (label, inside) in shells:
-                    own = add(body, "body", name=solid_name(label, number, inside))
-                    add(own, "inertial", pos="0 0 0", mass=0, diaginertia="0 0 0")
+                    inner = add(body, "body", name=solid_name(label, number, inside))
+                    add(inner, "inertial", pos="0 0 0", mass=0, diaginertia="0 0 0")
                 solid, faces = solids[inside], insets.of(inside)
-                _add_geoms(own, f"{name}/{inside}", solid, whole.centre, faces, False)
+                _add_geoms(inner, f"{name}/{inside}", solid, whole.centre, faces, False)
 
 
 def _add_body(
@@ -166,9 +166,9 @@ def add_meshes(asset: Element, product: Product, insets: Insets) -> dict[str, by
         if solid.mesh is not None:
             receded.setdefault(solid.mesh.name, set()).update(insets.of(label).items())
     for mesh in used_meshes(product):
-        found = [mesh_file(mesh), *piece_files(mesh)]
-        found += (inset_file(mesh, *at) for at in sorted(receded[mesh.name]))
-        for file, content in found:
+        written = [mesh_file(mesh), *piece_files(mesh)]
+        written += (inset_file(mesh, *at) for at in sorted(receded[mesh.name]))
+        for file, content in written:
             name = file.rpartition(".")[0]
             add(asset, "mesh", name=f"mesh/{name}", file=file, inertia="convex")
             files[file] = content
@@ -177,5 +177,5 @@ def add_meshes(asset: Element, product: Product, insets: Insets) -> dict[str, by
 
 def used_meshes(product: Product) -> list[Mesh]:
     """Each mesh once, in the order in which the parts use them."""
-    found = {s.mesh.name: s.mesh for s in product.solids.values() if s.mesh is not None}
-    return list(found.values())
+    meshes = {s.mesh.name: s.mesh for s in product.solids.values() if s.mesh is not None}
+    return list(meshes.values())

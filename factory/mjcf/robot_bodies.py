@@ -2,19 +2,110 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from xml.etree.ElementTree import Element
 
+import numpy as np
+
+from factory.geometry.sight import Array
 from factory.layout.hands.hand import Hand
 from factory.layout.hands.limbs import limbs
-from factory.layout.layout import Layout
+from factory.layout.layout import Guidepath, Layout
+from factory.mjcf.elements import add, add_shown, numbers
 from factory.mjcf.hands import Styles, load_hand
-from factory.mjcf.plates import add_number
+from factory.mjcf.names import carriage
 from factory.mjcf.robots import Drive, Held, Hoist, RobotModel, instantiate, load_robot_model
 from factory.mjcf.scene import add_follower
 from factory.mjcf.stops import carriage_stops
 from factory.plant.factory import Factory
 from factory.problem.robot_types import Catalogue
+
+STROKES = {
+    "a": (0.0, 0.6, 0.84, 1.0),
+    "b": (0.44, 0.6, 0.42, 1.0),
+    "c": (0.44, 0.6, 0.0, 0.58),
+    "d": (0.0, 0.6, 0.0, 0.16),
+    "e": (0.0, 0.16, 0.0, 0.58),
+    "f": (0.0, 0.16, 0.42, 1.0),
+    "g": (0.0, 0.6, 0.42, 0.58),
+    "i": (0.22, 0.38, 0.0, 1.0),
+    "j": (0.06, 0.38, 0.84, 1.0),
+}
+"""The strokes of digits that are one unit high: from where to where to the right and up."""
+
+DIGITS = "abcdef", "ij", "abged", "abgcd", "fgbc", "afgcd", "afgedc", "abc", "abcdefg", "abcdfg"
+"""The strokes of each digit."""
+
+WIDE, STEP = 0.6, 0.8
+"""How wide a digit is, and how far the next is from it, as shares of its height."""
+
+RAISED = 3e-4
+"""How far the strokes stand out [m]."""
+
+MARGIN = 0.002
+"""How far they stay from the edges on top at least [m]."""
+
+MAST = 0.0125
+"""How far from the middle of the top the mast and its cap reach [m]."""
+
+LIGHT, DARK = "0.97 0.97 0.97 1", "0.09 0.10 0.12 1"
+INKS = {"output": LIGHT, "carrier": LIGHT, "fed": DARK, "tool": DARK}
+"""What can be read on the paint of each role."""
+
+
+def add_number(body: Element, asset: Element, robot: str, path: Guidepath, role: str) -> None:
+    """The number of a robot `r3` on the box of its carriage; none on one of another shape."""
+    box = next((g for g in body.findall("geom") if g.get("name") == carriage(robot)), None)
+    digits = robot.lstrip("r")
+    if box is None or not digits.isdecimal():
+        return
+    half = np.array([float(v) for v in (box.get("size") or "").split()])
+    middle = np.array([float(v) for v in (box.get("pos") or "0 0 0").split()])
+    if half.shape != (3,):
+        return
+    corners = np.concatenate([*_texts(digits, half, path)]) + middle
+    faces = (4 * np.arange(len(corners) // 4)[:, None] + [0, 1, 2, 0, 2, 3]).ravel()
+    name = f"number/{robot}"
+    add(asset, "mesh", name=name, inertia="shell", vertex=_flat(corners), face=numbers(faces))
+    shell = next((b for b in body.findall("body") if b.get("name") == f"{robot}/shell"), body)
+    add_shown(shell, f"{robot}/number", "mesh", mesh=name, rgba=INKS.get(role, LIGHT))
+
+
+def _flat(corners: Array) -> str:
+    """Places to a hundredth of a millimetre."""
+    return " ".join(f"{value:.5g}" for value in np.round(corners, 5).ravel().tolist())
+
+
+def _texts(digits: str, half: Array, path: Guidepath) -> Iterator[Array]:
+    """The corners of the strokes (4 n, 3) on each face of a box about its middle [m]."""
+    up = np.array([0.0, 0.0, 1.0])
+    for axis in (0, 1):
+        for side in (-1.0, 1.0):
+            out = np.zeros(3)
+            out[axis] = side
+            room = np.array([1.6 * half[1 - axis], 1.4 * half[2]])
+            at = out * (half[axis] + RAISED) + up * 0.1 * half[2]
+            yield _text(digits, at, np.cross(up, out), up, room)
+    north = np.array([path.heading[1], path.heading[0], 0.0])
+    rear, beside = half[0] - MAST - 2 * MARGIN, 2 * (half[1] - MARGIN)
+    at = np.array([-MAST - MARGIN - rear / 2, 0.0, half[2] + RAISED])
+    room = np.array([beside, rear] if abs(north[0]) > 0.5 else [rear, beside])
+    yield _text(digits, at, np.cross(north, up), north, room)
+
+
+def _text(digits: str, at: Array, right: Array, up: Array, room: Array) -> Array:
+    """The corners (4 n, 3) of strokes that are centred at a place, no wider and higher than there
+    is room [m]."""
+    wide = WIDE + STEP * (len(digits) - 1)
+    size = min(room[1], room[0] / wide)
+    corners = list[Array]()
+    for number, digit in enumerate(digits):
+        for stroke in DIGITS[int(digit)]:
+            left, end, low, high = STROKES[stroke]
+            for x, y in ((left, low), (end, low), (end, high), (left, high)):
+                across = x + STEP * number - wide / 2
+                corners.append(at + size * (across * right + (y - 0.5) * up))
+    return np.array(corners)
 
 
 def add_robots(
@@ -58,12 +149,12 @@ def add_robots(
 def _low(layout: Layout, robot: int) -> float:
     """How far above z0 the lowest point of a robot's payload is carried, with its lift down [m]."""
     factory, product = layout.factory, layout.product
-    ground, found = float(product.low[2]), list[float]()
+    ground, heights = float(product.low[2]), list[float]()
     for tour, label in zip(factory.tours[robot], factory.deliveries(robot), strict=False):
         low = min(float(product.solids[part].low[2]) for part in factory.contents[label])
-        found.append(low - ground + layout.visits[tour[0], robot].height)
+        heights.append(low - ground + layout.visits[tour[0], robot].height)
     first = factory.robots[robot].operations[0]
-    return min(found, default=layout.visits[first, robot].height)
+    return min(heights, default=layout.visits[first, robot].height)
 
 
 def _style(hand: Hand | None, loaded: dict[str, Styles]) -> Styles:

@@ -17,7 +17,7 @@ from factory.mjcf import names
 
 def trunks(m: Any) -> NDArray[np.intp]:
     """For each body of an engine's model (nbody,) the body that it is a shell of; else itself."""
-    found = np.arange(m.nbody)
+    trunk = np.arange(m.nbody)
     shells = [b for b in range(m.nbody) if names.kind(m.body(b).name) == names.SHELL]
-    found[shells] = m.body_parentid[shells]
-    return found
+    trunk[shells] = m.body_parentid[shells]
+    return trunk

@@ -77,10 +77,10 @@ class DrivenAxis:
     room: float = inf
 
     @classmethod
-    def loaded(cls, own: float, load: float, acceleration: float, **more: float) -> DrivenAxis:
+    def loaded(cls, mass: float, load: float, acceleration: float, **more: float) -> DrivenAxis:
         """One whose guide bears its load, and which pushes for its acceleration alone."""
         held = 2 * (FRICTION + ROLLING * load * GRAVITY)
-        return cls(own, load, acceleration, acceleration, STIFFNESS, held=held, **more)
+        return cls(mass, load, acceleration, acceleration, STIFFNESS, held=held, **more)
 
     def error(self, settings: Settings) -> float:
         """How far it may get off its reference [m]: the speed that it misses, times the peak of a
@@ -117,21 +117,21 @@ def timed(
         return replace(settings, substeps=settings.steps)
     least = settings.substeps or 1
     counts = [n for n in STEPS if n >= least] or [least]
-    found = [replace(settings, timestep=TICK / n, substeps=n) for n in counts]
+    candidates = [replace(settings, timestep=TICK / n, substeps=n) for n in counts]
     if world == "ideal":
-        return _usual(found)
+        return _usual(candidates)
     fastest = max(settings.speed * (1 + jitter), settings.outfeed)
-    found = [s for s in found if fastest * s.step < layout.clearance] or found[-1:]
+    candidates = [s for s in candidates if fastest * s.step < layout.clearance] or candidates[-1:]
     axes, heaviest_fed = tuple(_axes(settings, layout, jitter)), 0.0
     if settings.hands:
         heaviest_fed = max(layout.product.solids[o.label].mass for o in layout.factory.leaves)
-    good = (s for s in found if _good(s, axes) and _dip(s, heaviest_fed) < DEEPEST)
-    return next(good, _usual(found))
+    good = (s for s in candidates if _good(s, axes) and _dip(s, heaviest_fed) < DEEPEST)
+    return next(good, _usual(candidates))
 
 
-def _usual(found: Sequence[Settings]) -> Settings:
+def _usual(candidates: Sequence[Settings]) -> Settings:
     """Those with the usual timestep, or the next shorter one that there is."""
-    return next(s for s in found if s.steps >= USUAL)
+    return next(s for s in candidates if s.steps >= USUAL)
 
 
 def predicted_error(settings: Settings, layout: Layout, jitter: float = 0.0) -> float:

@@ -49,15 +49,15 @@ class Slides:
     def of(cls, m: mujoco.MjModel, d: mujoco.MjData) -> Slides:
         """Those of a model, whose kinematics in `d` are up to date."""
         most = 1 + int((m.body_jntnum > 1).any())
-        own = m.body_jntadr[:, None] + np.arange(most)
-        own[np.arange(most) >= m.body_jntnum[:, None]] = -1
-        turns = (own[:, 0] >= 0) & (m.jnt_type[own[:, 0]] == HINGE)
-        own[(m.jnt_type[own] != SLIDE) & (m.jnt_type[own] != HINGE)] = -1
-        joint = np.concatenate([own, own[m.body_parentid]], axis=1)
+        joints = m.body_jntadr[:, None] + np.arange(most)
+        joints[np.arange(most) >= m.body_jntnum[:, None]] = -1
+        turns = (joints[:, 0] >= 0) & (m.jnt_type[joints[:, 0]] == HINGE)
+        joints[(m.jnt_type[joints] != SLIDE) & (m.jnt_type[joints] != HINGE)] = -1
+        joint = np.concatenate([joints, joints[m.body_parentid]], axis=1)
         slides = (joint >= 0) & (m.jnt_type[joint] == SLIDE)
         way = np.where(slides[:, :, None], d.xaxis[joint], 0.0)
-        spin = np.where(turns, d.xaxis[own[:, 0]][:, 2].round(), 0.0)
-        return cls(m.jnt_qposadr[joint], m.jnt_dofadr[joint], way, d.xanchor[own[:, 0]], spin)
+        spin = np.where(turns, d.xaxis[joints[:, 0]][:, 2].round(), 0.0)
+        return cls(m.jnt_qposadr[joint], m.jnt_dofadr[joint], way, d.xanchor[joints[:, 0]], spin)
 
     def velocity(self, bodies: Index, qvel: Array) -> Array:
         """Velocities of bodies that only slide (..., n, 3) [m/s] from all speeds (..., nv)."""
@@ -108,10 +108,10 @@ class WeldFrames:
     def at(self, slides: Array) -> Array:
         """Where they are (n, 3) [m] at coordinates of their joints (n, k), which are
         qpos[`along`]."""
-        found = np.asarray(self.base + np.einsum("nk,nkj->nj", slides, self.way))
+        places = np.asarray(self.base + np.einsum("nk,nkj->nj", slides, self.way))
         if self.spin.any():
-            found[:, :2] += _turned(self.arm, self.spin * slides[:, 0]) - self.arm
-        return found
+            places[:, :2] += _turned(self.arm, self.spin * slides[:, 0]) - self.arm
+        return places
 
     def turned(self, slides: Array) -> Array:
         """How they are turned (n, 4), quaternions, at coordinates of their joints (n, 2)."""

@@ -50,15 +50,15 @@ def operation_modes(layout: Layout, eps: float) -> tuple[Mode, ...]:
     return modes
 
 
-def check_modes(factory: Factory, own: Iterable[Template], product: Product) -> None:
-    """Try templates of the user's `own` when they are compiled, on the first feasible layout: their
-    goal balls, and which robots may hold up which, are measured in metres. Of the shipped ones it
-    is known, whatever the layout.
+def check_modes(factory: Factory, users: Iterable[Template], product: Product) -> None:
+    """Try the `users` own templates when they are compiled, on the first feasible layout: their
+    goal balls, and which robots may hold up which, are measured in metres. The shipped ones need
+    no trial.
 
     Raises InputError: BadTemplate for an F that is no control law, NotPrepared where an operation
     cannot reach its goal, or what is joined, or changes hands, does not come together.
     """
-    for template in own:
+    for template in users:
         if law_of(template) is hold:
             message = (
                 f"{template.name}: F = {template.law.name} moves no robot, so they never come to"
@@ -154,13 +154,13 @@ def _with_lifts(mode: Mode, layout: Layout, operation: Operation) -> Mode:
     goals = np.array(layout.goals(operation.index)[count:])
     ups = np.array([layout.visits[operation.index, robot].up for robot in robots])
     lowers = np.array([factory.lowers(robot) for robot in robots]) & (goals < ups)
-    own = np.array([_gate(layout, operation, robot) for robot in robots])
+    gates = np.array([_gate(layout, operation, robot) for robot in robots])
     return replace(
         mode,
         goals=np.append(mode.goals, goals),
         lower=np.append(mode.lower, np.zeros(len(axes))),
         upper=np.append(mode.upper, strokes),
-        gate=np.append(mode.gate, np.where(lowers, own, -1)),
+        gate=np.append(mode.gate, np.where(lowers, gates, -1)),
         standoff=np.append(mode.standoff, np.where(lowers, ups - goals, 0.0)),
     )
 

@@ -53,7 +53,7 @@ def stages(layout: Layout, modes: Sequence[Mode]) -> tuple[HeadStart, ...]:
     """Every way that a robot can go ahead: it brings nothing and has others to wait for, and none
     of them comes near it on its way, whatever their speeds. A lift that holds from above rises
     before its robot goes home."""
-    found: list[HeadStart] = []
+    starts_ahead: list[HeadStart] = []
     starts, awaited = operation_starts(layout), awaited_positions(layout)
     for operation, mode, start in zip(layout.factory.operations, modes, starts, strict=True):
         homes = start.copy()
@@ -61,7 +61,7 @@ def stages(layout: Layout, modes: Sequence[Mode]) -> tuple[HeadStart, ...]:
         clear = all(map(mode.clear_from, (start, homes)))
         for slot, robot in enumerate(operation.robots):
             if rises_first(layout, robot):
-                found += _rising(
+                starts_ahead += _rising(
                     layout, operation, mode, slot, float(start[slot]), awaited.get(robot)
                 )
                 continue
@@ -72,9 +72,9 @@ def stages(layout: Layout, modes: Sequence[Mode]) -> tuple[HeadStart, ...]:
                 empty = operation.awaits_empty(slot) or not operation.inputs
                 ahead, goal = empty and robot in awaited, awaited.get(robot, goal)
             if ahead and abs(float(start[slot]) - goal) > ROUNDING:
-                found.append(_ahead(operation, mode, slot, goal, float(start[slot])))
-                found += _adjusting(layout, operation, mode, slot, start)
-    return tuple(found)
+                starts_ahead.append(_ahead(operation, mode, slot, goal, float(start[slot])))
+                starts_ahead += _adjusting(layout, operation, mode, slot, start)
+    return tuple(starts_ahead)
 
 
 def _rising(
@@ -109,19 +109,19 @@ def _adjusting(
 
 
 def _ahead(operation: Operation, mode: Mode, slot: int, goal: float, start: float) -> HeadStart:
-    own = slice(slot, slot + 1)
-    alone = Mode(np.array([goal]), mode.lower[own], mode.upper[own], mode.eps)
+    only = slice(slot, slot + 1)
+    alone = Mode(np.array([goal]), mode.lower[only], mode.upper[only], mode.eps)
     robot = operation.robots[slot] if slot < len(operation.robots) else -1
     return HeadStart(robot, operation.index, slot, alone, start, robot)
 
 
 def stages_of(layout: Layout, modes: Sequence[Mode], settings: Settings) -> tuple[HeadStart, ...]:
     """Those, where the settings ask for them; else those that something may wait for."""
-    found = stages(layout, modes)
+    every = stages(layout, modes)
     if settings.stage:
-        return found
+        return every
     awaited = awaited_positions(layout)
-    return tuple(stage for stage in found if stage.axis in awaited or stage.axis != stage.robot)
+    return tuple(stage for stage in every if stage.axis in awaited or stage.axis != stage.robot)
 
 
 def with_time(
@@ -136,7 +136,7 @@ def with_time(
 
 def staged(starts: Sequence[Array], ahead: Sequence[HeadStart]) -> list[Array]:
     """Where the axes of each operation are when it starts, if those that go ahead are there."""
-    found = [np.array(start) for start in starts]
+    positions = [np.array(start) for start in starts]
     for stage in ahead:
-        found[stage.operation][stage.slot] = stage.goal
-    return found
+        positions[stage.operation][stage.slot] = stage.goal
+    return positions

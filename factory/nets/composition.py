@@ -150,8 +150,8 @@ def notation(net: MarkedNet, place: int) -> str:
 
 def _uncovered(net: MarkedNet, passing: list[int]) -> Iterator[Defect]:
     """Places and transitions that are part of no gear."""
-    for place, own in enumerate(net.owners):
-        if not own:
+    for place, owners in enumerate(net.owners):
+        if not owners:
             at = net.net.places[place]
             text = f"place {at.name} = {notation(net, place)} is in no gear"
             beside = [q for e in at.left + at.right for q in net.net.preset[e] + net.net.postset[e]]
@@ -166,13 +166,13 @@ def _uncovered(net: MarkedNet, passing: list[int]) -> Iterator[Defect]:
 def _misplaced(net: MarkedNet) -> Iterator[Defect]:
     """Places whose slots belong to other robots than the gears through them."""
     for place, slots in enumerate(net.slots):
-        own, at = net.owners[place], net.net.places[place]
-        if at.size != len(own) or (slots != own and tuple(sorted(slots)) != own):
+        owners, at = net.owners[place], net.net.places[place]
+        if at.size != len(owners) or (slots != owners and tuple(sorted(slots)) != owners):
             text = (
                 f"place {at.name} acts on {at.size} robots with slots for {named(net, slots)},"
-                f" but the gears through it are those of {named(net, own)}"
+                f" but the gears through it are those of {named(net, owners)}"
             )
-            yield no_gear_net("slots", text, own, [place])
+            yield no_gear_net("slots", text, owners, [place])
 
 
 def named(net: MarkedNet, gears: Iterable[int]) -> str:
@@ -186,11 +186,11 @@ def _shared(net: MarkedNet, passing: list[int]) -> Iterator[Defect]:
     just one."""
     owners = net.owners
     joint = [NONE] * len(passing)
-    for place, own in enumerate(owners):
-        if len(own) < 2:
+    for place, on in enumerate(owners):
+        if len(on) < 2:
             continue
         for event in (net.left[place], net.right[place]):
-            if passing[event] == len(own):
+            if passing[event] == len(on):
                 joint[event] = place if joint[event] == NONE else MANY
     for event, count in enumerate(passing):
         if count < 2 or joint[event] >= 0:
@@ -234,7 +234,9 @@ def _ring(net: MarkedNet) -> Defect:
     """A cycle in the incidence graph of gears (from 0) and shared places (from -1 down)."""
     import networkx as nx  # only a net that is none pays for it
 
-    pairs = ((gear, ~place) for place, own in enumerate(net.owners) if own[1:] for gear in own)
+    pairs = (
+        (gear, ~place) for place, owners in enumerate(net.owners) if owners[1:] for gear in owners
+    )
     around = [node for node, _ in nx.find_cycle(nx.Graph(pairs))]
     gears, places = [n for n in around if n >= 0], [~n for n in around if n < 0]
     names = listing(net.net.places[p].name for p in places)

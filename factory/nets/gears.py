@@ -55,7 +55,7 @@ class GearNet(Pictured):
         """Whether the incidence graph of gears and the places that they share is a tree, if it
         hangs together: that of a gear net is, of any other gear train not."""
         gears = sum(bool(gear.places) for gear in self.gears)
-        return sum(len(own) - 1 for own in self.slots if own) == gears - 1
+        return sum(len(on) - 1 for on in self.slots if on) == gears - 1
 
     def threads_of(self, marked: Marking) -> dict[Slot, int]:
         """f_m of a marking: every slot holds the robot that owns it (Definition 3.3)."""

@@ -98,7 +98,7 @@ class MarkedNet(Pictured):
         """The net with gears, and sizes and slots of its places that fit them."""
         slots = replace(self, gears=gears).owners
         pairs = zip(self.net.places, slots, strict=True)
-        places = tuple(replace(place, size=len(own)) for place, own in pairs)
+        places = tuple(replace(place, size=len(on)) for place, on in pairs)
         return MarkedNet(replace(self.net, places=places), self.tokens, gears, slots)
 
 
@@ -193,17 +193,17 @@ def dead_ends(net: MarkedNet) -> tuple[int, ...]:
 def least_tokens(net: MarkedNet, source: int) -> list[int | None]:
     """For each transition the least number of tokens on a path to it from `source`, None where
     there is no path (marked graphs). One search by levels: a 0-1 BFS where m_0 is safe."""
-    found: list[int | None] = [None] * len(net.net.transitions)
+    least: list[int | None] = [None] * len(net.net.transitions)
     levels = {0: [source]}
     right, tokens, postset = net.right, net.tokens, net.net.postset
     while levels:
         level = min(levels)
         for event in levels[level]:
-            if found[event] is not None:
+            if least[event] is not None:
                 continue
-            found[event] = level
+            least[event] = level
             for p in postset[event]:
-                if right[p] != NONE and found[right[p]] is None:
+                if right[p] != NONE and least[right[p]] is None:
                     levels.setdefault(level + tokens[p], []).append(right[p])
         del levels[level]
-    return found
+    return least

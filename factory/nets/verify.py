@@ -109,8 +109,8 @@ def _miscounted(subject: MarkedNet) -> Iterator[Defect]:
             where = listing(names[p].name for p in on)
             text = f"the gear of {gear.robot} carries {count} tokens, at {where}"
             yield Defect("legal", "doubled token", text, (number,), tuple(on))
-    for place, own in enumerate(subject.owners):
-        if tokens[place] and not own:
+    for place, owners in enumerate(subject.owners):
+        if tokens[place] and not owners:
             text = f"place {names[place].name} is marked and in no gear"
             yield Defect("legal", "place in no gear", text, (), (place,))
 

@@ -195,7 +195,7 @@ class Factory(Pictured):
     def tours(self) -> tuple[tuple[tuple[int, ...], ...], ...]:
         """For each robot the operations of its tours, in the order of its gear: a tour leads from
         empty hands to empty hands. A robot that serves one label has one, one on a line several."""
-        found = []
+        by_robot = []
         for robot in self.robots:
             tours, tour = list[tuple[int, ...]](), list[int]()
             for number in robot.operations:
@@ -204,8 +204,8 @@ class Factory(Pictured):
                 if operation.after[operation.robots.index(robot.index)] == NOPART:
                     tours.append(tuple(tour))
                     tour = []
-            found.append(tuple(tours))
-        return tuple(found)
+            by_robot.append(tuple(tours))
+        return tuple(by_robot)
 
     @cached_property
     def folded(self) -> bool:
@@ -241,12 +241,12 @@ class Factory(Pictured):
     def strokes(self) -> Mapping[int, float]:
         """How far [m] each robot (index) with a lift lowers what it delivers, robot by robot: one
         with several tours the farthest that one of them asks for, one that is adjusted 0."""
-        found: dict[int, float] = dict.fromkeys(self.adjusted, 0.0)
+        strokes: dict[int, float] = dict.fromkeys(self.adjusted, 0.0)
         for o in self.operations:
             if o.approach is not None and o.lowered >= 0:
                 robot = o.robots[o.lowered]
-                found[robot] = max(found.get(robot, 0.0), o.approach.stroke)
-        return MappingProxyType(dict(sorted(found.items())))
+                strokes[robot] = max(strokes.get(robot, 0.0), o.approach.stroke)
+        return MappingProxyType(dict(sorted(strokes.items())))
 
     @cached_property
     def axes(self) -> tuple[tuple[int, ...], ...]:
@@ -254,13 +254,13 @@ class Factory(Pictured):
         their robots' numbers, and the lifts that are raised or lowered in it, numbered from R on in
         the order of `strokes`. A lift is up but for the operations that it delivers to; one that is
         adjusted stays where it is on a tour."""
-        found = [list(operation.robots) for operation in self.operations]
+        moved = [list(operation.robots) for operation in self.operations]
         for robot, axis in self.lift_axis.items():
             for tour in self.tours[robot]:
                 ends = (tour[0],) if robot in self.adjusted else (tour[0], tour[-1])
                 for number in dict.fromkeys(ends):
-                    found[number].append(axis)
-        return tuple(map(tuple, found))
+                    moved[number].append(axis)
+        return tuple(map(tuple, moved))
 
     @cached_property
     def lift_axis(self) -> Mapping[int, int]:
@@ -303,11 +303,11 @@ class Factory(Pictured):
 
     def deliveries(self, robot: int) -> tuple[str, ...]:
         """The labels a robot (index) carries to its A end, tour by tour; none for a tool."""
-        found = []
+        labels = []
         for tour in self.tours[robot]:
             operation = self.operations[tour[-1]]
-            found.append(operation.before[operation.robots.index(robot)])
-        return tuple(label for label in found if label != NOPART)
+            labels.append(operation.before[operation.robots.index(robot)])
+        return tuple(label for label in labels if label != NOPART)
 
     def tour_with(self, robot: int, label: str) -> int:
         """Which of its tours a robot (index) holds a part on, or what it makes of parts."""
@@ -321,8 +321,8 @@ class Factory(Pictured):
     def contents(self) -> Mapping[str, tuple[str, ...]]:
         """For each label that is carried: the labels of its parts. Quadratic in a chain; only for
         factories that are built in the engine."""
-        found: dict[str, tuple[str, ...]] = {}
+        parts: dict[str, tuple[str, ...]] = {}
         for operation in reversed(self.making):
-            joined = tuple(part for label in operation.inputs for part in found[label])
-            found[operation.label] = joined or (operation.label,)
-        return MappingProxyType(found)
+            joined = tuple(part for label in operation.inputs for part in parts[label])
+            parts[operation.label] = joined or (operation.label,)
+        return MappingProxyType(parts)

@@ -40,10 +40,10 @@ def family(one: PAG, other: PAG, counts: tuple[int, int], folder: Path) -> Famil
     Raises InputError: BadMix for a product that is a mix, or part of the other."""
     for pag in (one, other):
         pag.check_alone("factory mix")
-    found = matching(one, other)
-    x, y, z = found.shift
+    matched = matching(one, other)
+    x, y, z = matched.shift
     moved = shifted(other, (-x, -y, -z))
-    labels = _common(found)
+    labels = _common(matched)
     names = _names(one, moved, labels)
     common = tuple(names[label] for label in (n.label for n in moved.nodes) if label in labels)
     for pag, root in ((one, one.root), (moved, names[moved.root])):
@@ -60,14 +60,14 @@ def family(one: PAG, other: PAG, counts: tuple[int, int], folder: Path) -> Famil
     allowed = (*one.allowed, *(_allowed(a, names) for a in other.allowed))
     file = str(folder / "family.pag")
     made = PAG(one.root, tuple(nodes), None, str(folder), file, tuple(dict.fromkeys(allowed)), mix)
-    return Family(made, names, common, found)
+    return Family(made, names, common, matched)
 
 
-def _common(found: Matching) -> Renamed:
+def _common(matched: Matching) -> Renamed:
     """The labels of the second product that are equal to one of the first, from the root on: first
     as the products are matched, then wherever there is an equal one."""
-    old, new, (before, after) = found.old, found.new, found.digests
-    mapped = {y: x for x, y in found.labels.items() if found.is_equal(x)}
+    old, new, (before, after) = matched.old, matched.new, matched.digests
+    mapped = {y: x for x, y in matched.labels.items() if matched.is_equal(x)}
     pool, taken, common = defaultdict[str, list[str]](list), set[str](), Renamed()
     for node in old.nodes:
         pool[before[node.label]].append(node.label)
@@ -90,10 +90,10 @@ def _common(found: Matching) -> Renamed:
 
 def _below(pag: PAG, label: str) -> list[str]:
     """A label and all below it; of equal sub-trees in the same order."""
-    found = [label]
-    for one in found:
-        found += pag[one].inputs
-    return found
+    labels = [label]
+    for one in labels:
+        labels += pag[one].inputs
+    return labels
 
 
 def _names(one: PAG, other: PAG, labels: Renamed) -> Renamed:

@@ -68,13 +68,13 @@ class FusedBodies:
         if not self.wholes:
             labels = factory.deliveries(robot)
             return tuple(body for label in labels for body in self.carried[label])
-        found: dict[str, None] = {}
+        bodies: dict[str, None] = {}
         for number in factory.robots[robot].operations:
             operation = factory.operations[number]
             if operation.carrier == robot and operation.label in self.carried:
                 for label in (*operation.inputs, operation.label):
-                    found.update(dict.fromkeys(self.carried[label]))
-        return tuple(found)
+                    bodies.update(dict.fromkeys(self.carried[label]))
+        return tuple(bodies)
 
     def meeting(self, factory: Factory, pair: tuple[str, str]) -> list[tuple[Inside, Inside]]:
         """Two parts, each with a body that it may belong to as the operation begins that joins

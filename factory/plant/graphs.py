@@ -51,7 +51,7 @@ def _net(net: MarkedNet) -> nx.DiGraph:
     import networkx as nx
 
     graph = nx.DiGraph()
-    for index, (place, own) in enumerate(zip(net.net.places, net.owners, strict=True)):
+    for index, (place, owners) in enumerate(zip(net.net.places, net.owners, strict=True)):
         graph.add_node(
             f"p{index}",
             kind="place",
@@ -60,7 +60,7 @@ def _net(net: MarkedNet) -> nx.DiGraph:
             label=place.label,
             size=place.size,
             tokens=net.tokens[index],
-            robots=" ".join(net.gears[gear].robot for gear in own),
+            robots=" ".join(net.gears[gear].robot for gear in owners),
             source=_source(place.position),
         )
     for index, event in enumerate(net.net.transitions):

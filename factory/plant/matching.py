@@ -87,13 +87,13 @@ def matching(old: PAG, new: PAG) -> Matching:
 
 def label_digests(pag: PAG, shift: Shift = NOWHERE) -> dict[str, str]:
     """The digest of each label of a product whose parts lie elsewhere by a `shift` [m]."""
-    meshes, found = dict[Value, str](), dict[str, str]()
+    meshes, digests = dict[Value, str](), dict[str, str]()
     for node in pag.postorder():
         values = sorted((p.name, _content(pag, p, meshes, shift)) for p in node.parameters)
         if not node.inputs and not any(name == "pos" for name, _ in values):
             values.append(("pos", _less(NOWHERE, shift)))
-        found[node.label] = digest(node.operation, values, [found[x] for x in node.inputs])
-    return found
+        digests[node.label] = digest(node.operation, values, [digests[x] for x in node.inputs])
+    return digests
 
 
 def common_shift(old: PAG, new: PAG) -> Shift:
@@ -125,13 +125,13 @@ def _moved(node: Assembly, shift: Shift) -> Assembly:
 
 def _by_shape(pag: PAG) -> dict[str, list[Shift]]:
     """The places of parts that have a shape, by the digest of that."""
-    meshes, found = dict[Value, str](), defaultdict[str, list[Shift]](list)
+    meshes, places = dict[Value, str](), defaultdict[str, list[Shift]](list)
     for part in pag.parts():
         shaped = [p for p in part.parameters if p.name != "pos"]
         values = sorted((p.name, _content(pag, p, meshes, NOWHERE)) for p in shaped)
         if values:
-            found[digest(values)].append(_place(part))
-    return found
+            places[digest(values)].append(_place(part))
+    return places
 
 
 def _content(pag: PAG, parameter: Parameter, meshes: dict[Value, str], shift: Shift) -> object:
@@ -180,14 +180,14 @@ class _Matcher:
 
     def labels(self) -> dict[str, str]:
         """The mapping."""
-        found = dict[str, str]()
+        mapping = dict[str, str]()
         stack = [([self.old.root], [self.new.root])]
         while stack:
             for x, y in self._pairs(*stack.pop()):
-                found[x] = y
+                mapping[x] = y
                 if self.old[x].inputs or self.new[y].inputs:
                     stack.append(([*self.old[x].inputs], [*self.new[y].inputs]))
-        return found
+        return mapping
 
     def _pairs(self, left: list[str], right: list[str]) -> Iterator[tuple[str, str]]:
         """The pairs of labels of two lists, or of what is below those that are stepped over."""

@@ -30,7 +30,7 @@ class Pairing:
         mapped by what is joined to them, else by the label that they make."""
         labels = self.matching.labels
         by_inputs = {_joined(self.new, o): o for o in self.new.making}
-        found = dict[int, int]()
+        pairs = dict[int, int]()
         for o in self.old.making:
             stem, template, inputs = _joined(self.old, o)
             mapped = frozenset(labels.get(label, "") for label in inputs)
@@ -38,19 +38,19 @@ class Pairing:
             if other is None and o.label in labels:
                 other = self.new.by_label[labels[o.label]]
                 other = other if other.template.name == template else None
-            if other is not None and other.index not in found.values():
-                found[o.index] = other.index
-        return {**found, self.old.dropoff.index: self.new.dropoff.index}
+            if other is not None and other.index not in pairs.values():
+                pairs[o.index] = other.index
+        return {**pairs, self.old.dropoff.index: self.new.dropoff.index}
 
     @cached_property
     def robots(self) -> Mapping[int, int]:
         """The robots of the old factory with those of the new that they are."""
-        found = {0: 0}
+        pairs = {0: 0}
         for robot in self.old.robots[1:]:
             other = self._partner(robot.index)
-            if other is not None and other not in found.values():
-                found[robot.index] = other
-        return found
+            if other is not None and other not in pairs.values():
+                pairs[robot.index] = other
+        return pairs
 
     def _partner(self, robot: int) -> int | None:
         last = self.old.operations[self.old.robots[robot].operations[-1]]

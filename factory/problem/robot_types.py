@@ -52,10 +52,10 @@ class Catalogue:
         """Whether a robot of type `name` can take the role of a `wanted` one: it is that type or
         extends it, directly or not."""
         while name != wanted:
-            known = self.types.get(name)
-            if known is None or not known.extends:
+            kind = self.types.get(name)
+            if kind is None or not kind.extends:
                 return False
-            name = known.extends
+            name = kind.extends
         return True
 
     def meet(self, one: str, other: str) -> str | None:

@@ -111,8 +111,8 @@ def _table(path: Path, schema: str) -> dict[str, Any]:
     """The table in a file. Raises OSError, ValueError."""
     table = json.loads(read_bytes(path, TEXT))
     if not isinstance(table, dict) or table.get("schema") != schema:
-        found = table.get("schema") if isinstance(table, dict) else table
-        raise ValueError(f"its schema must be '{schema}', not {found!r:.40}")
+        stated = table.get("schema") if isinstance(table, dict) else table
+        raise ValueError(f"its schema must be '{schema}', not {stated!r:.40}")
     return table
 
 

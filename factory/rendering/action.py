@@ -151,9 +151,9 @@ class Action:
 def action_of(m: mujoco.MjModel, d: mujoco.MjData) -> Action:
     """The action of a model, with its state at the start."""
     points: defaultdict[Own, list[Array]] = defaultdict(list)
-    for own, corners_of in (*_bodies(m, d), *_loads(m, d)):
-        points[own].append(corners_of)
-    boxes = {own: box_of(np.concatenate(corners_of)) for own, corners_of in points.items()}
+    for owner, corners_of in (*_bodies(m, d), *_loads(m, d)):
+        points[owner].append(corners_of)
+    boxes = {owner: box_of(np.concatenate(corners_of)) for owner, corners_of in points.items()}
     beside = [placed(m, d, g) for g in range(m.ngeom) if names.kind(m.geom(g).name) == "feeder"]
     robots: list[Array] = []
     for (body, _), box in boxes.items():
@@ -185,9 +185,9 @@ def _loads(m: mujoco.MjModel, d: mujoco.MjData) -> Iterator[tuple[Own, Array]]:
         holder, body = int(m.eq_obj1id[e]), int(m.eq_obj2id[e])
         if body not in shapes:
             shapes[body] = shape_of(m, body)
-        own = int(m.body_rootid[holder]), "load"
-        yield own, held[e] + shapes[body]
-        yield own, held[e] + shapes[body] + (0.0, 0.0, _stroke(m, holder))
+        owner = int(m.body_rootid[holder]), "load"
+        yield owner, held[e] + shapes[body]
+        yield owner, held[e] + shapes[body] + (0.0, 0.0, _stroke(m, holder))
 
 
 def shape_of(m: mujoco.MjModel, body: int) -> Array:

@@ -243,8 +243,8 @@ def render(
     at its time. Raises InputError, MissingError without GL, StoppedError as `carry_out`."""
     probe()
     if isinstance(source, Log):
-        given = shot.output, shot.picture, shot.fps, shot.at, shot.poster
-        return Rendered(render_log(source, *given), None)
+        options = shot.output, shot.picture, shot.fps, shot.at, shot.poster
+        return Rendered(render_log(source, *options), None)
     made = Simulation(source.layout, asked.request(source))
     films: list[Film] = []
 

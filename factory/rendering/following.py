@@ -117,14 +117,16 @@ class Followed:
         handled = [label for parts in carried.values() for label in parts]
         most, unlike = Counter(handled), dict.fromkeys(handled)
         inside = [{part}] if part else [{*contents[product]} for product in factory.products]
-        known = {max((x for x in unlike if x in parts), key=most.__getitem__) for parts in inside}
+        followed = {
+            max((x for x in unlike if x in parts), key=most.__getitem__) for parts in inside
+        }
         parts = {robot: len(labels) for robot, labels in carried.items()}
         self.rank = {e: _rank(name, parts) for e, name in enumerate(self.kinds)}
         bodies = {m.body(b).name: b for b in range(m.nbody)}
         self.labels = {
             b: names.label_of(name) for name, b in bodies.items() if names.kind(name) == "part"
         }
-        self.copies = [b for b, label in self.labels.items() if known & {*contents[label]}]
+        self.copies = [b for b, label in self.labels.items() if followed & {*contents[label]}]
         self.box = self._box(m, {b for b, label in self.labels.items() if label in handled})
         self.last: tuple[int, Array] | None = None
 

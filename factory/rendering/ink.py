@@ -48,8 +48,8 @@ OTHERS = ((190, 84, 130), (150, 132, 38), (98, 128, 66), (168, 92, 70), (70, 150
 def template_colours(factory: Factory) -> dict[str, Colour]:
     """The colour of each template of a factory, in the order in which products come by."""
     names = dict.fromkeys(o.template.name for o in reversed(factory.making))
-    own = [name for name in names if name not in TEMPLATES]
-    chosen = {**TEMPLATES, **{name: OTHERS[n % len(OTHERS)] for n, name in enumerate(own)}}
+    users = [name for name in names if name not in TEMPLATES]
+    chosen = {**TEMPLATES, **{name: OTHERS[n % len(OTHERS)] for n, name in enumerate(users)}}
     return {name: chosen[name] for name in (*names, factory.dropoff.template.name)}
 
 

@@ -221,9 +221,9 @@ class OpcuaPlant:
 
     async def _tell(self, sensed: Sensed, stop: bool) -> None:
         """Events, refusals, and from time to time the axes."""
-        plant, told = self._plant, self._told
-        events, refusals = plant.events[told[0] :], plant.refusals[told[1] :]
-        self._told = [told[0] + len(events), told[1] + len(refusals)]
+        plant, sent = self._plant, self._told
+        events, refusals = plant.events[sent[0] :], plant.refusals[sent[1] :]
+        self._told = [sent[0] + len(events), sent[1] + len(refusals)]
         for message in (*(e.transition for e in events), *(r.message for r in refusals)):
             await self._nodes["event"].trigger(message=message)
         if refusals:

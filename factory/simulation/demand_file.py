@@ -42,7 +42,7 @@ def read_demand(path: Path, pag: PAG) -> Demand:
         message = f"'{path}' cannot be read: {getattr(error, 'strerror', 'it is not UTF-8 text')}"
         raise InputError(Diagnostic("BadFile", message, None, HINT)) from error
     columns = ",".join(head)
-    found, faults = list[tuple[str, float]](), list[Diagnostic]()
+    orders, faults = list[tuple[str, float]](), list[Diagnostic]()
 
     def fault(row: int, message: str, hint: str = HINT) -> None:
         faults.append(Diagnostic("BadDemand", message, Position(str(path), row, 1), hint))
@@ -63,19 +63,19 @@ def read_demand(path: Path, pag: PAG) -> Demand:
             fault(
                 row, f"'{more[0]}' is no {'time [s]' if 'time' in columns else 'count'} from 0 on"
             )
-        elif found and number < found[-1][1]:
-            fault(row, f"{more[0]} comes after {found[-1][1]:g}: orders are in the order of time")
+        elif orders and number < orders[-1][1]:
+            fault(row, f"{more[0]} comes after {orders[-1][1]:g}: orders are in the order of time")
         else:
-            found.append((product, number))
-    if not faults and not found:
+            orders.append((product, number))
+    if not faults and not orders:
         fault(1, "there is no order")
-    if not faults and columns == "product,made" and found[0][1]:
-        fault(2, f"nothing is asked for before {found[0][1]:g} products are made; begin at 0")
+    if not faults and columns == "product,made" and orders[0][1]:
+        fault(2, f"nothing is asked for before {orders[0][1]:g} products are made; begin at 0")
     if faults:
         raise InputError(faults)
     if columns == "product,made":
-        return Demand(changes=tuple((product, int(made)) for product, made in found))
-    return Demand(tuple(found))
+        return Demand(changes=tuple((product, int(made)) for product, made in orders))
+    return Demand(tuple(orders))
 
 
 def _number(text: str) -> float | None:

@@ -138,7 +138,7 @@ class DistributedSupervisor:
         periods = self.random.integers(low, high + 1, size=len(programs))
         x = self.world.sense()[0]
         lifts = {robot: len(programs) + n for n, robot in enumerate(self.factory.strokes)}
-        found = []
+        processes = []
         for p, n in zip(programs, periods, strict=True):
             axes = np.array([p.robot, *([lifts[p.robot]] if p.robot in lifts else [])])
             phase = int(self.random.integers(n))
@@ -147,8 +147,8 @@ class DistributedSupervisor:
                 np.zeros(len(axes)),
             )
             link.at(p.steps[0].operation, 0)
-            found.append(Process(p, link, int(n), phase, axes, np.array(x[axes]), still))
-        return found
+            processes.append(Process(p, link, int(n), phase, axes, np.array(x[axes]), still))
+        return processes
 
     @property
     def events(self) -> list[Event]:

@@ -55,8 +55,8 @@ def _overlaps(layout: Layout) -> tuple[Diagnostic, ...]:
         if o.approach is not None and o.turn in firsts
     )
     insides = factory.pag.insides if factory.period > 1 else ()
-    found = overlaps_of(layout.product, *insides).faults(allowed)
-    return (*found, *(fault for fault in blocked if fault is not None))
+    overlapping = overlaps_of(layout.product, *insides).faults(allowed)
+    return (*overlapping, *(fault for fault in blocked if fault is not None))
 
 
 def physical_model(

@@ -65,10 +65,10 @@ def model_faults(
         if subject_of_run(made).as_json()["goals"] != log.header["monitor"]["goals"]:
             return (), "the run was in another layout than the one that its PAG gets now"
     except FactoryError as error:
-        found = error.diagnostics[0]
-        if found.code == "BadPlan":
-            return (Diagnostic("Record", found.message),), ""
-        return (), found.message
+        first = error.diagnostics[0]
+        if first.code == "BadPlan":
+            return (Diagnostic("Record", first.message),), ""
+        return (), first.message
     except BROKEN as error:
         return (), str(error)
     assert made.model is not None

@@ -159,8 +159,8 @@ class Supervisor:
 
     def recall(self, axes: Container[int]) -> None:
         """End the stages of these axes wherever they are."""
-        ahead, own = self.active.ahead, self.bundles.axes_of
-        kept = [n for n in ahead if not any(axis in axes for axis in own[n])]
+        ahead, axes_of = self.active.ahead, self.bundles.axes_of
+        kept = [n for n in ahead if not any(axis in axes for axis in axes_of[n])]
         self._activate(self.active.operations, kept)
 
     def send(self, stages: Iterable[int]) -> None:

@@ -108,14 +108,14 @@ class Revision:
 
     def words(self, afresh: float | None = None) -> Iterator[str]:
         """The same for people, line by line."""
-        found, document = self.pairing.matching, self.as_json(afresh)
+        matched, document = self.pairing.matching, self.as_json(afresh)
         changes = [
             f"{len(labels)} {what} ({_listed(labels)})"
             for what, labels in (
-                ("gone", found.gone),
-                ("new", found.added),
-                ("changed", [f"{x} -> {y}" if x != y else x for x, y in found.changed.items()]),
-                ("renamed", [f"{x} -> {y}" for x, y in found.renamed.items()]),
+                ("gone", matched.gone),
+                ("new", matched.added),
+                ("changed", [f"{x} -> {y}" if x != y else x for x, y in matched.changed.items()]),
+                ("renamed", [f"{x} -> {y}" for x, y in matched.renamed.items()]),
             )
             if labels
         ]

@@ -96,8 +96,8 @@ class Settings:
             if getattr(self, name) in (False, True):
                 object.__setattr__(self, name, int(getattr(self, name)))
         values = {name: getattr(self, name) for name in RANGES}
-        found = [wrong_type(n, v) for n, v in values.items() if (n, v) != ("substeps", None)]
-        if faults := [fault for fault in found if fault]:
+        faults_of = [wrong_type(n, v) for n, v in values.items() if (n, v) != ("substeps", None)]
+        if faults := [fault for fault in faults_of if fault]:
             raise InputError(faults)
 
     @property

@@ -20,8 +20,8 @@ def part_pool(factory: Factory, wip: int | None = None) -> Mapping[str, int]:
     search for all parts of a unit of a period. Raises InputError (BadValue) where `wip` is below 1.
     """
     net = marked(factory.net) if wip is None else with_wip(factory, wip)
-    found = [least_tokens(net, dropoff.end) for dropoff in factory.dropoffs]
-    pool = {part.label: found[part.turn][part.start] for part in factory.leaves}
+    least_of = [least_tokens(net, dropoff.end) for dropoff in factory.dropoffs]
+    pool = {part.label: least_of[part.turn][part.start] for part in factory.leaves}
     return MappingProxyType({label: n for label, n in pool.items() if n is not None})
 
 

@@ -75,8 +75,8 @@ class Timing:
     @cached_property
     def stages(self) -> tuple[HeadStart, ...]:
         """The ways that robots go ahead of operations while they wait, if they are to."""
-        found = stages_of(self.layout, self.modes, self.settings)
-        return with_time(self.layout, found, self.world, self.wip)
+        chosen = stages_of(self.layout, self.modes, self.settings)
+        return with_time(self.layout, chosen, self.world, self.wip)
 
     @cached_property
     def coordinated(self) -> Coordinated:

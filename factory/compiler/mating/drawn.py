@@ -133,10 +133,10 @@ class DrawnWays:
 
     def finished(self, one: int, other: int) -> float:
         """Penetration depth of two parts in the finished product [m]."""
-        key, found = (self._labels[one], self._labels[other]), self._found.finished
-        if key not in found:
-            found[key] = common(self._body(one), self._body(other)).depth
-        return found[key]
+        key, depths = (self._labels[one], self._labels[other]), self._found.finished
+        if key not in depths:
+            depths[key] = common(self._body(one), self._body(other)).depth
+        return depths[key]
 
     def _path(self, moving: int, standing: int, axis: int, sign: int) -> tuple[float, float]:
         """How deep the first part gets into the second on its way, and where [m]. The depth of a

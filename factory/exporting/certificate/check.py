@@ -112,7 +112,7 @@ def _prove_gear_train(net: Net, section: Section, document: Section) -> Iterator
         yield "gear_train: some robot's gear is no cycle (Definition 3.5)"
         return
     yield from net.uncovered("gear_train")
-    shared = {p for p, own in enumerate(net.owners) if len(own) > 1}
+    shared = {p for p, owners in enumerate(net.owners) if len(owners) > 1}
     for robot in net.robots:
         if any({robot.places[i - 1], p} <= shared for i, p in enumerate(robot.places)):
             yield f"gear_train: {robot.name} has no wait of its own before each operation"
@@ -128,7 +128,9 @@ def _prove_gear_train(net: Net, section: Section, document: Section) -> Iterator
 
 def _connected(net: Net) -> bool:
     """Whether the gears and the places that they share form a connected graph."""
-    graph = nx.Graph((index, ~p) for p, own in enumerate(net.owners) if own[1:] for index in own)
+    graph = nx.Graph(
+        (index, ~p) for p, owners in enumerate(net.owners) if owners[1:] for index in owners
+    )
     graph.add_nodes_from(range(len(net.robots)))
     return bool(nx.is_connected(graph))
 

@@ -101,7 +101,7 @@ class Net:
         gears."""
         if not all(self.owners) or not all(self.meeting):
             yield f"{claim}: some place or transition is in no gear"
-        if not all(self.fits(p, own) for p, own in enumerate(self.owners)):
+        if not all(self.fits(p, owners) for p, owners in enumerate(self.owners)):
             yield f"{claim}: the slots of some place are not its gears'"
 
     def wrong_moves(self, claim: str) -> Iterator[str]:

@@ -44,8 +44,8 @@ def read_certificate(path: Path) -> Json:
     missing = [key for key in sections if not isinstance(document, dict) or key not in document]
     if missing:
         raise InputError(_bad(path, f"it lacks {', '.join(map(repr, missing))}"))
-    found: Json = document
-    return found
+    certificate: Json = document
+    return certificate
 
 
 def check_against(path: Path, net: GearNet | MarkedNet, verdict: Verdict) -> Json:
@@ -78,9 +78,9 @@ def _named(document: Json, has_gears: bool) -> Json:
     net, robots = document["net"], document["robots"]
     events, places = ([row["name"] for row in net[key]] for key in ("transitions", "places"))
     names = [robot["name"] for robot in robots]
-    found: Json = {f"transition {event}": {} for event in events}
+    by_name: Json = {f"transition {event}": {} for event in events}
     for place in net["places"]:
-        found[f"place {place['name']}"] = row = {
+        by_name[f"place {place['name']}"] = row = {
             "tokens": place["tokens"],
             "producers": sorted(events[e] for e in place["left"]),
             "consumers": sorted(events[e] for e in place["right"]),
@@ -91,14 +91,14 @@ def _named(document: Json, has_gears: bool) -> Json:
     for event in net["transitions"] if has_gears else ():
         moves = event["moves"]
         named = moves and sorted([places[p], i, places[q], j] for p, i, q, j in moves)
-        found[f"transition {event['name']}"]["moves"] = named
+        by_name[f"transition {event['name']}"]["moves"] = named
     for robot in robots if has_gears else ():
-        found[f"robot {robot['name']}"] = {
+        by_name[f"robot {robot['name']}"] = {
             "type": robot["type"],
             "gear": [places[p] for p in robot["places"]],
             "initial place": None if robot["initial"] is None else places[robot["initial"]],
         }
-    return found
+    return by_name
 
 
 def first_difference(one: Any, other: Any, path: str = "") -> str:

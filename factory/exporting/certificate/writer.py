@@ -78,9 +78,9 @@ def _listing(net: GearNet | MarkedNet, subject: MarkedNet) -> Json:
                 "right": list(place.right),
                 "tokens": tokens,
                 "size": place.size,
-                "slots": list(own),
+                "slots": list(on),
             }
-            for place, tokens, own in zip(subject.net.places, subject.tokens, slots, strict=True)
+            for place, tokens, on in zip(subject.net.places, subject.tokens, slots, strict=True)
         ],
     }
 

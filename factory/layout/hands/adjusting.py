@@ -1,4 +1,5 @@
-"""Lifts for lines whose labels are held at different heights: the robot sets its hand for each."""
+"""Lifts for lines whose labels are held at different heights: the robot adjusts its hand for
+each."""
 
 from __future__ import annotations
 
@@ -10,8 +11,8 @@ from factory.problem.robot_types import LIFT, Catalogue
 
 
 def lifts_for(hands: Hands, catalogue: Catalogue) -> frozenset[int]:
-    """The robots (index) of `hands` with several tours that have no lift, where one hand holds all
-    that they bring if they have one, and else none does."""
+    """The robots (index) of `hands` with several tours and no lift for which one hand suits all
+    labels with a lift, and none without."""
     factory, product, push = hands.factory, hands.holding.product, hands.holding.push
     lacking = {
         robot.index
@@ -25,13 +26,12 @@ def lifts_for(hands: Hands, catalogue: Catalogue) -> frozenset[int]:
 
 
 def without_hands(hands: Hands, however: bool = False) -> set[int]:
-    """The robots with unlike tours that have no hand in some way that they may lie, or `however`
-    they lie."""
-    found = set[int]()
+    """The robots with unlike tours that have no hand in some frame, or `however` in none."""
+    robots = set[int]()
     for robot, tours in enumerate(hands.tours.of):
         if len({*hands.tours.alike(tours)}) > 1 and held(hands.holding.factory, tours[0]):
             chosen = (hands.hand(robot, u, t) for u, t in hands.holding.frames(tours[0]))
             none = (hand is None or hand.kind == "none" for hand in chosen)
             if all(none) if however else any(none):
-                found.add(robot)
-    return found
+                robots.add(robot)
+    return robots

@@ -38,47 +38,50 @@ class HandsApart:
     def __init__(self, holding: Holding, hand_of: Callable[[int, Way], Hand]) -> None:
         self.holding, self.hand_of = holding, hand_of
 
-    def over_fingers(self, kind: Kind, found: Places) -> Truth:
+    def over_fingers(self, kind: Kind, places: Places) -> Truth:
         """Whether a hand behind stays over the fingers of those below (n,)."""
         if kind != "behind":
-            return np.ones(len(found), bool)
+            return np.ones(len(places), bool)
         least = self.holding.product.low[2] - UNDER
-        return np.asarray(found.at[:, 2] - halves(found.radius) >= least)
+        return np.asarray(places.at[:, 2] - halves(places.radius) >= least)
 
-    def own_side(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Truth:
-        """Whether a hand at a place stays on its own side: of the line of the carrier, where that
-        comes from below too, else of what another that comes from the opposite side holds."""
-        carrier, free = self.holding.on[robot], np.ones(len(found), bool)
+    def own_side(self, robot: int, kind: Kind, places: Places, u: Way, t: Way) -> Truth:
+        """Whether a hand at a place stays on its own side: of the carrier's line if the carrier is
+        held from below too, otherwise of the payload of another robot that comes from the opposite
+        side."""
+        carrier, free = self.holding.on[robot], np.ones(len(places), bool)
         if carrier < 0 or self.holding.serves_fixed(robot):
             return free
         axis, side = (0, u[0]) if u[0] else (1, u[1])
         hand = self.hand_of(carrier, t)
         if hand.kind == "below" and kind == "below":
             half = max(FINGER / 2, hand.radius) + BESIDE
-            free &= (hand.places[0][axis] - found.at[:, axis]) * side >= halves(found.radius) + half
+            free &= (hand.places[0][axis] - places.at[:, axis]) * side >= halves(
+                places.radius
+            ) + half
         last = self.holding.last(robot)
         brought = [label for label in last.before if label != NOPART]
         if last.before[last.template.carrier - 1] == NOPART and len(brought) > 1:
             boxes = [self.holding.box(label) for label in brought]
             middle = float(np.mean([(box[0] + box[1])[axis] / 2 for box in boxes]))
-            free &= (middle - found.at[:, axis]) * side >= halves(found.radius) + BESIDE / 2
+            free &= (middle - places.at[:, axis]) * side >= halves(places.radius) + BESIDE / 2
         return free
 
-    def crossing(self, robot: int, found: Places, u: Way, t: Way) -> Array:
-        """How far a hand reaches over the line of a carrier whose tall mast comes along there, or
-        over what is broader of its hand (n,) [m]."""
+    def crossing(self, robot: int, places: Places, u: Way, t: Way) -> Array:
+        """Distance that a hand reaches over the line of a carrier whose tall mast comes along
+        there, or over a broader part of its hand (n,) [m]."""
         carrier = self.holding.on[robot]
         if carrier < 0 or not (hand := self.hand_of(carrier, t)).tall:
-            return np.zeros(len(found))
+            return np.zeros(len(places))
         axis, side = (0, u[0]) if u[0] else (1, u[1])
-        over = (found.at[:, axis] - hand.places[0][axis]) * side
+        over = (places.at[:, axis] - hand.places[0][axis]) * side
         half = max(MAST / 2, float(halves(np.array(hand.radius))))
-        return np.maximum(0.0, over + halves(found.radius) + half + BESIDE)
+        return np.maximum(0.0, over + halves(places.radius) + half + BESIDE)
 
     def beam(self, robot: int, at: Places, frames: Sequence[tuple[Way, Way]]) -> float:
-        """How high the beam of a hand above at some places is at its lower edge [m]: over all that
-        its payload is joined to, and over the beam of its carrier where it reaches over the
-        carrier's line."""
+        """Height of the lower edge of the beam of a hand above, by place [m]: over everything that
+        its payload is joined to, and over its carrier's beam if it reaches over the carrier's
+        line."""
         height = self.holding.top(self.holding.last(robot)) + OVER
         height += self.holding.axis[robot] * (BEAM + LEVEL)
         for u, t in frames:
@@ -89,11 +92,11 @@ class HandsApart:
         return height
 
     def carriers_hand(
-        self, robot: int, kind: Kind, found: Places, u: Way, t: Way
+        self, robot: int, kind: Kind, places: Places, u: Way, t: Way
     ) -> Iterator[Swept]:
-        """A hand with all that is behind it, and the hand of the carrier: a tall one, as its lift
-        rises, with all that is behind that, since both are there at once; of one below the column,
-        with all its way ahead, where it comes from and goes."""
+        """The sweep of a hand with everything behind it, against the carrier's hand: a tall one, as
+        its lift rises, with everything behind it, since both are there at once; one below the
+        column, with all its way ahead."""
         carrier = self.holding.on[robot]
         if carrier < 0 or self.holding.serves_fixed(robot):
             return
@@ -101,14 +104,14 @@ class HandsApart:
             return
         if kind == hand.kind == "below":  # fingers keep to their sides
             return
-        own = swept(*reach(self.holding.product, kind, found.at, found.radius, u), back(u))
-        own[1][:, 2] += self.holding.factory.strokes.get(robot, 0.0)
+        way_out = swept(*reach(self.holding.product, kind, places.at, places.radius, u), back(u))
+        way_out[1][:, 2] += self.holding.factory.strokes.get(robot, 0.0)
         at, radius = np.array(hand.places), np.full(len(hand.places), hand.radius)
         low, high = reach(self.holding.product, hand.kind, at, radius, t)
         if hand.kind == "behind":
             low[:, 2] -= self.holding.factory.strokes.get(carrier, 0.0)
         if hand.kind == "above":
-            yield (*own, np.stack((low, high), axis=1))
+            yield (*way_out, np.stack((low, high), axis=1))
             half = max(FINGER, hand.width) / 2
             low, high = at - half, at + half
             low[:, 2], high[:, 2] = hand.beam, hand.beam + BEAM
@@ -116,4 +119,4 @@ class HandsApart:
         if carrier in self.holding.turning and not hand.tall:
             ways.append(back(t))
         for way in ways:
-            yield (*own, np.stack(swept(low, high, way), axis=1))
+            yield (*way_out, np.stack(swept(low, high, way), axis=1))

@@ -1,4 +1,4 @@
-"""The bores that parts need for hands that hold by pins."""
+"""The bores that parts need for hands with pins."""
 
 from __future__ import annotations
 
@@ -24,13 +24,14 @@ class Bore:
     diameter: float
 
     def as_json(self) -> dict[str, Any]:
-        """It in `--json` documents."""
-        found = {"label": self.label, "robot": self.robot, "from": self.kind}
-        return {**found, "at_m": list(self.at), "diameter_mm": round(self.diameter * 1e3, 4)}
+        """The bore in `--json` documents."""
+        document = {"label": self.label, "robot": self.robot, "from": self.kind}
+        return {**document, "at_m": list(self.at), "diameter_mm": round(self.diameter * 1e3, 4)}
 
 
 def bores(layout: Layout) -> Iterator[Bore]:
-    """Those of a layout's robots, in their order: half as wide as the collars of their hands."""
+    """The bores for a layout's robots, in their order: half as wide as the collars of their
+    hands."""
     for robot, hand in zip(layout.factory.robots, layout.hands, strict=False):
         if hand is not None and hand.kind != "none" and hand.tip == "pin":
             label = held(layout.factory, robot.index)

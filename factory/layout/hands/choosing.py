@@ -41,7 +41,7 @@ class Tours:
 
     @classmethod
     def apart(cls, factory: Factory) -> Tours:
-        """Those of a factory, which stays itself where no robot has several."""
+        """The tours of a factory; the factory itself if no robot has several."""
         if not factory.folded:
             return cls(factory, tuple((robot.index,) for robot in factory.robots))
         of, robots = list[tuple[int, ...]](), list[Robot]()
@@ -65,8 +65,8 @@ class Tours:
         return cls(made, tuple(of), frozenset(turning))
 
     def alike(self, tours: Sequence[int]) -> tuple[int, ...]:
-        """For each of some tours the first of them that is the same but for the unit of a period
-        that it is for: one hand has the same place on both."""
+        """For each tour the first that equals it except for the unit of a period: one hand has the
+        same place on both."""
         first = dict[object, int]()
         return tuple(first.setdefault(self._done(tour), tour) for tour in tours)
 
@@ -77,10 +77,10 @@ class Tours:
 
 
 class Hands:
-    """The hands of a factory's robots. That of a carrier depends on its heading alone, since those
-    that deliver to it depend on its line; that of another on its frame. `travels`: how far robots
-    are to go at the least [m], as layouts have shown. `wanted`: hands of robots (index) with
-    one tour that they keep where these can hold."""
+    """The hands of a factory's robots. A carrier's hand depends on its heading only, since those
+    that deliver to it depend on its line; any other's on its frame. `travels`: least travels of
+    robots [m], as layouts have shown. `wanted`: hands that robots (index) with one tour keep if
+    these fit."""
 
     def __init__(
         self,
@@ -104,26 +104,26 @@ class Hands:
         self._on = {tour: of for of in self.tours.of for tour in of}
 
     def hand(self, robot: int, u: Way, t: Way) -> Hand | None:
-        """The hand of a robot that heads along u, to a carrier that heads along t; None for a
-        tool. That of a robot with several tours is in its place on the label of the first."""
+        """The hand of a robot that heads along u, to a carrier that heads along t; None for a tool.
+        For several tours: in its place on the label of the first."""
         tours = self.tours.of[robot]
         return self._of(tours, u, t)[0] if held(self.holding.factory, tours[0]) else None
 
     def shifts(self, robot: int, u: Way, t: Way | None = None) -> tuple[Point3, ...]:
-        """For each tour of a robot how far the product is from where it is on the first, as seen
-        from the robot [m], so that the hand stays where it is; nothing for one tour. `t` does not
-        matter for a carrier."""
+        """For each tour of a robot the product's displacement from its place on the first tour, in
+        the robot's frame [m], such that the hand stays where it is; empty for one tour. `t` does
+        not matter for a carrier."""
         tours = self.tours.of[robot]
         if len(tours) == 1 or not held(self.holding.factory, tours[0]):
             return ()
         places = [hand.places[0] for hand in self._of(tours, u, t)]
-        found = np.round(np.array(places[:1]) - places, 6) + 0.0
-        return tuple((x, y, z) for x, y, z in found.tolist())
+        offsets = np.round(np.array(places[:1]) - places, 6) + 0.0
+        return tuple((x, y, z) for x, y, z in offsets.tolist())
 
     def together(self, robots: Sequence[int]) -> bool:
-        """Whether robots with one tour each could share a hand, by estimate: in some way to lie a
-        hand of one kind holds what each of them brings. It does not know of the size of tips, nor
-        of the hands of others that are on lines."""
+        """Whether robots with one tour each could share a hand, by estimate: in some frame a hand
+        of one kind holds what each of them brings. Sizes of tips and the hands of other lines are
+        not considered."""
         tours = [tour for robot in robots for tour in self.tours.of[robot]]
         if any(not held(self.holding.factory, tour) for tour in tours):
             return True
@@ -136,24 +136,23 @@ class Hands:
         return any((u, back(t), kind, z) in common for u, t, kind, z in common)
 
     def carries(self, robot: int) -> bool:
-        """Whether others come to a robot, with something or to work on what it holds."""
+        """Whether other robots come to a robot, with an input or to work on its payload."""
         return any(self.holding.is_carrier(tour) for tour in self.tours.of[robot])
 
     def is_fed(self, robot: int) -> bool:
-        """Whether a feeder presents what a robot takes."""
+        """Whether a robot takes parts from a feeder."""
         return self.holding.is_fed(self.tours.of[robot][0])
 
     def line(self, robot: int, u: Way) -> float:
-        """Where the line of a robot's hand that heads along u is across its heading, in the frame
-        of the product [m]."""
+        """Position across the heading u of the line of a robot's hand, in the product's frame
+        [m]."""
         across = 1 if u[0] else 0
         if self.carries(robot):
             return self._carrier(self.tours.of[robot][0], u).places[0][across]
         return float(self.holding.product.middle[across])
 
     def _of(self, tours: tuple[int, ...], u: Way, t: Way | None) -> tuple[Hand, ...]:
-        """The hand of a robot in its place on the label of each of its tours: tours that are alike
-        have that of one of them."""
+        """The hand of a robot in its place on the label of each tour; equal tours share one."""
         carries = any(map(self.holding.is_carrier, tours))
         frames = self._sides(tours[0], u) if carries or t is None else ((u, t),)
         if (tours, frames) not in self._chosen:
@@ -172,8 +171,8 @@ class Hands:
         return self._chosen[tours, frames]
 
     def _settle(self, tours: tuple[int, ...]) -> None:
-        """Choose the hands of all carriers above some tours, the uppermost first: however deep a
-        product is, none is looked for while another is."""
+        """Choose the hands of all carriers above some tours, the uppermost first, so that the
+        choice never recurses, however deep the product."""
         above, todo = list[int](), [*tours]
         while todo:
             carrier = self.holding.on[todo.pop()]
@@ -190,19 +189,20 @@ class Hands:
         return self._of(tours, u, None)[tours.index(tour)]
 
     def _sides(self, robot: int, u: Way) -> tuple[tuple[Way, Way], ...]:
-        """How a carrier that heads along u may lie."""
+        """The frames of a carrier that heads along u."""
         delivers = self.holding.on[robot] >= 0
         sides = ((u[1], u[0]), (-u[1], -u[0])) if delivers else ((0.0, 1.0),)
         return tuple((u, (x + 0.0, y + 0.0)) for x, y in sides)
 
     def all_frames(self, robot: int) -> list[tuple[tuple[Way, Way], ...]]:
-        """How a robot may lie on the floor: together what one hand has to be clear in."""
-        found = list(self.holding.frames(robot))
+        """The frames of a robot on the floor, grouped: one hand has to be clear in all frames of a
+        group."""
+        frames = list(self.holding.frames(robot))
         if self.holding.is_carrier(robot):
-            return [self._sides(robot, u) for u in dict.fromkeys(u for u, _ in found)]
-        return [(frame,) for frame in found]
+            return [self._sides(robot, u) for u in dict.fromkeys(u for u, _ in frames)]
+        return [(frame,) for frame in frames]
 
     def _nowhere(self, label: str) -> Hand:
-        """No hand, at the centre of mass of what is to be held."""
+        """No hand, at the centre of mass of the payload."""
         x, y, z = centre_of(self.holding.product, self.holding.factory.contents[label])[1].tolist()
         return Hand("none", ((float(x), float(y), float(z)),))

@@ -1,4 +1,4 @@
-"""What of a load uses the strength of a hand, by the hand's shape."""
+"""The share of a hand's strength that a load uses, by the hand's shape."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def middle(hand: Hand) -> Array:
 
 
 def outward(hand: Hand, heading: Point2) -> Array:
-    """From the face of a hand's tips to the payload (3,), for a robot with a heading."""
+    """Direction from the face of a hand's tips to the payload (3,), for a robot with a heading."""
     if hand.kind == "behind":
         return np.array([*heading, 0.0])
     return np.array([0.0, 0.0, -1.0 if hand.kind == "above" else 1.0])
@@ -26,5 +26,5 @@ def gauge(hand: Hand, heading: Point2, tour: int = 0) -> Array:
     """From a force [N] and a moment [Nm] about the middle of a hand's tips to the terms of what
     they use of its strength on a tour (11, 6), as `tips.shares` takes them."""
     apart = np.subtract(hand.places[-1], hand.places[0])
-    found = tip(hand.tip).gauge(outward(hand, heading), np.array(hand.radius), apart)
-    return found / hand.covered[tour]
+    terms = tip(hand.tip).gauge(outward(hand, heading), np.array(hand.radius), apart)
+    return terms / hand.covered[tour]

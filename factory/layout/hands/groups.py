@@ -36,10 +36,11 @@ PAIRED = 8
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Groups:
-    """Groups (g,) of clear `places`: the numbers of the two, or of one twice, `chosen` (g, 2); the
-    `share` (g,) of the strength of its tips that is used by suction and if they are `pinned` (g,);
-    how badly those that deliver to it would hold from below then, `served` (g,); if the hand has to
-    be there `first` (g,), and how far back it goes until its carrier may go on (`waits`, g) [m]."""
+    """Groups (g,) of clear `places`: the indices of the two, or of one twice, `chosen` (g, 2); the
+    `share` (g,) of the strength of its tips used with suction, and with pins (`pinned`, g); the
+    cost of the hands of robots that deliver to it from below, `served` (g,); whether the hand has
+    to be there `first` (g,), and how far it goes back until its carrier may go on (`waits`, g)
+    [m]."""
 
     places: Places
     chosen: Index
@@ -53,7 +54,7 @@ class Groups:
         return len(self.chosen)
 
     def among(self, which: Index | Truth) -> Groups:
-        """Some of them."""
+        """A selection of groups."""
         return Groups(
             self.places,
             self.chosen[which],
@@ -66,43 +67,43 @@ class Groups:
 
     @property
     def radius(self) -> Array:
-        """That of their tips (g,) [m]."""
+        """Radius of their tips (g,) [m]."""
         return np.asarray(self.places.radius[self.chosen].min(axis=1))
 
     @property
     def covered(self) -> Array:
-        """The share (g,) of a tip's face that the surface covers."""
+        """Share (g,) of a tip's face that the surface covers."""
         return np.asarray(self.places.covered[self.chosen].min(axis=1))
 
     @property
     def height(self) -> Array:
-        """How high they are (g,) [m]."""
+        """Height (g,) [m]."""
         return np.asarray(self.places.at[self.chosen[:, 0], 2])
 
     def across(self, way: tuple[float, float]) -> Array:
-        """How far along a way of the floor they are (g,) [m]."""
+        """Position along a direction of the floor (g,) [m]."""
         return np.asarray((self.places.at[:, :2] @ np.array(way))[self.chosen].mean(axis=1))
 
     def cost(self, tip: TipName) -> Array:
-        """How bad it is (g,) to hold by a tip, inf where that is too weak."""
+        """Cost (g,) of holding with a tip; inf if that is too weak."""
         bad, wait = self.served + PINNED * (tip == "pin"), self.waits
         strong = self.share <= ENOUGH if tip == "suction" else self.pinned <= STRONG
         return np.where(strong, bad + np.minimum(WAIT * wait, LONG), np.inf)
 
     def used(self, tip: TipName) -> Array:
-        """The share (g,) of the strength of such tips that is used."""
+        """Share (g,) of the strength of such tips that is used."""
         return self.share if tip == "suction" else self.pinned
 
     def rank(self, tip: TipName, beside: Array) -> Index:
-        """The place of each (g,) in their order: the least far `beside` the best (g,) first, then
-        the least bad, what never waits, is in nobody's way, simple, strong."""
+        """Rank of each group (g,): by the distance `beside` the best (g,), then cost, waiting,
+        being in the way, simplicity and strength."""
         two, rank = self.chosen[:, 0] != self.chosen[:, 1], np.empty(len(self), np.intp)
         keys = self.used(tip), two, self.first, self.waits, self.cost(tip), beside
         rank[np.lexsort(keys)] = np.arange(len(self))
         return rank
 
     def keys(self, tip: TipName) -> tuple[float, ...]:
-        """What the first group is ordered by where it is as bad as others."""
+        """The sort key of the first group among groups of equal cost."""
         one, other = self.chosen[0].tolist()
         keys = self.waits[0], self.first[0], one != other, self.used(tip)[0]
         return tuple(map(float, keys))
@@ -115,13 +116,13 @@ class Groups:
     def points(self) -> tuple[Point3, ...]:
         """The places of the first group [m]."""
         at = self.places.at[sorted({*self.chosen[0].tolist()})]
-        found = sorted((x, y, z) for x, y, z in at.round(6).tolist())
-        return tuple(found)
+        points = sorted((x, y, z) for x, y, z in at.round(6).tolist())
+        return tuple(points)
 
 
 def in_one_place(options: Sequence[Groups]) -> list[Groups]:
-    """For each label the one group in the place that is the least bad for all labels together, the
-    strongest if several are; nothing where they have no place in common."""
+    """For each label the group at the place of least total cost, the strongest if several are;
+    empty if the labels have no place in common."""
     numbers = [dict(zip(one.spots(), range(len(one)), strict=True)) for one in options]
     common = [spot for spot in numbers[0] if all(spot in number for number in numbers)]
     if not common:
@@ -137,8 +138,8 @@ def in_one_place(options: Sequence[Groups]) -> list[Groups]:
 
 
 def on_one_line(options: Sequence[Groups], way: tuple[float, float]) -> list[Groups]:
-    """The groups of each label that are equally far along a way of the floor: as far as is the
-    least bad for all labels together, in the middle if several are."""
+    """The groups of each label at one position along a direction of the floor: that of least total
+    cost, the middle one if several are."""
     lines = [np.round(option.across(way), 5) for option in options]
     common, every = reduce(np.intersect1d, lines), np.concatenate(lines)
     if not len(common):
@@ -155,15 +156,15 @@ def on_one_line(options: Sequence[Groups], way: tuple[float, float]) -> list[Gro
 
 
 def bad(share: Array, pinned: Array) -> Array:
-    """How bad it is (n,) to hold with tips of which these shares are used."""
+    """Cost (n,) of tips of which these shares are used."""
     return np.where(share <= ENOUGH, 0.0, np.where(pinned <= STRONG, PINNED, WEAK))
 
 
 def least(reach: Array, bad: Array, bound: Array) -> Array:
-    """How bad the best is of those that reach no further than a bound (n,)."""
+    """Cost of the best of those that reach no further than a bound (n,)."""
     order = np.argsort(reach)
-    found = np.minimum.accumulate(np.append(WEAK, bad[order]))
-    return np.asarray(found[np.searchsorted(reach[order], bound, side="right")])
+    best = np.minimum.accumulate(np.append(WEAK, bad[order]))
+    return np.asarray(best[np.searchsorted(reach[order], bound, side="right")])
 
 
 def in_line(at: Array, along: int, centre: float) -> Iterator[tuple[int, int]]:
@@ -180,6 +181,6 @@ def in_line(at: Array, along: int, centre: float) -> Iterator[tuple[int, int]]:
 
 
 def _spread(numbers: Sequence[int]) -> list[int]:
-    """Some of many, the first and others all over."""
+    """A sample of many: the first, and others spread evenly."""
     step = max(1, len(numbers) // (PAIRED // 2))
     return list(dict.fromkeys([*numbers[: PAIRED // 2], *numbers[::step]]))

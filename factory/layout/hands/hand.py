@@ -42,15 +42,17 @@ PAD = 0.0015
 
 @dataclass(frozen=True, slots=True)
 class Hand:
-    """How a robot holds: `places`: the points of the payload's surface that the middles of its tips
-    are at, in the frame of the finished product [m]: one, or, from below, two on one line along its
-    heading; `radius` of a tip [m]; `beam`: how high the beam of a hand above is, in that frame, at
-    its lower edge [m]; `covered`: which share of a tip's face the surface covers on each tour of
-    its robot, where that holds by suction; `share`: which share of the strength of its tips weight
-    and acceleration take, as predicted; `tip`: what it holds with; `first`: whether it has to be in
-    its place before what it takes comes there; `wait`: how far it has to go back until its
-    carrier's next operation may start [m], as predicted. Of the kind `none` where
-    nothing can hold."""
+    """How a robot holds its payload.
+
+    `places`: points of the payload's surface at the middles of its tips, in the frame of the
+    finished product [m]: one, or, from below, two on one line along its heading; `radius` of a tip
+    [m]; `beam`: height of the lower edge of the beam of a hand above, in that frame [m]; `covered`:
+    share of a tip's face that the surface covers, for each tour, with suction; `share`: predicted
+    share of the tips' strength used by weight and acceleration; `tip`: kind of tip; `first`:
+    whether it has to be in place before its payload comes; `wait`: predicted distance that it has
+    to go back until its carrier's next operation may start [m]. Of the kind `none` if nothing can
+    hold.
+    """
 
     kind: Kind
     places: tuple[Point3, ...]
@@ -69,7 +71,7 @@ class Hand:
 
     @property
     def width(self) -> float:
-        """Width of its finger, or of what goes across to its stem [m]."""
+        """Width of its finger, or of the bar to its stem [m]."""
         return float(widths(np.array(self.radius)))
 
     @property
@@ -79,6 +81,6 @@ class Hand:
 
 
 def widths(radius: Array) -> Array:
-    """Widths (n,) of the fingers of pads with some radii (n,) [m]: no wider than those, within
+    """Widths (n,) of the fingers of pads of some radii (n,) [m]: no wider than the pads, within
     bounds."""
     return np.clip(2 * radius, SLENDER, FINGER)

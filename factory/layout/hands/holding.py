@@ -1,4 +1,4 @@
-"""What robots hold, in which places, and what is around it."""
+"""The payloads of robots, the places at which they can be held, and what surrounds them."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Holding:
         self._loads: dict[str, Loads] = {}
 
     def frames(self, robot: int) -> Iterator[tuple[Way, Way]]:
-        """How a robot may lie on the floor."""
+        """The frames of a robot on the floor."""
         if self.on[robot] < 0:
             yield (1.0, 0.0), (0.0, 1.0)
             return
@@ -53,16 +53,16 @@ class Holding:
             yield (along, across) if self.axis[robot] == 0 else (along[::-1], across[::-1])
 
     def is_carrier(self, robot: int) -> bool:
-        """Whether others come to a robot, with something or to work on what it holds."""
+        """Whether other robots come to a robot, with an input or to work on its payload."""
         return any(len(operation.robots) > 1 for operation in self.made(robot))
 
     def is_fed(self, robot: int) -> bool:
-        """Whether a feeder presents what a robot takes."""
+        """Whether a robot takes parts from a feeder."""
         first = self.factory.operations[self.factory.robots[robot].operations[0]]
         return len(first.robots) == 1
 
     def serves_fixed(self, robot: int) -> bool:
-        """Whether a fixed robot takes what a robot brings, when no carrier is there."""
+        """Whether a fixed robot takes what a robot brings, while no carrier is there."""
         return self.factory.robots[self.last(robot).carrier].fixed
 
     def made(self, robot: int) -> list[Operation]:
@@ -75,38 +75,38 @@ class Holding:
         return self.factory.operations[self.factory.robots[robot].operations[-1]]
 
     def places(self, label: str, kind: Kind, axis: int, way: int, radius: float = 0.0) -> Places:
-        """The places on a side of a sub-assembly, found once: with the pad that is best at each,
-        or with one of a `radius` [m]."""
+        """The places on a side of a sub-assembly, cached: with the best pad at each, or with one of
+        a `radius` [m]."""
         key = label, kind, axis, way, radius
         if key not in self._places:
             of, loads = (tuple(self.factory.contents[label]), (axis, way)), self.loads(label)
             if radius:
-                known = self.places(label, kind, axis, way)
-                found = self.product.kept(resized, *of, loads, known, radius)
+                of_any_size = self.places(label, kind, axis, way)
+                candidates = self.product.kept(resized, *of, loads, of_any_size, radius)
             else:
                 asked, mix = tuple(self.wanted.get(label, ())), self.factory.pag.mix is not None
                 asked += tuple(self._axis(of[0]))
-                found = self.product.kept(places, *of, kind, loads, mix, asked)
-                found = self._about_axis(of[0], found)
-            self._places[key] = found
+                candidates = self.product.kept(places, *of, kind, loads, mix, asked)
+                candidates = self._about_axis(of[0], candidates)
+            self._places[key] = candidates
         return self._places[key]
 
     def _axis(self, parts: Sequence[str]) -> Iterator[Point3]:
-        """The axis of a part that is presented turned: hands hold it there, so that it turns in
-        them about their pads."""
+        """The axis of a part that is presented turned: hands hold it there, so that it turns about
+        their pads."""
         if fed_of(self.product, parts):
             x, y, _ = axis_of(self.product.solids[parts[0]]).tolist()
             yield x, y, 0.0
 
-    def _about_axis(self, parts: Sequence[str], found: Places) -> Places:
+    def _about_axis(self, parts: Sequence[str], places: Places) -> Places:
         """The places from which a part can be turned: on its axis."""
         for x, y, _ in self._axis(parts):
-            found = found.chosen(np.abs(found.at[:, :2] - (x, y)).max(axis=1) < ASKED)
-        return found
+            places = places.chosen(np.abs(places.at[:, :2] - (x, y)).max(axis=1) < ASKED)
+        return places
 
     def loads(self, label: str) -> Loads:
-        """What the robot that takes a sub-assembly holds by it: that, and all that it becomes while
-        others bring the rest."""
+        """The loads of the robot that takes a sub-assembly: that, and everything that it becomes
+        while others bring the rest."""
         if label not in self._loads:
             made = self.made(self.factory.by_label[label].carrier)
             labels = [label, *(o.label for o in made if not self.factory.drops(o.index))]
@@ -122,18 +122,18 @@ class Holding:
 
     def box(self, label: str) -> Array:
         """The box (2, 3) of a sub-assembly."""
-        found = self.boxes(label)
-        return np.array([found[:, 0].min(axis=0), found[:, 1].max(axis=0)])
+        boxes = self.boxes(label)
+        return np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
     def top(self, operation: Operation) -> float:
-        """How high the result of an operation is [m]."""
+        """Height of the result of an operation [m]."""
         parts = self.factory.contents[self.factory.result(operation)]
         return float(max(self.product.solids[part].high[2] for part in parts))
 
 
 def held(factory: Factory, robot: int, at_last: bool = False) -> str:
-    """What a robot takes first, and holds by the same place ever after, or what it has `at_last`;
-    "" for a tool."""
+    """The label that a robot takes first and holds by one place ever after, or its last one
+    (`at_last`); "" for a tool."""
     for number in factory.robots[robot].operations[:: -1 if at_last else 1]:
         operation = factory.operations[number]
         if operation.carrier == robot and not factory.drops(number):

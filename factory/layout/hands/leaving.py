@@ -1,5 +1,5 @@
-"""Robots on their way home: where those go by themselves whose hands have to be there first, and
-what is clear of a hand that has let go."""
+"""Robots on their way home: where robots go by themselves whose hands must be there before the next
+part, and what is clear of a hand that has released its payload."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ ON = 0.009
 
 
 def homes(layout: Layout) -> dict[int, float]:
-    """The robots (index) whose hands have to be there before what they take, and where that is, an
-    arc length [m]; unless others could be where a tall hand comes to."""
+    """The robots (index) whose hands must be in place before what they take, and the arc length of
+    that place [m]; without robots whose tall hands could meet others there."""
     operations, ways = layout.factory.operations, dict[int, float]()
     for robot in layout.factory.robots:
         hand = layout.hand(robot.index)
@@ -32,13 +32,13 @@ def homes(layout: Layout) -> dict[int, float]:
 
 
 def gone_by(layout: Layout, robot: int, least: float) -> float:
-    """Where a robot goes so that it comes past a point: on a little, if it can [m]."""
+    """Goal of a robot that is to pass a point: a little beyond it, if possible [m]."""
     return min(least + ON, max(least + NEAR, before_next(layout, robot)))
 
 
 def before_next(layout: Layout, robot: int) -> float:
-    """How far back a robot may be while its next part comes down, an arc length [m]: not as far as
-    that where its hand is above what it takes."""
+    """Greatest arc length of a robot while its next part comes down [m]: its B end, or less if its
+    hand is above what it takes."""
     length, hand = layout.guidepaths[robot].length, layout.hand(robot)
     tours = layout.factory.tours[robot] if hand is not None and hand.kind == "above" else ()
     firsts = (layout.factory.operations[tour[0]] for tour in tours)
@@ -54,5 +54,5 @@ def raised(layout: Layout, robot: int, after: int) -> Past:
 
 
 def farther(layout: Layout, robot: int, by: float) -> float:
-    """How far a robot is to go from where it delivers that has to go so much further [m]."""
+    """Travel of a robot that has to go further by a distance [m]."""
     return up(layout.guidepaths[robot].travel + by)

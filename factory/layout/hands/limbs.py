@@ -1,4 +1,4 @@
-"""The hands of a layout's robots: their limbs, and the room that those take."""
+"""The hands of a layout's robots: their limbs, and the room that these take."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ def limbs(layout: Layout, robot: int) -> tuple[Limb, ...]:
 
 
 def rises_first(layout: Layout, robot: int) -> bool:
-    """Whether a robot's lift has to be up before it goes home: its hand is above what it has let
-    go."""
+    """Whether a robot's lift has to be up before it goes home: its hand is above what it
+    released."""
     hand = layout.hand(robot)
     return hand is not None and hand.kind == "above" and layout.factory.lowers(robot)
 
 
 def cross_of(layout: Layout, robot: int) -> tuple[float, float]:
-    """From where to where the arm of a robot in a lane reaches across to the line of its finger, to
-    the left of its carriage's line [m]; (0, 0) where it does not."""
+    """The interval across which the arm of a robot in a lane reaches to the line of its finger, to
+    the left of its carriage's line [m]; (0, 0) without a lane."""
     hand = layout.hand(robot)
     if hand is None or hand.kind != "below":
         return 0.0, 0.0

@@ -1,4 +1,4 @@
-"""What no hand can hold, and how near each kind of hand comes to it."""
+"""Labels that no hand can hold, and the nearest miss of each kind of hand."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Obstacle:
 
     @property
     def named(self) -> str:
-        """In words."""
+        """The obstacle in words."""
         if self.why == "own":
             return f"its own {self.part}"
         return f"{self.part} {THERE[self.why]}" if self.part else THERE[self.why]
@@ -66,7 +66,7 @@ class Miss:
 
     @property
     def words(self) -> str:
-        """Where it is and what is in its way, in words."""
+        """The place and its obstacles, in words."""
         if self.at is None:
             return f"{self.kind} there is no place for a pad"
         at = ", ".join(f"{c * 1e3:.4g}" for c in self.at)
@@ -75,30 +75,30 @@ class Miss:
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """The parts in the way, each once."""
-        return tuple(dict.fromkeys(found.part for found in self.obstacles if found.part))
+        """The parts in the way."""
+        return tuple(dict.fromkeys(obstacle.part for obstacle in self.obstacles if obstacle.part))
 
     @property
     def strength(self) -> str:
-        """How strong a hand would be there, in words."""
+        """The strength of a hand there, in words."""
         if self.share > 1:
             return f"it would take {self.share:.3g} times its strength"
         return f"it would take {100 * self.share:.0f} % of its strength"
 
     @property
     def named(self) -> str:
-        """What is in the way, in words."""
-        names = [found.named for found in self.obstacles]
+        """The obstacles in words."""
+        names = [obstacle.named for obstacle in self.obstacles]
         more = len(names) - NAMED
         return ", ".join(names[:NAMED]) + (f" and {more} more" if more > 0 else "")
 
     def as_json(self) -> dict[str, Any]:
-        """How many places were tried, and the nearest miss."""
-        found = {"kind": self.kind, "tried": len(self.tried)}
+        """The number of places tried, and the nearest miss."""
+        document = {"kind": self.kind, "tried": len(self.tried)}
         if self.at is None:
-            return {**found, "at_m": None, "in_the_way": []}
+            return {**document, "at_m": None, "in_the_way": []}
         return {
-            **found,
+            **document,
             "most": self.why,
             "at_m": list(self.at),
             "heading": list(self.heading),
@@ -136,7 +136,7 @@ class NoGrip:
         return len(self.line) > 1
 
     def warning(self) -> Diagnostic:
-        """What is told of it."""
+        """The warning to the user."""
         if self.ways:
             ways = "; ".join(self._way(kind, labels) for kind, labels in self.ways)
             message = f"no one hand can hold all that {self.robot} brings, {_listed(self.line)}"
@@ -154,7 +154,7 @@ class NoGrip:
         return Diagnostic("NoGrip", message, self.position, hint, "parts have no grip", about)
 
     def _way(self, kind: Kind, labels: tuple[str, ...]) -> str:
-        """Which labels of a line a kind of hand can hold, in words."""
+        """The labels of a line that a kind of hand can hold, in words."""
         if labels == self.line:
             return f"{kind} it can hold each, but not in one place of the hand"
         return f"{kind} it can hold {_listed(labels) if labels else 'none'}"

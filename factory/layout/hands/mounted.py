@@ -58,18 +58,18 @@ class Mount:
         return self.heading[0] * self.side[1] - self.heading[1] * self.side[0]
 
     def reached(self, hand: Hand) -> list[Point3]:
-        """Where the pads touch, in the robot's frame, the nearest first."""
+        """The points of contact of the pads, in the robot's frame, nearest first."""
         (x, y), (u, v), (s, t) = self.middle, self.heading, self.side
-        found = []
+        points = []
         for px, py, pz in hand.places:
             ahead = (px - x) * u + (py - y) * v + self.reach
             aside = ((px - x) * s + (py - y) * t - self.offset) * self.left
-            found.append((round(ahead, 6), round(aside, 6) + 0.0, round(pz + self.up, 6)))
-        return sorted(found)
+            points.append((round(ahead, 6), round(aside, 6) + 0.0, round(pz + self.up, 6)))
+        return sorted(points)
 
 
 def limbs_of(hand: Hand, mount: Mount) -> tuple[Limb, ...]:
-    """The limbs of a hand that is mounted somewhere; none where nothing can hold."""
+    """The limbs of a mounted hand; empty if nothing can hold."""
     if hand.kind == "below":
         return tuple(_below(mount, hand))
     if hand.kind == "behind":
@@ -82,11 +82,11 @@ def limbs_of(hand: Hand, mount: Mount) -> tuple[Limb, ...]:
 def grip_of(hand: Hand, mount: Mount) -> Extent | None:
     """The box about the product's middle, in the robot's frame (u, t), of what a hand and its mast
     take among the payloads; None for nothing."""
-    found = limbs_of(hand, mount)
-    if not found:
+    limbs = limbs_of(hand, mount)
+    if not limbs:
         return None
-    ahead = [limb.low[0] for limb in found], [limb.high[0] for limb in found]
-    sides = min(limb.low[1] for limb in found), max(limb.high[1] for limb in found)
+    ahead = [limb.low[0] for limb in limbs], [limb.high[0] for limb in limbs]
+    sides = min(limb.low[1] for limb in limbs), max(limb.high[1] for limb in limbs)
     across = sorted(mount.offset + side * mount.left for side in sides)
     return min(ahead[0]) - mount.reach, max(ahead[1]) - mount.reach, across[0], across[1]
 

@@ -1,5 +1,5 @@
-"""Look for what no hand can hold, and for the nearest misses: of each kind of hand the place that
-is strong enough and has the fewest things in its way."""
+"""Finds the labels that no hand can hold, and the nearest misses: for each kind of hand the place
+that is strong enough and has the fewest obstacles."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ AS_WEAK = 1.5
 
 
 def no_grips(hands: Hands) -> tuple[NoGrip, ...]:
-    """Each sub-assembly that no hand of a robot can hold, however that robot lies; and where that
-    can hold all that it brings, but not by one hand, these."""
-    factory, found = hands.holding.factory, list[NoGrip]()
+    """Each sub-assembly that no hand of its robot can hold, in any frame; and for a robot that can
+    hold each of its labels, but not all by one hand, all of them."""
+    factory, lacking_grips = hands.holding.factory, list[NoGrip]()
     for robot, tours in enumerate(hands.tours.of):
         frames = hands.holding.frames(tours[0])
         chosen = [hands.hand(robot, u, t) for u, t in frames]
@@ -43,10 +43,10 @@ def no_grips(hands: Hands) -> tuple[NoGrip, ...]:
             lacking = [t for t in unlike if not (labels and hands.one_hand.fits(t))]
             searches = [_Search(hands, tour, held(factory, tour)) for tour in lacking or tours[:1]]
             ways = () if lacking else tuple(_ways(hands, unlike))
-            found += [
+            lacking_grips += [
                 replace(search.found(not lacking), line=labels, ways=ways) for search in searches
             ]
-    return tuple(found)
+    return tuple(lacking_grips)
 
 
 def _ways(hands: Hands, tours: Sequence[int]) -> Iterator[tuple[Kind, tuple[str, ...]]]:
@@ -69,7 +69,7 @@ class _Search:
         self._own = frozenset(self.holding.factory.contents[label])
 
     def found(self, bare: bool = False) -> NoGrip:
-        """What is told of it; nothing of misses if that is to be `bare`."""
+        """The result; without misses if `bare`."""
         factory, last = self.holding.factory, self.holding.last(self.robot)
         made = factory.contents[factory.result(last)]
         return NoGrip(
@@ -84,19 +84,19 @@ class _Search:
         )
 
     def nearest(self, kind: Kind) -> Miss:
-        """The nearest miss of a kind of hand, however the robot lies."""
+        """The nearest miss of a kind of hand, over all frames."""
         best: tuple[tuple[bool, int, float], Frames, Places] | None = None
         for frames in self.all_frames:
-            found = self.in_the_way.on_side(self.label, kind, frames)
-            if not len(found):
+            places = self.in_the_way.on_side(self.label, kind, frames)
+            if not len(places):
                 continue
-            number = self._counted(kind, found, frames)
-            enough = max(STRONG, AS_WEAK * float(found.pinned.min()))
-            place = np.lexsort((found.pinned, number, found.pinned > enough))[0]
-            share = float(found.pinned[place])
+            number = self._counted(kind, places, frames)
+            enough = max(STRONG, AS_WEAK * float(places.pinned.min()))
+            place = np.lexsort((places.pinned, number, places.pinned > enough))[0]
+            share = float(places.pinned[place])
             rank = share > STRONG, int(number[place]), share
             if best is None or rank < best[0]:
-                best = rank, frames, found.chosen(np.arange(len(found)) == place)
+                best = rank, frames, places.chosen(np.arange(len(places)) == place)
         if best is None:
             return Miss(kind, self.all_frames[0][0][0], np.zeros((0, 3)))
         _, frames, place = best
@@ -115,21 +115,21 @@ class _Search:
         )
 
     def _why(self, kind: Kind, frames: Frames) -> str:
-        """What is in the way of most places, in words."""
-        found = self.in_the_way.on_side(self.label, kind, frames)
-        checks, _ = self.in_the_way.checks(self.robot, self.label, kind, found, frames)
+        """The most frequent obstacle, in words."""
+        places = self.in_the_way.on_side(self.label, kind, frames)
+        checks, _ = self.in_the_way.checks(self.robot, self.label, kind, places, frames)
         why, free = min(checks.items(), key=lambda item: int(item[1].sum()))
-        return f"{len(found) - int(free.sum())} of {len(found)} places: {IN_THE_WAY[why]}"
+        return f"{len(places) - int(free.sum())} of {len(places)} places: {IN_THE_WAY[why]}"
 
-    def _counted(self, kind: Kind, found: Places, frames: Frames) -> Index:
-        """How many things are in the way of a hand at each place (n,)."""
+    def _counted(self, kind: Kind, places: Places, frames: Frames) -> Index:
+        """Number of obstacles of a hand at each place (n,)."""
         things: dict[tuple[str, str], Truth] = {}
-        for key, met, _, _ in self._met(kind, found, frames):
-            things[key] = things.get(key, np.zeros(len(found), bool)) | met
-        return np.asarray(np.sum([np.zeros(len(found), np.intp), *things.values()], axis=0))
+        for key, met, _, _ in self._met(kind, places, frames):
+            things[key] = things.get(key, np.zeros(len(places), bool)) | met
+        return np.asarray(np.sum([np.zeros(len(places), np.intp), *things.values()], axis=0))
 
     def _obstacles(self, kind: Kind, place: Places, frames: Frames) -> tuple[Obstacle, ...]:
-        """What is in the way of a hand at one place."""
+        """The obstacles of a hand at one place."""
         things: dict[tuple[str, str], tuple[list[Array], list[Array]]] = {}
         for key, met, way, body in self._met(kind, place, frames):
             if met[0]:
@@ -143,43 +143,43 @@ class _Search:
         )
 
     def _met(
-        self, kind: Kind, found: Places, frames: Frames
+        self, kind: Kind, places: Places, frames: Frames
     ) -> Iterator[tuple[tuple[str, str], Truth, tuple[Array, Array] | None, Array | None]]:
-        """Why and which part, whether that is in the way of a hand at each place (n,), what the
-        hand sweeps there (low and high), and the part's box (2, 3); None for both where it is no
-        matter of boxes."""
-        checks, _ = self.in_the_way.checks(self.robot, self.label, kind, found, frames)
-        for why, late, (low, high, boxes) in self._ways(kind, found, frames):
+        """For each reason and part: whether it is in the way of a hand at each place (n,), the
+        hand's sweep (low and high), and the part's box (2, 3); None for both if boxes do not
+        matter."""
+        checks, _ = self.in_the_way.checks(self.robot, self.label, kind, places, frames)
+        for why, late, (low, high, boxes) in self._ways(kind, places, frames):
             for box in boxes[near(low, high, boxes)]:
                 met = late & hit(low, high, box[None])
                 if met.any():
                     part = "" if why == "hands" else self._part(box)
-                    own = why == "joined" and part in self._own
-                    yield ("own" if own else why, part), met, (low, high), box
+                    is_own = why == "joined" and part in self._own
+                    yield ("own" if is_own else why, part), met, (low, high), box
         for why in ("weak", "hands", "feeder", "tray"):
             if not checks[why].all():
                 yield (why, ""), ~checks[why], None, None
 
     def _part(self, box: Array) -> str:
-        """The part that a box of a body is of: one that comes from above is endless to the top, and
-        where it comes over what stands there also higher, and endless to a side."""
+        """The part of a body's box. The box of a part that is lowered is endless upwards, and where
+        it comes over other parts also higher and endless to a side."""
         level = (np.abs(self._boxes - box)[:, :, :2] < SAME) | np.isinf(box[:, :2])
-        found = np.asarray(level.all(axis=(1, 2)))
-        low = found & (np.abs(self._boxes[:, 0, 2] - box[0, 2]) < SAME)
-        chosen = np.flatnonzero(low if low.any() else found)
+        matches = np.asarray(level.all(axis=(1, 2)))
+        low = matches & (np.abs(self._boxes[:, 0, 2] - box[0, 2]) < SAME)
+        chosen = np.flatnonzero(low if low.any() else matches)
         return self._names[chosen[0]] if len(chosen) else ""
 
     def _ways(
-        self, kind: Kind, found: Places, frames: Frames
+        self, kind: Kind, places: Places, frames: Frames
     ) -> Iterator[tuple[str, Truth, Swept]]:
-        """What may be in the way and why, with the places (n,) where that matters."""
-        robot, label, always = self.robot, self.label, np.ones(len(found), bool)
-        _, first = self.in_the_way.checks(robot, label, kind, found, frames)
-        own = self.holding.is_fed(robot) and kind != "below"
+        """Possible obstacles, each with its reason and the places (n,) at which it matters."""
+        robot, label, always = self.robot, self.label, np.ones(len(places), bool)
+        _, first = self.in_the_way.checks(robot, label, kind, places, frames)
+        is_fed = self.holding.is_fed(robot) and kind != "below"
         for u, t in frames:
-            for why, ways in self.in_the_way.met(robot, kind, found, u, t):
+            for why, ways in self.in_the_way.met(robot, kind, places, u, t):
                 yield why, always, ways
-            for ways in self.in_the_way.coming(robot, label, kind, found, u, t) if own else ():
+            for ways in self.in_the_way.coming(robot, label, kind, places, u, t) if is_fed else ():
                 yield "own", always, ways
-            for later, ways in self.in_the_way.joined(robot, kind, found, u, t):
+            for later, ways in self.in_the_way.joined(robot, kind, places, u, t):
                 yield "brought", first | later, ways

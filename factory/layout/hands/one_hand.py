@@ -58,14 +58,14 @@ Fit = tuple[Way, Way, Kind, float]
 
 @dataclass(frozen=True, slots=True)
 class OneHand:
-    """Looks for one hand for some tours, each given by its robot in a factory with a robot a tour.
-    `adjusted`: tours of robots with a lift that is set for each."""
+    """Finds one hand for some tours, each given by its robot in a factory with a robot for each
+    tour. `adjusted`: tours of robots whose lift is adjusted for each."""
 
     in_the_way: InTheWay
     adjusted: frozenset[int] = frozenset()
 
     def kinds(self, tours: Sequence[int]) -> list[Kind]:
-        """The kinds that are tried for all of some tours, the first of them first."""
+        """The kinds of hand to try for all of some tours, in order."""
         return [k for k in self._kinds(tours[0]) if all(k in self._kinds(t) for t in tours)]
 
     def _kinds(self, tour: int) -> tuple[Kind, ...]:
@@ -80,8 +80,8 @@ class OneHand:
         return "below", "behind", "above"
 
     def fits(self, tour: int) -> frozenset[Fit]:
-        """In which ways a hand of a line could hold the label of a tour: how its robot lies, of
-        what kind it is, and at which height, for one that a lift would take anywhere 0 [m]."""
+        """The ways in which a hand of a line could hold the label of a tour: frame, kind and height
+        [m], 0 with a lift."""
         holding, fits = self.in_the_way.holding, set[Fit]()
         by_heading: dict[tuple[float, ...], list[tuple[Way, Way]]] = {}
         for u, t in holding.frames(tour):
@@ -89,15 +89,15 @@ class OneHand:
         for frames in by_heading.values():
             for kind in self._kinds(tour):
                 if self._possible(kind, tour, frames):
-                    found, free, _ = self._clear(kind, tour, frames)
+                    places, free, _ = self._clear(kind, tour, frames)
                     lifted = tour in holding.factory.strokes or kind == "behind"
-                    heights = np.unique(np.round(found.at[free, 2], 4)) * (not lifted)
+                    heights = np.unique(np.round(places.at[free, 2], 4)) * (not lifted)
                     fits |= {(u, t, kind, z) for u, t in frames for z in heights.tolist()}
         return frozenset(fits)
 
     def chosen(self, tours: Sequence[int], frames: Frames) -> tuple[Hand, ...]:
-        """The hand in its place on the label of each tour, the best of the first kind for which
-        there is one that is not bad at all, or that is least bad; nothing where there is none."""
+        """The hand in its place on the label of each tour: the best of the first kind that costs
+        nothing, or of least cost; empty if there is none."""
         best = tuple[Hand, ...]()
         for kind in self.kinds(tours):
             hands = self.of_kind(kind, tours, frames)
@@ -108,8 +108,7 @@ class OneHand:
         return best
 
     def like(self, hand: Hand, tour: int, frames: Frames) -> tuple[Hand, ...]:
-        """The hand of one tour that holds by the same places as another; nothing where it could
-        not."""
+        """The hand of one tour that holds by the same places as another; empty if it cannot."""
         if hand.kind not in self._kinds(tour) or not self._possible(hand.kind, tour, frames):
             return ()
         groups = self._groups(hand.kind, tour, frames, 0.0)
@@ -125,8 +124,8 @@ class OneHand:
         return self._hands(hand.kind, [tour], frames, hand.tip, [same])
 
     def of_kind(self, kind: Kind, tours: Sequence[int], frames: Frames) -> tuple[Hand, ...]:
-        """The best hand of one kind, the one with the largest tips if others are as good; nothing
-        where there is none. Of one tour each place has the tip that is best there."""
+        """The best hand of one kind, with the largest tips among equals; empty if there is none.
+        For one tour each place has its best tip."""
         alone = len(tours) == 1
         lifted = alone or tours[0] in self.in_the_way.holding.factory.strokes
         lifted |= kind == "behind" and tours[0] in self.adjusted
@@ -154,7 +153,7 @@ class OneHand:
     def _of_each(
         self, kind: Kind, tours: Sequence[int], frames: Frames, radius: float
     ) -> list[Groups]:
-        """The groups of each tour; nothing where one of them has none."""
+        """The groups of each tour; empty if a tour has none."""
         options = list[Groups]()
         for tour in tours:
             options.append(self._groups(kind, tour, frames, radius))
@@ -163,9 +162,9 @@ class OneHand:
         return options
 
     def _radii(self, kind: Kind, tours: Sequence[int], frames: Frames) -> list[float]:
-        """The radii that a tip for several tours may have, the largest first [m]."""
+        """Possible radii of a tip for several tours, largest first [m]."""
         places = [self.in_the_way.on_side(self._label(tour), kind, frames) for tour in tours]
-        most = min(float(found.radius.max(initial=0.0)) for found in places)
+        most = min(float(of_tour.radius.max(initial=0.0)) for of_tour in places)
         return sorted({r for p in places for r in p.radius.tolist() if r <= most})[::-1]
 
     def _below_pads(self, tours: Sequence[int], chosen: Sequence[Groups]) -> bool:
@@ -178,8 +177,8 @@ class OneHand:
         return self.in_the_way.possible(tour, self._label(tour), kind, frames)
 
     def _level(self, tours: Sequence[int]) -> bool:
-        """Whether what tours deliver to is always at one height: it is one thing, or no robot that
-        carries it has a lift."""
+        """Whether the robots that tours deliver to are always at one height: it is one robot, or
+        none has a lift."""
         holding = self.in_the_way.holding
         carriers = {holding.on[tour] for tour in tours}
         above = set[int]()
@@ -202,17 +201,18 @@ class OneHand:
     def _clear(
         self, kind: Kind, tour: int, frames: Frames, radius: float = 0.0
     ) -> tuple[Places, Truth, Truth]:
-        """The places for tips of a radius, or of the best at each if that is 0, for the label of a
-        tour; which of them (n,) are clear in every frame, and where the hand has to be first."""
+        """The places for tips of a radius, or for the best tip at each if 0, for the label of a
+        tour; whether each (n,) is clear in every frame, and whether the hand must be there
+        first."""
         label = self._label(tour)
-        found = self.in_the_way.on_side(label, kind, frames, radius)
-        checks, first = self.in_the_way.checks(tour, label, kind, found, frames)
-        return found, np.logical_and.reduce([*checks.values(), np.ones(len(found), bool)]), first
+        places = self.in_the_way.on_side(label, kind, frames, radius)
+        checks, first = self.in_the_way.checks(tour, label, kind, places, frames)
+        return places, np.logical_and.reduce([*checks.values(), np.ones(len(places), bool)]), first
 
     def _groups(self, kind: Kind, tour: int, frames: Frames, radius: float) -> Groups:
         """The groups of clear places by which a hand with such tips holds the label of a tour."""
-        found, free, first = self._clear(kind, tour, frames, radius)
-        clear, first = found.chosen(free), first[free]
+        places, free, first = self._clear(kind, tour, frames, radius)
+        clear, first = places.chosen(free), first[free]
         waits, every = self.in_the_way.waits(tour, kind, clear, frames), np.arange(len(clear))
         alone = np.stack([every, every], axis=1)
         carries = kind == "below" and self.in_the_way.holding.is_carrier(tour)
@@ -222,16 +222,16 @@ class OneHand:
 
     def _paired(self, tour: int, alone: Groups) -> Groups:
         """Groups of one place, and of two on one line under what a tour brings."""
-        holding, found = self.in_the_way.holding, alone.places
+        holding, places = self.in_the_way.holding, alone.places
         along, label = holding.axis[tour], self._label(tour)
         _, centre = centre_of(holding.product, holding.factory.contents[label])
-        two = np.array(list(in_line(found.at, along, float(centre[along]))), int).reshape(-1, 2)
-        at, radius = found.at[two], found.radius[two].min(axis=1)
+        two = np.array(list(in_line(places.at, along, float(centre[along]))), int).reshape(-1, 2)
+        at, radius = places.at[two], places.radius[two].min(axis=1)
         held = radius, at[:, 1] - at[:, 0], holding.loads(label).about(at.mean(axis=1))
-        share = strain_of_two(tip("suction"), *held) / found.covered[two].min(axis=1)
+        share = strain_of_two(tip("suction"), *held) / places.covered[two].min(axis=1)
         pinned = strain_of_two(tip("pin"), *held)
         return Groups(
-            found,
+            places,
             np.concatenate([alone.chosen, two]),
             np.concatenate([alone.share, share]),
             np.concatenate([alone.pinned, pinned]),
@@ -240,13 +240,13 @@ class OneHand:
             np.concatenate([alone.waits, alone.waits[two].max(axis=1)]),
         )
 
-    def _served(self, tour: int, found: Places) -> Array:
-        """How badly those that deliver to a carrier would hold from below on their own side of its
-        line, all together, by the place (n,) of its hand."""
+    def _served(self, tour: int, places: Places) -> Array:
+        """Total cost of the hands of robots that deliver to a carrier, from below on their own side
+        of its line, by the place (n,) of its hand."""
         holding = self.in_the_way.holding
         across = 1 - holding.axis[tour]
-        line, spare = found.at[:, across], np.maximum(found.radius, FINGER / 2) + BESIDE
-        total = np.zeros(len(found))
+        line, spare = places.at[:, across], np.maximum(places.radius, FINGER / 2) + BESIDE
+        total = np.zeros(len(places))
         for operation in holding.made(tour):
             sides = []
             for guest, label in zip(operation.robots, operation.before, strict=True):
@@ -298,16 +298,15 @@ class OneHand:
 
 
 def _cost(hand: Hand) -> float:
-    """How bad a hand is."""
+    """The cost of a hand."""
     return PINNED * (hand.tip == "pin") + min(WAIT * hand.wait, LONG)
 
 
 def _level(
     options: Sequence[Groups], u: Way, t: Way, lifted: bool
 ) -> tuple[float, TipName, list[Groups]]:
-    """Of groups that are at one height for all labels, or at any for a robot that is `lifted`, how
-    bad the least bad are together, with which tip, and one for each label; inf where there is no
-    such height."""
+    """For groups at one height for all labels, or at any if the robot is `lifted`: the least total
+    cost, its tip, and a group for each label; inf if there is no such height."""
     best: tuple[float, TipName, list[Groups]] = np.inf, "suction", []
     worst: tuple[float, ...] = (np.inf,)
     tips: tuple[TipName, ...] = "suction", "pin"
@@ -329,8 +328,8 @@ def _level(
 
 
 def _together(options: Sequence[Groups], by: TipName, u: Way, t: Way) -> list[Groups]:
-    """For each label one of its groups, the best that there is: such that the carrier stands in one
-    place for all of them if that can be, and then of several in the middle of the label."""
+    """A group for each label, the best combination: the carrier stands in one place for all of them
+    if possible, and among several the middle of the label wins."""
     across = [option.across(t) for option in options]
     tried = np.unique(np.round(np.concatenate(across), 4))
     away, ranks, chosen = np.zeros(len(tried)), np.zeros(len(tried)), []

@@ -1,7 +1,7 @@
-"""How far out convex bodies reach within round pads, exactly.
+"""The exact extent of convex bodies within round pads.
 
 Lines through a pad miss the crests and corners between them. Within a disc a body is highest on one
-of its edges, where that is inside the disc, or where the face that rises least comes to the rim.
+of its edges, where that is inside the disc, or where its flattest face meets the rim.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ def outermost(
     points: Array,
     radius: Array | float,
     side: tuple[int, int],
-    known: Array,
+    at_least: Array,
 ) -> Array:
     """How far bodies reach on a side, an axis and a way along it, within discs of some radii (n,)
-    across it about points (n, 3), at least as far as is `known` (n,) [m]."""
-    found, (one, other) = known.copy(), (a for a in range(3) if a != side[0])
+    across it about points (n, 3), at least as far as is `at_least` (n,) [m]."""
+    reach, (one, other) = at_least.copy(), (a for a in range(3) if a != side[0])
     x, y = points[:, one], points[:, other]
     radii = np.broadcast_to(radius, x.shape)
     for body in bodies:
@@ -35,14 +35,14 @@ def outermost(
             np.maximum(np.maximum(low[one] - x, x - high[one]), 0.0),
             np.maximum(np.maximum(low[other] - y, y - high[other]), 0.0),
         )
-        for near in blocks(np.flatnonzero((beside < radii) & (found < out - SAME))):
+        for near in blocks(np.flatnonzero((beside < radii) & (reach < out - SAME))):
             reached = (
                 out
                 if body.boxed
-                else _within(body, points[near], radii[near], side, float(found[near].min()))
+                else _within(body, points[near], radii[near], side, float(reach[near].min()))
             )
-            found[near] = np.maximum(found[near], reached)
-    return found
+            reach[near] = np.maximum(reach[near], reached)
+    return reach
 
 
 def _within(body: Body, points: Array, radius: Array, side: tuple[int, int], least: float) -> Array:
@@ -86,6 +86,6 @@ def _on_edges(ends: Array, out: Array, at: Array, radius: Array) -> Array:
     high = np.where(upright, 1.0, np.clip((-middle + half) / square, 0.0, 1.0))
     begin, rise = out[edge, 0], (out[:, 1] - out[:, 0])[edge]
     most = begin + np.maximum(low * rise, high * rise)
-    found = np.full(len(at), -np.inf)
-    np.maximum.at(found, disc, np.where(low < high, most, -np.inf))
-    return found
+    reach = np.full(len(at), -np.inf)
+    np.maximum.at(reach, disc, np.where(low < high, most, -np.inf))
+    return reach

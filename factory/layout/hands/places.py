@@ -90,7 +90,7 @@ class Places:
     covered: Array
 
     def chosen(self, which: Index | Truth) -> Places:
-        """Some of them."""
+        """A selection of places."""
         every = self.at, self.radius, self.share, self.pinned, self.covered
         return Places(*(values[which] for values in every))
 
@@ -110,13 +110,13 @@ class Loads:
 
     @classmethod
     def of(cls, product: Product, held: tuple[tuple[str, ...], ...], push: float) -> Loads:
-        """Those of sub-assemblies of such parts."""
+        """The loads of sub-assemblies of such parts."""
         masses, centres = zip(*(centre_of(product, parts) for parts in held), strict=True)
         return cls(held, push, np.array(masses), np.array(centres))
 
     def about(self, at: Array) -> tuple[Array, Array]:
         """Force (3, 1, m) [N] and moment (3, n, m) [Nm] about places `at` (n, 3) of each load, at
-        rest and as it is accelerated to any side."""
+        rest and under acceleration to any side."""
         pulls = np.array([0.0, 0.0, -GRAVITY]) + SURGE * self.push * PUSHES
         fx, fy, fz = force = pulls.T[:, None] * self.mass[:, None]
         x, y, z = (self.centre - at[:, None]).T.swapaxes(1, 2)[..., None]
@@ -184,12 +184,12 @@ def places(
         )
         best[better], share[better] = number, used[number][better]
     # smaller pads have room where large ones do not, and one that is not all covered holds less
-    found = [((best >= 0).nonzero()[0], best[best >= 0])]
+    pads = [((best >= 0).nonzero()[0], best[best >= 0])]
     for number in smaller:
         least = PARTLY if number < SMALLER[-1] else 0.0
         chosen = ((covered[number] > least) & (number > best)).nonzero()[0]
-        found.append((chosen, np.full(len(chosen), number)))
-    point, size = (np.concatenate(numbers) for numbers in zip(*found, strict=True))
+        pads.append((chosen, np.full(len(chosen), number)))
+    point, size = (np.concatenate(numbers) for numbers in zip(*pads, strict=True))
     at, radius, covers = points[point], sizes[size], covered[size, point]
     at[:, axis] = plane[size, point]
     load = loads.about(at)
@@ -204,15 +204,15 @@ def resized(
     parts: tuple[str, ...],
     side: tuple[int, int],
     loads: Loads,
-    known: Places,
+    larger: Places,
     radius: float,
 ) -> Places:
-    """Those of some `known` places with a pad no smaller where one of a `radius` [m] fits, each
+    """Those of some `larger` places with a pad no smaller where one of a `radius` [m] fits, each
     once, with such a pad; loads and side as for `places`."""
     surfaces = product.kept(Surfaces)
-    points = np.unique(known.at[known.radius >= radius - SAME], axis=0)
+    points = np.unique(larger.at[larger.radius >= radius - SAME], axis=0)
     if not len(points):
-        return known.chosen(np.zeros(0, np.intp))
+        return larger.chosen(np.zeros(0, np.intp))
     covered, plane = _covered(surfaces, parts, points, side, (radius,))
     fits = covered[0] > (PARTLY if radius > RADII[-1] else 0.0)
     at, covers = points[fits], covered[0][fits]
@@ -223,8 +223,8 @@ def resized(
 
 
 def _tried(low: Array, high: Array, centre: Array, side: tuple[int, int]) -> Array:
-    """Points (n, 3) of lines to be tried: a grid over the bodies, of boxes from `low` to `high`
-    (b, 3), that are outermost or near the centre of mass, and the centre itself."""
+    """Points (n, 3) of lines to be tried: a grid over the outermost bodies and those near the
+    centre of mass, with boxes from `low` to `high` (b, 3), and the centre itself."""
     axis, way = side
     across = [a for a in range(3) if a != axis]
     outer = (-way * (high if way > 0 else low)[:, axis]).tolist()
@@ -237,16 +237,16 @@ def _tried(low: Array, high: Array, centre: Array, side: tuple[int, int]) -> Arr
     ticks = begin[:, None] + (end - begin)[:, None] * shares[:, None]
     grid = np.empty((len(begin), GRID, GRID, 2))
     grid[..., 0], grid[..., 1] = ticks[:, None, :, 0], ticks[:, :, None, 1]
-    found = np.zeros((len(begin) * (GRID**2 + 1) + 1, 3))
-    found[0] = centre
-    found[1:, across] = np.concatenate([grid.reshape(-1, 2), np.clip(centre[across], begin, end)])
-    return found
+    points = np.zeros((len(begin) * (GRID**2 + 1) + 1, 3))
+    points[0] = centre
+    points[1:, across] = np.concatenate([grid.reshape(-1, 2), np.clip(centre[across], begin, end)])
+    return points
 
 
 def _raster(low: Array, high: Array, middle: Array, across: Sequence[int]) -> Array:
     """Points (n, 3) over each body, of boxes from `low` to `high` (b, 3), on lines at multiples of
     RASTER from the product's middle: the WIDE nearest to the middle of the body."""
-    found = [np.zeros((0, 3))]
+    rasters = [np.zeros((0, 3))]
     for least, most in zip(low - middle, high - middle, strict=True):
         for line, along in (across, across[::-1]):
             at = RASTER * np.arange(np.ceil(least[line] / RASTER), most[line] / RASTER)
@@ -255,14 +255,14 @@ def _raster(low: Array, high: Array, middle: Array, across: Sequence[int]) -> Ar
             points = np.zeros((3 * len(at), 3))
             points[:, line] = np.repeat(at, 3)
             points[:, along] = np.tile(least[along] + share * (most[along] - least[along]), len(at))
-            found.append(points + middle)
-    return np.concatenate(found)
+            rasters.append(points + middle)
+    return np.concatenate(rasters)
 
 
 def _lines(low: Array, high: Array, centre: Array) -> Array:
-    """Points (n, 3) under a sub-assembly, several on one line along x or y: near the centre of
-    mass, and where it crosses bodies, of boxes from `low` to `high` (b, 3)."""
-    found, middle = [centre[None]], (low + high) / 2
+    """Points (n, 3) under a sub-assembly, several on each line along x or y: near the centre of
+    mass, and where lines cross bodies, with boxes from `low` to `high` (b, 3)."""
+    points_on, middle = [centre[None]], (low + high) / 2
     for along, across in ((0, 1), (1, 0)):
         tried = np.unique(np.round([centre[across], *middle[:, across]], 3))
         for line in tried[np.argsort(abs(tried - centre[across]))][:LINES]:
@@ -274,13 +274,13 @@ def _lines(low: Array, high: Array, centre: Array) -> Array:
             at = np.concatenate([np.arange(1, 6) * ((end - begin) / 6) + begin, inner], axis=1)
             points = np.zeros((at.size, 3))
             points[:, along], points[:, across] = at.ravel(), line
-            found.append(points)
-    return np.concatenate(found)
+            points_on.append(points)
+    return np.concatenate(points_on)
 
 
 def _rounded(points: Array, least: float, middle: Array) -> Array:
     """Points (n, 3) in whole millimetres from the product's middle, or in tenths if the `least`
-    width of a body is small; each once."""
+    width of a body is small; unique."""
     step = 1e-3 if least > 8e-3 else 1e-4
     rounded = middle + np.round((points - middle) / step) * step
     ordered = rounded[np.lexsort(rounded.T[::-1])]
@@ -295,9 +295,9 @@ def _covered(
     side: tuple[int, int],
     radii: Sequence[float],
 ) -> tuple[Array, Array]:
-    """On a side, an axis and a way along it, for each pad and point (radii, n): with which share of
-    the pad its bellows reach the surface, and where its face is along the axis, on what stands out
-    the most under it [m]."""
+    """On a side, an axis and a way along it, for each pad and point (radii, n): the share of the
+    pad over which its bellows reach the surface, and the position of its face along the axis, on
+    what stands out most under it [m]."""
     (axis, way), sizes = side, np.array(radii)
     across = [a for a in range(3) if a != axis]
     turns = np.arange(RAYS) * 2 * pi / RAYS

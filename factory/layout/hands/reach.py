@@ -1,4 +1,4 @@
-"""The boxes of what a hand has among the payloads: pad and column, pad and stem, pad and bar."""
+"""The boxes of a hand among the payloads: pad and column, pad and stem, or pad and bar."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ APART = 2e-4
 
 
 def reach(product: Product, kind: Kind, at: Array, radius: Array, u: Way) -> tuple[Array, Array]:
-    """The boxes (n, 3) [m] of pad and column, of pad and stem, or of pad and bar of hands that head
-    along u, with pads of some radii (n,) at places (n, 3); a play around them. Over a pad
-    half its air is play: what is held sags, and may hang lower than where the pad is."""
+    """The boxes (n, 3) [m] of pad and column, pad and stem, or pad and bar of hands that head along
+    u, with pads of some radii (n,) at places (n, 3), including play. Over a pad half its air is
+    play: a payload sags, and may hang lower than the pad."""
     half = halves(radius)[:, None] if kind == "behind" else radius[:, None]
     low, high = at - half - APART, at + half + APART
     if kind == "below":
@@ -33,14 +33,14 @@ def reach(product: Product, kind: Kind, at: Array, radius: Array, u: Way) -> tup
 
 
 def under_beam(kind: Kind, low: Array, high: Array, radius: Array) -> tuple[Array, Array]:
-    """The boxes of hands for parts that come down from above: a hand above is as wide as its
-    beam, which is over its pad."""
+    """The boxes of hands for parts that are lowered: a hand above is as wide as its beam, which is
+    over its pad."""
     more = np.maximum(0.0, FINGER / 2 - radius)[:, None] * [1.0, 1.0, 0.0] * (kind == "above")
     return low - more, high + more
 
 
 def halves(radius: Array) -> Array:
-    """How far to a side pads of some radii (n,), or what goes to them, reach (n,) [m]."""
+    """Half the width of pads of some radii (n,) and their fingers (n,) [m]."""
     return np.maximum(radius, widths(radius) / 2)
 
 

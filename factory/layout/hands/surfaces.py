@@ -1,7 +1,7 @@
-"""The surfaces of sub-assemblies, looked at from below, from above and from behind.
+"""The surfaces of sub-assemblies, seen from below, above and behind.
 
-Everything is read from the convex bodies of the parts. A body is met by a line exactly; what could
-be in the way of a hand is boxed, which is exact for boxes and on the safe side for others.
+Everything is derived from the convex bodies of the parts. Lines meet bodies exactly; obstacles of
+hands are boxed, which is exact for boxes and conservative for others.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class Body:
 
     @classmethod
     def of(cls, solid: Solid) -> Iterator[Body]:
-        """Those that a solid is made of."""
+        """The bodies of a solid."""
         ball = solid.kind == "sphere"
         for piece in solid.pieces:
             low, high = (solid.low, solid.high) if ball else (piece.min(axis=0), piece.max(axis=0))
@@ -69,21 +69,21 @@ class Body:
     @cached_property
     def faces(self) -> tuple[Array, Array]:
         """The outward normals (f, 3) of its faces and how far they reach along them (f,) [m]."""
-        found = polytope(self.vertices)
-        return found.normals, found.reach
+        hull = polytope(self.vertices)
+        return hull.normals, hull.reach
 
     @cached_property
     def facing(self) -> tuple[tuple[Faces, Faces, Faces], ...]:
         """For each axis those of its faces that are parallel to it, face against it, and face along
         it."""
         normals, offsets = self.faces
-        found = []
+        by_axis = []
         for axis, along in enumerate(normals.T):
             across = normals[:, [a for a in range(3) if a != axis]]
             sides = np.abs(along) < FLAT, along < -FLAT, along > FLAT
             one, two, three = (Faces(along[s], across[s].T, offsets[s]) for s in sides)
-            found.append((one, two, three))
-        return tuple(found)
+            by_axis.append((one, two, three))
+        return tuple(by_axis)
 
     @cached_property
     def edges(self) -> Array:
@@ -96,8 +96,10 @@ class Body:
         except QhullError:
             corners = np.array([[*p] for p in pairs(*zip(self.low, self.high, strict=True))])
             return np.asarray(corners[list(combinations(range(8), 2))])
-        found = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [0, 2]]]))
-        return np.asarray(corners[np.unique(found, axis=0)])
+        sorted_ends = np.sort(
+            np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [0, 2]]])
+        )
+        return np.asarray(corners[np.unique(sorted_ends, axis=0)])
 
     @cached_property
     def boxed(self) -> bool:
@@ -106,7 +108,7 @@ class Body:
         return len(np.unique(self.vertices, axis=0)) == 8 and bool(corners.all())
 
     def out(self, side: tuple[int, int]) -> float:
-        """How far out it is on a side, an axis and a way (+1, -1) along it [m]."""
+        """Extent on a side, an axis and a way (+1, -1) along it [m]."""
         axis, way = side
         return way * float((self.high if way > 0 else self.low)[axis])
 
@@ -119,8 +121,8 @@ class Body:
         return np.where(away > radius, -1.0, np.sqrt(np.maximum(radius**2 - away**2, 0.0)))
 
     def crossed(self, points: Array, axis: int) -> tuple[Array, Array]:
-        """From where to where lines along an axis through points (n, 3), which are within its box
-        across it, are inside (n,); (inf, -inf) where a line passes it by."""
+        """The intervals in which lines along an axis through points (n, 3), within its box across
+        it, are inside (n,); (inf, -inf) for lines that miss it."""
         if self.ball:
             half = self.dome(points, axis)
             middle = (self.low + self.high)[axis] / 2
@@ -144,13 +146,13 @@ class Surfaces:
 
     def boxes(self, parts: Iterable[str]) -> Array:
         """The boxes (n, 2, 3) of the bodies of some parts."""
-        found = [(body.low, body.high) for part in parts for body in self.bodies[part]]
-        return np.array(found).reshape(-1, 2, 3)
+        corners = [(body.low, body.high) for part in parts for body in self.bodies[part]]
+        return np.array(corners).reshape(-1, 2, 3)
 
     def outermost(self, parts: Sequence[str], points: Array, side: tuple[int, int]) -> Array:
-        """How far out some parts are on a side, an axis and a way (+1, -1) along it, where lines
-        along the axis through points (n, 3) meet them (n,) [m]; -inf where nowhere."""
-        (axis, way), found = side, np.full(len(points), -np.inf)
+        """Extent of some parts on a side, an axis and a way (+1, -1) along it, where lines along
+        the axis through points (n, 3) meet them (n,) [m]; -inf for lines that miss them."""
+        (axis, way), reach = side, np.full(len(points), -np.inf)
         one, other = (a for a in range(3) if a != axis)
         x, y = points[:, one].copy(), points[:, other].copy()
         bodies = [(body.out(side), body) for part in parts for body in self.bodies[part]]
@@ -158,24 +160,24 @@ class Surfaces:
             low, high = body.low, body.high
             beside = (x >= low[one]) & (x <= high[one]) & (y >= low[other]) & (y <= high[other])
             if body.boxed:
-                np.maximum(found, out, out=found, where=beside)
+                np.maximum(reach, out, out=reach, where=beside)
                 continue
             # what ends further in than what is known is not looked at
-            for near in blocks(np.flatnonzero(beside & (found < out + FLAT))):
+            for near in blocks(np.flatnonzero(beside & (reach < out + FLAT))):
                 enter, leave = body.crossed(points[near], axis)
-                found[near] = np.maximum(found[near], leave if way > 0 else -enter)
-        return found
+                reach[near] = np.maximum(reach[near], leave if way > 0 else -enter)
+        return reach
 
 
 def blocks(numbers: Index) -> Iterator[Index]:
-    """Some numbers (n,), BLOCK at a time."""
+    """Numbers (n,) in blocks of BLOCK."""
     for begin in range(0, len(numbers), BLOCK):
         yield numbers[begin : begin + BLOCK]
 
 
 def swept(low: Array, high: Array, *ways: Way) -> tuple[Array, Array]:
-    """Boxes from `low` to `high` (n, 3) [m] and all that they sweep as they go any way along each
-    of some world directions in the plane, and along them together."""
+    """Boxes from `low` to `high` (n, 3) [m] extended by their sweep any distance along each of some
+    world directions in the plane, and along them together."""
     low, high = low.copy(), high.copy()
     for x, y in ways:
         for axis, way in ((0, x), (1, y)):
@@ -193,17 +195,18 @@ def hit(low: Array, high: Array, boxes: Array, spare: float = TOUCH) -> Truth:
 
 
 def retreat(low: Array, high: Array, boxes: Array, ways: tuple[Way, Way]) -> Array:
-    """How far boxes from `low` to `high` (n, 3) have to go the first of two ways until each of
-    `boxes` (m, 2, 3) is not in their way along the second (n, m) [m]; 0 where it is not."""
+    """Distance that boxes from `low` to `high` (n, 3) have to go along the first of two directions
+    until each of `boxes` (m, 2, 3) is not in their way along the second (n, m) [m]; 0 if it is
+    not."""
     wide, ((x, y), _) = swept(low, high, *ways), ways
-    found, kept = np.zeros((len(low), len(boxes))), near(*wide, boxes)
+    distances, kept = np.zeros((len(low), len(boxes))), near(*wide, boxes)
     axis, side = (0, x) if x else (1, y)
     if side < 0:
         past = high[:, None, axis] - boxes[kept, 0, axis]
     else:
         past = boxes[kept, 1, axis] - low[:, None, axis]
-    found[:, kept] = np.where(_overlap(*wide, boxes[kept], TOUCH), np.maximum(past, 0.0), 0.0)
-    return found
+    distances[:, kept] = np.where(_overlap(*wide, boxes[kept], TOUCH), np.maximum(past, 0.0), 0.0)
+    return distances
 
 
 def near(low: Array, high: Array, boxes: Array) -> Truth:
@@ -217,8 +220,8 @@ def near(low: Array, high: Array, boxes: Array) -> Truth:
 def _overlap(low: Array, high: Array, boxes: Array, spare: float) -> Truth:
     """Which boxes from `low` to `high` (n, 3) overlap which of `boxes` (m, 2, 3) by more than
     `spare` [m] (n, m)."""
-    found = np.ones((len(low), len(boxes)), bool)
+    overlapping = np.ones((len(low), len(boxes)), bool)
     for axis in range(3):
-        found &= low[:, None, axis] < boxes[:, 1, axis] - spare
-        found &= high[:, None, axis] > boxes[:, 0, axis] + spare
-    return found
+        overlapping &= low[:, None, axis] < boxes[:, 1, axis] - spare
+        overlapping &= high[:, None, axis] > boxes[:, 0, axis] + spare
+    return overlapping

@@ -1,5 +1,5 @@
-"""What a hand holds with: the tips of the catalogue, a file in `mjcf/hands/` each, and how much of
-their strength a load uses."""
+"""The tips of hands: a catalogue with a file in `mjcf/hands/` each, and the share of their strength
+that a load uses."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ class Tip:
         but the load as `gauge`: `force` (n, 3) [N] and `moment` (n, 3) [Nm] about the middle of the
         tips."""
         load = np.concatenate(np.broadcast_arrays(force, moment), axis=-1)
-        found = shares((self.gauge(outward, radius, apart) @ load[..., None])[..., 0])
-        return np.maximum(found, 0.0)
+        used = shares((self.gauge(outward, radius, apart) @ load[..., None])[..., 0])
+        return np.maximum(used, 0.0)
 
     def alone(self, side: tuple[int, int], radius: Array, force: Array, moment: Array) -> Array:
         """As `used` (...,), for hands with one tip on a side of the payload, an axis and a way (+1,
@@ -84,12 +84,12 @@ class Tip:
             bent * _deep(2 / (count * radius)),
             (over - bent) / _deep(lever),
         )
-        found = np.zeros(
+        terms = np.zeros(
             (*np.broadcast_shapes(outward.shape[:-1], radius.shape, two.shape), TERMS, 6)
         )
-        found[..., OFF, :3], found[..., BESIDE, :3] = force[0], force[1]
-        found[..., TURN, 3:], found[..., BENT, 3:], found[..., TILTED, 3:] = moment
-        return np.asarray(found / _deep(self.pull * np.pi * radius**2))
+        terms[..., OFF, :3], terms[..., BESIDE, :3] = force[0], force[1]
+        terms[..., TURN, 3:], terms[..., BENT, 3:], terms[..., TILTED, 3:] = moment
+        return np.asarray(terms / _deep(self.pull * np.pi * radius**2))
 
 
 OFF, BESIDE, TURN, BENT, TILTED = 0, slice(1, 4), 4, slice(5, 8), slice(8, 11)
@@ -111,7 +111,7 @@ def shares(terms: Array) -> Array:
 
 
 def _length(squares: Array) -> Array:
-    """The length (n,) of what has such squares (n, 3)."""
+    """Length (n,) of vectors with such squares (n, 3)."""
     return np.asarray(np.sqrt(squares.sum(axis=-1)))
 
 
@@ -121,7 +121,7 @@ def _squared(direction: Array) -> Array:
 
 
 def _deep(values: Array | float) -> Array:
-    """Values (n,) for matrices (n, 3, 3)."""
+    """Values (n,) broadcast to matrices (n, 3, 3)."""
     return np.asarray(values)[..., None, None]
 
 
@@ -135,8 +135,8 @@ def tip(name: TipName, folder: Path | None = None) -> Tip:
             numeric.attrib["name"]: float(numeric.attrib["data"])
             for numeric in ElementTree.parse(path).getroot().iterfind("custom/numeric")
         }
-        found = Tip(name, numbers["pull"], numbers["friction"])
-        if not (found.pull > 0 and found.friction > 0):
+        made = Tip(name, numbers["pull"], numbers["friction"])
+        if not (made.pull > 0 and made.friction > 0):
             raise ValueError("pull and friction are positive")
     except (OSError, ElementTree.ParseError, KeyError, ValueError) as error:
         message = f"the file of tips {name} is unusable: {error}"
@@ -144,4 +144,4 @@ def tip(name: TipName, folder: Path | None = None) -> Tip:
         raise InputError(
             Diagnostic("BadTemplate", message, Position(str(path), 1, 1), hint)
         ) from error
-    return found
+    return made

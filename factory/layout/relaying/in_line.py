@@ -1,9 +1,9 @@
 """The hands of robots that relay each other.
 
-They run in one line, in two lanes beside it by turns. Giver and taker of a hand-over hold different
-places, each on the side of the line on which its carriage runs, from below. So nothing of one comes
-over the line, and none of two meets the other, whatever the robots do. As seen from what is handed
-over every hand leaves against its heading and comes from ahead.
+They run in one line, in two lanes beside it in alternation. Giver and taker of a hand-over hold
+different places, each on the side of the line on which its carriage runs, from below. So nothing of
+one comes over the line, and neither meets the other, whatever the robots do. Seen from the payload,
+every hand leaves against its heading and comes from ahead.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from factory.plant.factory import Factory
 
 @dataclass(frozen=True, slots=True)
 class InLine:
-    """The hands of a factory with relays, and the robots (of that without) whose lanes are the
-    other way round."""
+    """The hands of a factory with relays, and the robots (of the factory without) whose lanes are
+    exchanged."""
 
     hands: tuple[Hand | None, ...]
     turned: frozenset[int]
@@ -56,7 +56,7 @@ def hands_in_line(
 
 
 def _depth(on: Sequence[int], robot: int) -> int:
-    """How many robots carry on what a robot delivers."""
+    """Number of robots that carry on what a robot delivers."""
     count = 0
     while on[robot] >= 0:
         count, robot = count + 1, on[robot]
@@ -64,8 +64,8 @@ def _depth(on: Sequence[int], robot: int) -> int:
 
 
 class _Choice:
-    """Chooses the hands of robots in lanes, those of carriers first, and of those that deliver to
-    them; `settled`: those that are chosen."""
+    """Chooses the hands of robots in lanes, carriers first, and of those that deliver to them;
+    `settled`: hands chosen already."""
 
     holding: HoldingInLanes
     in_the_way: InTheWayInLanes
@@ -76,21 +76,21 @@ class _Choice:
         self.in_the_way = InTheWayInLanes(holding, self.lanes, settled)
 
     def settle(self, old: int, carrier: int, pieces: Sequence[int]) -> int:
-        """Choose the hands of the robots that have a robot's guidepath now, and its lanes: gives
-        which way round, +1 or -1."""
-        known = self.before.hand(old)
-        if known is None or known.kind == "none":
+        """Choose the hands of the robots that now share a robot's guidepath, and its lanes. Returns
+        their orientation, +1 or -1."""
+        before = self.before.hand(old)
+        if before is None or before.kind == "none":
             for robot in pieces:
-                self.settled[robot] = known
+                self.settled[robot] = before
             return 1
         tried = []
         for way in (1, -1):
-            hands = self._hands(old, carrier, pieces, way, max(STRONG, known.share))
+            hands = self._hands(old, carrier, pieces, way, max(STRONG, before.share))
             lacking = sum(hand.kind == "none" for hand in hands.values())
             tried.append((lacking, max(hand.share for hand in hands.values()), way, hands))
             if not lacking and tried[-1][1] <= STRONG:
                 break
-        _, _, way, hands = min(tried, key=lambda found: found[:2])
+        _, _, way, hands = min(tried, key=lambda attempt: attempt[:2])
         for robot, hand in hands.items():
             self.settled[robot] = hand
         return way
@@ -98,41 +98,41 @@ class _Choice:
     def _hands(
         self, old: int, carrier: int, pieces: Sequence[int], way: int, most: float
     ) -> dict[int, Hand]:
-        """The hands of the robots that have a robot's guidepath now, and of those that deliver to
-        them, with the lanes one way round."""
-        found: dict[int, Hand] = {}
+        """The hands of the robots that share a robot's guidepath, and of those that deliver to
+        them, for one orientation of the lanes."""
+        hands: dict[int, Hand] = {}
         for number, robot in enumerate(pieces):
             self.lanes[robot] = self._lane(old, carrier, pieces, way * (-1) ** number)
         for robot in pieces:
             lane = self.lanes[robot]
-            found[robot] = self._below(robot, [(lane.heading, lane.toward)], most)
+            hands[robot] = self._below(robot, [(lane.heading, lane.toward)], most)
         for robot in pieces:
-            self.settled[robot] = found[robot]
+            self.settled[robot] = hands[robot]
         for robot in pieces:
             guests = {g for o in self.holding.made(robot) for g in o.robots} - {robot}
             for guest in sorted(guests):
                 if hand := self._guest(guest, robot):
-                    found[guest] = hand
-        return found
+                    hands[guest] = hand
+        return hands
 
     def _guest(self, guest: int, robot: int) -> Hand | None:
         """The hand from below of a robot that delivers to one in a lane, on its own side; None
         where it has none from below, or where that is to be chosen."""
-        known = self.before.hand(self.holding.origins[guest])
+        before = self.before.hand(self.holding.origins[guest])
         if self.holding.on[guest] != robot or self.holding.cut(guest):
             return None
-        if known is None or known.kind != "below":
+        if before is None or before.kind != "below":
             return None
         u, t = self.holding.headings[guest], self.holding.headings[robot]
         sides = (t, (-t[0], -t[1])) if self.holding.is_carrier(guest) else (t,)
-        at, radius = np.array(known.places), np.full(len(known.places), known.radius)
-        self.in_the_way.apart.kept[guest] = known
+        at, radius = np.array(before.places), np.full(len(before.places), before.radius)
+        self.in_the_way.apart.kept[guest] = before
         free = self.in_the_way.apart.own_side(
             guest, "below", Places(at, radius, radius, radius, radius), u, t
         )
         if free.all():
-            return known
-        return self._below(guest, [(u, side) for side in sides], max(STRONG, known.share))
+            return before
+        return self._below(guest, [(u, side) for side in sides], max(STRONG, before.share))
 
     def _lane(self, old: int, carrier: int, pieces: Sequence[int], side: int) -> Lane:
         """A lane to one side (of the guidepath's own) of a robot's guidepath. What the robots hold
@@ -149,12 +149,12 @@ class _Choice:
         return Lane(path.heading, toward, line, side * way)
 
     def _below(self, robot: int, frames: Sequence[tuple[Way, Way]], most: float) -> Hand:
-        """The best hand from below of a robot, of whose strength no more than so much is used; of
-        the kind `none` if there is none."""
+        """The best hand from below of a robot, using at most a given share of its strength; of the
+        kind `none` if there is none."""
         label = held(self.holding.factory, robot)
-        found = OneHand(self.in_the_way).of_kind("below", [robot], frames)
-        if found and found[0].share <= most:
-            return found[0]
+        hands = OneHand(self.in_the_way).of_kind("below", [robot], frames)
+        if hands and hands[0].share <= most:
+            return hands[0]
         parts = self.holding.factory.contents[label]
         x, y, z = centre_of(self.holding.product, parts)[1].tolist()
         return Hand("none", ((x, y, z),), share=most)

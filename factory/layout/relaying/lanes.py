@@ -1,4 +1,4 @@
-"""What robots in lanes hold, and what is in the way of their hands there."""
+"""Payloads of robots in lanes, and obstacles of their hands."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ NOTHING = Hand("none", ((0.0, 0.0, 0.0),))
 
 
 class HoldingInLanes(Holding):
-    """As `Holding`; hand-overs in line are no operations that others come to."""
+    """As `Holding`; no robot comes to a hand-over in line."""
 
     def __init__(
         self,
@@ -66,7 +66,7 @@ class HoldingInLanes(Holding):
         return [o for o in super().made(robot) if o.index not in self.relays]
 
     def cut(self, robot: int) -> bool:
-        """Whether a robot has a piece of a guidepath."""
+        """Whether a robot runs on a piece of a guidepath."""
         return robot in self._cut
 
     def gives(self, robot: int) -> bool:
@@ -93,35 +93,35 @@ class HandsApartInLanes(HandsApart):
         super().__init__(holding, hand_of)
         self.lanes, self.kept = lanes, dict[int, Hand]()
 
-    def own_side(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Truth:
+    def own_side(self, robot: int, kind: Kind, places: Places, u: Way, t: Way) -> Truth:
         if robot in self.kept:
-            known, across = self.kept[robot], 1 if u[0] else 0
-            free: Truth = np.abs(found.at[:, across] - known.places[0][across]) < SAME
-            free &= found.radius <= max(known.radius, FINGER / 2) + SAME
-            return free & super().own_side(robot, kind, found, u, t)
+            kept, across = self.kept[robot], 1 if u[0] else 0
+            free: Truth = np.abs(places.at[:, across] - kept.places[0][across]) < SAME
+            free &= places.radius <= max(kept.radius, FINGER / 2) + SAME
+            return free & super().own_side(robot, kind, places, u, t)
         lane, c = self.lanes[robot], self.holding.clearance
-        wide = widths(found.radius) / 2
-        away = (found.at[:, lane.across] - lane.line) * lane.side
-        free = (away - wide >= c.c / 2) & (away - found.radius >= BESIDE)
+        wide = widths(places.radius) / 2
+        away = (places.at[:, lane.across] - lane.line) * lane.side
+        free = (away - wide >= c.c / 2) & (away - places.radius >= BESIDE)
         free &= away + wide <= c.spread + CARRIAGE / 2
         if self.holding.gives(robot):
             return free
-        return free & super().own_side(robot, kind, found, u, t)
+        return free & super().own_side(robot, kind, places, u, t)
 
-    def crossing(self, robot: int, found: Places, u: Way, t: Way) -> Array:
+    def crossing(self, robot: int, places: Places, u: Way, t: Way) -> Array:
         if self.holding.gives(robot):
-            return np.zeros(len(found))
-        return super().crossing(robot, found, u, t)
+            return np.zeros(len(places))
+        return super().crossing(robot, places, u, t)
 
     def carriers_hand(
-        self, robot: int, kind: Kind, found: Places, u: Way, t: Way
+        self, robot: int, kind: Kind, places: Places, u: Way, t: Way
     ) -> Iterator[Swept]:
         if not self.holding.gives(robot):
-            yield from super().carriers_hand(robot, kind, found, u, t)
+            yield from super().carriers_hand(robot, kind, places, u, t)
 
 
 class InTheWayInLanes(InTheWay):
-    """As `InTheWay`, for robots in lanes; `settled`: the hands that are chosen already."""
+    """As `InTheWay`, for robots in lanes; `settled`: hands chosen already."""
 
     holding: HoldingInLanes
     apart: HandsApartInLanes
@@ -138,26 +138,28 @@ class InTheWayInLanes(InTheWay):
     def possible(
         self, robot: int, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]
     ) -> bool:
-        """Always: a lane has two ends."""
+        """Always true: a lane has two ends."""
         return True
 
     def checks(
-        self, robot: int, label: str, kind: Kind, found: Places, frames: Sequence[tuple[Way, Way]]
+        self, robot: int, label: str, kind: Kind, places: Places, frames: Sequence[tuple[Way, Way]]
     ) -> tuple[dict[str, Truth], Truth]:
-        """Looked at anew, since lanes and the hands that are settled change."""
-        return self._looked_at(robot, label, kind, found, frames)
+        """Not cached, since lanes and settled hands change."""
+        return self._looked_at(robot, label, kind, places, frames)
 
-    def _passing(self, robot: int, label: str, kind: Kind, found: Places, u: Way, t: Way) -> Passed:
-        return self._looked_past(robot, label, kind, found, u, t)
+    def _passing(
+        self, robot: int, label: str, kind: Kind, places: Places, u: Way, t: Way
+    ) -> Passed:
+        return self._looked_past(robot, label, kind, places, u, t)
 
-    def _going_on(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Array:
+    def _going_on(self, robot: int, kind: Kind, places: Places, u: Way, t: Way) -> Array:
         if self.holding.gives(robot):
-            return np.zeros(len(found))
-        return super()._going_on(robot, kind, found, u, t)
+            return np.zeros(len(places))
+        return super()._going_on(robot, kind, places, u, t)
 
-    def _leaving(self, robot: int, kind: Kind, found: Places, u: Way) -> Iterator[Swept]:
-        """Also what a hand sweeps as it comes to what it takes over, from ahead."""
-        low, high = self.reach(kind, found, u)
+    def _leaving(self, robot: int, kind: Kind, places: Places, u: Way) -> Iterator[Swept]:
+        """Also the sweep of a hand as it comes to take over, from ahead."""
+        low, high = self.reach(kind, places, u)
         if self.holding.takes(robot):
             label = held(self.holding.factory, robot)
             yield (*swept(low, high, u), self.holding.boxes(label))
@@ -165,10 +167,10 @@ class InTheWayInLanes(InTheWay):
             last = held(self.holding.factory, robot, at_last=True)
             yield (*swept(low, high, (-u[0], -u[1])), self.holding.boxes(last))
         else:
-            yield from super()._leaving(robot, kind, found, u)
+            yield from super()._leaving(robot, kind, places, u)
 
     def coming(
-        self, robot: int, label: str, kind: Kind, found: Places, u: Way, t: Way
+        self, robot: int, label: str, kind: Kind, places: Places, u: Way, t: Way
     ) -> Iterator[Swept]:
         if not self.holding.takes(robot):
-            yield from super().coming(robot, label, kind, found, u, t)
+            yield from super().coming(robot, label, kind, places, u, t)

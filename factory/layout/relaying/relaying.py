@@ -68,15 +68,14 @@ def relayed(
 
 
 def robot_times(layout: Layout, settings: Settings) -> list[float]:
-    """How long the gear of each robot takes [s]; of the output robot's, how long the outfeed does
-    where that is longer."""
+    """Time of each robot's gear [s]; for the output robot at least that of the outfeed."""
     pace = Pace.of(settings)
-    found = gear_times(layout, pace)
+    seconds = gear_times(layout, pace)
     dropoff = layout.factory.dropoff.index
     way = layout.home(0, dropoff) - layout.visits[dropoff, 0].at
     outfeed = pace.rest(way) + pace.lost + away(layout, settings)
-    found[0] = max(found[0], outfeed)
-    return found
+    seconds[0] = max(seconds[0], outfeed)
+    return seconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +93,7 @@ class Room:
         return optimised(plain.factory, plain.product, c, self.pace, self.floor, wide, self.hands)
 
     def cuttable(self) -> set[int]:
-        """The robots with a way that can be cut, where all of these have room for it."""
+        """The robots with a way that can be cut if all of these have room for it."""
         layout, wide = self.plain, set[int]()
         for _ in range(WIDENED):
             more = wide | {way.robot for way in ways(layout).values()}
@@ -145,7 +144,7 @@ class _Search:
         return max(cycle_of(layout, pace), *robot_times(layout, self.settings))
 
     def look(self, cycle: float | None) -> None:
-        """For few relays that make it as fast as wanted, or as can be."""
+        """Find few relays with which the factory is as fast as wanted, or as possible."""
         pace = Pace.of(self.settings)
         if cycle is None:
             most = self._split({label: way.most for label, way in self.ways.items()})
@@ -160,8 +159,8 @@ class _Search:
             self.found = self._split(self.numbers)
 
     def faulty(self) -> set[str]:
-        """The robots (by name) of what was found that no hand can hold, though it can without
-        relays; where there are none, those with a fault of the certificate."""
+        """The robots (by name) that no hand serves although one does without relays; if there are
+        none, those with a fault of the certificate."""
         robots, hands = self.found.factory.robots, self.found.hands
         none = {h for h in self.layout.hands if h is not None and h.kind == "none"}
         held = {
@@ -172,8 +171,8 @@ class _Search:
         return held or {name for fault in certify(self.found).faults for name in fault.robots}
 
     def forbid(self, robots: Collection[str]) -> None:
-        """Cut no way any more that one of these robots (by name) has a piece of; where they have
-        none, no way at all."""
+        """Exclude the ways of which one of these robots (by name) has a piece; if there are none,
+        all ways."""
         chosen = (r for r in self.found.factory.robots if r.name in robots)
         labels = {origin_of(x) for robot in chosen for x in _carried(self.found, robot)}
         shared = labels & set(self.ways)
@@ -183,27 +182,27 @@ class _Search:
         return split(self.layout, self.ways, numbers, self.templates, self.catalogue)
 
     def _guess(self, way: Way, seconds: float) -> int:
-        """The least number of cuts that leaves no piece that takes longer."""
+        """The least number of cuts that leaves no piece too long."""
         pace = Pace.of(self.settings)
         fast = (n for n in range(way.most) if pace.rest(way.longest(n)) <= seconds)
         return next(fast, way.most)
 
     def _more(self) -> set[str]:
-        """The ways to cut once more: of each robot that takes too long the longest that it waits
-        for, or goes itself."""
-        found = set[str]()
+        """The ways to cut once more: for each robot that takes too long the longest way that it
+        waits for, or goes itself."""
+        to_cut = set[str]()
         times, numbers = robot_times(self.found, self.settings), self.numbers
         for robot in self.found.factory.robots:
             if times[robot.index] > self.cycle + 1e-9:
                 labels = map(origin_of, _carried(self.found, robot))
                 left = [x for x in labels if x in self.ways and numbers[x] < self.ways[x].most]
                 if left:
-                    found.add(max(left, key=lambda x: (self.ways[x].longest(numbers[x]), x)))
-        return found
+                    to_cut.add(max(left, key=lambda x: (self.ways[x].longest(numbers[x]), x)))
+        return to_cut
 
 
 def _carried(layout: Layout, robot: Robot) -> Iterator[str]:
-    """All that is carried in the operations of a robot, to them and from them."""
+    """All labels carried in the operations of a robot, to them and from them."""
     for number in robot.operations:
         operation = layout.factory.operations[number]
         yield from (x for x in (*operation.before, *operation.after) if x != NOPART)

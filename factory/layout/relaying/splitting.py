@@ -27,7 +27,7 @@ from factory.problem.template import Template
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """What one robot has of the guidepath that was another's: from `start` to `end`, distances
+    """The piece of another robot's guidepath that a robot has: from `start` to `end`, distances
     from its B end [m]; the operations (by their labels without relays) that it does there."""
 
     robot: int
@@ -42,15 +42,15 @@ def split(
     templates: Mapping[str, Template],
     catalogue: Catalogue,
 ) -> Layout:
-    """The layout with so many relays on the way of each label. Linear."""
+    """The layout with a given number of relays on the way of each label. Linear."""
     before = layout.factory
     factory = with_relays(before, numbers, templates, catalogue)
     cut = {r: list(_pieces(layout, r, ways, factory)) for r in range(len(before.robots))}
-    found = _hands(layout, factory, cut)
+    chosen = _hands(layout, factory, cut)
     paths: dict[int, Guidepath] = {}
     starts: dict[int, float] = {}
     for robot, pieces in cut.items():
-        spread = Clearance(layout.clearance).spread * (-1 if robot in found.turned else 1)
+        spread = Clearance(layout.clearance).spread * (-1 if robot in chosen.turned else 1)
         for number, piece in enumerate(reversed(pieces)):
             lane = spread * (-1) ** number if len(pieces) > 1 else 0.0
             paths[piece.robot] = _path(layout.guidepaths[robot], piece, lane)
@@ -66,7 +66,7 @@ def split(
         factory=factory,
         guidepaths=guidepaths,
         visits=visits_of(factory, guidepaths, stations),
-        hands=found.hands,
+        hands=chosen.hands,
         payloads=payload_boxes(factory, layout.product),
         certificate=None,
     )
@@ -78,7 +78,7 @@ def with_relays(
     templates: Mapping[str, Template],
     catalogue: Catalogue,
 ) -> Factory:
-    """The factory in which so many robots more hand over each label. Linear."""
+    """The factory with a given number of additional robots on the way of each label. Linear."""
     plan = replace(before.plan, relays={label: n for label, n in numbers.items() if n})
     nodes = handed_over(nodes_of(before), plan.relays, templates)
     approaches = _approaches(before, plan)
@@ -96,7 +96,7 @@ def _hands(layout: Layout, factory: Factory, cut: Mapping[int, Sequence[Piece]])
 
 
 def _approaches(factory: Factory, plan: Plan) -> dict[str, Approach]:
-    """How inputs come together is as before: a relay turns nothing."""
+    """Approaches of inputs are unchanged: a relay turns nothing."""
     return {
         o.label: replace(o.approach, lowered=delivered(o.approach.lowered, plan))
         for o in factory.operations
@@ -123,7 +123,7 @@ def _pieces(
 
 
 def _path(path: Guidepath, piece: Piece, lane: float) -> Guidepath:
-    """The guidepath of a piece, in a lane so far to the side."""
+    """The guidepath of a piece, in a lane displaced to the side."""
     back = path.travel - piece.end
     a = tuple(round(a - u * back, 3) for a, u in zip(path.a, path.heading, strict=True))
     return replace(

@@ -22,9 +22,9 @@ from factory.problem.pag import NOPART
 
 @dataclass(frozen=True, slots=True)
 class Way:
-    """Where `robot` carries `label`: from `start` (or where it has been farther already) to `end`,
-    distances from its B end [m]. A cut is at least a `step` after the one before or the start, and
-    `last` before the end."""
+    """The way on which `robot` carries `label`: from `start` (or the farthest point reached before)
+    to `end`, distances from its B end [m]. A cut is at least `step` after the start or the cut
+    before, and `last` before the end."""
 
     label: str
     robot: int
@@ -35,16 +35,16 @@ class Way:
 
     @property
     def most(self) -> int:
-        """How many cuts there can be."""
+        """Largest number of cuts."""
         return max(0, floor((self.end - self.start - self.last) / self.step + 1e-9))
 
     def longest(self, number: int) -> float:
-        """The longest piece with so many cuts [m]."""
+        """The longest piece for a number of cuts [m]."""
         at = (self.start, *self.cuts(number), self.end)
         return max(after - before for before, after in pairwise(at))
 
     def cuts(self, number: int) -> tuple[float, ...]:
-        """So many cuts, as evenly as can be, in whole millimetres."""
+        """A number of cuts, as even as possible, in whole millimetres."""
         length = self.end - self.start
         if not number:
             return ()
@@ -56,8 +56,8 @@ class Way:
 def ways(layout: Layout) -> dict[str, Way]:
     """The way of every label, of those that can be cut. A robot that is fixed goes none."""
     along = (robot for robot, path in enumerate(layout.guidepaths) if not path.fixed)
-    found = (way for robot in along for way in _ways(layout, robot))
-    return {way.label: way for way in found if way.most}
+    every = (way for robot in along for way in _ways(layout, robot))
+    return {way.label: way for way in every if way.most}
 
 
 def _ways(layout: Layout, robot: int) -> Iterator[Way]:
@@ -69,33 +69,33 @@ def _ways(layout: Layout, robot: int) -> Iterator[Way]:
     ends = (at[n] + max(front, before) for n, (before, front) in enumerate(pairwise(fronts)))
     reached = list(accumulate(ends, max))
     beyond = path.travel + _beyond(layout, robot)
-    found = []
+    backwards = []
     for step in reversed(range(len(piles))):
         label, rear, front = piles[step]
         if label != NOPART:
             last = max(0.0, at[step + 1] + front - beyond) + c
             apart = max(front - rear, lanes) + c
             start = max(at[step], reached[step] - front)
-            found.append(Way(label, robot, up(start), at[step + 1], up(apart), up(last)))
+            backwards.append(Way(label, robot, up(start), at[step + 1], up(apart), up(last)))
         beyond = min(beyond, at[step] + rear)
-    yield from reversed(found)
+    yield from reversed(backwards)
 
 
 def _piles(layout: Layout, robot: int) -> list[tuple[str, float, float]]:
-    """What a robot carries after each operation but the last, with its extent behind and ahead of
-    the product's middle [m]."""
-    found, path = [], layout.guidepaths[robot]
+    """The labels that a robot carries after each operation but the last, with their extents behind
+    and ahead of the product's middle [m]."""
+    extents, path = [], layout.guidepaths[robot]
     for number in layout.factory.robots[robot].operations[:-1]:
         operation = layout.factory.operations[number]
         label = operation.after[operation.robots.index(robot)]
         box = layout.payloads.get(label, (0.0, 0.0, 0.0, 0.0))
-        found.append((label, *path.frame(box)[:2]))
-    return found
+        extents.append((label, *path.frame(box)[:2]))
+    return extents
 
 
 def _beyond(layout: Layout, robot: int) -> float:
-    """Where ahead of A begins what a robot delivers to: the way of what its carrier brings, or the
-    outfeed. A payload at a cut, and a carriage and arm there, are clear of it [m]."""
+    """Distance ahead of A at which the place of delivery begins: the way of the carrier's payload,
+    or the outfeed. A payload at a cut, with carriage and arm, is clear of it [m]."""
     path, factory, c = layout.guidepaths[robot], layout.factory, layout.clearance
     operation = factory.operations[factory.robots[robot].operations[-1]]
     (delivered,) = factory.deliveries(operation.carrier)

@@ -309,4 +309,4 @@ def _header(
 def versions() -> dict[str, str]:
     """The installed versions of the packages that a run depends on."""
     names = ("klavins-factory", "mujoco", "numpy")
-    return {name: found for name in names if (found := release(name))}
+    return {name: version for name in names if (version := release(name))}

@@ -191,7 +191,7 @@ def misplaced(
         elif {part} in ({*inside[x]} for x in factory.deliveries(holder[1])):
             half = subject.fed(part) / 2
             wanted[weld] = np.cos(half), 0.0, 0.0, np.sin(half)
-    found, straight = [], _straight(anatomy.frames.turned(slides), wanted, TURNED)
+    wrong, straight = [], _straight(anatomy.frames.turned(slides), wanted, TURNED)
     for weld, holder in enumerate(anatomy.holder):
         if holder is None or holder[0] not in (GRIP, HOLD):
             continue
@@ -201,8 +201,8 @@ def misplaced(
         tour = factory.tour_with(holder[1], anatomy.part[weld]) if holder[0] == GRIP else 0
         anchor, middle = first.setdefault((*holder, tour), (base, place))
         if not straight[weld] or np.abs((base - anchor) - (place - middle)).max() > tolerance:
-            found.append(weld)
-    return found
+            wrong.append(weld)
+    return wrong
 
 
 def _brings(brought: Sequence[set[str]], robot: int, parts: Iterable[str]) -> bool:

@@ -135,9 +135,9 @@ class _Contacts:
                 continue
             parked = self._anatomy.holder[weld] == (PARK, -1)
             code = NOBODY if parked else int(self._code[holder])
-            own = self._trunk == body
-            self._in[own] = code
-            self._replica.mask(self._solid[body], own, *masks_of(code))
+            with_shells = self._trunk == body
+            self._in[with_shells] = code
+            self._replica.mask(self._solid[body], with_shells, *masks_of(code))
 
     def _intended(self, a: int, b: int, apart: float, marked: set[int]) -> bool:
         """Whether two geoms may touch: those of parts that are being joined or overlap in the

@@ -104,7 +104,7 @@ Recorded = Sequence[tuple[float, str]]
 
 
 def disagreements(
-    subject: MonitorSubject, found: Iterable[Firing], recorded: Recorded
+    subject: MonitorSubject, firings: Iterable[Firing], recorded: Recorded
 ) -> Iterator[Violation]:
     """The firings that are in only one of the two, or that differ in time. At the end of the run,
     firings that move no parts may not have been observed yet."""
@@ -113,7 +113,7 @@ def disagreements(
     label = {t.name: subject.factory.operations[n // 2].label for n, t in enumerate(names)}
     ends = (o for o in subject.factory.operations if subject.moves_parts[o.index])
     shown = {names[o.end].name: o for o in ends}
-    left = {(firing.transition, firing.unit): firing for firing in found}
+    left = {(firing.transition, firing.unit): firing for firing in firings}
     last = 0.0
     for t, name in recorded:
         unit = count[name]

@@ -227,10 +227,10 @@ def subject_of(
 def _with_others(subject: MonitorSubject, whole: Layout) -> MonitorSubject:
     """A subject that knows of deputies: of all that their robots may do."""
     number = {o.label: o.index for o in subject.factory.operations}
-    own = {(o.index, o.robots) for o in subject.factory.operations}
+    present = {(o.index, o.robots) for o in subject.factory.operations}
     every, others = whole.factory.operations, dict[Manned, tuple[float, ...]]()
     for o in every:
-        if (key := (number[o.written], o.robots)) not in own:
+        if (key := (number[o.written], o.robots)) not in present:
             goals = (whole.visits[o.index, robot].at for robot in o.robots)
             others.setdefault(key, tuple(goals))
     early = {(number[every[o].written], robot) for o, robot in goes_early(whole)}

@@ -80,7 +80,7 @@ class Transfers:
             return list(switches)
         became = self._became(switches, gone)
         inside = {copy for _, _, copies in became for copy in copies}
-        units = [self._unit_of(*found) for found in became]
+        units = [self._unit_of(*change) for change in became]
         for copy in inside:
             self._put(copy, (PARK, -1))
             self.unit[copy] = -1
@@ -230,9 +230,9 @@ class Transfers:
         if sum(map(len, held)) == len(wanted) and all(parts <= wanted for parts in held):
             return
         contents, names = self.subject.factory.contents, self.anatomy.label
-        found = [inside for copy in sorted(copies) for inside in contents[names[copy]]]
-        missing, extra = sorted(wanted - set(found)), sorted(set(found) - wanted)
-        twice = sorted({part for part in found if found.count(part) > 1}) if not extra else []
+        inner = [inside for copy in sorted(copies) for inside in contents[names[copy]]]
+        missing, extra = sorted(wanted - set(inner)), sorted(set(inner) - wanted)
+        twice = sorted({part for part in inner if inner.count(part) > 1}) if not extra else []
         for part, what in [
             *((p, f"lacks {p}") for p in missing[:1]),
             *((p, f"has {p} in excess") for p in extra[:1]),

@@ -222,11 +222,11 @@ class _Plan:
     def _rigid(self, body: int) -> Iterator[tuple[int, Floats]]:
         """The geoms of a body, and of those that are fixed to it, with their vertices in its frame
         [m]."""
-        for own in np.flatnonzero(self.m.body_weldid == body).tolist():
-            place, turn = self.m.body_pos[own], rotation(self.m.body_quat[own])
-            for geom in shown(self.m, own):
+        for member in np.flatnonzero(self.m.body_weldid == body).tolist():
+            place, turn = self.m.body_pos[member], rotation(self.m.body_quat[member])
+            for geom in shown(self.m, member):
                 points = placed(self.m, geom)[0]
-                yield geom, points if own == body else points @ turn.T + place
+                yield geom, points if member == body else points @ turn.T + place
 
     def _meant(self, name: str) -> dict[str, Any]:
         """The attributes of a group that stands for a robot or a part."""

@@ -115,7 +115,7 @@ def predicted(recording: Recording) -> Predicted | None:
     units = max(1, int(recording.log.delivered[-1]))
     timeline = flow(timing, net, units)
     begun = recording.from_start
-    own = {circuit.name: circuit.seconds for circuit in net.named}
+    of_circuit = {circuit.name: circuit.seconds for circuit in net.named}
     return Predicted(
         net.pace,
         timeline.first if begun else None,
@@ -123,5 +123,5 @@ def predicted(recording: Recording) -> Predicted | None:
         tuple(circuit.name for circuit in net.critical),
         tuple((timeline.lasting + made.settings.tick).tolist()),
         timeline.busy,
-        tuple(own[robot.name] for robot in recording.factory.robots),
+        tuple(of_circuit[robot.name] for robot in recording.factory.robots),
     )

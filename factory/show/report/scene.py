@@ -67,14 +67,14 @@ class DrawnFactory:
         """What each robot is for, as its paint shows: output, carrier, fed or tool, else shared."""
         m = self.m
         paints = {i: m.mat(i).name.removeprefix("role/") for i in range(m.nmat)}
-        found = []
+        by_robot = []
         for robot in self.factory.robots:
             body = m.body(names.carriage(robot.name))
             first = int(body.geomadr[0])
             worn = (int(m.geom_matid[g]) for g in range(first, first + int(body.geomnum[0])))
             roles = (paints[paint] for paint in worn if paints.get(paint) in ROLES)
-            found.append(next(roles, "shared"))
-        return tuple(found)
+            by_robot.append(next(roles, "shared"))
+        return tuple(by_robot)
 
 
 def stations(

@@ -100,11 +100,11 @@ class _Acting:
         chosen = dict.fromkeys(robots)
         if not chosen:
             return np.arange(self.world.motion.axes.tray)
-        known = {robot.name: robot.index for robot in self.simulation.layout.factory.robots}
+        number = {robot.name: robot.index for robot in self.simulation.layout.factory.robots}
         for name in chosen:
-            _known(name, known, "robot")
+            _known(name, number, "robot")
         of_robot = self.world.motion.axes.of_robot
-        return np.array(sorted(axis for name in chosen for axis in of_robot(known[name])), np.intp)
+        return np.array(sorted(axis for name in chosen for axis in of_robot(number[name])), np.intp)
 
     def _body(self, name: str) -> int:
         m = self.world.m
@@ -131,9 +131,9 @@ def _late(kept: deque[tuple[Array, Array]]) -> Measure:
     return measure
 
 
-def _known(name: str, known: Iterable[str], kind: str) -> None:
-    if name not in known:
-        hint = did_you_mean(name, sorted(known), f"{kind} names")
+def _known(name: str, names: Iterable[str], kind: str) -> None:
+    if name not in names:
+        hint = did_you_mean(name, sorted(names), f"{kind} names")
         raise _bad(f"there is no {kind} '{name}' to disturb", hint)
 
 

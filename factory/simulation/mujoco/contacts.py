@@ -44,7 +44,9 @@ class ContactMasks:
         for shell in np.flatnonzero(self.trunk != np.arange(m.nbody)).tolist():
             trunk = int(self.trunk[shell])
             self._own[trunk] = np.append(self._own[trunk], shell)
-        self.solid = {body: self._solid_geoms(own) for body, own in self._own.items()}
+        self.solid = {
+            body: self._solid_geoms(with_shells) for body, with_shells in self._own.items()
+        }
         self._partners: dict[str, list[tuple[str, Inside]]] = {}
         for one, other in apart:
             self._partners.setdefault(one[0], []).append((one[1], other))
@@ -86,10 +88,10 @@ class ContactMasks:
         for body, holder in holders.items():
             geoms = self.solid[body]
             contype, conaffinity = masks_of(holder)
-            own = self._own[body]
-            self.code[own] = holder
+            bodies = self._own[body]
+            self.code[bodies] = holder
             self.fresh.add(holder)
-            with_geoms = own[m.body_geomnum[own] > 0]
+            with_geoms = bodies[m.body_geomnum[bodies] > 0]
             self._masks[:, with_geoms] = [[contype], [conaffinity]]
             m.body_contype[with_geoms], m.body_conaffinity[with_geoms] = contype, conaffinity
             m.geom_contype[geoms], m.geom_conaffinity[geoms] = contype, conaffinity
@@ -116,14 +118,14 @@ class ContactMasks:
         """Exclude the pairs of a part with the present parts of its unit, or include them again.
         The engine merges the exclusions, a sorted list of unsigned numbers, with its sorted pairs;
         free slots are at its end."""
-        found = (
+        beside = (
             (part, other, theirs)
             for part, (partner, theirs) in self._partners.get(label, ())
             for other in self._of[partner][self.unit[self._of[partner]] == unit].tolist()
         )
         pairs = [
             sorted((self._of_part[body, part], self._of_part[other, theirs]))
-            for part, other, theirs in found
+            for part, other, theirs in beside
         ]
         for low, high in pairs:
             (self._signatures.add if now else self._signatures.discard)((low << 16) + high)

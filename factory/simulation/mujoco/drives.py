@@ -41,10 +41,10 @@ class Drives:
         m: mujoco.MjModel,
         d: mujoco.MjData,
         actuators: Index,
-        own: Array,
+        inertia: Array,
         across: Across | None = None,
     ) -> None:
-        self.own, self.mass, self.weight = own, own.copy(), np.zeros(len(own))
+        self.own, self.mass, self.weight = inertia, inertia.copy(), np.zeros(len(inertia))
         self._across = across
         if across is not None:
             actuators = np.concatenate([actuators, across.actuator])
@@ -83,29 +83,29 @@ class Drives:
         legs = np.stack([place, lagging, np.broadcast_to(force[:, None], place.shape)], axis=-1)
         rest = np.where(v[-1] == 0.0, weight, force[-1])
         after = np.stack([x[-1], v[-1], rest], axis=-1)
-        told = np.concatenate([legs.reshape(-1, *after.shape), after[None]]).swapaxes(0, 1)
+        setpoints = np.concatenate([legs.reshape(-1, *after.shape), after[None]]).swapaxes(0, 1)
         if len(self._bent(axes)[1]):
             a = np.concatenate([np.repeat(a, steps, axis=0), np.where(v[-1] == 0.0, 0.0, a[-1:])])
             lag = np.append(np.full(len(a) - 1, self.timestep / 2), 0.0)
-            return self.bent(axes, told, a.T, lag)
-        return told
+            return self.bent(axes, setpoints, a.T, lag)
+        return setpoints
 
-    def bent(self, axes: Index, told: Array, a: Array, lag: Array) -> Array:
+    def bent(self, axes: Index, setpoints: Array, a: Array, lag: Array) -> Array:
         """Setpoints with the second slides appended, (n + b, samples, 3), from setpoints (n,
         samples, 3) along axes, whose speeds are those of `lag` (samples,) [s] before, and
         accelerations (n, samples) [m/s²]."""
         which, rows = self._bent(axes)
         if self._across is None or not len(rows):
-            return told
-        x, v, a = told[which, :, 0].T, (told[which, :, 1] + a[which] * lag).T, a[which].T
+            return setpoints
+        x, v, a = setpoints[which, :, 0].T, (setpoints[which, :, 1] + a[which] * lag).T, a[which].T
         place, first, second = self._across.ways.at(rows, x)
         speed = first * v[..., None]
         gain = first * a[..., None] + second * (v**2)[..., None]
         force = self.mass[axes[which]][:, None] * gain
         both = np.stack([place, speed - lag[:, None, None] * gain, force], axis=-1)
-        told = told.copy()
-        told[which] = both[:, :, 0].swapaxes(0, 1)
-        return np.concatenate([told, both[:, :, 1].swapaxes(0, 1)])
+        setpoints = setpoints.copy()
+        setpoints[which] = both[:, :, 0].swapaxes(0, 1)
+        return np.concatenate([setpoints, both[:, :, 1].swapaxes(0, 1)])
 
     def _bent(self, axes: Index) -> tuple[Index, Index]:
         """Which of some axes have a second slide, and their indices."""
@@ -138,8 +138,10 @@ class Drives:
         actuators, (delay, kept) = self._actuators[self._rows(axes)], self._history
         delay[actuators] = kept[actuators] = 0
         setpoint = self._d.ctrl.reshape(-1, INPUTS)
-        told = np.stack([x, np.zeros(len(axes)), self.weight[axes]], axis=-1)[:, None]
-        setpoint[actuators] = self.bent(axes, told, np.zeros((len(axes), 1)), np.zeros(1))[:, 0]
+        setpoints = np.stack([x, np.zeros(len(axes)), self.weight[axes]], axis=-1)[:, None]
+        setpoint[actuators] = self.bent(axes, setpoints, np.zeros((len(axes), 1)), np.zeros(1))[
+            :, 0
+        ]
 
     def load(self, axes: Index, mass: Array, weight: Array) -> None:
         """Set the added mass [kg] and weight [N] of axes, from their next setpoints on."""

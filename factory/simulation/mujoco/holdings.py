@@ -188,16 +188,22 @@ class Holdings:
 def _welds(m: mujoco.MjModel, model: Model) -> dict[tuple[int, str], int]:
     """The weld by which each holder (code) holds a label: robots first, then the tray, then
     feeders."""
-    factory, outlets, found = model.factory, outlets_of(model.layout), dict[tuple[int, str], str]()
+    factory, outlets, weld_names = (
+        model.factory,
+        outlets_of(model.layout),
+        dict[tuple[int, str], str](),
+    )
     for grip in grips_of(model.layout, model.carried):
         name = names.grip(factory.robots[grip.robot].name, grip.label)
-        found[robot_code(grip.robot), grip.label] = name
+        weld_names[robot_code(grip.robot), grip.label] = name
     for product in factory.products:
         for label in model.carried.carried[product]:
-            found[tray_code(factory), label] = names.hold(label)
+            weld_names[tray_code(factory), label] = names.hold(label)
     codes = feeder_codes(factory, outlets)
-    found |= {(codes[outlet.robot], outlet.label): names.feed(outlet.name) for outlet in outlets}
-    return {part: m.equality(name).id for part, name in found.items()}
+    weld_names |= {
+        (codes[outlet.robot], outlet.label): names.feed(outlet.name) for outlet in outlets
+    }
+    return {part: m.equality(name).id for part, name in weld_names.items()}
 
 
 def copies_of(m: mujoco.MjModel, model: Model) -> dict[str, Index]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import comb, degrees
 
@@ -11,13 +12,35 @@ from factory.layout.layout import Layout
 from factory.mjcf.model import Model
 from factory.mjcf.weld_frames import residuals
 from factory.record.figures import PhysicsFigures
-from factory.simulation.mujoco.onsets import Onsets
 from factory.simulation.mujoco.pressing import Pressing
 from factory.simulation.mujoco.product_error import Misfit, product_errors
 from factory.simulation.mujoco.soundness import Soundness
 from factory.simulation.mujoco.strength import StrengthUse
 from factory.simulation.mujoco.welds import Welds
 from factory.support.engine import mujoco
+
+
+class Onsets:
+    """`pairs`: the pairs of geoms, by name, in the order of time; `begun`: time of the first onset
+    [s]. `name` gives a geom's name."""
+
+    def __init__(self, name: Callable[[int], str]) -> None:
+        self.pairs: list[tuple[str, str]] = []
+        self.begun: float | None = None
+        self._name = name
+        self._touching: frozenset[tuple[int, int]] = frozenset()
+
+    def note(self, now: set[tuple[int, int]], t: float) -> None:
+        """Record the touching pairs of geoms at a time [s], after a step of the engine."""
+        fresh = sorted(now - self._touching)
+        if fresh and self.begun is None:
+            self.begun = t
+        self.pairs += [(self._name(a), self._name(b)) for a, b in fresh]
+        self._touching = frozenset(now)
+
+    def apart(self) -> None:
+        """Forget which geoms touch."""
+        self._touching = frozenset()
 
 
 class Inspection:
@@ -61,15 +84,15 @@ class Inspection:
     def contacts(self) -> None:
         """Record the forces between inputs that are being joined, and count the onsets of all other
         contacts except between pads and their payloads."""
-        found = self._d.contact
+        pairs = self._d.contact
         now = set()
-        for number in np.flatnonzero(found.dist[: self._d.ncon] < 0).tolist():
-            a, b = found.geom[number].tolist()
+        for number in np.flatnonzero(pairs.dist[: self._d.ncon] < 0).tolist():
+            a, b = pairs.geom[number].tolist()
             label = self._joined(a, b)
             if label is not None:
                 self._press(label, number)
                 self.pressing.knocked(a, b)
-            elif not self.pressing.meant(a, b, float(found.dist[number])):
+            elif not self.pressing.meant(a, b, float(pairs.dist[number])):
                 now.add((a, b))
         self.onsets.note(now, float(self._d.time))
 
@@ -95,8 +118,8 @@ class Inspection:
         """Record the error of the finished product of a unit, with the misfit of its parts when
         they were fused."""
         product = self._products[unit % len(self._products)]
-        found = product.measure(self._d, bodies).worse(misfit)
-        self.error = found.worse(self.error or Misfit())
+        measured = product.measure(self._d, bodies).worse(misfit)
+        self.error = measured.worse(self.error or Misfit())
 
     def figures(self, welds: Welds, strength: StrengthUse | None = None) -> PhysicsFigures:
         """The figures of the run so far; `strength`: the largest share of a hand's strength that

@@ -8,16 +8,43 @@ import numpy as np
 
 from factory.control.mode import Array, Index
 from factory.control.navigation import Bundle
-from factory.mjcf.model import GRAVITY, HEAD_MASS, Model
-from factory.simulation.mujoco.axes import Axes
+from factory.mjcf.model import GRAVITY, HEAD_MASS, ROLLING, Model
+from factory.simulation.mujoco.axes import Across, Axes
 from factory.simulation.mujoco.courses import Course, Follower, along, planned
 from factory.simulation.mujoco.drives import Drives
-from factory.simulation.mujoco.guides import Guides
 from factory.simulation.mujoco.outfeed import Outfeed
 from factory.simulation.mujoco.sleep import Sleep
 from factory.simulation.mujoco.sliders import Sliders
 from factory.simulation.mujoco.stepping import Stepping
 from factory.support.engine import mujoco
+
+
+class Guides:
+    """The guides of axes with degrees of freedom `dof` (axes,). `empty` (axes,): friction without a
+    load [N], as in the model."""
+
+    def __init__(self, m: mujoco.MjModel, dof: Index, across: Across) -> None:
+        self._m, self._dof, self._across = m, dof, across
+        self.empty = m.dof_frictionloss[dof].copy()
+        self._loads = np.zeros(len(dof))
+
+    def load(self, axes: Index, loads: Array) -> None:
+        """Set the loads of axes beside their own weight [kg]."""
+        self._loads[axes] = loads
+        self._rub(axes)
+
+    def rub(self, axes: Index, newtons: float) -> None:
+        """Set the friction of empty axes [N]."""
+        self.empty[axes] = newtons
+        self._rub(axes)
+
+    def _rub(self, axes: Index) -> None:
+        weight = self._loads[axes] * GRAVITY
+        self._m.dof_frictionloss[self._dof[axes]] = self.empty[axes] + ROLLING * weight
+        which, rows = self._across.among(np.asarray(axes))
+        if len(rows):
+            same = self._m.dof_frictionloss[self._dof[np.asarray(axes)[which]]]
+            self._m.dof_frictionloss[self._across.dof[rows]] = same[:, None]
 
 
 class Motion:
@@ -38,10 +65,10 @@ class Motion:
         m.actuator_biasprm[robots, 1:3] *= np.asarray(gains)[:, None]
         m.actuator_biasprm[across.actuator, 1:3] *= np.asarray(gains)[across.axes, None]
         body, dof = self.axes.body, self.axes.dof
-        own = m.body_subtreemass[body] + m.dof_armature[dof]
+        inertia = m.body_subtreemass[body] + m.dof_armature[dof]
         turns = self.axes.turns
-        own[turns] = m.dof_M0[dof[turns]]
-        self.drives = Drives(m, d, self.axes.actuator, own.round(9), across)
+        inertia[turns] = m.dof_M0[dof[turns]]
+        self.drives = Drives(m, d, self.axes.actuator, inertia.round(9), across)
         self.guides = Guides(m, dof, across)
         self.sleep = Sleep(m, d, self.axes.tree)
         x, v = np.append(start, [0.0, 0.0]), np.zeros(len(self.axes))
@@ -206,8 +233,8 @@ class Motion:
             x, v = self._planned(axes, np.minimum(self.drives.time - begun, reach))
             self.robots.x[axes], self.robots.v[axes] = x, v
             force = self.drives.mass[axes] * a + self.drives.weight[axes]
-            told = np.stack([x, v, force], axis=-1)[:, None]
-            self.drives.show(axes, self.drives.bent(axes, told, a[:, None], np.zeros(1))[:, 0])
+            setpoints = np.stack([x, v, force], axis=-1)[:, None]
+            self.drives.show(axes, self.drives.bent(axes, setpoints, a[:, None], np.zeros(1))[:, 0])
 
     def _planned(self, axes: Index, t: Array) -> tuple[Array, Array]:
         """Positions and speeds of axes on their plans, some time [s] after these began."""

@@ -32,14 +32,14 @@ class ProductError:
 
     def __init__(self, model: Model, product: str) -> None:
         solids, bodies = model.layout.product.solids, model.carried
-        found = bodies.carried[product]
+        labels = bodies.carried[product]
         corners = [
-            np.concatenate([solids[part].corners for part in bodies.parts(body)]) for body in found
+            np.concatenate([solids[part].corners for part in bodies.parts(body)]) for body in labels
         ]
-        self._labels = found
-        self._owner = np.repeat(np.arange(len(found)), [len(points) for points in corners])
-        self._nominal = np.concatenate(corners) - bodies.centre[found[0]]
-        places = np.array([bodies.centre[body] for body in found])
+        self._labels = labels
+        self._owner = np.repeat(np.arange(len(labels)), [len(points) for points in corners])
+        self._nominal = np.concatenate(corners) - bodies.centre[labels[0]]
+        places = np.array([bodies.centre[body] for body in labels])
         self._local = np.concatenate(corners) - places[self._owner]
 
     def measure(self, d: mujoco.MjData, bodies: np.ndarray) -> Misfit:

@@ -84,8 +84,8 @@ class Sliders:
         drives = np.array([m.actuator(slider).id for slider in sliders])
         self.trees = m.body_treeid[self._body]
         self._d, self._address = d, m.jnt_qposadr[joint]
-        own = m.body_subtreemass[self._body] + m.dof_armature[m.jnt_dofadr[joint]]
-        self._drives, self._sleep = Drives(m, d, drives, own.round(9)), sleep
+        inertia = m.body_subtreemass[self._body] + m.dof_armature[m.jnt_dofadr[joint]]
+        self._drives, self._sleep = Drives(m, d, drives, inertia.round(9)), sleep
         self._loads = np.array([model.masses[outlet.label] for outlet in outlets])
         lengths = np.array([outlet.feeder.stroke for outlet in outlets])
         named = {names.slider(outlet.name): number for number, outlet in enumerate(outlets)}

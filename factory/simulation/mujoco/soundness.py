@@ -150,8 +150,8 @@ class Soundness:
                 held.setdefault(int(m.eq_obj2id[weld]), []).append(masks_of(code))
         for body, masks in held.items():
             geoms = self.masks.solid[body]
-            given = np.stack([m.geom_contype[geoms], m.geom_conaffinity[geoms]], axis=1)
-            right = (given[:, None] == masks).all(axis=2).any(axis=1)
+            actual = np.stack([m.geom_contype[geoms], m.geom_conaffinity[geoms]], axis=1)
+            right = (actual[:, None] == masks).all(axis=2).any(axis=1)
             yield from (self._name[geom] for geom in geoms[~right].tolist())
 
     def _left_out(self) -> Iterator[str]:
@@ -217,7 +217,7 @@ class Soundness:
 
 def _each(code: str, words: str, wrong: Iterable[str]) -> Iterator[Diagnostic]:
     """A fault for each of the first names, and the number of the others."""
-    found = list(dict.fromkeys(wrong))
-    yield from (Diagnostic(code, words.format(name)) for name in found[:NAMED])
-    if len(found) > NAMED:
-        yield Diagnostic(code, f"and {len(found) - NAMED} more")
+    names = list(dict.fromkeys(wrong))
+    yield from (Diagnostic(code, words.format(name)) for name in names[:NAMED])
+    if len(names) > NAMED:
+        yield Diagnostic(code, f"and {len(names) - NAMED} more")

@@ -92,33 +92,33 @@ class Strength:
         terms = self._gauges[grips] @ d.efc_force[: d.ne].reshape(-1, ROWS, 1)
         loads = np.zeros((len(self._hands) + 1, TERMS))
         np.add.at(loads, self._hand[grips], terms[:, :, 0])
-        found = shares(loads[:-1])
-        share = float(found.max())
+        use = shares(loads[:-1])
+        share = float(use.max())
         if self.most is None or share > self.most.share:
-            self._keep(found, grips)
+            self._keep(use, grips)
         if share <= 1.0:
             return []
-        worst = int(found.argmax())
+        worst = int(use.argmax())
         if self.dropped is None:
             self.dropped = self._drop(worst, self._use(worst, share, grips))
-        weak = np.append(found > 1.0, False)[self._hand[grips]]
+        weak = np.append(use > 1.0, False)[self._hand[grips]]
         return [self._grips[grip][1] for grip in grips[weak].tolist()]
 
-    def _keep(self, found: Array, grips: Index) -> None:
+    def _keep(self, use: Array, grips: Index) -> None:
         """Keep the largest share."""
         holding = np.unique(self._hand[grips[grips < len(self._grips)]])
         if len(holding):
-            worst = int(holding[found[holding].argmax()])
-            if self.most is None or found[worst] > RISE * self.most.share:
+            worst = int(holding[use[holding].argmax()])
+            if self.most is None or use[worst] > RISE * self.most.share:
                 self._risen = float(self._d.time)
-            self.most = self._use(worst, max(0.0, float(found[worst])), grips)
+            self.most = self._use(worst, max(0.0, float(use[worst])), grips)
 
     def _of_grips(self) -> Array:
         """For each grip the map from the rows of its weld to the terms of strength (grips + 1, 11,
         6). Position rows are the opposite of the force on the body, rotation rows twice the
         opposite of the torque: together the load at the body's centre of mass. Bodies keep the axes
         of the world."""
-        found = np.zeros((len(self._grips) + 1, TERMS, ROWS))
+        terms = np.zeros((len(self._grips) + 1, TERMS, ROWS))
         layout = self._model.layout
         grips = {(grip.robot, grip.label): grip for grip in grips_of(layout, self._model.carried)}
         for number, (key, _) in enumerate(self._grips):
@@ -131,8 +131,8 @@ class Strength:
             at[2] += grip.visit.height
             at[2] -= grip.layout.visits[first, grip.robot].height
             load[3:, :3] = np.cross(at, np.eye(3)).T
-            found[number] = gauge(hand, layout.guidepaths[grip.robot].heading, tour) @ load
-        return found
+            terms[number] = gauge(hand, layout.guidepaths[grip.robot].heading, tour) @ load
+        return terms
 
     def _use(self, number: int, share: float, grips: Index) -> StrengthUse:
         """The payload of the n-th hand, and the share of its strength used."""

@@ -3,19 +3,91 @@ engine, gathered and written at once."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.control.mode import Array
+from factory.control.mode import Array, Index
+from factory.mjcf.pads import Pads
+from factory.mjcf.weld_frames import WeldFrames
 from factory.simulation.mujoco.contacts import ContactMasks
-from factory.simulation.mujoco.pad_gaps import PadGaps
+from factory.simulation.mujoco.fusing import rotations
 from factory.simulation.mujoco.sleep import Sleep
-from factory.simulation.mujoco.takeovers import Takeovers
 from factory.support.engine import mujoco
 
 Place = tuple[float, float, float]
+
+
+class Takeovers:
+    """Measurements of bodies as a grip closes on them. `count`: bodies taken over; `gap` [m] and
+    `turn` [rad]: largest distance and angle between the frames that a grip joined; `off` [m]:
+    largest displacement of a vertex by its grip, turns included. `radii` (nbody,): distance of
+    vertices from their body's origin [m]. The kinematics in `d` are up to date."""
+
+    def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, radii: Array) -> None:
+        self.count, self.gap, self.turn, self.off = 0, 0.0, 0.0, 0.0
+        self._d, self._frames, self._radii = d, WeldFrames.of(m, d), radii
+        self._qpos = m.jnt_qposadr[m.body_jntadr][:, None] + np.arange(7)
+
+    def measure(self, welds: Index, bodies: Index) -> None:
+        """Measure bodies on which welds close, at their current places; `xpos` belongs to the start
+        of the last step."""
+        q, frames = self._d.qpos, self._frames.chosen(welds)
+        pose = q[self._qpos[bodies]]
+        gap = np.linalg.norm(pose[:, :3] - frames.at(q[frames.along]), axis=1)
+        turn = frames.turned(q[frames.along])
+        sine = np.sqrt(np.maximum(0.0, 1.0 - (pose[:, 3:] * turn).sum(axis=1) ** 2))
+        turned = 2 * sine * self._radii[bodies]
+        self.count += len(welds)
+        self.gap = max(self.gap, float(gap.max()))
+        self.turn = max(self.turn, 2 * float(np.arcsin(np.minimum(sine.max(), 1.0))))
+        self.off = max(self.off, float((gap + turned).max()))
+
+
+class PadGaps:
+    """Distances between holders' pads and their payloads. `largest` [m]: largest distance between
+    the pads of a holder and the nearest of its bodies; None while no holder with pads has taken
+    anything. Pads are measured at a holder's first payload: welds are rigid, so further bodies
+    bring the nearest no farther away."""
+
+    def __init__(self, m: mujoco.MjModel, d: mujoco.MjData) -> None:
+        self.largest: float | None = None
+        self._m, self._d = m, d
+        self._frames = WeldFrames.of(m, d)
+        self._pads = Pads(m)
+        self._at_zero, self._turned = d.geom_xpos.copy(), rotations(m.geom_quat)
+        self._welds = {h: np.flatnonzero(m.eq_obj1id == h) for h in self._pads.of}
+        for holder, welds in self._welds.items():
+            pads, weld = self._pads.of[holder], welds[0]
+            moved = d.qpos[self._frames.along[weld]] @ self._frames.way[weld]
+            self._at_zero[pads] = d.geom_xpos[pads] - moved
+
+    def measure(self, on: Mapping[int, int]) -> None:
+        """Measure welds that are about to close, each with its body. A holder that exchanges parts
+        for their fused body has been measured before."""
+        taken: dict[int, tuple[int, list[int]]] = {}
+        for weld, body in on.items():
+            holder = int(self._m.eq_obj1id[weld])
+            if holder in self._pads.of and body in self._pads.solid:
+                taken.setdefault(holder, (weld, []))[1].append(body)
+        for holder, (weld, bodies) in taken.items():
+            if not self._d.eq_active[self._welds[holder]].any():
+                self._pads_of(holder, weld, bodies)
+
+    def _pads_of(self, holder: int, weld: int, bodies: Sequence[int]) -> None:
+        m, d, pads, flat = self._m, self._d, self._pads.of[holder], np.empty(9)
+        along, way = self._frames.along[weld], self._frames.way[weld]
+        d.geom_xpos[pads] = self._at_zero[pads] + d.qpos[along] @ way
+        for body in bodies:
+            geoms = self._pads.solid[body]
+            at = m.jnt_qposadr[m.body_jntadr[body]] + np.arange(7)
+            mujoco.mju_quat2Mat(flat, d.qpos[at[3:]])
+            turn = flat.reshape(3, 3)
+            d.geom_xpos[geoms] = d.qpos[at[:3]] + m.geom_pos[geoms] @ turn.T
+            d.geom_xmat[geoms] = (turn @ self._turned[geoms]).reshape(-1, 9)
+        apart = self._pads.apart(d, holder, self._pads.geoms(bodies))
+        self.largest = max(self.largest or 0.0, apart)
 
 
 @dataclass(slots=True)

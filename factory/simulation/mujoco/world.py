@@ -274,5 +274,5 @@ class MujocoWorld:
 
     def figures(self) -> PhysicsFigures:
         """The figures of the run so far."""
-        found = self.inspection.figures(self.parts.welds, self.parts.strength.most)
-        return found if self.dropped is None else replace(found, dropped_s=self.dropped.time)
+        figures = self.inspection.figures(self.parts.welds, self.parts.strength.most)
+        return figures if self.dropped is None else replace(figures, dropped_s=self.dropped.time)

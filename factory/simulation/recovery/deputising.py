@@ -78,5 +78,5 @@ class Deputising:
         ordering = Ordering(order for order in timing.coordinated.orders if order.past is not None)
         self._books.supervisor.exchange(takeover.crew, modes, stages, undone, fired, ordering)
         names, net = takeover.names, takeover.after.net
-        told = undone.t, *names, fired, net, takeover.crew, predicted
-        self.exchanges.append(Exchange(*told))
+        fields = undone.t, *names, fired, net, takeover.crew, predicted
+        self.exchanges.append(Exchange(*fields))

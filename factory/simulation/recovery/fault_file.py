@@ -49,19 +49,19 @@ def read_campaign(path: Path, spares: int = 0, swap: float = SWAP) -> Campaign:
     [s]. Raises InputError with every error of the file: BadFile, Syntax, UnknownParameter,
     BadValue, BadFault."""
     text, values = read_toml(path, EXAMPLE)
-    found = _Reader(path, text)
-    found.check(values, KEYS, "")
+    reader = _Reader(path, text)
+    reader.check(values, KEYS, "")
     sensors = values.get("sensors", {})
     if isinstance(sensors, dict):
-        found.check(sensors, OF_SENSORS, "in [sensors]")
+        reader.check(sensors, OF_SENSORS, "in [sensors]")
     tables = values.get("fault", [])
-    faults = [*found.faults(tables if isinstance(tables, list) else [])]
-    if found.wrong:
-        raise InputError(found.wrong)
-    known = {k: float(v) for k, v in sensors.items()}
+    faults = [*reader.faults(tables if isinstance(tables, list) else [])]
+    if reader.wrong:
+        raise InputError(reader.wrong)
+    numbers = {k: float(v) for k, v in sensors.items()}
     clear = float(values.get("clear", CLEAR))
     seed = values.get("seed", 0)
-    return Campaign(tuple(faults), seed, clear, Sensors(**known), spares, swap)
+    return Campaign(tuple(faults), seed, clear, Sensors(**numbers), spares, swap)
 
 
 class _Reader:
@@ -71,18 +71,18 @@ class _Reader:
         self.path, self.text = path, text
         self.wrong: list[Diagnostic] = []
 
-    def check(self, values: Mapping[str, Any], known: Mapping[str, type], where: str) -> None:
+    def check(self, values: Mapping[str, Any], types: Mapping[str, type], where: str) -> None:
         """Check that every key is known and that its value has the right type and is not
         negative."""
         for key, value in values.items():
             at = key_position(self.path, self.text, key)
-            if key not in known:
+            if key not in types:
                 message = " ".join(filter(None, (f"unknown key '{key}'", where)))
-                hint = did_you_mean(key, [*known], "keys")
+                hint = did_you_mean(key, [*types], "keys")
                 self.wrong.append(Diagnostic("UnknownParameter", message, at, hint))
-            elif not _is(value, known[key]) or (_is(value, float) and not 0 <= value <= MOST):
-                least = f" from 0 to {MOST:g}" if known[key] in (int, float) else ""
-                message = f"{key} must be {WORDS[known[key]]}{least}"
+            elif not _is(value, types[key]) or (_is(value, float) and not 0 <= value <= MOST):
+                least = f" from 0 to {MOST:g}" if types[key] in (int, float) else ""
+                message = f"{key} must be {WORDS[types[key]]}{least}"
                 self.wrong.append(Diagnostic("BadValue", message, at, EXAMPLE))
 
     def faults(self, tables: list[Any]) -> Iterator[WorldFault]:
@@ -139,11 +139,11 @@ def check_names(campaign: Campaign, factory: Factory) -> None:
         if fault.kind in OF_LABEL:
             is_joint = fault.kind == "bad_joint"
             labels, what = (joined, "joined labels") if is_joint else (parts, "parts")
-        for name, known, kinds in ((fault.robot, robots, "robots"), (fault.label, labels, what)):
-            if name and name not in known:
+        for name, names, kinds in ((fault.robot, robots, "robots"), (fault.label, labels, what)):
+            if name and name not in names:
                 message = f"'{fault.kind}' names '{name}', which is none of the {kinds}"
                 wrong.append(
-                    Diagnostic("BadFault", message, None, did_you_mean(name, known, kinds))
+                    Diagnostic("BadFault", message, None, did_you_mean(name, names, kinds))
                 )
     if wrong:
         raise InputError(wrong)

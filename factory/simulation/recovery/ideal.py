@@ -40,9 +40,9 @@ class IdealPlant(Plant):
         factory, fired = self._books.factory, self._books.supervisor.fired
         upcoming = self._books.supervisor.word.upcoming
         now = {o.label: upcoming(factory.unit(o, fired[o.end])) for o in factory.leaves}
-        found = [part for part in now.items() if self._shown.get(part[0]) != part[1]]
+        shown = [part for part in now.items() if self._shown.get(part[0]) != part[1]]
         self._shown = now
-        return found
+        return shown
 
     def spoil(self, label: str, fault: WorldFault) -> None:
         self._bad[label] = fault
@@ -64,14 +64,14 @@ class IdealPlant(Plant):
         return label not in self._bad
 
     def refused(self) -> Sequence[tuple[str, int, str]]:
-        found = [
+        faulty = [
             (label, self._shown[label], "rejected" if fault.kind == "bad_part" else "misplaced")
             for label, fault in self._bad.items()
         ]
         for label in self._bad:
             del self._shown[label]
         self._bad.clear()
-        return found
+        return faulty
 
     def residual(self, operation: Operation) -> float:
         return self._slipped.get(operation.index, 0.0)

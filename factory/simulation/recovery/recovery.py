@@ -15,7 +15,6 @@ from factory.problem.template import Failure
 from factory.record.failures import Exchange, Failing, Failures, Stood
 from factory.record.state import Event
 from factory.simulation.recovery.books import Books
-from factory.simulation.recovery.counting import summed
 from factory.simulation.recovery.faults import Campaign, WorldFault
 from factory.simulation.recovery.plant import Plant
 from factory.simulation.recovery.responding import Responding
@@ -28,6 +27,53 @@ from factory.support.tables import table_of
 
 IN_VAIN = 2.0
 """Nothing more will happen when nothing fires for so many times the longest delay of all."""
+
+
+CAUSES = {
+    "drop": "lost",
+    "knocked": "lost",
+    "misplaced": "misplaced",
+    "bad_part": "rejected",
+    "bad_joint": "residual",
+    "dead": "jammed",
+}
+"""The test that finds each kind of fault, of those that some test finds."""
+
+
+def summed(
+    failures: Sequence[Failing],
+    struck: Mapping[str, int],
+    undone: int,
+    spares: int,
+    contacts: int,
+    stood: Sequence[Stood],
+    binned: int = 0,
+    spilled: tuple[str, ...] = (),
+) -> Failures:
+    """The failures of a run. A dead robot that was never asked to move does not count as missed. A
+    robot that is stuck in its operation does not count as a false alarm: it indicates an input that
+    has slipped."""
+    stuck = sum(one.test == "jammed" and not one.is_death for one in failures)
+    tests, wanted = Counter(one.test for one in failures), Counter[str]()
+    tests["jammed"] -= stuck
+    for kind, count in struck.items():
+        if kind in CAUSES:
+            wanted[CAUSES[kind]] += count
+    wanted["jammed"] = min(wanted["jammed"], tests["jammed"])
+    missed, alarms = wanted - tests, tests - wanted
+    missed["residual"] -= min(stuck, missed["residual"])
+    return Failures(
+        tuple(failures),
+        {kind: count for kind, count in struck.items() if count},
+        missed.total(),
+        alarms.total(),
+        undone,
+        spares,
+        contacts,
+        tuple(stood),
+        binned,
+        spilled,
+    )
 
 
 class Recovery:

@@ -19,11 +19,10 @@ from factory.record.failures import Failing
 from factory.simulation.recovery.books import Books
 from factory.simulation.recovery.deputising import Deputising, Successors
 from factory.simulation.recovery.faults import Campaign
-from factory.simulation.recovery.on_end import OnEnd
 from factory.simulation.recovery.plant import Plant
 from factory.simulation.recovery.returning import Goal, Returning, WayBack, order_of
 from factory.simulation.recovery.standing import Standing
-from factory.simulation.recovery.wasting import Wasting
+from factory.simulation.recovery.wasting import OnEnd, Wasting
 from factory.simulation.simulation import Simulation
 from factory.support.errors import Diagnostic
 
@@ -159,12 +158,12 @@ class Responding:
         robot is returning."""
         due, appointed = (r for r, until in self.dead.items() if until <= now), self.deputising
         settled = self.returning.halted(self.dead)
-        found = [robot for robot in due if settled or robot not in appointed.by_robot]
-        for robot in found:
+        robots = [robot for robot in due if settled or robot not in appointed.by_robot]
+        for robot in robots:
             if self._replaced(robot):
                 del self.dead[robot]
                 self._plant.supplied()
-        return found
+        return robots
 
     def _replaced(self, robot: int) -> bool:
         """Replace a dead robot. Returns False if its deputy is dead too."""

@@ -78,20 +78,20 @@ class Standing:
         """Robots that do not move although a late operation or stage asks them to. Operations of
         `excused` robots are not late."""
         supervisor, factory = self._supervisor, self._supervisor.factory
-        found, modes = list[int](), supervisor.bundles
+        jammed, modes = list[int](), supervisor.bundles
         for number in supervisor.active.operations:
             operation = factory.operations[number]
             if not excused.isdisjoint(operation.robots):
                 self.begun(operation, now)
             elif now > self._late(number, now):
-                found += self._at_fault(modes.modes[number], [*factory.axes[number]])
+                jammed += self._at_fault(modes.modes[number], [*factory.axes[number]])
         going = supervisor.ahead.going(supervisor.active.ahead)
         went = {n: self._went.get(n, now) for n in going}
         self._went = {n: now if going[n].robot in excused else t for n, t in went.items()}
         for number, since in self._went.items():
             if now > since + self._longest:
-                found += self._at_fault(modes.modes[number], [going[number].axis])
-        return found
+                jammed += self._at_fault(modes.modes[number], [going[number].axis])
+        return jammed
 
     def latest(self, now: float) -> float:
         """The time at which the last operation or stage under way becomes late [s]."""
@@ -114,7 +114,7 @@ class Standing:
         bundle = Bundle.of([mode], [self._limits.of(axes)])
         asked = np.abs(bundle.field(x[axes], simulation.request.settings.tick)) > MOVES
         stuck = asked & (np.abs(v[axes]) < STILL)
-        of_axis = {axis: robot for robot, own in enumerate(self._axes) for axis in own}
+        of_axis = {axis: robot for robot, axes_of in enumerate(self._axes) for axis in axes_of}
         return [
             *dict.fromkeys(of_axis[axis] for axis, is_so in zip(axes, stuck, strict=True) if is_so)
         ]

@@ -196,9 +196,9 @@ class Estimator:
         has them; and the sum of estimated cycles above a bound [s]."""
         refused |= self._alike
         tasks = (replace(task, order=order, refused=refused) for task in self.tasks)
-        found = [best_forms(task, bound) for task in tasks]
-        chosen = {x: pile for piles, _ in reversed(found) for x, pile in piles.items()}
-        return chosen, sum(over for _, over in found)
+        best = [best_forms(task, bound) for task in tasks]
+        chosen = {x: pile for piles, _ in reversed(best) for x, pile in piles.items()}
+        return chosen, sum(over for _, over in best)
 
     def _filled(self, one: Candidate, robots: float) -> Iterator[Estimate]:
         """The estimates of a candidate with one robot for each label, and with lines for each
@@ -217,11 +217,11 @@ class Estimator:
                 yield Estimate(count, shift.seconds(lines), forms, filling)
 
     def _shift(self, project: Project) -> Shift:
-        given = project.catalogue, self.tasks[0].pace
+        shared = project.catalogue, self.tasks[0].pace
 
         def of(factory: Factory, forest: Shift | None = None) -> Shift:
             boxes = _boxes(factory, project.product)
-            return Shift.of(factory, given[0], boxes, given[1], forest)
+            return Shift.of(factory, shared[0], boxes, shared[1], forest)
 
         alone = of(project.approached)
         return of(project.planned, alone) if project.pag.mix else alone

@@ -83,8 +83,8 @@ class Mishaps:
         """The parts that feeders have begun to present since the last call, all of them
         straight."""
         back = self._world.parts.feeders.back
-        found, back.fresh = [*back.fresh.items()], {}
-        return found
+        shown, back.fresh = [*back.fresh.items()], {}
+        return shown
 
     def spoil(self, label: str, fault: WorldFault) -> None:
         """Make the part that a feeder presents defective, or misplace it."""

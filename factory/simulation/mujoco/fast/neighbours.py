@@ -169,11 +169,11 @@ def _holders(parts: Parts, axes: Axes, shutter: int) -> Index:
 
 def _of_trees(m: mujoco.MjModel, code: Index) -> Index:
     """For each kinematic tree a body that tells its holder."""
-    found = np.zeros(m.ntree, np.intp)
+    body_of = np.zeros(m.ntree, np.intp)
     for bodies in (np.arange(m.nbody), np.flatnonzero(code != NOBODY)):
         moving = bodies[m.body_treeid[bodies] >= 0]
-        found[m.body_treeid[moving]] = moving
-    return found
+        body_of[m.body_treeid[moving]] = moving
+    return body_of
 
 
 def _met(holders: Index, low: Array, high: Array) -> Truth:
