@@ -66,8 +66,7 @@ class Layout(Pictured):
 
     @property
     def whole(self) -> Layout:
-        """The layout of all tours that its robots may do, with the same numbers: itself unless
-        deputies may take over."""
+        """The layout of all tours that its robots may do, itself unless deputies may take over."""
         return self.standby or self
 
     def named(self, label: str) -> str:

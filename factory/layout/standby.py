@@ -14,14 +14,14 @@ from factory.support.errors import FactoryError
 
 def deputies_in(layout: Layout) -> Mapping[int, int]:
     """The robots of a layout for which a deputy can take over, and that (indices)."""
-    factory, deputy_of = layout.factory, dict[int, int]()
+    factory, successor = layout.factory, dict[int, int]()
     for o in layout.whole.factory.operations:
         label = o.within(factory.period)
         pairs = zip(layout.whole.factory.by_label[label].robots, o.robots, strict=True)
-        deputy_of |= {
+        successor |= {
             robot: other for robot, other in pairs if robot != other and label in factory.by_label
         }
-    return deputy_of
+    return successor
 
 
 def part_of(layout: Layout, factory: Factory) -> Layout | None:

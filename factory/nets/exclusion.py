@@ -12,18 +12,21 @@ live and reversible; both new places lie on a circuit with one token, so they ar
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
-from factory.nets.marked import MANY, NONE, MarkedNet
+from factory.nets.marked import NONE, MarkedNet, token_free
 from factory.nets.petri import PetriNet, Place
 
 ORDER = "order"
 """The mode of an order place."""
 
+BLOCK = 4096
+"""Number of transitions whose predecessors are found in one pass over a net."""
+
 Pair = tuple[int, int]
-"""Two places, by index."""
+"""Two places, or two transitions, by index."""
 
 Circuit = tuple[int, ...]
 """Places, each of which leads from its producer to that of the next, cyclically."""
@@ -33,8 +36,8 @@ def excluding(net: MarkedNet, pairs: Iterable[Pair]) -> list[Circuit | None]:
     """For each pair of different places of a live marked graph a circuit through both that carries
     one token: the proof that they are never marked together. None where there is no such circuit.
 
-    Linear in the net for each place that is in some pair. Raises ValueError where the net is no
-    marked graph.
+    Linear in the net for each BLOCK places that are in some pair, and in the lengths of the
+    circuits. Raises ValueError where the net is no marked graph.
     """
     return _Paths(net).circuits([*pairs])
 
@@ -125,60 +128,98 @@ class _Paths:
         self._out[arc.before].remove(arc)
 
     def implies(self, arc: _Arc) -> bool:
-        """Whether some path between the same transitions has no more tokens."""
-        return arc.after in self.least(arc.before, {arc.after}, arc.tokens)
-
-    def circuits(self, pairs: Sequence[Pair]) -> list[Circuit | None]:
-        """As `excluding`, a search for each transition that a place of some pair leads to."""
-        net, goals = self._net, dict[int, set[int]]()
-        for pair in pairs:
-            for p, q in (pair, pair[::-1]):
-                if net.right[p] != NONE and net.left[q] != NONE:
-                    goals.setdefault(net.right[p], set()).add(net.left[q])
-        paths = {source: self.least(source, wanted, 1) for source, wanted in goals.items()}
-        return [self._circuit(pair, paths) for pair in pairs]
-
-    def _circuit(
-        self, pair: Pair, paths: Mapping[int, Mapping[int, tuple[int, Circuit]]]
-    ) -> Circuit | None:
-        net, circuit, total = self._net, list[int](), 0
-        for p, q in (pair, pair[::-1]):
-            tokens, path = paths.get(net.right[p], {}).get(net.left[q], (MANY, ()))
-            if tokens == MANY:
-                return None
-            circuit += [p, *path]
-            total += net.tokens[p] + tokens
-        return tuple(circuit) if total == 1 else None
-
-    def least(self, source: int, goals: set[int], most: int) -> dict[int, tuple[int, Circuit]]:
-        """By those of the goals to which some path from a transition has no more than so many
-        tokens: the least number of tokens, and the places of such a path. A 0-1 search."""
-        tokens, arrived = {source: 0}, dict[int, _Arc]()
-        queue, done, left = deque([source]), set[int](), set(goals)
-        while queue and left:
+        """Whether some path between the same transitions has no more tokens. A 0-1 search."""
+        tokens, done, queue = {arc.before: 0}, set[int](), deque([arc.before])
+        while queue:
             event = queue.popleft()
+            if event == arc.after:
+                return True
             if event in done:
                 continue
             done.add(event)
-            left.discard(event)
-            for arc in self._out[event]:
-                there = tokens[event] + arc.tokens
-                if there <= most and there < tokens.get(arc.after, most + 1):
-                    tokens[arc.after], arrived[arc.after] = there, arc
-                    (queue.append if arc.tokens else queue.appendleft)(arc.after)
-        return {goal: (tokens[goal], _back(arrived, source, goal)) for goal in goals & done}
+            for way in self._out[event]:
+                there = tokens[event] + way.tokens
+                if there <= arc.tokens and there < tokens.get(way.after, arc.tokens + 1):
+                    tokens[way.after] = there
+                    (queue.append if way.tokens else queue.appendleft)(way.after)
+        return False
+
+    def circuits(self, pairs: Sequence[Pair]) -> list[Circuit | None]:
+        """As `excluding`: first the tokens of the shortest circuit of each pair, then the places of
+        those that carry one."""
+        net, ways = self._net, dict[Pair, tuple[Pair, Pair]]()
+        for p, q in pairs:
+            ways[p, q] = (net.right[p], net.left[q]), (net.right[q], net.left[p])
+        asked = (way for both in ways.values() for way in both)
+        least = {way: reach.least(way) for reach, some in self._reaches(asked) for way in some}
+        tight = {
+            (p, q): both
+            for (p, q), both in ways.items()
+            if net.tokens[p] + net.tokens[q] + least[both[0]] + least[both[1]] == 1
+        }
+        asked = (way for both in tight.values() for way in both)
+        paths = {
+            way: tuple(self._path(way, least[way], reach))
+            for reach, some in self._reaches(asked)
+            for way in some
+        }
+        made = {(p, q): (p, *paths[on], q, *paths[back]) for (p, q), (on, back) in tight.items()}
+        return [made.get(pair) for pair in pairs]
+
+    def _reaches(self, ways: Iterable[Pair]) -> Iterator[tuple[_Reach, list[Pair]]]:
+        """The transitions from which the ends of ways are reached, for BLOCK ends at a time, each
+        time with the ways that end there."""
+        to_end, order = dict[int, list[Pair]](), token_free(self._net).order[::-1]
+        for way in dict.fromkeys(ways):
+            to_end.setdefault(way[1], []).append(way)
+        ends = [*to_end]
+        for first in range(0, len(ends), BLOCK):
+            bits = {end: n for n, end in enumerate(ends[first : first + BLOCK])}
+            free = [0] * len(self._out)
+            for end, n in bits.items():
+                free[end] |= (end != NONE) << n
+            for event in order:
+                for arc in self._out[event]:
+                    if not arc.tokens:
+                        free[event] |= free[arc.after]
+            single = [*free]
+            for event in order:
+                for arc in self._out[event]:
+                    if arc.tokens <= 1:
+                        single[event] |= (free if arc.tokens else single)[arc.after]
+            yield _Reach(bits, (free, single)), [way for end in bits for way in to_end[end]]
+
+    def _path(self, way: Pair, tokens: int, reach: _Reach) -> Iterator[int]:
+        """The places of a path with the least number of tokens."""
+        event, end = way
+        while event != end:
+            arc = next(
+                arc
+                for arc in self._out[event]
+                if arc.tokens <= tokens and reach.leads((arc.after, end), tokens - arc.tokens)
+            )
+            assert isinstance(arc.of, int), "order places that are yet to be made have no number"
+            yield arc.of
+            event, tokens = arc.after, tokens - arc.tokens
 
 
-def _back(arrived: Mapping[int, _Arc], source: int, goal: int) -> Circuit:
-    """The places of the path by which a search has come to a goal; none for order places that are
-    yet to be made."""
-    path = list[int]()
-    while goal != source:
-        arc = arrived[goal]
-        if isinstance(arc.of, int):
-            path.append(arc.of)
-        goal = arc.before
-    return tuple(reversed(path))
+@dataclass(frozen=True, slots=True)
+class _Reach:
+    """From which transitions the ends of ways, numbered by `bits`, are reached: for each transition
+    the set of these ends, as an integer, along paths without tokens, and along paths with at most
+    one."""
+
+    bits: Mapping[int, int]
+    sets: tuple[Sequence[int], Sequence[int]]
+
+    def leads(self, way: Pair, tokens: int) -> bool:
+        """Whether some path between two transitions has no more than so many tokens."""
+        return bool(self.sets[tokens][way[0]] >> self.bits[way[1]] & 1)
+
+    def least(self, way: Pair) -> int:
+        """The least number of tokens on a path between two transitions; 2 for two or more, or where
+        there is no path."""
+        return 2 if way[0] == NONE else next((k for k in (0, 1) if self.leads(way, k)), 2)
 
 
 def times(net: MarkedNet, sequence: Sequence[int]) -> list[int]:
