@@ -38,7 +38,7 @@ class _Digest(pickle.Pickler):
     def reducer_override(self, value: Any) -> Any:
         if not is_dataclass(value) or isinstance(value, type):
             return NotImplemented
-        told = (getattr(value, field.name) for field in fields(value))
+        told = (getattr(value, field.name) for field in fields(value) if field.init)
         return type(value), tuple(
             sorted(one, key=repr) if isinstance(one, set | frozenset) else one for one in told
         )

@@ -17,7 +17,7 @@ from factory.layout.clearance import ClearanceSearch, certify, separation
 from factory.layout.crossings import touching
 from factory.layout.dimensions import PAYLOADS, SIDE
 from factory.layout.layout import Layout
-from factory.pipeline import read
+from factory.record.plan_file import read_plan
 from tests.layout_values import (
     DRAWN,
     Drawn,
@@ -317,9 +317,10 @@ def test_only_who_is_coupled_may_share_room() -> None:
 def test_robots_without_a_common_operation_share_floor_where_the_net_keeps_them_apart(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Two carriages of this family are nearer than the clearance, in places that one circuit with
-    one token goes through; without their circuits the layout is refused."""
-    layout = read(Path(__file__).parent / "data" / "crossing.pag").layout
+    """Two carriages of this layout of a family are nearer than the clearance, in places that one
+    circuit with one token goes through; without their circuits it is refused."""
+    plan = read_plan(Path(__file__).parent / "data" / "crossing" / "plan.json")
+    layout = plan.project(plan.settings, plan.ground, print).layout
     assert layout.certificate is not None and layout.certificate.holds
     (near,) = layout.certificate.crossing
     assert near.robots == ("r10", "r12")

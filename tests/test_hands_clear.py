@@ -10,7 +10,6 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from factory.layout import clearance
-from factory.layout import exclusions as excluding
 from factory.layout.certificate import Exclusions
 from factory.layout.dimensions import FINGER_TOP, PAYLOAD
 from factory.layout.feeding import feeder_of
@@ -21,6 +20,7 @@ from factory.layout.hands.limbs import limbs
 from factory.layout.hands.outermost import outermost
 from factory.layout.hands.places import Places
 from factory.layout.hands.surfaces import Body
+from factory.layout.homeward import Homeward
 from factory.layout.layout import Layout
 from factory.pipeline import read
 from factory.simulation.request import RunRequest
@@ -145,7 +145,7 @@ def test_hands_from_either_side_wait_for_each_other(distributed: bool, tmp_path:
 
 def test_if_they_did_not_they_would_meet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The certificate says so; a layout that is not asked for one shows it."""
-    monkeypatch.setattr(excluding, "_cuts", lambda *_: [])
+    monkeypatch.setattr(Homeward, "cuts", lambda *_: [])
     with pytest.raises(RunError, match=r"beam of r6, .* and cross of r7, .* both at once"):
         laid_out(BOX, tmp_path)
     monkeypatch.setattr(clearance, "exclusions", lambda *_: Exclusions())
