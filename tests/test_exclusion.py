@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from factory.nets import exclusion
 from factory.nets.exclusion import ORDER, excluding, ordered
 from factory.nets.marked import MarkedNet
 from factory.nets.petri import PetriNet, Place, Transition
@@ -65,10 +66,14 @@ def test_excluded_where_never_marked_together(rng: random.Random) -> None:
     marked = together(net)
     if marked is None:
         return
-    for pair, circuit in zip(pairs, excluding(net, pairs), strict=True):
+    circuits = excluding(net, pairs)
+    for pair, circuit in zip(pairs, circuits, strict=True):
         assert (circuit is None) == (pair in marked)
         if circuit is not None:
             check_circuit(net, circuit, pair)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(exclusion, "BLOCK", 2)
+        assert excluding(net, pairs) == circuits
 
 
 @given(st.randoms(use_true_random=False))
