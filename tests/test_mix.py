@@ -383,6 +383,41 @@ def test_products_end_at_one_height(shaped: Path, run: Terminal) -> None:
     assert "'b@2' ends 5.00 mm higher than 'a'" in done.json["errors"][0]["message"]
 
 
+DIPPING = """
+mix = 3 s4, 1 s4.b;
+s1 = mate ( p3, p4, p5, p6 );
+s2 = mate ( p0, p1, p2 );
+s3 = mate ( s2, s1, p7 );
+s4 = mate ( s3, p8 );
+p0 = atomic ( sphere = 0.01, pos = ( 0, 0, 0.01 ) );
+p1 = atomic ( sphere = 0.015, pos = ( 0.003, 0.006, 0.0355 ) );
+p2 = atomic ( cylinder = ( 0.02, 0.02 ), pos = ( 0.0305, 0.008, 0.01 ) );
+p3 = atomic ( sphere = 0.01, pos = ( 0.0615, -0.004, 0.01 ) );
+p4 = atomic ( sphere = 0.01, pos = ( -0.023, 0.018, 0.0305 ) );
+p5 = atomic ( cylinder = ( 0.01, 0.04 ), pos = ( 0.004, 0.001, 0.071 ) );
+p6 = atomic ( box = ( 0.1, 0.01, 0.06 ), pos = ( -0.0565, 0.009, 0.081 ) );
+p7 = atomic ( box = ( 0.02, 0.1, 0.02 ), pos = ( -0.026, 0.0785, 0.0305 ) );
+p8 = atomic ( sphere = 0.015, pos = ( -0.0865, -0.0115, 0.066 ) );
+s1.b = mate ( p3.b, p4.b, p5, p6 );
+s2.b = mate ( p0, p1.b, p2.b );
+s3.b = mate ( s2.b, s1.b, p7 );
+s4.b = mate ( s3.b, p8 );
+p1.b = atomic ( sphere = 0.0135, pos = ( 0.003, 0.006, 0.0355 ) );
+p2.b = atomic ( cylinder = ( 0.014, 0.014 ), pos = ( 0.0305, 0.008, 0.01 ) );
+p3.b = atomic ( sphere = 0.007, pos = ( 0.0615, -0.004, 0.01 ) );
+p4.b = atomic ( sphere = 0.007, pos = ( -0.023, 0.018, 0.0305 ) );
+"""
+"""Products whose lowest ball is over the tray's slot: what rests beside it differs by 2 mm."""
+
+
+def test_products_rest_on_the_tray_at_one_height(tmp_path: Path, run: Terminal) -> None:
+    file = tmp_path / "dipping.pag"
+    file.write_text(DIPPING)
+    done = run("run", file, "--json")
+    assert (done.status, done.codes) == (1, ["Layout"])
+    assert "'s4.b@3' ends 2.00 mm higher than 's4'" in done.json["errors"][0]["message"]
+
+
 def test_check_says_what_is_shared(file: Path, run: Terminal) -> None:
     found = run("check", file, "--json").json
     assert found["products"] == [

@@ -50,6 +50,7 @@ from factory.layout.dimensions import (
 from factory.layout.exclusions import exclusions
 from factory.layout.guidepath import Box
 from factory.layout.layout import Layout, delivery
+from factory.layout.outfeed import dip_of, slot_of
 from factory.layout.sweeps import Pile, piles, regions
 from factory.plant.approaches import MARGIN
 from factory.plant.factory import Operation
@@ -295,8 +296,10 @@ def _raised(layout: Layout, by_label: Mapping[str, Pile]) -> Iterator[Fault]:
 def _uneven(layout: Layout, by_label: Mapping[str, Pile]) -> Iterator[Fault]:
     """Faults where products of different units end at different heights: the tray takes all at
     one."""
-    factory = layout.factory
+    factory, slot = layout.factory, slot_of(layout)
     lows = {product: by_label[product].z[0] for product in factory.products}
+    if len(lows) > 1:
+        lows = {product: low + dip_of(layout, slot, product) for product, low in lows.items()}
     lowest = min(lows, key=lows.__getitem__)
     for product, low in lows.items():
         if (above := low - lows[lowest]) > EVEN:

@@ -3,13 +3,14 @@ that is shut, and comes back), and the slot in the tray for a round bottom."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from math import sqrt
 
 import numpy as np
 
 from factory.control.profile import SpeedProfile
 from factory.geometry.meshes import Array
-from factory.geometry.solids import Product
+from factory.geometry.solids import Solid
 from factory.layout.dimensions import BEHIND, PLAY, SLOT, Clearance
 from factory.layout.guidepath import Box, Point2
 from factory.layout.hands.limbs import limbs
@@ -69,15 +70,20 @@ def slot_of(layout: Layout) -> tuple[float, float, float] | None:
     return ends, low, max(limb.high[1] for limb in upright) + path.offset + SLOT
 
 
-def dip_of(layout: Layout, slot: tuple[float, float, float] | None) -> float:
-    """Depth of the product in the tray's slot [m]."""
+def dip_of(layout: Layout, slot: tuple[float, float, float] | None, label: str = "") -> float:
+    """Depth of the product in the tray's slot [m]; in a mix of what touches the tray first, or of
+    one product, by its label."""
     if slot is None:
         return 0.0
     (_, xhi, ylo, yhi), (end, low, high) = layout.outgoing, slot
     x, y = layout.product.middle[:2].tolist()
     beside = (1, y + low, -1, low - ylo), (1, y + high, 1, yhi - high), (0, x + end, 1, xhi - end)
     plates = [(axis, at, way) for axis, at, way, room in beside if room > SLOT]
-    return dip(layout.product, plates)
+    solids, bottom = layout.product.solids, float(layout.product.low[2])
+    if label:
+        solids = {part: solids[part] for part in layout.factory.contents[label]}
+        bottom = float(min(solid.low[2] for solid in solids.values()))
+    return dip(solids.values(), bottom, plates)
 
 
 def slotted(plate: Box, slot: tuple[float, float, float] | None) -> list[tuple[Point2, Point2]]:
@@ -97,11 +103,11 @@ def slotted(plate: Box, slot: tuple[float, float, float] | None) -> list[tuple[P
     ]
 
 
-def dip(product: Product, plates: list[HalfSpace]) -> float:
-    """Height difference between a product's lowest point and its lowest point over some level
-    plates [m]; 0 where it is over none."""
-    bodies = [body for solid in product.solids.values() for body in Body.of(solid)]
-    least, bottom = np.inf, float(product.low[2])
+def dip(solids: Iterable[Solid], bottom: float, plates: list[HalfSpace]) -> float:
+    """Height difference between the `bottom` of a product and the lowest point of its solids over
+    some level plates [m]; 0 where they are over none."""
+    bodies = [body for solid in solids for body in Body.of(solid)]
+    least = np.inf
     for body in sorted(bodies, key=lambda body: float(body.low[2])):
         if float(body.low[2]) >= least:
             break
