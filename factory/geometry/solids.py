@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import colorsys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -14,8 +14,7 @@ from factory.geometry.meshes import LEAST_MASS, Array, MassProperties, Mesh, sou
 from factory.geometry.pieces import box_piece, cylinder_piece, sphere_piece
 from factory.problem.pag import Assembly
 from factory.support.errors import Diagnostic
-
-Kept = TypeVar("Kept")
+from factory.support.keeping import Keeping
 
 DENSITY = 1000.0
 """Density of a part that states neither mass nor density [kg/m³]."""
@@ -65,23 +64,13 @@ class Solid:
 
 
 @dataclass(frozen=True)
-class Product:
+class Product(Keeping):
     """The solids of a product's parts by label, its bounding box, and warnings."""
 
     solids: Mapping[str, Solid]
     low: Array
     high: Array
     warnings: tuple[Diagnostic, ...] = ()
-    _kept: dict[object, Any] = field(init=False, default_factory=dict, compare=False, repr=False)
-
-    def kept(self, make: Callable[..., Kept], *values: object) -> Kept:
-        """What `make` makes of the product and of what is `values`: once for equal values, so that
-        further factories of the product need not make it again."""
-        key = make, *values
-        if key not in self._kept:
-            self._kept[key] = make(self, *values)
-        made: Kept = self._kept[key]
-        return made
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "solids", MappingProxyType(dict(self.solids)))

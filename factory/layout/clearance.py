@@ -296,9 +296,10 @@ def _raised(layout: Layout, by_label: Mapping[str, Pile]) -> Iterator[Fault]:
 def _uneven(layout: Layout, by_label: Mapping[str, Pile]) -> Iterator[Fault]:
     """Faults where products of different units end at different heights: the tray takes all at
     one."""
-    factory, slot = layout.factory, slot_of(layout)
+    factory = layout.factory
     lows = {product: by_label[product].z[0] for product in factory.products}
     if len(lows) > 1:
+        slot = slot_of(layout)
         lows = {product: low + dip_of(layout, slot, product) for product, low in lows.items()}
     lowest = min(lows, key=lows.__getitem__)
     for product, low in lows.items():

@@ -90,10 +90,7 @@ def kept(layout: Layout) -> Exclusions:
     certificate = layout.certificate
     if certificate is not None and certificate.is_of(layout.factory):
         return certificate.apart
-    stored: Exclusions | None = layout.__dict__.get("kept")
-    if stored is None:
-        stored = layout.__dict__["kept"] = exclusions(layout)
-    return stored
+    return layout.kept(exclusions)
 
 
 def exclusions(layout: Layout, further: Presences | None = None) -> Exclusions:
@@ -121,7 +118,7 @@ def exclusions(layout: Layout, further: Presences | None = None) -> Exclusions:
         cuts = homeward.cuts(net.net, when, needed.values()) if rounds else []
         if passes.keys() >= {*cuts}:
             stuck = (pair for pair in needed.values() if _orderable(net.net, when, pair) is None)
-            setting = dict.fromkeys(homeward.adjusted(net, stuck)) if rounds else {}
+            setting = dict.fromkeys(homeward.adjusted_at_home(net, stuck)) if rounds else {}
             if at_home.keys() >= setting.keys():
                 break
             at_home |= setting

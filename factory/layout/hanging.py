@@ -41,15 +41,12 @@ class Hanging:
 
     @classmethod
     def of(cls, layout: Layout) -> Hanging:
-        """That of a layout, found once. Parts of one line hang from as few sliders as can be, whose
-        pads are apart; where there is no place for these, each from its own."""
-        stored: Hanging | None = layout.__dict__.get("hanging")
-        if stored is None:
-            stored = layout.__dict__["hanging"] = cls._found(layout)
-        return stored
+        """The sliders of a layout, computed once. Parts of one line hang from as few sliders as
+        possible, whose pads are apart; if there is no place for these, each from its own."""
+        return layout.kept(cls._of)
 
     @classmethod
-    def _found(cls, layout: Layout) -> Hanging:
+    def _of(cls, layout: Layout) -> Hanging:
         pads, slider = _FeederPads(), dict[str, str]()
         places: dict[str, PadPlace] = {}
         for line in lines_of(layout):

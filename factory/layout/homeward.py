@@ -84,7 +84,7 @@ class Homeward(Nearness):
                 )
         return cuts
 
-    def adjusted(self, net: CoordinatedNet, pairs: Iterable[Near]) -> Iterator[Precedence]:
+    def adjusted_at_home(self, net: CoordinatedNet, pairs: Iterable[Near]) -> Iterator[Precedence]:
         """The order places by which lifts that are adjusted for each tour are adjusted at home, for
         robots that go there by themselves and would come near a machine of a pair on the way."""
         layout, factory, transitions = self._layout, self._layout.factory, net.net.net.transitions

@@ -28,6 +28,7 @@ from factory.layout.way import Ways
 from factory.plant.approaches import Overlap
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
+from factory.support.keeping import Keeping
 from factory.support.showing import Pictured
 
 BESIDE = 0.001
@@ -35,15 +36,14 @@ BESIDE = 0.001
 
 
 @dataclass(frozen=True)
-class Layout(Pictured):
+class Layout(Keeping, Pictured):
     """A factory laid out: a guidepath for each robot, and its visit for each of its operations.
 
     `payloads[label]`: the box of a sub-assembly about the product's middle; `outfeed`: the box of
     the conveyor in the world; `hands`: those of the robots, None for tools, nothing where they are
-    not chosen;
-    `plain`: the layout without relays, None where this is one; `standby`: that of all tours that
-    its robots may do, of which this is a part, None where this is all; `tile`: the size of the
-    tiles of the platen over which robots go [m], 0 where they go on rails.
+    not chosen; `plain`: the layout without relays, None where this is one; `standby`: that of all
+    tours that its robots may do, of which this is a part, None where this is all; `tile`: the size
+    of the tiles of the platen over which robots go [m], 0 where they go on rails.
     """
 
     factory: Factory

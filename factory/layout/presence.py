@@ -161,7 +161,7 @@ class Presence:
 
     @cached_property
     def filled(self) -> Hashable:
-        """What is the same for presences that fill the same places."""
+        """A digest of the space that its bodies fill."""
         bodies = self.bodies
         arrays = (
             bodies.boxes,
@@ -179,7 +179,7 @@ class Presence:
         return self.bodies.names[number % len(self.bodies.names)]
 
     def solid(self, number: int) -> Polytope:
-        """The bodies in one of the boxes."""
+        """The convex body in one of the boxes."""
         if number not in self._solids:
             self._solids[number] = self._solid(number)
         return self._solids[number]
@@ -245,14 +245,14 @@ def nearer(near: Near, clearance: float) -> Near | None:
 
 
 class Nearness:
-    """Which pairs come near by their bodies, judged once for all that are alike: turns of
-    a period, and what is found again and again in a search."""
+    """Judges pairs of presences as `nearer`, each only once for all that are alike: in the turns of
+    a period, and in the rounds of a search."""
 
     def __init__(self, clearance: float) -> None:
         self._clearance, self._known = clearance, dict[Hashable, Lacking | None]()
 
     def nearer(self, near_pair: Near) -> Near | None:
-        """As the function does."""
+        """The pair as `nearer` judges it."""
         if (pair := alike(near_pair.one, near_pair.other)) not in self._known:
             self._known[pair] = _judged(near_pair.one, near_pair.other, self._clearance)
         judged = self._known[pair]
@@ -260,7 +260,7 @@ class Nearness:
 
 
 def alike(one: Presence, other: Presence) -> Hashable:
-    """What is the same for pairs of which all come near, or none."""
+    """A key of two presences: pairs with equal keys come near alike."""
     apart = one.partners.isdisjoint(other.partners)
     return one.filled, other.filled, apart, one.bears or other.bears
 
@@ -271,7 +271,7 @@ def _named(pair: Near, judged: Lacking) -> Near:
 
 
 def _judged(one: Presence, other: Presence, clearance: float) -> Lacking | None:
-    """Which bodies in two boxes come near: edges are looked at where faces do not tell."""
+    """The bodies that come too near, and by how much; edges count only if faces do not decide."""
     for lacking, i, j in sorted(_pairs(one, other, clearance), reverse=True):
         need = lacking - float(_overlap(one.boxes[i], other.boxes[j]))
         solids = one.solid(i), other.solid(j)

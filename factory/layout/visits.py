@@ -111,10 +111,10 @@ def _in_world(path: Guidepath, shift: Point3) -> Point2:
 def _levels(
     factory: Factory, shifts: Sequence[Sequence[Point3]]
 ) -> Iterator[list[tuple[float, float, float]]]:
-    """For each robot and each of its tours: how far up its lift is where it delivers, and before
-    that, and how far above its place in the product it carries what it brings [m]: what its own
-    lift has to lower it, on all tours alike, so that those that deliver to it come at one height;
-    over that at which the robot that it delivers to carries it."""
+    """For each robot and each of its tours: the height of its lift where it delivers, and before
+    that, and the elevation of its payload above its place in the product [m]. The elevation is that
+    of the robot that it delivers to, and its own stroke, the same on all tours, so that all that
+    deliver to it come at one height."""
     elevations: list[list[float]] = []
     for robot, tours in enumerate(factory.tours):
         ends = [factory.operations[tour[-1]] for tour in tours]

@@ -45,8 +45,8 @@ class Ways:
     """Some ways (n,) from the origin, which begin and end along the first axis, piece by piece:
     straight and round in turn, each with a constant second derivative.
 
-    `ends` (n, 2c + 2): the coordinates where pieces begin, and where the last one ends, from -FAR
-    to FAR, which are also those of pieces that a way does not have; `middle` (n, 2c + 1): where
+    `ends` (n, 2c + 2): the coordinates of the ends of pieces, from -FAR to FAR, padded with FAR for
+    ways with fewer pieces; `middle` (n, 2c + 1): where
     straight ones begin, and the corners of round ones; `terms` (n, 2c + 1, 3, 2): place, first and
     second derivative there; `rounding` (n,) [m].
     """

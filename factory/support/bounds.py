@@ -24,7 +24,7 @@ class Allowance:
     effort: float
     seconds: float = inf
     stopped: Callable[[], bool] = field(default=lambda: False, repr=False)
-    spent: float = 0
+    spent: int = 0
     cut_off: bool = False
     begun: float = field(default_factory=monotonic, repr=False)
 
@@ -49,9 +49,9 @@ class Allowance:
         elapsed = self.elapsed
         return elapsed if elapsed == inf else elapsed / self.seconds
 
-    def spend(self, cost: float = 1) -> None:
-        """Count one more candidate, or what costs as much as several."""
-        self.spent += cost
+    def spend(self) -> None:
+        """Count one more candidate."""
+        self.spent += 1
 
     def over(self, share: float = 1.0) -> bool:
         """Whether a share of the candidates has been examined, or the time is over."""

@@ -28,9 +28,9 @@ QUICK, SURELY = 8, 10 * TOLERANCE
 """With so few samples a clash that is deeper than this [m] is told from a touch."""
 
 
-class _Found:
-    """What has been found of some parts of a product, by their labels: what each sweeps, and how
-    deep two get into each other; and whether meshes, by identity, are rough or wider."""
+class _Measurements:
+    """Measurements of some parts of a product, by label: the sweep of each, and the penetration
+    depth of two; and whether meshes, by identity, are rough or wider."""
 
     def __init__(self, *_: object) -> None:
         self.sweeps: dict[tuple[str, int, int], Any] = {}
@@ -46,7 +46,7 @@ class DrawnWays:
     def __init__(self, bodies: ConvexBodies) -> None:
         self._solids = bodies.solids
         self._labels = [solid.label for solid in bodies.solids]
-        self._found = bodies.product.kept(_Found, frozenset(self._labels))
+        self._found = bodies.product.kept(_Measurements, frozenset(self._labels))
 
     @cached_property
     def rough(self) -> NDArray[np.bool_]:

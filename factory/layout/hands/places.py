@@ -204,15 +204,15 @@ def resized(
     parts: tuple[str, ...],
     side: tuple[int, int],
     loads: Loads,
-    larger: Places,
+    candidates: Places,
     radius: float,
 ) -> Places:
-    """Those of some `larger` places with a pad no smaller where one of a `radius` [m] fits, each
-    once, with such a pad; loads and side as for `places`."""
+    """The `candidates` with a pad no smaller at which one of a `radius` [m] fits, each once, with
+    such a pad; loads and side as for `places`."""
     surfaces = product.kept(Surfaces)
-    points = np.unique(larger.at[larger.radius >= radius - SAME], axis=0)
+    points = np.unique(candidates.at[candidates.radius >= radius - SAME], axis=0)
     if not len(points):
-        return larger.chosen(np.zeros(0, np.intp))
+        return candidates.chosen(np.zeros(0, np.intp))
     covered, plane = _covered(surfaces, parts, points, side, (radius,))
     fits = covered[0] > (PARTLY if radius > RADII[-1] else 0.0)
     at, covers = points[fits], covered[0][fits]

@@ -19,7 +19,8 @@ from factory.support.engine import mujoco
 class Across:
     """The second slides of robots with bent guidepaths: `axes` (b,): their carriages; `ways`: their
     curves; `row` (axes,): the index of an axis in `axes`, -1 for none. Each (b,): `qpos`, `dof`,
-    `actuator`: addresses in the engine's model."""
+    `actuator`: addresses in the engine's model. `latest`: the last arc lengths and speeds, by the
+    state that they belong to."""
 
     axes: Index
     ways: Ways
@@ -27,7 +28,7 @@ class Across:
     qpos: Index
     dof: Index
     actuator: Index
-    found: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, repr=False)
+    latest: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(cls, m: mujoco.MjModel, layout: Layout, count: int) -> Across:
@@ -61,11 +62,11 @@ class Across:
     def along(self, places: Array, speeds: Array) -> tuple[Array, Array]:
         """Arc lengths [m] and speeds [m/s] (b,) of positions and velocities (b, 2)."""
         state = places.tobytes() + speeds.tobytes()
-        if state not in self.found:
+        if state not in self.latest:
             x, first = self.ways.nearest(places)
-            self.found.clear()
-            self.found[state] = x, (speeds * first).sum(axis=-1) / (first**2).sum(axis=-1)
-        return self.found[state]
+            self.latest.clear()
+            self.latest[state] = x, (speeds * first).sum(axis=-1) / (first**2).sum(axis=-1)
+        return self.latest[state]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
