@@ -145,6 +145,18 @@ def test_a_slow_robot_takes_its_time() -> None:
         assert run.sim_time_s > 1.5 * plain.sim_time_s
 
 
+@pytest.mark.parametrize(
+    ("name", "robots"),
+    [("lamp", [3]), pytest.param("truck", range(23), marks=pytest.mark.slow)],
+)
+def test_what_waits_at_a_gate_waits_for_the_robot(name: str, robots: list[int]) -> None:
+    """Not for its reference, which a robot that is held back does not keep to: inputs would meet
+    the hand that is to be there before them."""
+    drag = next(kind for kind in disturbances.KINDS if kind.name == "a robot held back")
+    for robot in robots:
+        assert disturbances.trial(layout(name), drag.make, 10.0, robot, True).failure == ""
+
+
 def test_distributed_runs_can_be_disturbed() -> None:
     run = simulated(Noise(5e-5), Slowed("r2", 0.5), distributed=True).run()
     assert disturbances.judge(run) == ""

@@ -66,6 +66,11 @@ class Gates:
         robot, gate = self.robot[at] + moved, self.gate[at] + moved
         return Gates(robot, gate, self.inner[at], self.width[at], self.standoff[at], mode)
 
+    def opens(self, before: Array, after: Array) -> bool:
+        """Whether any gate begins to open between two `offset`s [m] of the robots from their
+        goals."""
+        return bool(((self._phase(before) == 1.0) & (self._phase(after) < 1.0)).any())
+
     def closed(self, offset: Array) -> Array:
         """tau (g,) [m] where the robots are `offset` [m] from their goals."""
         z = self._phase(offset)

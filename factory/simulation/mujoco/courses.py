@@ -1,7 +1,9 @@
 """Courses: the references of axes for a number of ticks, planned ahead.
 
-A reference depends on no measurement, so a course is planned once and then followed, in one call of
-the engine or tick by tick, with the same result.
+Within a course a reference depends on no measurement, so it is planned once and then followed, in
+one call of the engine or tick by tick, with the same result. A course ends where a gate would open,
+and the next begins with what was measured of robots that are off their references (`Motion`): so
+what waits at a gate waits for the robot, not for its reference.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ from factory.nets.coordinated import Past
 from factory.simulation.mujoco.drives import Drives
 
 AHEAD = 0.0005
-"""No robot is further ahead of its reference than this [m]."""
+"""No robot is further off its reference than this [m], if nothing disturbs it."""
 
 FASTER = 0.8
 """No robot is slower than this share of its reference, half a timestep ago: the engine's speeds lag
@@ -75,7 +77,8 @@ def along(bundle: Bundle, tick: float, timestep: float) -> Callable[[Array, Arra
         x1, v1, a = follow(bundle, x, v, tick)
         v1[np.abs(v1) < ROUNDING] = 0.0
         slow = FASTER * np.abs(v1 - timestep / 2 * a) < REST
-        return x1, v1, a, bool(bundle.near_goal(x1, AHEAD, slow))
+        opens = bundle.gates.opens(x - bundle.goal, x1 - bundle.goal)
+        return x1, v1, a, opens or bundle.near_goal(x1, AHEAD, slow)
 
     return go
 

@@ -10,7 +10,7 @@ from factory.control.mode import Array, Index
 from factory.control.navigation import Bundle
 from factory.mjcf.model import GRAVITY, HEAD_MASS, ROLLING, Model
 from factory.simulation.mujoco.axes import Across, Axes
-from factory.simulation.mujoco.courses import Course, Follower, along, planned
+from factory.simulation.mujoco.courses import AHEAD, Course, Follower, along, planned
 from factory.simulation.mujoco.drives import Drives
 from factory.simulation.mujoco.outfeed import Outfeed
 from factory.simulation.mujoco.sleep import Sleep
@@ -171,8 +171,15 @@ class Motion:
                 self.outfeed.follower.course = None
 
     def _plan(self, bundle: Bundle) -> None:
-        """The next stride of the active modes, each robot with the payload of its operation."""
+        """The next stride of the active modes, each robot with the payload of its operation. The
+        reference of a robot that is off it begins anew where the robot is, and no faster than
+        either, so that it can still stop at its goal."""
         axes, robots = self.active, self.robots
+        off = axes[self.axes.off(self._d, robots.x)[axes] > AHEAD]
+        if len(off):
+            x, v = (measured[off] for measured in self.axes.measured(self._d))
+            robots.x[off] = x
+            robots.v[off] = robots.v[off].clip(np.minimum(v, 0.0), np.maximum(v, 0.0))
         self._begin(robots, axes, self._course(bundle, robots.x[axes], robots.v[axes]))
 
     def _begin(self, follower: Follower, axes: Index, course: Course) -> None:
