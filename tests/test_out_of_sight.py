@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from factory.layout.dimensions import RISE
 from factory.layout.feeding import feeder_of
 from factory.layout.layout import Layout
 from factory.mjcf import names
@@ -77,9 +78,11 @@ def jumps(layout: Layout, units: int, fuse: bool = False) -> Iterator[Jump]:
 
 
 def cameras(layout: Layout, at: np.ndarray) -> Iterator[mujoco.MjvCamera | str]:
-    """The overview, the one from above, and low ones from every side that look at a place."""
+    """The overview, the one from above, and low ones from every side that look at a place, no
+    steeper than housings are made for."""
     yield from ("overview", "top")
-    away = max(AWAY, 3 * float(max(layout.product.high - layout.product.low)))
+    size = float(max(layout.product.high - layout.product.low))
+    away = max(AWAY, 3 * size, (at[2] - EYES) / RISE)
     for turn in np.arange(4) * np.pi / 2 + 0.3:
         eye = np.array([at[0] + away * cos(turn), at[1] + away * sin(turn), EYES])
         look = at - eye

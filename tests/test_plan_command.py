@@ -50,7 +50,7 @@ def test_a_plan_is_free_and_no_slower_than_the_tree_drawn_by_hand(
 ) -> None:
     from factory.timing.prediction import pace
 
-    done = planning(EXAMPLES / f"{name}.pag", "--no-look")
+    done = planning(EXAMPLES / f"{name}.pag", "--no-look", "--no-screws")
     assert done.status == 0, done.err
     checked = run("check", done.json["pag"], "--json").json
     assert checked["live"] and checked["approaches"]["blocked"] == 0
