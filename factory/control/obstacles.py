@@ -6,7 +6,7 @@ Both are kept for many modes at once; indices are those of the bundle's robots a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,7 +36,8 @@ class Gates:
     its own goal, 0 up to OPEN * eps and `standoff` from eps on.
 
     All (g,): the gated `robot`, its `gate`, `inner` = OPEN * eps [m] and the `width` of the step
-    beyond it, `standoff` [m], `mode`.
+    beyond it, `standoff` [m], `mode`; by how much the gate robot is off the place that is asked
+    about, `late` [m].
     """
 
     robot: Index
@@ -45,6 +46,7 @@ class Gates:
     width: Array
     standoff: Array
     mode: Index
+    late: Array | float = 0.0
 
     @classmethod
     def of(cls, modes: Sequence[Mode], starts: Index) -> Gates:
@@ -66,6 +68,10 @@ class Gates:
         robot, gate = self.robot[at] + moved, self.gate[at] + moved
         return Gates(robot, gate, self.inner[at], self.width[at], self.standoff[at], mode)
 
+    def of_late(self, late: Array) -> Gates:
+        """The same for robots (n,) that are off the places that are asked about [m]."""
+        return replace(self, late=late[self.gate])
+
     def opens(self, before: Array, after: Array) -> bool:
         """Whether any gate begins to open between two `offset`s [m] of the robots from their
         goals."""
@@ -80,10 +86,10 @@ class Gates:
         """dtau / dx_gate (g,)."""
         z = self._phase(offset)
         steepness = self.standoff / self.width * (30.0 * (z * (1.0 - z)) ** 2)
-        return np.asarray(steepness * np.sign(offset[self.gate]))
+        return np.asarray(steepness * np.sign(offset[self.gate] + self.late))
 
     def _phase(self, offset: Array) -> Array:
-        z = np.abs(offset.take(self.gate))
+        z = np.abs(offset.take(self.gate) + self.late)
         z -= self.inner
         z /= self.width
         np.maximum(z, 0.0, out=z)

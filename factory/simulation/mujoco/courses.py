@@ -2,8 +2,8 @@
 
 Within a course a reference depends on no measurement, so it is planned once and then followed, in
 one call of the engine or tick by tick, with the same result. A course ends where a gate would open,
-and the next begins with what was measured of robots that are off their references (`Motion`): so
-what waits at a gate waits for the robot, not for its reference.
+and in the next the gate stays closed if its robot is off its reference (`Motion`): what waits at a
+gate waits for the robot.
 """
 
 from __future__ import annotations

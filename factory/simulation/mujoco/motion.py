@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -171,15 +172,12 @@ class Motion:
                 self.outfeed.follower.course = None
 
     def _plan(self, bundle: Bundle) -> None:
-        """The next stride of the active modes, each robot with the payload of its operation. The
-        reference of a robot that is off it begins anew where the robot is, and no faster than
-        either, so that it can still stop at its goal."""
+        """The next stride of the active modes, each robot with the payload of its operation."""
         axes, robots = self.active, self.robots
-        off = axes[self.axes.off(self._d, robots.x)[axes] > AHEAD]
-        if len(off):
-            x, v = (measured[off] for measured in self.axes.measured(self._d))
-            robots.x[off] = x
-            robots.v[off] = robots.v[off].clip(np.minimum(v, 0.0), np.maximum(v, 0.0))
+        late = self.axes.measured(self._d)[0][axes] - robots.x[axes]
+        late[np.abs(late) <= AHEAD] = 0.0
+        if late.any():
+            bundle = replace(bundle, gates=bundle.gates.of_late(late))
         self._begin(robots, axes, self._course(bundle, robots.x[axes], robots.v[axes]))
 
     def _begin(self, follower: Follower, axes: Index, course: Course) -> None:
