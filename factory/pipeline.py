@@ -24,7 +24,6 @@ from factory.plant.factory import Factory
 from factory.problem.pag import PAG
 from factory.problem.plan import Plan
 from factory.problem.robot_types import Catalogue, load_catalogue
-from factory.problem.shapes import is_plain, is_shaped
 from factory.problem.template import Template
 from factory.support.errors import Diagnostic, InputError
 from factory.support.resources import templates_folder
@@ -175,7 +174,7 @@ class Project:
     @cached_property
     def matings(self) -> Matings | None:
         """What was found of how its inputs come together; None for a product of default boxes."""
-        if not is_shaped(self.pag):
+        if not self.pag.is_shaped:
             return None
         if self.pag.mix is not None:
             from factory.compiler.mating.findings import together
@@ -192,7 +191,7 @@ class Project:
         """Which parts overlap in the finished product; none of default boxes."""
         from factory.geometry.overlapping import DrawnOverlaps, overlaps_of
 
-        if not is_shaped(self.pag):
+        if not self.pag.is_shaped:
             return DrawnOverlaps()
         return overlaps_of(self.product, *(self.pag.insides if self.pag.mix else ()))
 
@@ -200,11 +199,11 @@ class Project:
     def warnings(self) -> tuple[Diagnostic, ...]:
         """What is wrong with the geometry of its parts, what overlaps, what is blocked, and what no
         hand can hold, unless the product is of an unlikely size."""
-        product = () if is_plain(self.pag) else self.product.warnings
+        product = () if self.pag.is_plain else self.product.warnings
         blocked = self.matings.faults(self.pag.allowed) if self.matings else ()
         sized = any(warning.code == "Size" for warning in product)
         grips = () if sized else tuple(no_grip.warning() for no_grip in self.no_grips)
-        overlaps = self.overlaps.faults(self.pag.allowed) if is_shaped(self.pag) else ()
+        overlaps = self.overlaps.faults(self.pag.allowed) if self.pag.is_shaped else ()
         return (*product, *overlaps, *blocked, *grips)
 
     @cached_property
@@ -223,7 +222,7 @@ class Project:
     @cached_property
     def no_grips(self) -> tuple[NoGrip, ...]:
         """What no hand can hold, where hands are chosen; nothing for a product of default boxes."""
-        if not is_shaped(self.pag) or self._hands is None:
+        if not self.pag.is_shaped or self._hands is None:
             return ()
         from factory.layout.hands.nearest import no_grips
 
@@ -283,7 +282,7 @@ class Project:
         factory = compile_pag(
             self.pag, self.templates, self.catalogue, self.approaches, self._single
         )
-        check_shapes(factory, is_shaped(self.pag))
+        check_shapes(factory, self.pag.is_shaped)
         users = {name for name, template in self.templates.items() if not _is_shipped(template)}
         tried = users and users & {operation.template.name for operation in factory.operations}
         if tried:

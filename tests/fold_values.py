@@ -12,7 +12,6 @@ from factory.compiler.assigning import gear_net
 from factory.compiler.compiler import compile_pag
 from factory.compiler.folding import (
     Line,
-    delivery,
     fold,
     folded,
     line_of,
@@ -77,7 +76,7 @@ def random_lines(factory: Factory, rng: random.Random) -> list[Line]:
     one line, in different operations, and one type of robot is fit for them."""
     kids: dict[int, list[int]] = {robot.index: [] for robot in factory.robots}
     for robot in factory.robots[1:]:
-        kids[delivery(factory, robot.index).carrier].append(robot.index)
+        kids[factory.last(robot.index).carrier].append(robot.index)
     lines: list[Line] = [(0,)]
     apart = rng.choice((0.0, 0.1, 0.4))
     for line in lines:
@@ -98,7 +97,7 @@ def deputies(factory: Factory, lines: list[Line]) -> list[tuple[Line, Line]]:
     """The pairs of lines that one robot could serve: they deliver to one line, never in the same
     operation."""
     on = line_of(len(factory.robots), lines)
-    to = {line: on[delivery(factory, line[0]).carrier] for line in lines if line[0]}
+    to = {line: on[factory.last(line[0]).carrier] for line in lines if line[0]}
     return [
         (one, other)
         for one, other in combinations(to, 2)
@@ -110,7 +109,7 @@ def _fits(factory: Factory, group: list[int], kid: int) -> bool:
     robots = factory.robots
     return all(
         catalogue().meet(robots[other].type, robots[kid].type) is not None
-        and delivery(factory, other).index != delivery(factory, kid).index
+        and factory.last(other).index != factory.last(kid).index
         for other in group
     )
 
@@ -153,7 +152,7 @@ def lines_of_one_side(factory: Factory, known: Catalogue, rng: random.Random) ->
     lines: list[Line] = [(0,)]
     for line in lines:
         groups: list[list[int]] = []
-        below = (r.index for r in factory.robots[1:] if delivery(factory, r.index).carrier in line)
+        below = (r.index for r in factory.robots[1:] if factory.last(r.index).carrier in line)
         for kid in below:
             on = line_of(len(factory.robots), lines)
             fitting = (group for group in groups if _shares(factory, group, kid, on, known))
@@ -182,7 +181,7 @@ def _shares(
     sides = (sides_of(factory, robot) for robot in (*group, kid))
     return bool(set.intersection(*sides)) and all(
         not mismatch(factory, other, kid, on, known)
-        and delivery(factory, other).index != delivery(factory, kid).index
+        and factory.last(other).index != factory.last(kid).index
         for other in group
     )
 

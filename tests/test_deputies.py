@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from factory.compiler import taking_over
 from factory.compiler.deputies import MOST, Siblings, deputies, moved_to
-from factory.compiler.folding import Line, delivery, fold
+from factory.compiler.folding import Line, fold
 from factory.compiler.parallel import in_parallel
 from factory.compiler.taking_over import Takeover, taken_over
 from factory.nets.marked import marked
@@ -27,7 +27,6 @@ from factory.nets.verify import verify
 from factory.pipeline import read
 from factory.plant.approaches import Approach
 from factory.plant.factory import Factory
-from factory.plant.material import joins_of
 from factory.problem.pag import NOPART
 from factory.problem.robot_types import Catalogue, load_catalogue
 from factory.support.errors import InputError, RunError
@@ -98,7 +97,7 @@ def test_they_are_the_folds(seed: int, rng: random.Random) -> None:
     found = deputies(folded, catalogue())
     tours = tours_of(base, folded)
     for dead, deputy in permutations(range(1, len(folded.robots)), 2):
-        kids = [r for r in folded.robots[1:] if delivery(folded, r.index).carrier == dead]
+        kids = [r for r in folded.robots[1:] if folded.last(r.index).carrier == dead]
         admitted = not kids and folds(base, tours, dead, deputy)
         assert (deputy in found[dead]) == admitted
         if not admitted:
@@ -110,7 +109,7 @@ def tours_of(base: Factory, folded: Factory) -> list[Line]:
     """For each robot of a fold the robots of the factory before that it stands for."""
     found: list[list[int]] = [[] for _ in folded.robots]
     for robot in base.robots:
-        last = delivery(base, robot.index)
+        last = base.last(robot.index)
         there = folded.operations[last.index].robots[last.robots.index(robot.index)]
         found[there].append(robot.index)
     return [tuple(line) for line in found]
@@ -293,7 +292,7 @@ def check_exchange(factory: Factory, dead: int, deputy: int, rng: random.Random)
     begun = marking_after(takeover.after.net, after)
     onward = fair_run(takeover.after.net, begun, 20, rng)
     entries: list[Entry] = [*(names[e] for e in record), undone, *(names[e] for e in onward)]
-    found = replay(factory.net, entries, None, joins_of(factory), (takeover.after.net,))
+    found = replay(factory.net, entries, None, factory.joins, (takeover.after.net,))
     assert (found.refines, found.reason) == (True, "")
     counts = [count + onward.count(event) for event, count in enumerate(after)]
     assert found.marking == marking_after(takeover.after.net, counts)

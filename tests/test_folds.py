@@ -16,7 +16,6 @@ import pytest
 from factory.compiler import folding
 from factory.compiler.folding import (
     Line,
-    delivery,
     fold,
     folded,
     kept_apart,
@@ -544,12 +543,12 @@ def apart(factory: Factory, lines: list[Line]) -> dict[tuple[str, str], str]:
     heads: dict[int, list[int]] = {}
     for line in sorted(lines)[1:]:
         if factory.robots[line[0]].type != "tool":
-            heads.setdefault(on[delivery(factory, line[0]).carrier], []).append(line[0])
+            heads.setdefault(on[factory.last(line[0]).carrier], []).append(line[0])
     for one, other in (pair for group in heads.values() for pair in pairwise(group)):
         both = tuple(robot for robot in range(len(on)) if on[robot] in (one, other))
         rest = [line for line in lines if line[0] not in both]
         reason = refusal(factory, [*rest, both])
-        if reason and delivery(factory, one) is not delivery(factory, other):
+        if reason and factory.last(one) is not factory.last(other):
             found[brought(factory, one), brought(factory, other)] = reason
     return found
 
@@ -568,7 +567,7 @@ def refusal(factory: Factory, lines: list[Line]) -> str:
 
 def brought(factory: Factory, robot: int) -> str:
     """What a robot brings, in quotes."""
-    last = delivery(factory, robot)
+    last = factory.last(robot)
     return f"'{last.before[last.robots.index(robot)]}'"
 
 

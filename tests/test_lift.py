@@ -149,7 +149,7 @@ def test_it_is_lowered_only_when_all_others_stand() -> None:
     layout = laid_out_with_lifts(FENCE)
     factory = layout.factory
     robot = next(iter(factory.strokes))
-    last = factory.operations[factory.robots[robot].operations[-1]]
+    last = factory.last(robot)
     simulation = Simulation(layout, RunRequest(units=1))
     goals = np.array(layout.goals(last.index)[: len(last.robots)])
     seen = []

@@ -19,7 +19,6 @@ import pytest
 from benches.faults.takeovers import PAPER as INSERTS
 from factory.nets.replay import replay
 from factory.nets.undone import Undone
-from factory.plant.material import joins_of
 from factory.record.state import State
 from factory.show.live import Server
 from factory.show.live.commands import FAULTS, KEYS, LASTS, Command, command_of
@@ -230,7 +229,7 @@ def test_a_session_tells_what_failed_and_begins_anew(running: Running) -> None:
     events = session.simulation.supervisor.events
     entry = next(e for e in events if isinstance(e, Undone))
     assert len(undone[0]) == len(entry.transitions)
-    net, joins = paper_layout().factory.net, joins_of(paper_layout().factory)
+    net, joins = paper_layout().factory.net, paper_layout().factory.joins
     assert replay(net, entries_of([*events]), joins=joins).refines
     send(Command("restart"))
     running.until(lambda f: f.run == 1 and not f.outages.standing and f.time > 0.1)

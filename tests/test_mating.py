@@ -40,7 +40,6 @@ from factory.geometry.solids import Product
 from factory.lang import read_pag
 from factory.pipeline import all_templates
 from factory.problem.pag import PAG
-from factory.problem.shapes import is_shaped
 from factory.problem.template import Template
 from factory.support.errors import Diagnostic
 from tests.command_line import Terminal
@@ -323,7 +322,7 @@ def test_default_boxes_always_slide(pag: PAG) -> None:
     """Theorem: neighbouring intervals of the path to and fro go ahead of each other."""
     plain = tuple(n if n.inputs else replace(n, parameters=()) for n in pag.nodes)
     bare = replace(pag, nodes=plain)
-    assert not is_shaped(bare)
+    assert not bare.is_shaped
     found = matings(expand(bare, TEMPLATES), product_geometry(bare))
     assert all(m.approach.kind == "slide" and m.level == STRICT for m in found.all)
 

@@ -66,7 +66,6 @@ def test_the_papers_example_is_read_as_it_stands() -> None:
 def test_everything_knows_where_it_came_from() -> None:
     node = read(PAPER)["sub3"]
     assert str(node.position) == "test.pag:3:1"
-    assert str(node.operation_position) == "test.pag:3:8"
     assert [at.column for at in node.input_positions] == [15, 21]
     assert node.position is not None
     assert node.position.text.startswith("sub3 = mate ( sub2, part3 ); // how")

@@ -355,7 +355,7 @@ def hands_of(name: str, *branches: tuple[str, int]) -> dict[tuple[object, ...], 
     hands = Hands(factory, repeated(example.product, factory))
     found: dict[tuple[object, ...], list[Hand | None]] = {}
     for robot, tours in enumerate(hands.tours.of):
-        first = factory.operations[factory.robots[robot].operations[0]].written
+        first = factory.first(robot).written
         for u, t in hands.holding.frames(tours[0]):
             hand = hands.hand(robot, u, t)
             same = replace(hand, covered=hand.covered[:1]) if hand else None

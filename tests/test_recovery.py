@@ -18,7 +18,6 @@ from factory.nets.undo import undo
 from factory.nets.undone import Undone
 from factory.pipeline import read
 from factory.plant.factory import Factory
-from factory.plant.material import joins_of
 from factory.problem.template import Failure
 from factory.record.failures import Failures
 from factory.simulation.mujoco.failing.plant import MujocoPlant, Senses
@@ -372,7 +371,7 @@ def test_one_transition_too_few_undone_is_refused(monkeypatch: pytest.MonkeyPatc
 
 def replays(made: Factory, events: Any) -> bool:
     """Whether a record is a run of the net."""
-    return replay(made.net, entries_of(events), None, joins_of(made)).refines
+    return replay(made.net, entries_of(events), None, made.joins).refines
 
 
 BLIND: dict[str, tuple[type, str, Any, str]] = {

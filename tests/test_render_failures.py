@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from factory.mjcf.replica import Replica
 from factory.nets.undo import marking_after, undo
 from factory.nets.undone import Undone
-from factory.plant.material import joins_of
 from factory.record.failures import Death, Failing
 from factory.record.log import Log
 from factory.record.log.model import model_of
@@ -98,7 +97,7 @@ def test_after_any_undo_it_is_at_the_marking_of_the_counts(subject, data) -> Non
         done = [event for event, times in enumerate(fired) if times]
         if done and data.draw(st.integers(0, 4)) == 0:
             asked = data.draw(st.sampled_from(done))
-            after = undo(net, fired, (asked,), joins_of(factory))
+            after = undo(net, fired, (asked,), factory.joins)
             what = time, "sub1", "lost"
             history.add(time, Undone.between(net, what, (asked,), fired, after))
             fired, now = [*after], marking_after(net, after)

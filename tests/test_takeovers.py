@@ -25,7 +25,6 @@ from factory.nets.replay import replay
 from factory.nets.undone import Undone
 from factory.nets.verify import verify
 from factory.pipeline import read
-from factory.plant.material import joins_of
 from factory.record.log import read_log
 from factory.record.monitor.record import verdict_on
 from factory.simulation.recovery import Campaign, WorldFault, recover
@@ -144,7 +143,7 @@ def test_all_units_are_made(dead: str, deputy: str, at: float) -> None:
     factory = laid_out().factory
     nets = [*nets_after(factory, entries)]
     assert [net == change.net for net in nets] == [True]
-    assert not replay(factory.net, entries, None, joins_of(factory), ()).refines
+    assert not replay(factory.net, entries, None, factory.joins, ()).refines
     busy = dict(zip((r.name for r in factory.robots), run.busy, strict=True))
     assert busy[dead] < change.t < run.sim_time_s
 
@@ -214,7 +213,7 @@ def test_other_counts_are_refused(times: int, monkeypatch: pytest.MonkeyPatch) -
     assert entry.transitions
     names = (*entry.transitions, "part2_e") if times > 0 else entry.transitions[1:]
     entries[at] = replace(entry, transitions=names)
-    verdict = replay(factory.net, entries, None, joins_of(factory), nets)
+    verdict = replay(factory.net, entries, None, factory.joins, nets)
     assert not verdict.refines and verdict.index == at and "takes back" in verdict.reason
 
 

@@ -18,7 +18,6 @@ from factory.nets.petri import Marking
 from factory.nets.undo import exchange, marking_after, tokens_after, undo
 from factory.nets.undone import Joins, Undone
 from factory.plant.factory import Factory
-from factory.plant.material import joins_of
 from factory.problem.pag import NOPART
 from tests.fold_values import deputies, inserted, plain, random_fold, random_lines, three_robots
 from tests.net_values import fair_run, random_marked_net
@@ -69,7 +68,7 @@ def test_it_is_the_greatest(seed: int, rng: random.Random) -> None:
     factory = random_fold(seed, 3)
     size = 2 * len(factory.operations)
     fired = fired_by(factory, rng.randint(1, 14 if size > 6 else 20), rng)
-    net, made, asked = marked(factory.net), joins_of(factory), some_asked(fired, rng)
+    net, made, asked = marked(factory.net), factory.joins, some_asked(fired, rng)
     assert undo(net, fired, asked, made) == brute(net, fired, asked, made)
     assert exchange(net, fired, asked, made) == brute(net, fired, asked, made)
 
@@ -98,10 +97,10 @@ def test_what_cannot_be_undone() -> None:
     factory = factory_of(paper())
     nothing = [0] * len(factory.net.threaded.transitions)
     with pytest.raises(ValueError, match="part2_s is to be undone 1 times, and has fired 0"):
-        undo(factory.net, nothing, (factory.by_label["part2"].start,), joins_of(factory))
+        undo(factory.net, nothing, (factory.by_label["part2"].start,), factory.joins)
     with pytest.raises(ValueError, match="no transition is asked"):
-        undo(factory.net, nothing, (), joins_of(factory))
-    assert exchange(factory.net, nothing, (), joins_of(factory)) == tuple(nothing)
+        undo(factory.net, nothing, (), factory.joins)
+    assert exchange(factory.net, nothing, (), factory.joins) == tuple(nothing)
 
 
 # --- Theorem 5, at every marking -----------------------------------------------------------------
@@ -165,7 +164,7 @@ def test_every_failure_at_every_marking(
         least = firings(factory.net, marking)
         fired = tuple(least[event] + 3 for event in range(len(least)))
         for asked in failures(factory, fired):
-            after = undo(net, fired, asked, joins_of(factory))
+            after = undo(net, fired, asked, factory.joins)
             assert marking_after(net, after) in seen
             assert wanting(factory, fired, after, asked) == []
             bad += bool(wanting(factory, fired, undo(net, fired, asked, {})))
@@ -179,7 +178,7 @@ def test_undos_of_folds(seed: int, rng: random.Random) -> None:
     """The marking is reached by firing so often, nothing is stuck there, and no robot is asked to
     hold what it had not; so again for a second failure."""
     factory = random_fold(seed, 16)
-    net, made = marked(factory.net), joins_of(factory)
+    net, made = marked(factory.net), factory.joins
     fired = fired_by(factory, rng.randint(1, 8 * len(factory.operations)), rng)
     for _ in range(2):
         every = [*failures(factory, fired)]
@@ -207,7 +206,7 @@ def test_how_often_each() -> None:
     names = [t.name for t in factory.net.threaded.transitions]
     twice, once = {"part1_s", "part1_e"}, {"part2_s", "part2_e", "sub1_s", "sub1_e"}
     fired = tuple(2 * (name in twice) + (name in once) for name in names)
-    after = undo(factory.net, fired, (factory.by_label["sub1"].end,), joins_of(factory))
+    after = undo(factory.net, fired, (factory.by_label["sub1"].end,), factory.joins)
     undone = Undone.between(factory.net, (1.0, "sub1", "lost"), (), fired, after)
     assert sorted(undone.transitions) == sorted(twice | once)
 
@@ -225,8 +224,8 @@ def test_exchanges(seed: int, rng: random.Random) -> None:
     fired = fired_by(old, rng.randint(1, 8 * len(old.operations)), rng)
     every: list[tuple[int, ...]] = [(), *failures(old, fired)]
     asked = rng.choice(every)
-    made = joins_of(new)
-    assert made == joins_of(old)
+    made = new.joins
+    assert made == old.joins
     after = exchange(new.net, fired, asked, made)
     check_reached(marked(new.net), after)
     assert all(after[event] < fired[event] for event in asked)
@@ -255,7 +254,7 @@ def test_deputies(seed: int, rng: random.Random) -> None:
     brought = {label for tour in dead for label in base.deliveries(tour)}
     gone = next(r.index for r in old.robots if {*old.deliveries(r.index)} == brought)
     asked = [old.by_label[had[gone]].end] if had[gone] != NOPART else []
-    after = exchange(new.net, fired, asked, joins_of(new))
+    after = exchange(new.net, fired, asked, new.joins)
     check_reached(marked(new.net), after)
     for robot, label in held(new, marking_after(new.net, after)).items():
         if label != NOPART:

@@ -15,7 +15,6 @@ from factory.nets.replay import ReplayVerdict, replay
 from factory.nets.undo import exchange, marking_after, tokens_after, undo
 from factory.nets.undone import Entry, Joins, Undone, lasting
 from factory.plant.factory import Factory
-from factory.plant.material import joins_of
 from tests.fold_values import inserted, plain, random_fold, random_lines, three_robots
 from tests.net_values import random_legal_marking
 from tests.pag_values import SHAPES, catalogue, factory_of, paper, random_pag
@@ -53,7 +52,7 @@ class Story:
         every = [*failures(self.factory, self.fired)]
         if every:
             asked = self.rng.choice(every)
-            after = undo(self.factory.net, self.fired, asked, joins_of(self.factory))
+            after = undo(self.factory.net, self.fired, asked, self.factory.joins)
             self._note(asked, after, False)
         return bool(every)
 
@@ -62,7 +61,7 @@ class Story:
         asked = self.rng.choice(every)
         self.factory = factory
         self.nets.append(factory.net)
-        self._note(asked, exchange(factory.net, self.fired, asked, joins_of(factory)), True)
+        self._note(asked, exchange(factory.net, self.fired, asked, factory.joins), True)
 
     def _note(self, asked: tuple[int, ...], after: tuple[int, ...], exchanged: bool) -> None:
         what = 0.0, "x", "lost"
@@ -73,7 +72,7 @@ class Story:
 
 
 def judged(story: Story, first: Factory) -> ReplayVerdict:
-    return replay(first.net, story.entries, None, joins_of(first), story.nets)
+    return replay(first.net, story.entries, None, first.joins, story.nets)
 
 
 def story_of(factory: Factory, rng: random.Random) -> Story:
@@ -110,7 +109,7 @@ def test_a_run_that_began_elsewhere(seed: int, rng: random.Random) -> None:
     story.run(rng.randint(0, 6))
     assume(story.fail())
     story.run(6)
-    found = replay(factory.net, story.entries, start, joins_of(factory))
+    found = replay(factory.net, story.entries, start, factory.joins)
     assert (found.refines, found.reason) == (True, "")
     assert found.marking == marking_after(factory.net, story.fired)
 
@@ -163,18 +162,18 @@ def test_an_undo_without_the_material_rule_is_refused() -> None:
     factory = factory_of(paper())
     names = ["part1_s", "part1_e", "part2_s", "part2_e", "sub1_s", "sub1_e"]
     undone = Undone(1.0, "sub1", "lost", ("sub1_e",), ("sub1_e",))
-    found = replay(factory.net, [*names, undone], None, joins_of(factory))
+    found = replay(factory.net, [*names, undone], None, factory.joins)
     assert (found.refines, found.index) == (False, 6)
     words = "the undo of sub1 takes back part1_e 0 times, where 1 is the least"
     assert found.reason == words
     assert {factory.net.threaded.places[p].name for p in found.marking} >= {"r3:sub1"}
     right = replace(undone, transitions=tuple(names))
-    assert replay(factory.net, [*names, right], None, joins_of(factory)).refines
+    assert replay(factory.net, [*names, right], None, factory.joins).refines
 
 
 def test_the_reasons() -> None:
     factory = three_robots()
-    made = joins_of(factory)
+    made = factory.joins
     undone = Undone(0.0, "part1", "lost", ("part1_s",), ("part1_s",))
 
     def reason(entry: Undone, material: Joins | None = made, nets: tuple[GearNet, ...] = ()) -> str:

@@ -15,7 +15,6 @@ from factory.commands.options import HANDS, OUTPUT, PATH, RELAY, SOURCE, WIP
 from factory.commands.outputs import for_a_pag, writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced, say_allowed
-from factory.problem.shapes import is_shaped
 from factory.support.collector import collector_paused
 from factory.support.console import emit, say, table
 from factory.support.files import is_net
@@ -205,7 +204,7 @@ def _by_property(faults: Sequence[Witness]) -> list[list[Witness]]:
 
 def _has_places(project: Project) -> bool:
     """Whether the layout matters for the check: parts have shapes, or robots have several tours."""
-    return is_shaped(project.pag) or bool(project.plan.turns)
+    return project.pag.is_shaped or bool(project.plan.turns)
 
 
 def _describe_approaches(matings: Matings, allowed: Sequence[AllowedOverlap]) -> None:

@@ -12,7 +12,7 @@ whatever is assigned (Theorem 2). Which assignments robots can do, where they st
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from itertools import accumulate
 
@@ -187,23 +187,33 @@ def shared(base: Factory, plan: Plan, catalogue: Catalogue) -> Factory:
                 raise _bad(f"nobody does some of the tours of '{base.products[o.turn]}' in a turn")
             if NOBODY not in does and len(does) < len(o.robots):
                 raise _bad(f"a robot cannot take two parts in '{o.label}'")
-    types, first = dict[int, str](), dict[int, Robot]()
-    for tour in tours:
-        base_robot = base.robots[tour]
-        for robot in dict.fromkeys(turn[tour] for turn in plan.turns if turn[tour] != NOBODY):
-            first.setdefault(robot, base_robot)
-            kind = types.setdefault(robot, base_robot.type)
-            types[robot] = catalogue.meet(kind, base_robot.type) or kind
-    if len(types) < len(every):
-        raise _bad(f"{len(every)} robots are named, and {len(types)} have tours")
+    busy = {robot for turn in plan.turns for robot in turn} - {NOBODY}
+    if len(busy) < len(every):
+        raise _bad(f"{len(every)} robots are named, and {len(busy)} have tours")
     lifts = plan.lifts or frozenset()
     if lifts - {*every}:
         raise _bad(f"r{max(lifts) + 1} has a lift, and there are {len(every)} robots")
-    for robot in lifts:
-        types[robot] = catalogue.meet(types[robot], LIFT) or LIFT
-    robots = [replace(first[n], index=n, name=f"r{n + 1}", type=types[n]) for n in every]
-    made = assigned(base, robots, plan.turns)
+    made = with_crew(base, plan.turns, catalogue, lifts)
     return named(replace(made, plan=plan, adjusted=lifts), plan.names)
+
+
+def with_crew(
+    base: Factory,
+    turns: Sequence[Sequence[int]],
+    catalogue: Catalogue,
+    lifts: Collection[int] = (),
+) -> Factory:
+    """The factory in which in turn t robot `turns[t][r]` of a crew r1, r2, ... does the tours of
+    robot r of `base`. The type of each fits all its tours, and has a lift for those of `lifts`."""
+    crew = dict[int, Robot]()
+    for tour, robot in enumerate(base.robots):
+        for n in dict.fromkeys(turn[tour] for turn in turns if turn[tour] != NOBODY):
+            kind = crew[n].type if n in crew else robot.type
+            kind = catalogue.meet(kind, robot.type) or kind
+            crew[n] = replace(crew.get(n, robot), index=n, name=f"r{n + 1}", type=kind)
+    for n in lifts:
+        crew[n] = replace(crew[n], type=catalogue.meet(crew[n].type, LIFT) or LIFT)
+    return assigned(base, [crew[n] for n in sorted(crew)], turns)
 
 
 def named(factory: Factory, names: Sequence[str]) -> Factory:

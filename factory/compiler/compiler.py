@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cache
 from types import MappingProxyType
 
 from factory.compiler.assigning import beside, gear_net
@@ -21,7 +20,7 @@ from factory.plant.factory import Factory, Operation, Robot
 from factory.problem.pag import NOPART, PAG
 from factory.problem.plan import AS_WRITTEN, Plan
 from factory.problem.robot_types import LIFT, Catalogue
-from factory.problem.template import Template, variable_number
+from factory.problem.template import Template
 from factory.support.collector import collector_paused
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 
@@ -163,7 +162,8 @@ class _Draft:
     def _operation(self, node: Node, carrier: int) -> Operation:
         """The instance of a node's template, with its new robots."""
         template, approach = node.template, self.approaches.get(node.label)
-        before = tuple(NOPART if i < 0 else node.inputs[i] for i in _arguments(template.before))
+        taken = dict(zip(template.inputs, node.inputs, strict=True))
+        before = tuple(taken.get(variable, NOPART) for variable in template.before)
         self._claim_carrier(node, carrier)
         return Operation(
             len(self.operations),
@@ -223,10 +223,3 @@ class _Draft:
         hint = "let the template ask for a 'dot', or the type extend 'lift'"
         self.troubles.append(Diagnostic("TypeMismatch", message, node.position, hint))
         return wanted
-
-
-@cache
-def _arguments(before: tuple[str, ...]) -> tuple[int, ...]:
-    """For each label of a template's a the index of its input, -1 for nopart."""
-    variables = sorted({*before} - {NOPART}, key=variable_number)
-    return tuple(-1 if label == NOPART else variables.index(label) for label in before)

@@ -24,7 +24,7 @@ from itertools import islice, pairwise, permutations
 from types import MappingProxyType
 
 from factory.compiler.assigning import assigned
-from factory.compiler.folding import delivery, kind_of, mismatch, sides_at
+from factory.compiler.folding import kind_of, mismatch, sides_of
 from factory.plant.factory import Factory
 from factory.problem.robot_types import Catalogue
 from factory.support.errors import Diagnostic, InputError
@@ -93,13 +93,7 @@ class Siblings:
     @cached_property
     def _sides(self) -> list[frozenset[int]]:
         """For each robot the sides from which it may come on all its tours."""
-        operations = self.factory.operations
-        return [
-            frozenset.intersection(
-                *(frozenset(sides_at(operations[number], robot)) for number in numbers)
-            )
-            for robot, numbers in enumerate(self._deliveries)
-        ]
+        return [frozenset(sides_of(self.factory, r.index)) for r in self.factory.robots]
 
     def ascends(self, program: Sequence[int]) -> bool:
         """Whether a program ascends in the postorder of the operations, the witness of liveness."""
@@ -195,7 +189,7 @@ class Siblings:
         return dead, deputy
 
     def _carrier(self, robot: int) -> int:
-        return delivery(self.factory, robot).carrier
+        return self.factory.last(robot).carrier
 
     def _signature(self, robot: int) -> tuple[str, ...]:
         """What robots in twins have in common: their type, and what they do, but for the unit."""
@@ -212,7 +206,7 @@ def chosen_pairs(factory: Factory, deputies: Sequence[Sequence[int]]) -> tuple[P
     delivers: branches that a twin takes over as a whole do not stand by. If possible two robots are
     each other's deputies, so that each must be fit for few tours."""
     mate: dict[int, int] = {}
-    to = [delivery(factory, robot.index).carrier for robot in factory.robots]
+    to = [factory.last(robot.index).carrier for robot in factory.robots]
     rows = [[r for r in row if to[r] == to[robot]] for robot, row in enumerate(deputies)]
     deputies = [() if robot in to else row for robot, row in enumerate(rows)]
     for robot, row in enumerate(deputies):

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from factory.plant.factory import Factory
-from factory.problem.pag import PAG, Assembly
+from factory.problem.pag import NOPART, PAG, Assembly
 from factory.problem.plan import AS_WRITTEN, THIRD, Plan
-from factory.problem.template import Template, variable_number
+from factory.problem.template import Template
 from factory.support.errors import Position
 
 RELAY = "relay"
@@ -36,6 +36,12 @@ class Node:
     position: Position | None
     last: Position | None = None
 
+    @property
+    def held(self) -> int:
+        """The number of the input that the carrier holds before the operation, -1 for none."""
+        held = self.template.held
+        return -1 if held == NOPART else self.template.inputs.index(held)
+
 
 def expand(pag: PAG, templates: Mapping[str, Template], plan: Plan = AS_WRITTEN) -> dict[str, Node]:
     """The operation instances by label, each after its inputs, the product last. Inputs beyond
@@ -56,10 +62,9 @@ def _brought(
 ) -> Iterator[str]:
     """The inputs of an operation, those that are not its carrier's after their hand-over by the
     template that it asks for (`x/pick` for x), which is added to the nodes unless it is written."""
-    variables = sorted(of.inputs, key=variable_number)
-    for variable, label in zip(variables, inputs, strict=False):
+    for variable, label in zip(of.inputs, inputs, strict=False):
         node, by = nodes[label], templates.get(of.brought)
-        if by is None or node.template is by or variable == of.before[of.carrier - 1]:
+        if by is None or node.template is by or variable == of.held:
             yield label
             continue
         name = f"{label}/{by.name}"
@@ -114,7 +119,7 @@ def nodes_of(factory: Factory) -> dict[str, Node]:
         o = factory.operations[number]
         if o.turn == 0:
             taken = dict(zip(o.template.before, o.before, strict=True))
-            inputs = tuple(taken[x] for x in sorted(o.template.inputs, key=variable_number))
+            inputs = tuple(taken[x] for x in o.template.inputs)
             size = 1 + sum(nodes[x].size for x in inputs)
             nodes[o.label] = Node(o.label, o.template, inputs, o.dwell, size, o.position)
     return _in_postorder(nodes, factory.products[0])

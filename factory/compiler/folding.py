@@ -20,10 +20,9 @@ Guarantees: the net is a gear train, live, safe and reversible. What is no fold 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
 from itertools import pairwise
 
-from factory.compiler.assigning import assigned
+from factory.compiler.assigning import with_crew
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
 from factory.problem.plan import Plan
@@ -50,22 +49,8 @@ def folded(factory: Factory, lines: Iterable[Line], catalogue: Catalogue) -> Fac
     """The factory with one robot for each of the `lines` of a fold, which is not checked, and for
     each robot on no line."""
     on = line_of(len(factory.robots), lines)
-    heads = sorted(set(on))
-    number = {head: n for n, head in enumerate(heads)}
-    tours: list[list[int]] = [[] for _ in heads]
-    for robot, head in enumerate(on):
-        tours[number[head]].append(robot)
-    robots = [
-        replace(
-            factory.robots[head],
-            index=n,
-            name=f"r{n + 1}",
-            type=_type(factory, line, catalogue),
-            operations=(),
-        )
-        for n, (head, line) in enumerate(zip(heads, tours, strict=True))
-    ]
-    return assigned(factory, robots, [[number[head] for head in on]])
+    number = {head: n for n, head in enumerate(sorted({*on}))}
+    return with_crew(factory, [[number[head] for head in on]], catalogue)
 
 
 def _tool_lines(factory: Factory, lines: Sequence[Line]) -> list[Line]:
@@ -75,9 +60,7 @@ def _tool_lines(factory: Factory, lines: Sequence[Line]) -> list[Line]:
     for robot in factory.robots[1:]:
         kind = kind_of(factory, robot.index)
         if kind[0] == "tool":
-            groups.setdefault((on[delivery(factory, robot.index).carrier], kind), []).append(
-                robot.index
-            )
+            groups.setdefault((on[factory.last(robot.index).carrier], kind), []).append(robot.index)
     return [tuple(tools) for tools in groups.values() if len(tools) > 1]
 
 
@@ -130,19 +113,6 @@ def lines_of_labels(factory: Factory, sides: Iterable[Sequence[str]]) -> tuple[L
     return tuple(lines)
 
 
-def delivery(factory: Factory, robot: int) -> Operation:
-    """The last operation of a tour, given by its robot."""
-    return factory.operations[factory.robots[robot].operations[-1]]
-
-
-def _type(factory: Factory, line: Sequence[int], catalogue: Catalogue) -> str:
-    """The type of robot that fits all tours of a line."""
-    kind = factory.robots[line[0]].type
-    for robot in line[1:]:
-        kind = catalogue.meet(kind, factory.robots[robot].type) or kind
-    return kind
-
-
 def line_faults(
     factory: Factory, line: Line, lines: Sequence[Line], catalogue: Catalogue
 ) -> Iterator[Diagnostic]:
@@ -176,9 +146,9 @@ def kept_apart(factory: Factory, lines: Sequence[Line], catalogue: Catalogue) ->
     heads: dict[int, list[int]] = {}
     for robot in dict.fromkeys(on[1:]):
         if kind_of(factory, robot)[0] != "tool":
-            heads.setdefault(on[delivery(factory, robot).carrier], []).append(robot)
+            heads.setdefault(on[factory.last(robot).carrier], []).append(robot)
     for one, other in (pair for group in heads.values() for pair in pairwise(group)):
-        if delivery(factory, one) is delivery(factory, other):
+        if factory.last(one) is factory.last(other):
             continue
         message = mismatch(factory, one, other, on, catalogue)
         tours = [robot for robot in range(len(on)) if on[robot] in (one, other)]
@@ -194,7 +164,7 @@ def mismatch(
 ) -> str:
     """The reason why two tours, given by their robots, cannot be on one line, "" if they can; `on`:
     the lines of all tours."""
-    ends = delivery(factory, one), delivery(factory, other)
+    ends = factory.last(one), factory.last(other)
     if 0 in (one, other):
         return "the output robot has a line of its own"
     if on[ends[0].carrier] != on[ends[1].carrier]:
@@ -210,12 +180,12 @@ def kind_of(factory: Factory, robot: int) -> tuple[object, ...]:
     """Kind of a tour, which is the same for all tours of a line: whether it begins at a feeder or
     takes inputs from two robots; whether it ends with an insertion, or with a carrier that takes
     its label; whether it lowers it. For tools, their template and their role in it."""
-    first = factory.operations[factory.robots[robot].operations[0]]
-    last = delivery(factory, robot)
+    first = factory.first(robot)
+    last = factory.last(robot)
     slot = last.robots.index(robot)
     if last.before[slot] == NOPART:
         return "tool", last.template.name, slot
-    fed, inserted = len(first.robots) == 1, last.before[last.template.carrier - 1] != NOPART
+    fed, inserted = len(first.robots) == 1, last.pile != NOPART
     if not fed and len(first.inputs) < 2:
         return "alone", robot
     return "fed" if fed else "taking", "inserted" if inserted else "taken", last.lowered == slot
@@ -223,7 +193,7 @@ def kind_of(factory: Factory, robot: int) -> tuple[object, ...]:
 
 def begun_by(factory: Factory, robot: int) -> list[int]:
     """The robots that bring the first inputs of a tour; none for a tour that begins at a feeder."""
-    first = factory.operations[factory.robots[robot].operations[0]]
+    first = factory.first(robot)
     return [other for other in first.robots if other != robot] if first.carrier == robot else []
 
 
@@ -243,7 +213,7 @@ def sides_at(o: Operation, robot: int) -> set[int]:
 
 
 def _named(factory: Factory, robot: int) -> str:
-    last = delivery(factory, robot)
+    last = factory.last(robot)
     label = last.before[last.robots.index(robot)]
     if label == NOPART:
         return f"the tool of '{last.written}'"

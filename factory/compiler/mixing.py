@@ -17,7 +17,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import permutations
 from typing import NamedTuple
 
-from factory.compiler.folding import begun_by, delivery, kind_of, sides_of
+from factory.compiler.folding import begun_by, kind_of, sides_of
 from factory.plant.factory import Factory
 from factory.problem.pag import NOPART, Mix
 from factory.problem.plan import NOBODY, Turns
@@ -100,7 +100,7 @@ def lowered_alike(products: Sequence[Factory]) -> dict[int, dict[str, str]]:
     """By products (index) whose output robot begins with two inputs that slide, where that of
     another begins with one that is lowered: the operation, and the input to be lowered there, so
     that one line with a lift can bring both."""
-    begins = [one.operations[one.robots[one.dropoff.carrier].operations[0]] for one in products]
+    begins = [one.first(one.dropoff.carrier) for one in products]
     model = next((first for first in begins if first.lowered >= 0), None)
     lowered_inputs = dict[int, dict[str, str]]()
     for number, first in enumerate(begins):
@@ -142,7 +142,7 @@ class _Begins:
 
     def key(self, robot: int, on: Sequence[int]) -> _Key:
         """The key of a robot's tour, whose carrier is on a line already."""
-        last = delivery(self.forest, robot)
+        last = self.forest.last(robot)
         if self.forest.drops(last.index):
             return _Key(-1, "product", None)
         onto, slot = on[last.carrier], last.robots.index(robot)
@@ -152,7 +152,7 @@ class _Begins:
             s for s, x in enumerate(last.before) if x != NOPART and last.robots[s] != last.carrier
         ]
         label = self._written(last.index, slot)
-        if last.before[last.template.carrier - 1] != NOPART or len(guests) != 2:
+        if last.pile != NOPART or len(guests) != 2:
             return _Key(onto, label, kind_of(self.forest, robot))
         one, other = self.sides.setdefault(onto, (set(), set()))
         first, second = (self._written(last.index, s) for s in guests)
@@ -176,7 +176,7 @@ def _fits(forest: Factory, tours: Sequence[int], catalogue: Catalogue) -> bool:
         if met is None:
             return False
         kind = met
-    deliveries = [delivery(forest, robot).index for robot in tours]
+    deliveries = [forest.last(robot).index for robot in tours]
     sides = set.intersection(*(sides_of(forest, robot) for robot in tours))
     return len(kinds) == 1 and len({*deliveries}) == len(deliveries) and bool(sides)
 
@@ -198,7 +198,7 @@ def _product_of(forest: Factory) -> Mapping[int, int]:
 def _fault(forest: Factory, robot: int) -> Diagnostic:
     """Why the output robot cannot begin the tours of two products."""
     here, there = robot, forest.dropoff.carrier
-    first, other = (forest.operations[forest.robots[r].operations[0]] for r in (here, there))
+    first, other = (forest.first(r) for r in (here, there))
     message = (
         f"'{first.written}' and '{other.written}' begin products on one robot, and their inputs"
         f" cannot come on the same two lines: {_ways_in(forest, here)}; {_ways_in(forest, there)}"
@@ -212,7 +212,7 @@ def _fault(forest: Factory, robot: int) -> Diagnostic:
 
 def _ways_in(forest: Factory, robot: int) -> str:
     """How the inputs come with which a tour begins, in words."""
-    first = forest.operations[forest.robots[robot].operations[0]]
+    first = forest.first(robot)
     return " and ".join(
         f"{forest.by_label[label].written} {'is lowered' if slot == first.lowered else 'slides'}"
         for slot, label in enumerate(first.before)

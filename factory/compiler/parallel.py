@@ -21,9 +21,9 @@ from dataclasses import replace
 from math import lcm
 
 from factory.compiler.assigning import assigned
-from factory.compiler.folding import delivery
-from factory.compiler.tees import ROOM, is_empty
+from factory.compiler.tees import ROOM
 from factory.plant.factory import Factory
+from factory.problem.pag import NOPART
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 from factory.support.settings import MOST_BRANCHES
 
@@ -40,7 +40,7 @@ def in_parallel(factory: Factory, branches: Branches) -> Factory:
     times = {_brings(factory, label): k for label, k in branches}
     lines: list[int] = []  # how many robots stand for each
     for robot in factory.robots:
-        above = lines[delivery(factory, robot.index).carrier] if lines else 1
+        above = lines[factory.last(robot.index).carrier] if lines else 1
         lines.append(above * times.get(robot.index, 1))
     period = lcm(*lines)
     if (units := period * factory.period) > MOST_BRANCHES:
@@ -99,9 +99,9 @@ def _within_tees(factory: Factory, several: Mapping[int, str]) -> Iterator[Diagn
     comes over a tee."""
     for robot, label in several.items():
         above = robot
-        while above and (above := delivery(factory, above).carrier) not in several:
+        while above and (above := factory.last(above).carrier) not in several:
             pass
-        if above in several and is_empty(delivery(factory, above)):
+        if above in several and factory.last(above).pile == NOPART:
             message = f"'{label}' is in the branch of '{several[above]}', which comes over a tee"
             position = factory.robots[robot].position
             yield _fault(message, position, "take more branches of one of the two")
@@ -129,13 +129,13 @@ def _not_inserted(factory: Factory, robot: int, k: int) -> Iterator[Diagnostic]:
         o = factory.operations[tour[-1]]
         label = o.before[o.robots.index(robot)]
         hint = f"write it with `insert`, '{label}' last: then there is a station for each branch"
-        if is_empty(o) and k > ROOM:
+        if o.pile == NOPART and k > ROOM:
             message = (
                 f"'{label}' comes to the start of a robot's path in '{o.label}', where there is"
                 f" room for {ROOM} branches, on a tee"
             )
             yield _fault(message, o.position, hint)
-        elif not is_empty(o) and len(o.robots) > 2:
+        elif o.pile != NOPART and len(o.robots) > 2:
             message = f"'{o.label}' takes '{label}' and other inputs at the same place"
             yield _fault(message, o.position, hint)
 

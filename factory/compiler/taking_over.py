@@ -22,7 +22,6 @@ from factory.nets.undo import exchange, marking_after
 from factory.nets.undone import Entry, Undone, exchanges
 from factory.nets.verify import proved
 from factory.plant.factory import Factory, Operation
-from factory.plant.material import joins_of
 from factory.problem.pag import NOPART
 from factory.problem.robot_types import Catalogue
 
@@ -56,7 +55,7 @@ class Takeover:
         net = self.after.net
         proved(net)
         asked = lost(self.before, fired, self.moved)
-        counts = exchange(net, fired, asked, joins_of(self.after))
+        counts = exchange(net, fired, asked, self.after.joins)
         at = _next(self.before, marking_after(self.before.net, fired), self.dead)
         what = t, at.label, "{} is dead, and {} takes its tours".format(*self.names)
         undone = Undone.between(net, what, asked, fired, counts, exchanged=True)

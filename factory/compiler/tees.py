@@ -17,8 +17,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from factory.compiler.assigning import gear_net
-from factory.compiler.folding import Line, delivery, line_faults, lines_of_labels
+from factory.compiler.assigning import assigned
+from factory.compiler.folding import Line, line_faults, lines_of_labels
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
 from factory.problem.plan import Plan
@@ -40,7 +40,7 @@ def heads(factory: Factory) -> tuple[int, ...]:
     for o in factory.making:
         alike.setdefault(o.written, []).append(o)
     for same in alike.values():  # carriers come before those that deliver to them
-        begins = len(same[0].robots) > 1 and is_empty(same[0])
+        begins = len(same[0].robots) > 1 and same[0].pile == NOPART
         firsts = dict[int, Operation]()
         for o in same:
             first = firsts.setdefault(head[o.carrier], o)
@@ -71,7 +71,7 @@ def _faults(factory: Factory, line: Line, labels: Sequence[str]) -> Iterator[Dia
         message = f"{names}: a stem has room for {ROOM} robots, each with a label of its own"
         yield Diagnostic("BadTee", message, None, HINT)
         return
-    ends = [delivery(factory, robot) for robot in line]
+    ends = [factory.last(robot) for robot in line]
     if ends[0] is ends[1]:
         message = f"{names} are both needed in '{ends[0].label}'"
         message += ": one stem has room for one at its end"
@@ -80,11 +80,6 @@ def _faults(factory: Factory, line: Line, labels: Sequence[str]) -> Iterator[Dia
     if factory.period > 1:
         message = f"{names} are brought by several robots in turn"
         yield Diagnostic("BadTee", message, ends[0].position, "leave out --parallel, or the tee")
-
-
-def is_empty(operation: Operation) -> bool:
-    """Whether the carrier of an operation holds nothing before it."""
-    return operation.before[operation.template.carrier - 1] == NOPART
 
 
 def on_stems(factory: Factory) -> tuple[Factory, tuple[int, ...]]:
@@ -96,31 +91,9 @@ def on_stems(factory: Factory) -> tuple[Factory, tuple[int, ...]]:
     kept = sorted({*head})
     number = {robot: n for n, robot in enumerate(kept)}
     place = tuple(number[robot] for robot in head)
-    programs: list[list[tuple[int, ...]]] = [[] for _ in kept]
-    for robot, tours in enumerate(factory.tours):
-        programs[place[robot]] += tours
-    when, operations = factory.postorder, factory.operations
-    robots = tuple(
-        replace(
-            factory.robots[robot],
-            index=n,
-            name=f"r{n + 1}",
-            operations=_in_turn(programs[n], operations, when),
-        )
-        for robot, n in number.items()
-    )
-    made = tuple(replace(o, robots=tuple(place[r] for r in o.robots)) for o in operations)
+    robots = [
+        replace(factory.robots[robot], index=n, name=f"r{n + 1}") for robot, n in number.items()
+    ]
     turns = tuple(tuple(place[robot] for robot in turn) for turn in factory.plan.turns)
     plan = replace(factory.plan, turns=turns, names=(), tees=())
-    stemmed = replace(
-        factory, robots=robots, operations=made, net=gear_net(robots, made), plan=plan
-    )
-    return stemmed, place
-
-
-def _in_turn(
-    tours: Sequence[tuple[int, ...]], operations: Sequence[Operation], when: Sequence[int]
-) -> tuple[int, ...]:
-    """The operations of tours unit by unit, in the order in which one is made."""
-    ordered = sorted(tours, key=lambda tour: (operations[tour[-1]].turn, when[tour[-1]]))
-    return tuple(number for tour in ordered for number in tour)
+    return replace(assigned(factory, robots, [place]), plan=plan), place

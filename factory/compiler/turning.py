@@ -8,13 +8,11 @@ with it: its joints, and the tools that work on it, are where they are in the pr
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from functools import cache
 
 from factory.compiler.expanding import Node
 from factory.plant.factory import Factory, Operation, Robot
 from factory.problem.pag import NOPART, PAG
 from factory.problem.robot_types import Catalogue
-from factory.problem.template import Template, variable_number
 from factory.support.errors import Diagnostic, InputError
 
 TURN = "turn"
@@ -55,8 +53,7 @@ def _hands_over(operation: Operation) -> bool:
 
 def _tools(operation: Operation) -> bool:
     """Whether a tool works in an operation, or its carrier brings what it keeps."""
-    template = operation.template
-    return bool(template.tools()) or template.before[template.carrier - 1] != NOPART
+    return bool(operation.template.tools()) or operation.template.held != NOPART
 
 
 def _placing(operation: Operation, label: str) -> str:
@@ -80,12 +77,13 @@ def _not_lowered(robots: Sequence[Robot], operations: Sequence[Operation]) -> It
 def check_shapes(factory: Factory, shaped: bool) -> None:
     """Raises InputError (Blocked) where a product whose parts are not `shaped` has fixed robots: of
     default boxes it is not known what can be lowered."""
-    labels = {r: factory.deliveries(r.index)[0] for r in factory.robots if r.fixed}
-    if labels and not shaped:
+    fixed = [robot for robot in factory.robots if robot.fixed and not shaped]
+    if fixed:
+        labels = (factory.deliveries(robot.index)[0] for robot in fixed)
         hint = "give parts shapes: box = ( 0.04, 0.02, 0.03 ), pos = ( 0, 0, 0.037 )"
         raise InputError(
-            Diagnostic("Blocked", f"'{label}' cannot be lowered: no part has a shape", at, hint)
-            for label, at in ((label, robot.position) for robot, label in labels.items())
+            Diagnostic("Blocked", f"'{x}' cannot be lowered: no part has a shape", r.position, hint)
+            for r, x in zip(fixed, labels, strict=True)
         )
 
 
@@ -94,14 +92,8 @@ def placed(nodes: Mapping[str, Node], catalogue: Catalogue) -> dict[str, str]:
     inputs = dict[str, str]()
     for label, node in nodes.items():
         of = node.template
-        for variable, taken in zip(_variables(of), node.inputs, strict=True):
+        for variable, taken in zip(of.inputs, node.inputs, strict=True):
             wanted = catalogue.types.get(of.robots[of.before.index(variable)])
             if wanted is not None and wanted.fixed:
                 inputs[label] = taken
     return inputs
-
-
-@cache
-def _variables(template: Template) -> tuple[str, ...]:
-    """The label variables of a template's a, in the order of its inputs."""
-    return tuple(sorted(template.inputs, key=variable_number))

@@ -7,7 +7,7 @@ import numpy as np
 
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Solid
-from factory.problem.pag import PAG, Assembly
+from factory.problem.pag import PAG, SHAPES, Assembly
 from factory.support.errors import Diagnostic, Position
 
 SMALLEST, FURTHEST, HEAVIEST = 5e-9, 1e4, 1e12
@@ -18,9 +18,6 @@ LONGEST, SHORTEST = 5.0, 0.005
 """A product outside these lengths [m] gets a warning."""
 
 METRES = "lengths are in metres, unless the text says otherwise: unit = mm;"
-
-SHAPES = ("box", "cylinder", "sphere", "mesh")
-"""Parameters that give a part a shape."""
 
 
 def beyond(node: Assembly, solid: Solid) -> Diagnostic | None:

@@ -21,7 +21,6 @@ from factory.geometry.decomposition import in_pieces
 from factory.geometry.limits import (
     FURTHEST,
     METRES,
-    SHAPES,
     SMALLEST,
     beyond,
     size_warnings,
@@ -42,7 +41,7 @@ from factory.geometry.meshes import (
     usable,
 )
 from factory.geometry.solids import Product, Solid, from_mesh, primitive
-from factory.problem.pag import PAG, Assembly
+from factory.problem.pag import PAG, SHAPES, Assembly
 from factory.support.cache import digest, load_arrays, packed, program, store_arrays, unpacked
 from factory.support.errors import Diagnostic, InputError
 from factory.support.files import MESH, read_bytes

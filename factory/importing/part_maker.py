@@ -17,8 +17,8 @@ from factory.importing.draft import ImportFaults
 from factory.importing.mesh_files import MeshStore, first_file, path_inside
 from factory.lang.operations import MESHES
 from factory.lang.source import near_file, quoted
-from factory.lang.values import GEOMETRY, SHAPES
-from factory.problem.pag import Parameter, Value
+from factory.lang.values import GEOMETRY
+from factory.problem.pag import SHAPES, Parameter, Value
 from factory.support.errors import Position
 from factory.support.files import MESH, read_bytes
 

@@ -19,8 +19,8 @@ from factory.importing.draft import (
 from factory.importing.part_maker import PartMaker, Placement
 from factory.lang.operations import MESHES, Signature
 from factory.lang.source import quoted
-from factory.lang.values import GEOMETRY, SHAPES, Kind
-from factory.problem.pag import Parameter, Value
+from factory.lang.values import GEOMETRY, Kind
+from factory.problem.pag import SHAPES, Parameter, Value
 from factory.support.errors import did_you_mean
 
 GROUP = ("name", "children", "operation", "parameters", "at", "quat")

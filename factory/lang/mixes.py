@@ -28,20 +28,20 @@ def mix_of(statements: Statements, findings: Findings) -> Mix | None:
     for root in statements.roots:
         message = f"there are a root and a mix, {where(at(mix.word), at(root))}"
         findings.add("BadMix", message, root, "the products of a mix are its roots: remove this")
-    labels = [amount.words[-1] for amount in mix.amounts]
+    labels = [amount[-1] for amount in mix.amounts]
     statements.roots[:] = {str(label): label for label in reversed(labels)}.values()
     statements.roots.reverse()
     counts = _counts(mix, findings)
     if len(counts) < 2:
         return None
-    counted = any(len(amount.words) > 1 for amount in mix.amounts)
+    counted = any(len(amount) > 1 for amount in mix.amounts)
     return Mix(tuple(counts.items()), () if counted else tuple(map(str, labels)))
 
 
 def _counts(mix: MixStatement, findings: Findings) -> Counter[str]:
     """How many units of each product a period has."""
-    counts, counted = Counter[str](), any(len(amount.words) > 1 for amount in mix.amounts)
-    for *number, label in (amount.words for amount in mix.amounts):
+    counts, counted = Counter[str](), any(len(amount) > 1 for amount in mix.amounts)
+    for *number, label in mix.amounts:
         if counted and not number:
             findings.add(
                 "BadMix", f"{quoted(label)} is not counted, and others are", label, BOTH_WAYS

@@ -14,9 +14,9 @@ from lark import Token
 
 from factory.lang.source import Findings, near_file, quoted, where
 from factory.lang.statements import Definition, Keyword
-from factory.lang.values import GEOMETRY, SHAPES, Kind, ValueReader, kind_of
+from factory.lang.values import GEOMETRY, Kind, ValueReader, kind_of
 from factory.lang.words import LABEL_HINT, UNITS, is_label, is_number
-from factory.problem.pag import RESERVED, Assembly, Parameter
+from factory.problem.pag import RESERVED, SHAPES, Assembly, Parameter
 from factory.problem.template import Template
 from factory.support.errors import Position, did_you_mean
 from factory.support.settings import DWELL
@@ -124,7 +124,6 @@ class AssemblyReader:
             tuple([str(token) for token in inputs]),
             self._parameters(entry, keywords) if entry and keywords else (),
             at(label),
-            at(operation),
             tuple([at(token) for token in inputs]),
         )
 

@@ -33,7 +33,6 @@ from factory.lang.recovery import (
 )
 from factory.lang.source import Findings, quoted
 from factory.lang.statements import (
-    Amount,
     CopiedLabel,
     Definition,
     Equation,
@@ -61,7 +60,7 @@ class _Builder(Transformer[Token, Any]):
     def start(self, *statements: Any) -> tuple[Any, ...]:
         return statements
 
-    arguments = start
+    arguments = amount = start
 
     def copy(self, name: Token, brackets: Token) -> Token:
         number = CopiedLabel(name, brackets).number
@@ -75,11 +74,8 @@ class _Builder(Transformer[Token, Any]):
     def permission(self, word: Token, *words: Token) -> Permission:
         return Permission(word, words)
 
-    def mix(self, word: Token, *amounts: Amount) -> MixStatement:
+    def mix(self, word: Token, *amounts: Sequence[Token]) -> MixStatement:
         return MixStatement(word, amounts)
-
-    def amount(self, *words: Token) -> Amount:
-        return Amount(words)
 
     def places(self, word: Token, *vectors: Vector) -> PlaceList:
         return PlaceList(word, vectors)

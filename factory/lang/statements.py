@@ -74,17 +74,11 @@ class WordPair(NamedTuple):
     second: Token
 
 
-class Amount(NamedTuple):
-    """`3 truck` or `truck` of a mix: its words."""
-
-    words: Sequence[Token]
-
-
 class MixStatement(NamedTuple):
-    """`mix = 3 truck, 1 van`, `mix = truck, truck, van`."""
+    """`mix = 3 truck, 1 van`, `mix = truck, truck, van`: the words of each amount."""
 
     word: Token
-    amounts: Sequence[Amount]
+    amounts: Sequence[Sequence[Token]]
 
 
 class Permission(NamedTuple):

@@ -128,7 +128,7 @@ def _check_hand_over(
     if other is None:
         hint = did_you_mean(name, list(templates), "templates")
         yield Diagnostic("BadTemplate", f"there is no template {quoted(name)}", at, hint)
-    elif len(other.inputs) != 1 or other.before[other.carrier - 1] != NOPART:
+    elif len(other.inputs) != 1 or other.held != NOPART:
         message = f"{quoted(name)} hands nothing over to {quoted(template.name)}"
         hint = "that takes one input, which another robot brings to its carrier, as pick does"
         yield Diagnostic("BadTemplate", message, at, hint)
@@ -142,7 +142,7 @@ def _check_other(
     if other is None:
         hint = did_you_mean(name, list(templates), "templates")
         yield Diagnostic("BadTemplate", f"there is no template {quoted(name)}", at, hint)
-    elif len(other.inputs) != 2 or other.before[other.carrier - 1] == NOPART:
+    elif len(other.inputs) != 2 or other.held == NOPART:
         message = f"{quoted(name)} {why}"
         hint = "that takes two inputs, one of which its carrier brings, as insert does"
         yield Diagnostic("BadTemplate", message, at, hint)

@@ -73,7 +73,6 @@ GEOMETRY: Mapping[str, Kind] = MappingProxyType(
         "fed": Kind(1, "0.61", low=-3.15, high=3.15),
     }
 )
-SHAPES = ("mesh", "box", "cylinder", "sphere")
 
 
 def kind_of(default: Value, high: float = math.inf) -> Kind:

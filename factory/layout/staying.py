@@ -153,7 +153,7 @@ class Staying:
         high, far = low, end
         if layout.factory.lowers(robot) and layout.factory.delivers(robot, operation.index):
             high = visit.up
-        pile = operation.before[operation.template.carrier - 1]
+        pile = operation.pile
         if comes and (slot != operation.lowered or pile != NOPART):
             far += layout.standoff(operation, slot)
         if label != NOPART:

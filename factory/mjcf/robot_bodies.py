@@ -173,5 +173,5 @@ def role_of(factory: Factory, robot: int) -> str:
         return "output"
     if factory.robots[robot].fixed or not factory.deliveries(robot):
         return "tool"
-    first = factory.operations[factory.robots[robot].operations[0]]
+    first = factory.first(robot)
     return "carrier" if first.inputs else "fed"

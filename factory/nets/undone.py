@@ -11,7 +11,7 @@ from factory.nets.gears import GearNet
 
 Joins = Mapping[int, tuple[int, ...]]
 """For each end the transitions that are undone at least as often as it is: its start, and the ends
-that made what it joined. `factory.plant.material.joins_of` makes it."""
+that made what it joined (`Factory.joins`)."""
 
 
 @dataclass(frozen=True, slots=True)

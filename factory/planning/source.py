@@ -26,8 +26,7 @@ from factory.lang.pag_reader import load_pag
 from factory.lang.source import quoted
 from factory.planning.faults import check_in_place, check_places, raise_if_any
 from factory.planning.parts import EXTRA, InPlace, Kept, PlacedPart, hull_stands
-from factory.problem.pag import PAG, Assembly
-from factory.problem.shapes import SHAPED
+from factory.problem.pag import PAG, SHAPES, Assembly
 from factory.problem.template import Template
 from factory.support.collector import collector_paused
 from factory.support.errors import Diagnostic, InputError, did_you_mean
@@ -127,7 +126,7 @@ def _stored(node: Assembly, pag: PAG, store: MeshStore, faults: list[Diagnostic]
     """A node, after its mesh, if it has one, was added to the store."""
     if node.inputs:
         return node
-    if not any(p.name in SHAPED - {"pos"} for p in node.parameters):
+    if not any(p.name in SHAPES for p in node.parameters):
         message = f"'{node.label}' has no shape: its place is known only from the tree"
         hint = "give it a mesh, a box, a cylinder or a sphere, and its pos"
         faults.append(Diagnostic("MissingPart", message, node.position, hint))

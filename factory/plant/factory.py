@@ -12,10 +12,11 @@ from functools import cached_property
 from types import MappingProxyType
 
 from factory.nets.gears import GearNet, ascending
+from factory.nets.undone import Joins
 from factory.plant.approaches import Approach
 from factory.problem.pag import NOPART, PAG
 from factory.problem.plan import Plan, in_turn, out_of_turn
-from factory.problem.template import Template, variable_number
+from factory.problem.template import Template
 from factory.support.errors import Position
 from factory.support.showing import Pictured
 
@@ -61,6 +62,11 @@ class Operation:
         """The labels brought, in the order of the robots."""
         return tuple(label for label in self.before if label != NOPART)
 
+    @property
+    def pile(self) -> str:
+        """The label that the carrier holds before, NOPART for none."""
+        return self.before[self.template.carrier - 1]
+
     def awaits_empty(self, slot: int) -> bool:
         """Whether the robot in a slot waits for others and carries nothing."""
         return len(self.robots) > 1 and self.before[slot] == NOPART
@@ -75,8 +81,8 @@ class Operation:
     @property
     def last(self) -> int:
         """The slot of the robot that brings the last input, -1 for none."""
-        variables = sorted(self.template.inputs, key=variable_number)
-        return self.template.before.index(variables[-1]) if variables else -1
+        inputs = self.template.inputs
+        return self.template.before.index(inputs[-1]) if inputs else -1
 
     @property
     def start(self) -> int:
@@ -232,8 +238,7 @@ class Factory(Pictured):
             o = self.operations[stack.pop()]
             count -= 1
             when[o.index] = count
-            pile = o.before[o.template.carrier - 1]
-            inputs = sorted(o.inputs, key=lambda label: label != pile)
+            inputs = sorted(o.inputs, key=o.pile.__ne__)
             stack += [self.by_label[label].index for label in inputs]
         return tuple(when)
 
@@ -276,6 +281,14 @@ class Factory(Pictured):
         """Whether a robot (index) lowers what it delivers."""
         return robot in self.strokes and robot not in self.adjusted
 
+    def first(self, robot: int) -> Operation:
+        """The first operation of a robot's program."""
+        return self.operations[self.robots[robot].operations[0]]
+
+    def last(self, robot: int) -> Operation:
+        """The last operation of a robot's program: what it brings is delivered there."""
+        return self.operations[self.robots[robot].operations[-1]]
+
     def begins(self, robot: int, operation: int) -> bool:
         """Whether a robot (index) begins a tour with an operation (index)."""
         return any(tour[0] == operation for tour in self.tours[robot])
@@ -292,14 +305,12 @@ class Factory(Pictured):
     def turns(self) -> Mapping[tuple[int, int], int]:
         """Which of the tours of a robot (index) an operation (index) is in, by (operation,
         robot)."""
-        return MappingProxyType(
-            {
-                (operation, robot): number
-                for robot, tours in enumerate(self.tours)
-                for number, tour in enumerate(tours)
-                for operation in tour
-            }
-        )
+        return {
+            (operation, robot): number
+            for robot, tours in enumerate(self.tours)
+            for number, tour in enumerate(tours)
+            for operation in tour
+        }
 
     def deliveries(self, robot: int) -> tuple[str, ...]:
         """The labels a robot (index) carries to its A end, tour by tour; none for a tool."""
@@ -316,6 +327,14 @@ class Factory(Pictured):
         parts = {*self.contents.get(label, (label,))}
         brought = [{*self.contents[label]} for label in self.deliveries(robot)]
         return next(number for number, inside in enumerate(brought) if parts <= inside)
+
+    @cached_property
+    def joins(self) -> Joins:
+        """For the end of each operation its start and the ends of the operations that made its
+        inputs: the transitions that are undone as often as the end, since nothing is taken apart
+        (the material rule of `factory.nets.undo`)."""
+        made = self.by_label
+        return {o.end: (o.start, *(made[x].end for x in o.inputs)) for o in self.operations}
 
     @cached_property
     def contents(self) -> Mapping[str, tuple[str, ...]]:

@@ -53,7 +53,7 @@ class Pairing:
         return pairs
 
     def _partner(self, robot: int) -> int | None:
-        last = self.old.operations[self.old.robots[robot].operations[-1]]
+        last = self.old.last(robot)
         slot = last.robots.index(robot)
         if last.before[slot] == NOPART:
             number = self.operations.get(last.index)
@@ -63,22 +63,14 @@ class Pairing:
         if not carried:
             return None
         other = self.new.by_label[labels[carried[-1]]].carrier
-        onward = self.new.operations[self.new.robots[other].operations[-1]]
+        onward = self.new.last(other)
         same = labels.get(_stem(self.old, last)) == _stem(self.new, onward)
         return other if same and last.template.name == onward.template.name else None
 
     def keeps_program(self, robot: int) -> bool:
         """Whether a robot that stays has the same operations, but for names of labels."""
-        return [*self._program(robot)] == [
-            (o.template.name, o.dwell, o.robots.index(other), o.index)
-            for other in (self.robots[robot],)
-            for o in map(self.new.operations.__getitem__, self.new.robots[other].operations)
-        ]
-
-    def _program(self, robot: int) -> Iterator[tuple[str, float, int, int]]:
-        for number in self.old.robots[robot].operations:
-            o = self.old.operations[number]
-            yield o.template.name, o.dwell, o.robots.index(robot), self.operations.get(number, -1)
+        before = [(*row, self.operations.get(n, -1)) for *row, n in _program(self.old, robot)]
+        return before == [*_program(self.new, self.robots[robot])]
 
     def keeps_contents(self, robot: int) -> bool:
         """Whether all that a robot that stays ever holds is equal to what it held."""
@@ -94,6 +86,13 @@ class Pairing:
             for label in held
             if label != NOPART
         ]
+
+
+def _program(factory: Factory, robot: int) -> Iterator[tuple[str, float, int, int]]:
+    """Template, dwell, slot and index of each operation of a robot."""
+    for number in factory.robots[robot].operations:
+        o = factory.operations[number]
+        yield o.template.name, o.dwell, o.robots.index(robot), number
 
 
 def _stem(factory: Factory, operation: Operation) -> str:

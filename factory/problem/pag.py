@@ -14,6 +14,9 @@ from factory.support.showing import Pictured
 NOPART = "nopart"
 RESERVED = frozenset({NOPART, "root", "mix", "parts", "dropoff"})
 
+SHAPES = ("mesh", "box", "cylinder", "sphere")
+"""Parameters that give a part a shape."""
+
 Value = float | str | tuple[float, ...]
 
 
@@ -30,8 +33,7 @@ class Parameter:
 class Assembly:
     """One node of a PAG: `label = operation(inputs, parameters)`. A part has no inputs.
 
-    Positions are those of the label, of the operation's name and of each input; they do not count
-    in comparisons.
+    Positions are those of the label and of each input; they do not count in comparisons.
     """
 
     label: str
@@ -39,7 +41,6 @@ class Assembly:
     inputs: tuple[str, ...] = ()
     parameters: tuple[Parameter, ...] = ()
     position: Position | None = field(default=None, compare=False)
-    operation_position: Position | None = field(default=None, compare=False)
     input_positions: tuple[Position, ...] = field(default=(), compare=False)
 
     def parameter(self, name: str, default: Value | None = None) -> Value | None:
@@ -159,6 +160,19 @@ class PAG(Pictured):
                 seen.add(label)
                 stack.append((label, True))
                 stack.extend((child, False) for child in reversed(node.inputs))
+
+    @cached_property
+    def is_shaped(self) -> bool:
+        """Whether some part has a shape or a place of its own. The default boxes of a product in
+        which none has can always slide: each sub-assembly is an interval of a path to and fro in a
+        lattice, so the next interval goes on ahead of it along x and along y."""
+        return any(p.name in (*SHAPES, "pos") for node in self.parts() for p in node.parameters)
+
+    @cached_property
+    def is_plain(self) -> bool:
+        """Whether no part says more of its geometry than its colour: nothing can be wrong with
+        it."""
+        return all(p.name == "rgba" for node in self.parts() for p in node.parameters)
 
     @cached_property
     def insides(self) -> tuple[frozenset[str], ...]:

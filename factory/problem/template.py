@@ -7,6 +7,7 @@ The text of a template is read by `factory.lang.read_template`; the shipped ones
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Literal
 
 from factory.problem.pag import NOPART, Value
@@ -127,8 +128,13 @@ class Template:
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """The sub-assemblies: the distinct label variables of a, in the order of the robots."""
-        return tuple(dict.fromkeys(label for label in self.before if label != NOPART))
+        """The sub-assemblies: the label variables of a, in the order in which they are written."""
+        return _variables(self.before)
+
+    @property
+    def held(self) -> str:
+        """The label variable that the carrier brings, NOPART for none."""
+        return self.before[self.carrier - 1]
 
     def robot_position(self, slot: int) -> Position | None:
         """The place of a robot's type; else that of the template."""
@@ -155,7 +161,11 @@ class Template:
         )
 
 
-def variable_number(variable: str) -> tuple[int, str]:
-    """The sort key of a label variable: its number, so that `LAB10` comes after `LAB2`."""
-    digits = "".join(c for c in variable if c.isdigit())
-    return int(digits or 0), variable
+@cache
+def _variables(before: tuple[str, ...]) -> tuple[str, ...]:
+    """The distinct label variables of a template's a, by number: `LAB10` comes after `LAB2`."""
+
+    def number(variable: str) -> tuple[int, str]:
+        return int("".join(c for c in variable if c.isdigit()) or 0), variable
+
+    return tuple(sorted({*before} - {NOPART}, key=number))

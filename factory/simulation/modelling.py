@@ -12,7 +12,6 @@ from factory.layout.layout import Layout
 from factory.mjcf.timestep import timed
 from factory.plant.fused_bodies import FusedBodies, bodies_of, fused_copies
 from factory.problem.robot_types import Catalogue, load_catalogue
-from factory.problem.shapes import is_shaped
 from factory.simulation.request import RunRequest
 from factory.support.errors import Diagnostic
 from factory.support.settings import Settings
@@ -45,7 +44,7 @@ def _overlaps(layout: Layout) -> tuple[Diagnostic, ...]:
     """Overlaps in a product, and collisions on the way to it, that are not allowed. Units of one
     product are alike, so one of each is examined."""
     factory = layout.factory
-    if not is_shaped(factory.pag):
+    if not factory.pag.is_shaped:
         return ()
     allowed, sequence = factory.pag.allowed, factory.sequence
     firsts = {sequence.index(product) for product in sequence}

@@ -19,7 +19,6 @@ from factory.nets.history import firings
 from factory.nets.petri import Marking
 from factory.nets.replay import replay
 from factory.plant.demand import Word
-from factory.plant.material import joins_of
 from factory.record.figures import PhysicsFigures
 from factory.record.state import Observer, State
 from factory.simulation.distributed import DistributedSupervisor
@@ -288,7 +287,7 @@ class Simulation:
         entries = entries_of(supervisor.events)
         exchanges = tuple(world.hooks.account.exchanges) if world.hooks.account else ()
         nets = [exchange.net for exchange in exchanges]
-        verdict = replay(factory.net, entries, self.start, joins_of(factory), nets)
+        verdict = replay(factory.net, entries, self.start, factory.joins, nets)
         return Run(
             request.world,
             request.units,

@@ -15,7 +15,6 @@ from factory.nets.verify import verify
 from factory.pipeline import Project
 from factory.plant.factory import Factory
 from factory.problem.pag import most_allowed
-from factory.problem.shapes import is_plain
 from factory.study.allocation.aim import Least, least_robots
 from factory.support.errors import Diagnostic
 from factory.timing.pool import part_pool
@@ -164,7 +163,7 @@ def check_project(
         len(factory.pag),
         part_pool(factory, wip),
         project.matings,
-        None if is_plain(project.pag) else project.product,
+        None if project.pag.is_plain else project.product,
         project.warnings,
         project.no_grips if project.settings.hands else None,
         factory,

@@ -14,8 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.compiler.expanding import Node
-from factory.problem.pag import NOPART
-from factory.problem.template import variable_number
 from factory.support.errors import Position
 
 Ints = NDArray[np.int64]
@@ -91,9 +89,8 @@ def meetings(nodes: Mapping[str, Node]) -> Meetings:
     root = next(reversed([*nodes]), "")
     turns, levels = {root: 1}, {root: 0}
     for label in reversed(list(nodes)):
-        held = _held(nodes[label])
-        for name in nodes[label].inputs:
-            turns[name] = turns[label] if name == held else 1 - turns[label]
+        for number, name in enumerate(nodes[label].inputs):
+            turns[name] = turns[label] if number == nodes[label].held else 1 - turns[label]
             levels[name] = levels[label] + 1
     made: list[Meeting] = []
     borders = np.zeros(max(0, len(parts) - 1), np.int64)
@@ -103,7 +100,7 @@ def meetings(nodes: Mapping[str, Node]) -> Meetings:
         first, end = spans[label]
         for name in node.inputs[1:]:
             borders[spans[name][0] - 1] = len(made)
-        split, either = spans[node.inputs[-1]][0], len(node.inputs) == 2 and not _held(node)
+        split, either = spans[node.inputs[-1]][0], len(node.inputs) == 2 and node.held < 0
         axis = turns[label]
         meeting = Meeting(label, node.inputs, axis, first, split, end, either, node.position)
         made.append(meeting)
@@ -122,12 +119,3 @@ def _spans(nodes: Mapping[str, Node]) -> tuple[dict[str, tuple[int, int]], tuple
             spans[label] = (len(parts), len(parts) + 1)
             parts.append(label)
     return spans, tuple(parts)
-
-
-def _held(node: Node) -> str:
-    """The input that the carrier holds before the operation, "" for none."""
-    variable = node.template.before[node.template.carrier - 1]
-    if variable == NOPART or not node.inputs:
-        return ""
-    variables = sorted(node.template.inputs, key=variable_number)
-    return node.inputs[variables.index(variable)]

@@ -61,7 +61,7 @@ class HandsApart:
             ) + half
         last = self.holding.last(robot)
         brought = [label for label in last.before if label != NOPART]
-        if last.before[last.template.carrier - 1] == NOPART and len(brought) > 1:
+        if last.pile == NOPART and len(brought) > 1:
             boxes = [self.holding.box(label) for label in brought]
             middle = float(np.mean([(box[0] + box[1])[axis] / 2 for box in boxes]))
             free &= (middle - places.at[:, axis]) * side >= halves(places.radius) + BESIDE / 2

@@ -58,7 +58,7 @@ class Holding:
 
     def is_fed(self, robot: int) -> bool:
         """Whether a robot takes parts from a feeder."""
-        first = self.factory.operations[self.factory.robots[robot].operations[0]]
+        first = self.factory.first(robot)
         return len(first.robots) == 1
 
     def serves_fixed(self, robot: int) -> bool:
@@ -72,7 +72,7 @@ class Holding:
 
     def last(self, robot: int) -> Operation:
         """The operation that a robot delivers to."""
-        return self.factory.operations[self.factory.robots[robot].operations[-1]]
+        return self.factory.last(robot)
 
     def places(self, label: str, kind: Kind, axis: int, way: int, radius: float = 0.0) -> Places:
         """The places on a side of a sub-assembly, cached: with the best pad at each, or with one of

@@ -299,7 +299,7 @@ class InTheWay:
             low, high = swept(low, high, back(u))
             rising = low - [0.0, 0.0, self.holding.factory.strokes.get(robot, 0.0)]
         for operation in self.holding.made(robot):
-            later = operation.before[operation.template.carrier - 1] != NOPART
+            later = operation.pile != NOPART
             for guest, label in zip(operation.robots, operation.before, strict=True):
                 if guest != robot and label != NOPART:
                     parts = self.holding.boxes(label)

@@ -97,7 +97,7 @@ def _beyond(layout: Layout, robot: int) -> float:
     """Distance ahead of A at which the place of delivery begins: the way of the carrier's payload,
     or the outfeed. A payload at a cut, with carriage and arm, is clear of it [m]."""
     path, factory, c = layout.guidepaths[robot], layout.factory, layout.clearance
-    operation = factory.operations[factory.robots[robot].operations[-1]]
+    operation = factory.last(robot)
     (delivered,) = factory.deliveries(operation.carrier)
     beside = path.frame(layout.payloads[delivered])[0]
     if operation.index != factory.dropoff.index:

@@ -14,7 +14,6 @@ from factory.mjcf.weld_frames import SLIDE
 from factory.nets.replay import replay
 from factory.plant.demand import Demand, Word
 from factory.plant.factory import Factory
-from factory.plant.material import joins_of
 from factory.record.failures import Failures
 from factory.record.log.model import model_of
 from factory.record.log.reader import Ends, Log
@@ -100,7 +99,7 @@ def verdict_on(
     there is one, and the faults of its model."""
     cut, start = log.cut_off, frozenset(log.header["start"])
     after = [*nets_after(factory, log.entries)]
-    refines = replay(factory.net, log.entries, start, joins_of(factory), after).refines
+    refines = replay(factory.net, log.entries, start, factory.joins, after).refines
     trouble = None if cut is None else cut.failure
     counted = report.figures if report else None
     figures = log.figures if counted is None else worst(log.figures, counted)

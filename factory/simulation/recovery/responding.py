@@ -13,7 +13,6 @@ from factory.nets.petri import Marking
 from factory.nets.undo import marking_after, undo
 from factory.nets.undone import Undone
 from factory.plant.factory import Operation
-from factory.plant.material import joins_of
 from factory.problem.pag import NOPART
 from factory.record.failures import Failing
 from factory.simulation.recovery.books import Books
@@ -218,7 +217,7 @@ class Responding:
         """Fire the net backwards and send robots back."""
         books, supervisor, factory = self._books, self._books.supervisor, self._books.factory
         before, under_way = books.marking, supervisor.active.operations
-        held, joins = books.held(), joins_of(factory)
+        held, joins = books.held(), factory.joins
         fired = undo(factory.net, supervisor.fired, asked, joins)
         while lacking := self._lacking(held, fired):
             asked += lacking

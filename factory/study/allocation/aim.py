@@ -79,7 +79,7 @@ def _needed(node: Node, templates: Mapping[str, Template], inputs: list[int]) ->
         return 1
     needed = max(count + n for n, count in enumerate(reversed(inputs)))
     template = node.template
-    takes_over = template.before[template.carrier - 1] == NOPART and not template.instead
+    takes_over = template.held == NOPART and not template.instead
     return max(needed, len(inputs) + 1) if takes_over else needed
 
 

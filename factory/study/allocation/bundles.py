@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from math import inf
 
-from factory.compiler.folding import Line, begun_by, delivery, kind_of, sides_of
+from factory.compiler.folding import Line, begun_by, kind_of, sides_of
 from factory.layout.durations import Pace
 from factory.layout.guidepath import Box
 from factory.plant.factory import Factory, Operation
@@ -207,7 +207,7 @@ class _Tour:
             timing.past(robot, numbers),
             tuple(kid for kid in begun_by(factory, robot) if kind_of(factory, kid)[0] != "tool"),
             tuple((n, inserted[n]) for n in (numbers[1:] if is_output else numbers[1:-1])),
-            tuple((kid, delivery(factory, kid).index) for kid in kids),
+            tuple((kid, factory.last(kid).index) for kid in kids),
         )
 
     def bundle(
@@ -260,7 +260,7 @@ def _least(
 
 def _inserted(factory: Factory, robot: int, operation: Operation) -> tuple[int, ...]:
     """The robots that bring something in an operation to what a robot already holds."""
-    if operation.carrier != robot or operation.before[operation.template.carrier - 1] == NOPART:
+    if operation.carrier != robot or operation.pile == NOPART:
         return ()
     pairs = zip(operation.robots, operation.before, strict=True)
     return tuple(guest for guest, label in pairs if guest != robot and label != NOPART)

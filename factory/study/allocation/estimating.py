@@ -20,7 +20,6 @@ from factory.layout.shapes import payload_boxes
 from factory.pipeline import Project
 from factory.plant.factory import Factory, Operation
 from factory.problem.plan import THIRD, Plan
-from factory.problem.shapes import is_shaped
 from factory.study.allocation.aim import STEP
 from factory.study.allocation.bundles import Filling
 from factory.study.allocation.candidate import Candidate
@@ -237,7 +236,7 @@ class Estimator:
 
 def _task(project: Project) -> FormsTask:
     pag, templates, product = project.pag, project.templates, project.product
-    admits = admitted(expand(pag, templates), product) if is_shaped(pag) else {}
+    admits = admitted(expand(pag, templates), product) if pag.is_shaped else {}
     boxes = payload_boxes(project.compiled, product)
     return FormsTask(pag, templates, admits, boxes, Pace.of(project.settings))
 

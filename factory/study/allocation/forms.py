@@ -23,9 +23,9 @@ from factory.compiler.mating.findings import BLOCKED, NO_DEEPER
 from factory.compiler.mating.mating import Admitted
 from factory.layout.durations import Pace
 from factory.layout.guidepath import Box
-from factory.problem.pag import NOPART, PAG
+from factory.problem.pag import PAG
 from factory.problem.plan import THIRD
-from factory.problem.template import Template, variable_number
+from factory.problem.template import Template
 
 APART = 0.06
 """Length of guidepath from one station to the next, beside the sub-assembly [m]."""
@@ -146,7 +146,7 @@ def _options(
     if not node.inputs:
         yield Option(0, 0, 0.0, 0, task.pace.lost, order=task.order)
         return
-    for pile in (THIRD, 0, 1) if node.label in task.free else (_held(node),):
+    for pile in (THIRD, 0, 1) if node.label in task.free else (node.held,):
         faults = _faults(task, node, axis, pile)
         for inputs in _combined([options[n != pile] for n, options in enumerate(each)]):
             yield _joined(task, node, pile, inputs, bound, faults)
@@ -232,11 +232,3 @@ def _faults(task: FormsTask, node: Node, axis: int, pile: int) -> tuple[int, int
         lowers = lowers[-1:]
     level = max(admits.slides[axis], *lowers)
     return int(level == BLOCKED), int(level < NO_DEEPER)
-
-
-def _held(node: Node) -> int:
-    """The number of the input that the carrier holds before the operation, -1 for none."""
-    variable = node.template.before[node.template.carrier - 1]
-    if variable == NOPART or not node.inputs:
-        return -1
-    return sorted(node.template.inputs, key=variable_number).index(variable)
