@@ -98,6 +98,14 @@ def test_changes_stand_until_the_next() -> None:
         Demand(changes=(("a", 1),))
 
 
+def test_only_orders_that_are_made_excuse_a_standstill() -> None:
+    word = Word(("a", "b"), Demand((("b", 0.0), ("a", 5.0))), 2)
+    assert [word.are_made(1, since) for since in (4.0, 5.0)] == [True, False]
+    assert word.are_made(2, 9.0)
+    assert not Word(("a", "b"), Demand(changes=(("a", 0),)), 2).are_made(1, 4.0)
+    assert not Word(("a", "b")).are_made(1, 4.0)
+
+
 def without_a_stop(factory: Factory, word: Word, rng: random.Random) -> int:
     """Fire the net at random, skipping as a run does, until its units are made. Gives the greatest
     number of units by which a letter was fixed ahead of its dropoff."""

@@ -79,8 +79,10 @@ class Word:
         return self.demand.letter(len(self.units), self.made, self.now)
 
     def are_made(self, made: int, since: float) -> bool:
-        """Whether all units are made that were asked for by a time [s], if so many are."""
-        return self.demand is not None and all(t > since for _, t in self.demand.orders[made:])
+        """Whether all units are made that were ordered by a time [s], if so many are; never where
+        changes stand, by which there is always another one asked for."""
+        orders = self.demand.orders if self.demand else ()
+        return bool(orders) and all(t > since for _, t in orders[made:])
 
     def placed(self, number: int) -> float:
         """When an order, counted from 0, is placed [s]."""
@@ -144,7 +146,4 @@ class Word:
     def counts(self, begin: int, end: int) -> Mapping[str, int]:
         """How many of each product the units from `begin` to `end` are."""
         counts = Counter(self.products(begin, end))
-        return {product: counts[product] for product in sorted({*self.sequence}, key=self._first)}
-
-    def _first(self, product: str) -> int:
-        return self.sequence.index(product)
+        return {product: counts[product] for product in dict.fromkeys(self.sequence)}
