@@ -49,9 +49,8 @@ class TemplateMaker:
             self._check_name(name)
         if labels is not None:
             self._check_labels(labels, count, carrier)
-            self._check_kind(labels, clause.geometry, further)
-            self._check_instead(labels, carrier, instead)
-            self._check_brought(labels, carrier, brought)
+            self._check_kind(labels, clause.geometry)
+            self._check_others(labels, carrier, contents)
         failures = self._failures(labels, carrier)
         if name is None or robots is None or carrier is None or labels is None or law is None:
             return None
@@ -207,35 +206,40 @@ class TemplateMaker:
         )
         return FailureReader(self.findings, takes, tools).read(clause.content)
 
-    def _check_kind(self, labels: Labels, geometry: bool, further: Token | None) -> None:
-        """Geometry belongs to operations that take nothing, further inputs to those that take and
-        make something."""
-        taken = any(label != NOPART for label in labels.before)
-        if geometry and taken:
+    def _check_kind(self, labels: Labels, geometry: bool) -> None:
+        """Geometry belongs to operations that take nothing."""
+        if geometry and any(label != NOPART for label in labels.before):
             hint = "leave out 'geometry', or let every robot come with nopart"
             message = "geometry belongs to parts, but the operation takes sub-assemblies"
             self._bad(message, self._head("parameters"), hint)
-        if further is not None and (not taken or self.draft.name == "dropoff"):
-            message = f"{self.draft.name} cannot pass further inputs on"
-            hint = "leave this clause out: it is for operations that take and make something"
-            self._bad(message, further, hint)
 
-    def _check_instead(self, labels: Labels, carrier: int | None, instead: Token | None) -> None:
-        """`instead` needs a carrier that takes what two other robots bring."""
-        brought = [label for label in labels.before if label != NOPART]
-        held = carrier is not None and labels.before[carrier - 1 : carrier] != (NOPART,)
-        if instead is not None and (len(brought) != 2 or held):
-            message = f"{self.draft.name} has no robot to spare"
-            hint = "leave this clause out: it is for carriers that take what two others bring"
-            self._bad(message, instead, hint)
-
-    def _check_brought(self, labels: Labels, carrier: int | None, brought: Token | None) -> None:
-        """`brought` needs a robot that brings something to the carrier."""
-        brings = [i for i, label in enumerate(labels.before, 1) if label != NOPART and i != carrier]
-        if brought is not None and not brings:
-            message = f"no robot brings anything to the carrier of {self.draft.name}"
-            hint = "leave this clause out: it is for robots that have their inputs handed over"
-            self._bad(message, brought, hint)
+    def _check_others(
+        self, labels: Labels, carrier: int | None, contents: Mapping[str, Token]
+    ) -> None:
+        """Each clause that names another template needs inputs that this can be for."""
+        name, taking = self.draft.name, [n for n, x in enumerate(labels.before, 1) if x != NOPART]
+        for kind, fits, message, those in (
+            (
+                "further",
+                taking and name != "dropoff",
+                f"{name} cannot pass further inputs on",
+                "operations that take and make something",
+            ),
+            (
+                "instead",
+                len(taking) == 2 and carrier not in taking,
+                f"{name} has no robot to spare",
+                "carriers that take what two others bring",
+            ),
+            (
+                "brought",
+                {*taking} - {carrier},
+                f"no robot brings anything to the carrier of {name}",
+                "robots that have their inputs handed over",
+            ),
+        ):
+            if kind in contents and not fits:
+                self._bad(message, contents[kind], f"leave this clause out: it is for {those}")
 
     def _check_labels(self, labels: Labels, count: int | None, carrier: int | None) -> None:
         """The conditions on <a; b>, each with its code."""

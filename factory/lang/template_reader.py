@@ -99,50 +99,39 @@ def _twice(second: Template, first: Template) -> Diagnostic:
 def _check_others(templates: Mapping[str, Template]) -> Iterator[Diagnostic]:
     """Errors of the templates that others name as `further`, `instead` or `brought`."""
     for template in templates.values():
-        if template.brought:
-            at = template.brought_position or template.position
-            yield from _check_hand_over(template, at, templates)
-        if template.further:
-            at = template.further_position or template.position
-            why = "cannot take further inputs one by one"
-            yield from _check_other(template.further, at, why, templates)
-        if template.instead:
-            at = template.instead_position or template.position
-            why = f"cannot stand for {quoted(template.name)}"
-            yield from _check_other(template.instead, at, why, templates)
-            other = templates.get(template.instead)
-            lacking = {name for name, _ in template.parameters}
-            lacking -= {name for name, _ in other.parameters} if other else lacking
-            if other is not None and lacking:
-                message = f"{quoted(other.name)} {why}: it has no {', '.join(sorted(lacking))}"
-                hint = "give it the same parameters, with their defaults"
-                yield Diagnostic("BadTemplate", message, at, hint)
-
-
-def _check_hand_over(
-    template: Template, at: Position | None, templates: Mapping[str, Template]
-) -> Iterator[Diagnostic]:
-    """Errors of the template by which another has its inputs handed over first."""
-    name = template.brought
-    other = templates.get(name)
-    if other is None:
-        hint = did_you_mean(name, list(templates), "templates")
-        yield Diagnostic("BadTemplate", f"there is no template {quoted(name)}", at, hint)
-    elif len(other.inputs) != 1 or other.held != NOPART:
-        message = f"{quoted(name)} hands nothing over to {quoted(template.name)}"
-        hint = "that takes one input, which another robot brings to its carrier, as pick does"
-        yield Diagnostic("BadTemplate", message, at, hint)
+        to = quoted(template.name)
+        at = template.brought_position or template.position
+        why = f"hands nothing over to {to}"
+        yield from _check_other(template.brought, at, why, templates, handed_over=True)
+        at = template.further_position or template.position
+        why = "cannot take further inputs one by one"
+        yield from _check_other(template.further, at, why, templates)
+        at, why = template.instead_position or template.position, f"cannot stand for {to}"
+        yield from _check_other(template.instead, at, why, templates)
+        other = templates.get(template.instead, template)
+        lacking = {name for name, _ in template.parameters}
+        lacking -= {name for name, _ in other.parameters}
+        if lacking:
+            message = f"{quoted(other.name)} {why}: it has no {', '.join(sorted(lacking))}"
+            hint = "give it the same parameters, with their defaults"
+            yield Diagnostic("BadTemplate", message, at, hint)
 
 
 def _check_other(
-    name: str, at: Position | None, why: str, templates: Mapping[str, Template]
+    name: str,
+    at: Position | None,
+    why: str,
+    templates: Mapping[str, Template],
+    handed_over: bool = False,
 ) -> Iterator[Diagnostic]:
-    """Errors of a template that must take one input in addition to that of its carrier."""
+    """Errors of a template, if one is named, that must take one input in addition to that of its
+    carrier, or by which an input is to be handed over to its carrier."""
     other = templates.get(name)
-    if other is None:
+    if name and other is None:
         hint = did_you_mean(name, list(templates), "templates")
         yield Diagnostic("BadTemplate", f"there is no template {quoted(name)}", at, hint)
-    elif len(other.inputs) != 2 or other.held == NOPART:
-        message = f"{quoted(name)} {why}"
+    elif other and (len(other.inputs), other.held == NOPART) != (2 - handed_over, handed_over):
         hint = "that takes two inputs, one of which its carrier brings, as insert does"
-        yield Diagnostic("BadTemplate", message, at, hint)
+        if handed_over:
+            hint = "that takes one input, which another robot brings to its carrier, as pick does"
+        yield Diagnostic("BadTemplate", f"{quoted(name)} {why}", at, hint)

@@ -54,17 +54,23 @@ def write_text(text: str) -> str:
 
 def write_template(template: Template) -> str:
     """The canonical text of a template: one clause a line, written as the paper does."""
+    failures = [*map(write_failure, template.failures)]
+    defaults = ", ".join(f"{name} = {write_value(value)}" for name, value in template.parameters)
+    parameters = ["geometry"] * template.geometry + [f"( {defaults} )"] * bool(defaults)
+    optional = {
+        "further": template.further,
+        "instead": template.instead,
+        "brought": template.brought,
+        "failure": "" if template.failures == LOST else _braces(failures),
+        "parameters": " and ".join(parameters),
+    }
     clauses = [
         f"R = < {', '.join(template.robots)} >",
         f"j = {template.carrier}",
         f"~ = {_braces([' = '.join(map(str, c)) for c in template.identifications])}",
         f"<a; b> = < {', '.join(template.before)}; {', '.join(template.after)} >",
         f"F = {_law(template.law)}",
-        *([f"further = {template.further}"] if template.further else []),
-        *([f"instead = {template.instead}"] if template.instead else []),
-        *([f"brought = {template.brought}"] if template.brought else []),
-        *([f"failure = {_failures(template)}"] if template.failures != LOST else []),
-        *_parameters(template),
+        *(f"{name} = {content}" for name, content in optional.items() if content),
     ]
     lines = [f"{template.name} = (R, j, ~, <a; b>, F) where", *(f"  {c};" for c in clauses)]
     return "\n".join(lines) + "\n"
@@ -83,17 +89,7 @@ def _law(law: Law) -> str:
     return f"{text} for {law.dwell if isinstance(law.dwell, str) else write_number(law.dwell)}"
 
 
-def _failures(template: Template) -> str:
-    return _braces([write_failure(failure) for failure in template.failures])
-
-
 def write_failure(failure: Failure) -> str:
     """One failure: `residual > 0.0005 : again 2 then scrap`."""
     limit = "" if failure.limit is None else f" > {write_number(failure.limit)}"
     return f"{failure.test}{limit} : {' then '.join(map(str, failure.responses))}"
-
-
-def _parameters(template: Template) -> list[str]:
-    defaults = ", ".join(f"{name} = {write_value(value)}" for name, value in template.parameters)
-    parts = ["geometry"] * template.geometry + [f"( {defaults} )"] * bool(defaults)
-    return [f"parameters = {' and '.join(parts)}"] if parts else []
