@@ -17,8 +17,8 @@ from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.mjcf.elements import add, add_shown, add_station
 from factory.mjcf.masks import feeder_codes, masks_of
-from factory.mjcf.robots import MOTOR, Drive, add_inertia, heading_quaternion
-from factory.mjcf.stops import Stops, lift_stops
+from factory.mjcf.robots import MOTOR, Drive, add_drive, heading_quaternion
+from factory.mjcf.stops import stops_of
 
 SLIDER_MASS = 0.4
 """Mass of a slider with its rod and pad [kg]."""
@@ -63,11 +63,10 @@ def add_feeders(
             _add_housing(body, names.feeder(at), feeder, path.left)
         if at not in hanging.places:
             continue
-        stops = lift_stops(feeder.stroke, layout.clearance, hanging.lowest(at))
-        place, code, drive = hanging.places[at], codes[outlet.robot], drives[at]
-        _add_slider(body, at, feeder.high + OVER, place, code, drive, stops)
-        gains, name = drive.attributes(), names.slider(at)
-        add(actuator, "pid", name=name, joint=name, **gains)
+        place, code = hanging.places[at], codes[outlet.robot]
+        joint = _add_slider(body, at, feeder.high + OVER, place, code)
+        stops = stops_of(hanging.lowest(at), feeder.stroke, layout.clearance)
+        add_drive(actuator, joint, drives[at], stops)
 
 
 def _add_housing(body: Element, name: str, feeder: Feeder, left: float) -> None:
@@ -103,25 +102,15 @@ def _add_housing(body: Element, name: str, feeder: Feeder, left: float) -> None:
         add_station(body, f"{name}/{kind}", pos=at, size=size, material=material)
 
 
-def _add_slider(
-    feeder: Element,
-    outlet: str,
-    end: float,
-    at: PadPlace,
-    code: int,
-    drive: Drive,
-    stops: Stops,
-) -> None:
-    """The slider, down where it presents the part of the outlet that it is named after; its joint
-    goes up from there, and its rod to the height `end` [m]. The pad touches the part by design, and
-    the rod its bearing in the lid: the one is masked as what the feeder holds, the other is only
-    shown."""
+def _add_slider(feeder: Element, outlet: str, end: float, at: PadPlace, code: int) -> Element:
+    """The slider, down where it presents the part of the outlet that it is named after; its joint,
+    which is returned, goes up from there, and its rod to the height `end` [m]. The pad touches the
+    part by design, and the rod its bearing in the lid: the one is masked as what the feeder holds,
+    the other is only shown."""
     name = names.slider(outlet)
     body = add(feeder, "body", name=name, pos="0 0 0", sleep="allowed")
     slide = {"type": "slide", "axis": "0 0 1", "armature": MOTOR, "frictionloss": 0.2}
     joint = add(body, "joint", name=name, **slide)
-    stops.limit(joint)
-    add_inertia(joint, drive)
     x, y, z = (float(v) for v in at.at)
     contype, conaffinity = masks_of(code)
     add(
@@ -145,3 +134,4 @@ def _add_slider(
         size=(min(ROD, 0.6 * at.radius), (end - z - PAD) / 2),
         material="rail",
     )
+    return joint

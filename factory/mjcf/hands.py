@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from copy import deepcopy
-from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
@@ -17,10 +16,10 @@ Styles = Mapping[str, Element]
 """What each limb of a kind of hand looks like, by its name without number."""
 
 
-def load_hand(kind: str, folder: Path | None = None) -> Styles:
+def load_hand(kind: str) -> Styles:
     """The geoms of a kind of hand, or of a tip, by name. Raises InputError (BadTemplate) where its
     file is no MJCF of one body with geoms."""
-    path = (folder or mjcf_folder()) / "hands" / f"{kind}.xml"
+    path = mjcf_folder() / "hands" / f"{kind}.xml"
     try:
         geoms = ElementTree.parse(path).getroot().findall("worldbody/body")[0].findall("geom")
         return {geom.attrib["name"]: geom for geom in geoms}

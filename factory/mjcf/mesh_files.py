@@ -14,7 +14,7 @@ import struct
 import numpy as np
 
 from factory.geometry.insets import inset
-from factory.geometry.meshes import Array, Indices, Mesh, hull_mesh
+from factory.geometry.meshes import Array, Indices, Mesh, hull_mesh, normals_of
 
 CREASE = 31.0
 """Triangles that meet at a smaller angle are shaded as one rounded surface [degrees]."""
@@ -91,8 +91,7 @@ def obj(vertices: Array, faces: Indices, normals: Array) -> bytes:
 
 def face_normals(mesh: Mesh) -> Array:
     """Unit normals of the triangles (m, 3); zero where a triangle has no area."""
-    corners = mesh.vertices[mesh.faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = normals_of(mesh.vertices, mesh.faces)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     return np.asarray(np.divide(normal, length, out=np.zeros_like(normal), where=length > 0))
 
@@ -103,8 +102,7 @@ def corner_normals(mesh: Mesh) -> Array:
     from scipy.sparse import csr_matrix
 
     normal, count = face_normals(mesh), len(mesh.faces)
-    edge = mesh.vertices[mesh.faces]
-    area = np.linalg.norm(np.cross(edge[:, 1] - edge[:, 0], edge[:, 2] - edge[:, 0]), axis=1)
+    area = np.linalg.norm(normals_of(mesh.vertices, mesh.faces), axis=1)
     at = csr_matrix(
         (np.ones(3 * count), (np.arange(3 * count), mesh.faces.ravel())),
         shape=(3 * count, len(mesh.vertices)),

@@ -37,7 +37,7 @@ from factory.mjcf.robots import (
     add_paints,
 )
 from factory.mjcf.scene import add_scene
-from factory.mjcf.stops import lift_stops
+from factory.mjcf.stops import stops_of
 from factory.mjcf.tools import gyration
 from factory.mjcf.unseen import leave_out_what_is_shown
 from factory.mjcf.welds import add_exclusions, add_welds
@@ -310,7 +310,7 @@ def _hoists(layout: Layout, masses: Mapping[str, float], settings: Settings) -> 
     for robot, stroke in layout.whole.strokes.items():
         most = settings.acceleration + GRAVITY
         drive = drive_for(HOIST_MASS, loads[robot], most, settings, HOIST_STIFFNESS)
-        hoists[robot] = Hoist(stroke, drive, lift_stops(stroke, layout.clearance))
+        hoists[robot] = Hoist(stroke, drive, stops_of(0.0, stroke, layout.clearance))
     return hoists
 
 

@@ -15,8 +15,8 @@ from factory.layout.outfeed import dip_of, slot_of, slotted
 from factory.mjcf import names
 from factory.mjcf.elements import add, add_station
 from factory.mjcf.masks import masks_of, tray_code
-from factory.mjcf.robots import MOTOR, Drive, add_inertia
-from factory.mjcf.stops import shutter_stops, tray_stops
+from factory.mjcf.robots import MOTOR, Drive, add_drive
+from factory.mjcf.stops import stops_of, tray_clearance
 
 TRAY_MASS = 4.0
 """Mass of the empty tray [kg]."""
@@ -62,8 +62,8 @@ def _add_tray(world: Element, actuator: Element, layout: Layout, drive: Drive) -
     body = add(world, "body", name=names.OUTFEED_TRAY, pos=(x, y, 0), sleep="allowed")
     slide = names.OUTFEED_SLIDE
     joint = add(body, "joint", name=slide, type="slide", axis="1 0 0", frictionloss=0.2)
-    add_inertia(joint, drive)
-    tray_stops(layout).limit(joint)
+    stops = stops_of(0.0, layout.outfeed_way, tray_clearance(layout))
+    add_drive(actuator, joint, drive, stops, names.OUTFEED_DRIVE)
     contype, conaffinity = masks_of(tray_code(layout.factory))
     plate, slot = (xlo, xhi, ylo, yhi), slot_of(layout)
     low, high = PAYLOAD - BELT_GAP - TRAY + 1e-4, PAYLOAD - BELT_GAP - 1e-4 + dip_of(layout, slot)
@@ -80,8 +80,6 @@ def _add_tray(world: Element, actuator: Element, layout: Layout, drive: Drive) -
             conaffinity=conaffinity,
             material="tray",
         )
-    gains = drive.attributes()
-    add(actuator, "pid", name=names.OUTFEED_DRIVE, joint=slide, **gains)
 
 
 def _add_shutter(world: Element, actuator: Element, layout: Layout, drive: Drive) -> None:
@@ -91,8 +89,7 @@ def _add_shutter(world: Element, actuator: Element, layout: Layout, drive: Drive
     body = add(world, "body", name=names.SHUTTER, pos=(start, (ylo + yhi) / 2, 0), sleep="allowed")
     slide = {"type": "slide", "axis": "0 0 1", "armature": MOTOR, "frictionloss": 0.2}
     joint = add(body, "joint", name=names.SHUTTER, **slide)
-    shutter_stops(layout).limit(joint)
-    add_inertia(joint, drive)
+    add_drive(actuator, joint, drive, stops_of(-stroke, 0.0, layout.clearance))
     thick = (WALL - CRACK) / 2
     low = BELT + SLIT + stroke
     add(
@@ -106,9 +103,6 @@ def _add_shutter(world: Element, actuator: Element, layout: Layout, drive: Drive
         size=(thick, (yhi - ylo) / 2, (stroke + PLAY) / 2),
         material="tray",
     )
-    gains = drive.attributes()
-    name = names.SHUTTER
-    add(actuator, "pid", name=name, joint=name, **gains)
 
 
 def _add_table(world: Element, layout: Layout) -> None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from xml.etree.ElementTree import Element
 
-from factory.geometry.meshes import Array, Mesh
+from factory.geometry.meshes import Array
 from factory.geometry.solids import Product, Solid
 from factory.geometry.turning import presented, upright
 from factory.layout.dimensions import PAYLOAD
@@ -165,7 +165,8 @@ def add_meshes(asset: Element, product: Product, insets: Insets) -> dict[str, by
     for label, solid in product.solids.items():
         if solid.mesh is not None:
             receded.setdefault(solid.mesh.name, set()).update(insets.of(label).items())
-    for mesh in used_meshes(product):
+    meshes = {s.mesh.name: s.mesh for s in product.solids.values() if s.mesh is not None}
+    for mesh in meshes.values():
         written = [mesh_file(mesh), *piece_files(mesh)]
         written += (inset_file(mesh, *at) for at in sorted(receded[mesh.name]))
         for file, content in written:
@@ -173,9 +174,3 @@ def add_meshes(asset: Element, product: Product, insets: Insets) -> dict[str, by
             add(asset, "mesh", name=f"mesh/{name}", file=file, inertia="convex")
             files[file] = content
     return files
-
-
-def used_meshes(product: Product) -> list[Mesh]:
-    """Each mesh once, in the order in which the parts use them."""
-    meshes = {s.mesh.name: s.mesh for s in product.solids.values() if s.mesh is not None}
-    return list(meshes.values())

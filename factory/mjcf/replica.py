@@ -55,10 +55,6 @@ class Replica:
         self.m.geom_contype[geoms], self.m.geom_conaffinity[geoms] = contype, conaffinity
         self.m.body_contype[bodies], self.m.body_conaffinity[bodies] = contype, conaffinity
 
-    def leave_out(self, geoms: NDArray[np.bool_]) -> None:
-        """Let these geoms (ngeom,) touch nothing by masks of their own."""
-        self.m.geom_contype[geoms] = self.m.geom_conaffinity[geoms] = 0
-
 
 def shown(m: mujoco.MjModel, body: int) -> Iterator[int]:
     """The geoms of a body that are drawn: no planes, nothing hidden."""

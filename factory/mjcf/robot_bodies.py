@@ -16,7 +16,7 @@ from factory.mjcf.hands import Styles, load_hand
 from factory.mjcf.names import carriage
 from factory.mjcf.robots import Drive, Held, Hoist, RobotModel, instantiate, load_robot_model
 from factory.mjcf.scene import add_follower
-from factory.mjcf.stops import carriage_stops
+from factory.mjcf.stops import stops_of
 from factory.plant.factory import Factory
 from factory.problem.robot_types import Catalogue
 
@@ -66,14 +66,10 @@ def add_number(body: Element, asset: Element, robot: str, path: Guidepath, role:
     corners = np.concatenate([*_texts(digits, half, path)]) + middle
     faces = (4 * np.arange(len(corners) // 4)[:, None] + [0, 1, 2, 0, 2, 3]).ravel()
     name = f"number/{robot}"
-    add(asset, "mesh", name=name, inertia="shell", vertex=_flat(corners), face=numbers(faces))
+    places = " ".join(f"{value:.5g}" for value in np.round(corners, 5).ravel().tolist())
+    add(asset, "mesh", name=name, inertia="shell", vertex=places, face=numbers(faces))
     shell = next((b for b in body.findall("body") if b.get("name") == f"{robot}/shell"), body)
     add_shown(shell, f"{robot}/number", "mesh", mesh=name, rgba=INKS.get(role, LIGHT))
-
-
-def _flat(corners: Array) -> str:
-    """Places to a hundredth of a millimetre."""
-    return " ".join(f"{value:.5g}" for value in np.round(corners, 5).ravel().tolist())
 
 
 def _texts(digits: str, half: Array, path: Guidepath) -> Iterator[Array]:
@@ -134,7 +130,7 @@ def add_robots(
             robot.name,
             path,
             drive,
-            carriage_stops(layout, robot.index),
+            stops_of(*layout.ends(robot.index), layout.clearance),
             held,
             role,
             hoists.get(robot.index),

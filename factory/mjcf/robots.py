@@ -86,6 +86,16 @@ def add_inertia(joint: Element, drive: Drive) -> None:
         joint.set("armature", number(float(joint.get("armature", 0.0)) + drive.inertia))
 
 
+def add_drive(
+    actuator: Element, joint: Element, drive: Drive, stops: Stops, name: str = ""
+) -> None:
+    """The actuator of a joint, called as that unless it has a `name`, and the joint's stops."""
+    add_inertia(joint, drive)
+    stops.limit(joint)
+    moved = joint.get("name") or ""
+    add(actuator, "pid", name=name or moved, joint=moved, **drive.attributes())
+
+
 def load_robot_model(robot: RobotType) -> RobotModel:
     """Reads the file of a type. Raises InputError (BadTemplate) where it is no MJCF of one
     robot."""

@@ -9,14 +9,13 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from factory.geometry.sight import Array, Framing, View, fit, towards
-from factory.layout.dimensions import CARRIAGE, PAYLOAD
+from factory.layout.dimensions import CARRIAGE, PAYLOAD, Clearance
 from factory.layout.guidepath import Guidepath
 from factory.layout.layout import Layout
 from factory.layout.platen import tiles_of
 from factory.mjcf.elements import add, add_shown, add_station, fill, numbers
 from factory.mjcf.names import COMPASS
 from factory.mjcf.robots import heading_quaternion
-from factory.mjcf.stops import robot_room
 
 VIEW = 32.0
 """Vertical field of view of the cameras [degrees]: narrow, for a calm perspective. The free
@@ -85,11 +84,8 @@ def _tiles(world: Element, layout: Layout) -> None:
 def _rail(world: Element, layout: Layout, robot: int) -> None:
     """A robot's rail, and a buffer at either end: its shoe meets it where the joint's limit
     begins (`stops.py`), its carriage passes over it."""
-    name, path, room = (
-        layout.factory.robots[robot].name,
-        layout.guidepaths[robot],
-        robot_room(layout.clearance),
-    )
+    name, path = layout.factory.robots[robot].name, layout.guidepaths[robot]
+    room = Clearance(layout.clearance)
     (low, high), over = layout.ends(robot), CARRIAGE / 2 + room.stop
     face = SHOE + room.play
     if path.bends:

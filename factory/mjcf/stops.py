@@ -34,36 +34,13 @@ class Stops:
         joint.set("margin", number(self.buffers))
 
 
-def robot_room(clearance: float) -> Clearance:
-    """The clearance that sets how far beyond its ends a robot is stopped, and its lift."""
-    return Clearance(clearance)
+def tray_clearance(layout: Layout) -> float:
+    """The clearance that sets how far beyond its ends the tray is stopped [m]: its track has half a
+    clearance behind it to itself, so it may go twice as far as a robot."""
+    return 2 * layout.clearance
 
 
-def tray_room(clearance: float) -> Clearance:
-    """The same of the tray: its track has half a clearance behind it to itself, so it may go twice
-    as far as a robot."""
-    return Clearance(2 * clearance)
-
-
-def carriage_stops(layout: Layout, robot: int) -> Stops:
-    """Of a robot's carriage, in arc length."""
-    return _beyond(layout.ends(robot), robot_room(layout.clearance))
-
-
-def lift_stops(stroke: float, clearance: float, low: float = 0.0) -> Stops:
-    """Of a lift that is raised by a stroke, from as `low` as it gets [m]."""
-    return _beyond((low, stroke), robot_room(clearance))
-
-
-def tray_stops(layout: Layout) -> Stops:
-    """Of the outfeed's tray."""
-    return _beyond((0.0, layout.outfeed_way), tray_room(layout.clearance))
-
-
-def shutter_stops(layout: Layout) -> Stops:
-    """Of the shutter of the outfeed's shed, which goes down from 0."""
-    return _beyond((-layout.shutter_stroke, 0.0), robot_room(layout.clearance))
-
-
-def _beyond(ends: tuple[float, float], room: Clearance) -> Stops:
-    return Stops(ends[0] - room.stop, ends[1] + room.stop, room.stop - room.play)
+def stops_of(low: float, high: float, clearance: float) -> Stops:
+    """The stops of an axis beyond its ends, which may have a `clearance` to others [m]."""
+    room = Clearance(clearance)
+    return Stops(low - room.stop, high + room.stop, room.stop - room.play)

@@ -27,7 +27,7 @@ from factory.mjcf.model import (
     lifted,
 )
 from factory.mjcf.outfeed import TRAY_MASS
-from factory.mjcf.stops import OVERLOAD, robot_room, tray_room
+from factory.mjcf.stops import OVERLOAD, tray_clearance
 from factory.support.settings import AUTO, TICK, Settings
 
 STEPS = (1, 2, 4, 5, 10, 20)
@@ -160,7 +160,7 @@ def _dip(settings: Settings, load: float) -> float:
 def _axes(settings: Settings, layout: Layout, jitter: float) -> Iterator[DrivenAxis]:
     """Every robot, lift and the tray with the heaviest that it carries, and the shutter; those that
     are alike once."""
-    room, far = robot_room(layout.clearance).c, tray_room(layout.clearance).c
+    room, far = layout.clearance, tray_clearance(layout)
     factory, solids, a = layout.factory, layout.product.solids, settings.acceleration
     masses: dict[str, float] = {}
     for operation in reversed(factory.making):

@@ -152,11 +152,6 @@ def residuals(d: mujoco.MjData) -> Array:
     return np.asarray(d.efc_pos[: d.ne].reshape(-1, ROWS)[:, :3])
 
 
-def soften(m: mujoco.MjModel, factor: float) -> None:
-    """Multiply the time constants of all welds by a factor."""
-    m.eq_solref[:, 0] *= factor
-
-
 def _turned(points: Array, angle: Array) -> Array:
     """Points of the plane (n, 2), turned about 0 by angles (n,)."""
     c, s = np.cos(angle), np.sin(angle)
