@@ -19,10 +19,10 @@ from factory.lang.pag_reader import read_pag
 from factory.lang.writer import write_pag
 from factory.layout.bounds import least_times
 from factory.layout.durations import Pace
-from factory.layout.repeated import repeated
 from factory.nets.marked import marked
 from factory.nets.verify import verify
 from factory.pipeline import Project, all_templates, read
+from factory.plant.fused_bodies import repeated
 from factory.problem.pag import PAG, Mix
 from factory.problem.plan import NOBODY, Plan
 from factory.simulation.request import RunRequest

@@ -20,7 +20,6 @@ from factory.layout.bounds import cycle_time_bound
 from factory.layout.durations import Pace, cycle_of
 from factory.layout.hands.choosing import Hands
 from factory.layout.hands.hand import Hand
-from factory.layout.repeated import repeated
 from factory.layout.stops import stops_of
 from factory.nets.history import legal_marking
 from factory.nets.marked import marked
@@ -28,6 +27,7 @@ from factory.nets.replay import replay
 from factory.nets.verify import verify
 from factory.pipeline import Project, all_templates, read
 from factory.plant.factory import Factory
+from factory.plant.fused_bodies import repeated
 from factory.plant.programs import program_of, write_program
 from factory.problem.pag import PAG, Parameter
 from factory.problem.robot_types import load_catalogue

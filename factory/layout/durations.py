@@ -1,6 +1,6 @@
 """Durations of operations from lengths alone: the objective of the layout search.
 
-`timing/prediction.py` predicts the run itself, from the modes; tests compare the two.
+`timing/timed.py` predicts the run itself, from the modes; tests compare the two.
 """
 
 from __future__ import annotations

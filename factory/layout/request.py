@@ -70,7 +70,7 @@ class Ground:
         from factory.compiler.mating.mating import judged
         from factory.layout.durations import Pace
         from factory.layout.embedding import lay_out
-        from factory.layout.repeated import repeated
+        from factory.plant.fused_bodies import repeated
 
         pace = Pace.of(settings)
         factory, product = judged(factory, product), repeated(product, factory)
@@ -102,7 +102,7 @@ class Ground:
         from factory.layout.dimensions import Clearance
         from factory.layout.durations import Pace
         from factory.layout.embedding import drafted
-        from factory.layout.repeated import repeated
+        from factory.plant.fused_bodies import repeated
 
         factory, product = judged(factory, product), repeated(product, factory)
         c, pace = Clearance(settings.clearance), Pace.of(settings)
@@ -140,7 +140,7 @@ def hands_of(factory: Factory, product: Product, settings: Settings) -> Hands:
     from factory.compiler.mating.mating import judged
     from factory.compiler.tees import on_stems
     from factory.layout.hands.choosing import Hands
-    from factory.layout.repeated import repeated
+    from factory.plant.fused_bodies import repeated
 
     stems, _ = on_stems(judged(factory, product))
     return Hands(stems, repeated(product, factory), settings.acceleration)

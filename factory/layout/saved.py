@@ -13,11 +13,11 @@ from factory.layout.guidepath import Box, Guidepath
 from factory.layout.hands.hand import Hand, Point3
 from factory.layout.layout import Layout
 from factory.layout.pins import frame_of
-from factory.layout.repeated import repeated
 from factory.layout.shapes import payload_boxes
 from factory.layout.standby import part_of
 from factory.layout.visits import Visit
 from factory.plant.factory import Factory
+from factory.plant.fused_bodies import repeated
 from factory.support.errors import RunError
 
 LAID_FOR = ("clearance", "hands", "acceleration")

@@ -15,9 +15,9 @@ from factory.compiler.mixing import lines_of_mix, orders, turns_of
 from factory.geometry.solids import Product
 from factory.layout.bounds import least_times
 from factory.layout.durations import Pace
-from factory.layout.repeated import repeated
 from factory.nets.ways import train_ratio
 from factory.plant.factory import Factory
+from factory.plant.fused_bodies import repeated
 from factory.problem.pag import Mix
 from factory.problem.plan import Plan
 from factory.problem.robot_types import Catalogue

@@ -9,7 +9,6 @@ every hand leaves against its heading and comes from ahead.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,14 +23,9 @@ from factory.layout.layout import Layout, carriers
 from factory.layout.relaying.lanes import HoldingInLanes, InTheWayInLanes, Lane
 from factory.plant.factory import Factory
 
-
-@dataclass(frozen=True, slots=True)
-class InLine:
-    """The hands of a factory with relays, and the robots (of the factory without) whose lanes are
-    exchanged."""
-
-    hands: tuple[Hand | None, ...]
-    turned: frozenset[int]
+InLine = tuple[tuple[Hand | None, ...], set[int]]
+"""The hands of a factory with relays, and the robots (of the factory without) whose lanes are
+exchanged."""
 
 
 def hands_in_line(
@@ -48,11 +42,11 @@ def hands_in_line(
     cut = {robot for pieces in lines.values() for robot in pieces}
     settled = [None if robot in cut else before.hand(old) for robot, old in enumerate(origins)]
     choice = _Choice(before, HoldingInLanes(before, factory, origins, cut, relays), settled)
-    on, turned = carriers(before.factory), set()
+    on, turned = carriers(before.factory), set[int]()
     for old in sorted(lines, key=lambda robot: _depth(on, robot)):
         if choice.settle(old, on[old], lines[old]) < 0:
             turned.add(old)
-    return InLine(tuple(settled), frozenset(turned))
+    return tuple(settled), turned
 
 
 def _depth(on: Sequence[int], robot: int) -> int:
@@ -66,9 +60,6 @@ def _depth(on: Sequence[int], robot: int) -> int:
 class _Choice:
     """Chooses the hands of robots in lanes, carriers first, and of those that deliver to them;
     `settled`: hands chosen already."""
-
-    holding: HoldingInLanes
-    in_the_way: InTheWayInLanes
 
     def __init__(self, before: Layout, holding: HoldingInLanes, settled: list[Hand | None]) -> None:
         self.before, self.holding, self.settled = before, holding, settled
@@ -119,7 +110,7 @@ class _Choice:
         """The hand from below of a robot that delivers to one in a lane, on its own side; None
         where it has none from below, or where that is to be chosen."""
         before = self.before.hand(self.holding.origins[guest])
-        if self.holding.on[guest] != robot or self.holding.cut(guest):
+        if self.holding.on[guest] != robot or guest in self.holding.cut:
             return None
         if before is None or before.kind != "below":
             return None

@@ -45,7 +45,8 @@ NOTHING = Hand("none", ((0.0, 0.0, 0.0),))
 
 
 class HoldingInLanes(Holding):
-    """As `Holding`; no robot comes to a hand-over in line."""
+    """As `Holding`; no robot comes to a hand-over in line. `cut`: the robots that run on a piece of
+    a guidepath."""
 
     def __init__(
         self,
@@ -57,17 +58,13 @@ class HoldingInLanes(Holding):
     ) -> None:
         super().__init__(factory, before.product)
         self.relays, self.clearance = relays, Clearance(before.clearance)
-        self.origins, self._cut = origins, cut
+        self.origins, self.cut = origins, cut
         self.headings = [before.guidepaths[old].heading for old in origins]
         for robot in cut:
             self.axis[robot] = 0 if self.headings[robot][0] else 1
 
     def made(self, robot: int) -> list[Operation]:
         return [o for o in super().made(robot) if o.index not in self.relays]
-
-    def cut(self, robot: int) -> bool:
-        """Whether a robot runs on a piece of a guidepath."""
-        return robot in self._cut
 
     def gives(self, robot: int) -> bool:
         """Whether a robot delivers to one in line with it."""

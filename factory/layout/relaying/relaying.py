@@ -24,8 +24,7 @@ from factory.layout.relaying.splitting import split
 from factory.layout.relaying.ways import Way, ways
 from factory.plant.factory import Robot
 from factory.problem.pag import NOPART
-from factory.problem.robot_types import Catalogue, load_catalogue
-from factory.problem.template import Template
+from factory.problem.robot_types import load_catalogue
 from factory.support.collector import collector_paused
 from factory.support.resources import templates_folder
 from factory.support.settings import Settings
@@ -67,17 +66,6 @@ def relayed(
     return replace(certified(search.found, floor), plain=plain)
 
 
-def robot_times(layout: Layout, settings: Settings) -> list[float]:
-    """Time of each robot's gear [s]; for the output robot at least that of the outfeed."""
-    pace = Pace.of(settings)
-    seconds = gear_times(layout, pace)
-    dropoff = layout.factory.dropoff.index
-    way = layout.home(0, dropoff) - layout.visits[dropoff, 0].at
-    outfeed = pace.rest(way) + pace.lost + away(layout, settings)
-    seconds[0] = max(seconds[0], outfeed)
-    return seconds
-
-
 @dataclass(frozen=True, slots=True)
 class Room:
     """Makes room for lanes in a `plain` layout."""
@@ -108,11 +96,9 @@ def _searched(
 ) -> _Search:
     """What was found with relays for these robots alone, such that it can be certified, and all
     that robots in line hold can be held."""
-    plain, layout = room.plain, room.layout(wide)
+    layout = room.layout(wide)
     chosen = {label: way for label, way in ways(layout).items() if way.robot in wide}
-    templates = {o.template.name: o.template for o in plain.factory.operations}
-    templates = {**load_templates([templates_folder()]), **templates}
-    search = _Search(layout, chosen, templates, load_catalogue(), settings)
+    search = _Search(layout, chosen, settings)
     search.look(cycle)
     while search.ways and (faulty := search.faulty()):
         search.forbid(faulty)
@@ -124,32 +110,34 @@ class _Search:
     """Looks for `numbers` of relays on the `ways` of a layout; `found`: the layout with them,
     `cycle`: what it was to reach [s]."""
 
-    def __init__(
-        self,
-        layout: Layout,
-        ways: Mapping[str, Way],
-        templates: Mapping[str, Template],
-        catalogue: Catalogue,
-        settings: Settings,
-    ) -> None:
+    def __init__(self, layout: Layout, ways: Mapping[str, Way], settings: Settings) -> None:
         self.layout, self.ways, self.settings = layout, ways, settings
-        self.templates, self.catalogue = templates, catalogue
+        self.pace = Pace.of(settings)
+        used = {o.template.name: o.template for o in layout.factory.operations}
+        self.templates = {**load_templates([templates_folder()]), **used}
         self.numbers: dict[str, int] = {}
         self.found = layout
         self.cycle = 0.0
 
     def seconds(self, layout: Layout) -> float:
         """The cycle time [s]."""
-        pace = Pace.of(self.settings)
-        return max(cycle_of(layout, pace), *robot_times(layout, self.settings))
+        return max(cycle_of(layout, self.pace), *self._times(layout))
+
+    def _times(self, layout: Layout) -> list[float]:
+        """Time of each robot's gear [s]; for the output robot at least that of the outfeed."""
+        seconds = gear_times(layout, self.pace)
+        dropoff = layout.factory.dropoff.index
+        way = layout.home(0, dropoff) - layout.visits[dropoff, 0].at
+        outfeed = self.pace.rest(way) + self.pace.lost + away(layout, self.settings)
+        seconds[0] = max(seconds[0], outfeed)
+        return seconds
 
     def look(self, cycle: float | None) -> None:
         """Find few relays with which the factory is as fast as wanted, or as possible."""
-        pace = Pace.of(self.settings)
         if cycle is None:
             most = self._split({label: way.most for label, way in self.ways.items()})
-            cycle = max(WITHIN * cycle_of(most, pace), self.seconds(most))
-        times = robot_times(self.layout, self.settings)
+            cycle = max(WITHIN * cycle_of(most, self.pace), self.seconds(most))
+        times = self._times(self.layout)
         late = {label: way for label, way in self.ways.items() if times[way.robot] > cycle}
         self.cycle, self.numbers = cycle, dict.fromkeys(self.ways, 0)
         self.numbers |= {label: self._guess(way, GUESS * cycle) for label, way in late.items()}
@@ -179,19 +167,18 @@ class _Search:
         self.ways = {k: way for k, way in self.ways.items() if shared and k not in shared}
 
     def _split(self, numbers: Mapping[str, int]) -> Layout:
-        return split(self.layout, self.ways, numbers, self.templates, self.catalogue)
+        return split(self.layout, self.ways, numbers, self.templates, load_catalogue())
 
     def _guess(self, way: Way, seconds: float) -> int:
         """The least number of cuts that leaves no piece too long."""
-        pace = Pace.of(self.settings)
-        fast = (n for n in range(way.most) if pace.rest(way.longest(n)) <= seconds)
+        fast = (n for n in range(way.most) if self.pace.rest(way.longest(n)) <= seconds)
         return next(fast, way.most)
 
     def _more(self) -> set[str]:
         """The ways to cut once more: for each robot that takes too long the longest way that it
         waits for, or goes itself."""
         to_cut = set[str]()
-        times, numbers = robot_times(self.found, self.settings), self.numbers
+        times, numbers = self._times(self.found), self.numbers
         for robot in self.found.factory.robots:
             if times[robot.index] > self.cycle + 1e-9:
                 labels = map(origin_of, _carried(self.found, robot))

@@ -46,11 +46,11 @@ def split(
     before = layout.factory
     factory = with_relays(before, numbers, templates, catalogue)
     cut = {r: list(_pieces(layout, r, ways, factory)) for r in range(len(before.robots))}
-    chosen = _hands(layout, factory, cut)
+    hands, turned = _hands(layout, factory, cut)
     paths: dict[int, Guidepath] = {}
     starts: dict[int, float] = {}
     for robot, pieces in cut.items():
-        spread = Clearance(layout.clearance).spread * (-1 if robot in chosen.turned else 1)
+        spread = Clearance(layout.clearance).spread * (-1 if robot in turned else 1)
         for number, piece in enumerate(reversed(pieces)):
             lane = spread * (-1) ** number if len(pieces) > 1 else 0.0
             paths[piece.robot] = _path(layout.guidepaths[robot], piece, lane)
@@ -66,7 +66,7 @@ def split(
         factory=factory,
         guidepaths=guidepaths,
         visits=visits_of(factory, guidepaths, stations),
-        hands=chosen.hands,
+        hands=hands,
         payloads=payload_boxes(factory, layout.product),
         certificate=None,
     )
@@ -88,7 +88,7 @@ def with_relays(
 def _hands(layout: Layout, factory: Factory, cut: Mapping[int, Sequence[Piece]]) -> InLine:
     """The hands of robots with relays; none where they are not chosen."""
     if not layout.hands:
-        return InLine((), frozenset())
+        return (), set()
     origins = {piece.robot: robot for robot, pieces in cut.items() for piece in pieces}
     lines = {r: [p.robot for p in reversed(pieces)] for r, pieces in cut.items() if len(pieces) > 1}
     relays = {o.index for o in factory.making if origin_of(o.label) != o.label}

@@ -15,10 +15,10 @@ from factory.geometry.solids import Product
 from factory.layout.durations import Pace
 from factory.layout.guidepath import Box
 from factory.layout.hands.misses import NoGrip
-from factory.layout.repeated import repeated
 from factory.layout.shapes import payload_boxes
 from factory.pipeline import Project
 from factory.plant.factory import Factory, Operation
+from factory.plant.fused_bodies import repeated
 from factory.problem.plan import THIRD, Plan
 from factory.study.allocation.aim import STEP
 from factory.study.allocation.bundles import Filling
