@@ -17,7 +17,7 @@ from factory.layout.pins import StayingRobot
 from factory.pipeline import all_templates, read
 from factory.study.revision import revised
 from factory.support.errors import RunError
-from factory.timing.prediction import pace
+from factory.timing.timed import pace
 from tests.revisions import KINDS, edited, kept_share, shuffled
 
 

@@ -33,8 +33,7 @@ from factory.study.analysis.analysing import least_wip
 from factory.study.analysis.firing import circuits, earliest_firings, slacks
 from factory.study.analysis.timed import flow, reached, timed_net
 from factory.support.settings import Settings
-from factory.timing.prediction import duration
-from factory.timing.timed import timed
+from factory.timing.timed import duration, timed
 from tests.command_line import PAPER, ROOT, Terminal
 from tests.layout_values import paper_layout, random_layout
 from tests.net_values import net_from

@@ -48,7 +48,7 @@ def puzzle(folder: Path, parts: Parts) -> Path:
 def test_a_plan_is_free_and_no_slower_than_the_tree_drawn_by_hand(
     planning: Planning, run: Terminal, name: str
 ) -> None:
-    from factory.timing.prediction import pace
+    from factory.timing.timed import pace
 
     done = planning(EXAMPLES / f"{name}.pag", "--no-look", "--no-screws")
     assert done.status == 0, done.err

@@ -14,7 +14,7 @@ from factory.pipeline import all_templates, read
 from factory.planning.plan import CannotAssemble, Planned, PlanOptions, plan
 from factory.planning.source import SourceOptions, read_source
 from factory.planning.writing import planned_product
-from factory.timing.prediction import pace
+from factory.timing.timed import pace
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"

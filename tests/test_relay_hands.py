@@ -30,7 +30,7 @@ from factory.pipeline import read
 from factory.plant.factory import Operation
 from factory.problem.robot_types import load_catalogue
 from factory.support.settings import Settings
-from factory.timing.prediction import pace
+from factory.timing.timed import pace
 from tests.command_line import Terminal
 from tests.test_hands import AT_MOST_MM, GRIP_MM, looked_at
 from tests.test_relay import templates_of

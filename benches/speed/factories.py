@@ -12,7 +12,6 @@ from factory.geometry.product import product_geometry
 from factory.layout.layout import Layout
 from factory.layout.request import Ground
 from factory.nets.replay import replay
-from factory.plant.material import joins_of
 from factory.record.verdict import RunVerdict, judged, kept_figures
 from factory.simulation.mujoco.courses import Course
 from factory.simulation.request import RunRequest
@@ -170,7 +169,7 @@ def judge(simulation: Simulation) -> None:
     world = simulation.physical
     supervisor, factory = simulation.supervisor, simulation.layout.factory
     entries = entries_of(supervisor.events)
-    refines = replay(factory.net, entries, simulation.start, joins_of(factory), []).refines
+    refines = replay(factory.net, entries, simulation.start, factory.joins, []).refines
     require(judged(None, refines, kept_figures(world.figures()), None))
 
 

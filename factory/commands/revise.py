@@ -53,7 +53,7 @@ def revise(
     from factory.study.live import LiveChange
     from factory.study.revision import revised
     from factory.support.files import write_all
-    from factory.timing.prediction import pace
+    from factory.timing.timed import pace
 
     writable(new, picture)
     writable_folder(output)

@@ -33,22 +33,27 @@ def with_ways(net: MarkedNet, gears: GearNet, ways: Iterable[Way]) -> MarkedNet:
     return MarkedNet(PetriNet(net.net.transitions, tuple(places)), tuple(tokens))
 
 
-def train_ratio(
-    gears: GearNet, seconds: Sequence[float], ways: Mapping[Way, float]
-) -> tuple[CycleRatio, list[int]]:
-    """The maximum cycle ratio of a live gear train, with the seconds of each of its places and the
-    `ways` that robots go ahead, and the robots on the critical circuit (`busiest`). Raises
-    ValueError where it is not live.
-
-    A way in a gear of one operation leads back to where it begins; its wait takes longer instead.
-    """
-    delays, apart = list(seconds), dict[Way, float]()
+def ways_apart(gears: GearNet, seconds: list[float], ways: Mapping[Way, float]) -> dict[Way, float]:
+    """The ways that get places of their own. One in a gear of one operation would lead back to
+    where it begins: its wait takes longer instead, in `seconds`."""
+    apart = dict[Way, float]()
     for (robot, number), taken in ways.items():
         wait, *others = (p for p in gears.gears[robot].places if p != number)
         if others:
             apart[robot, number] = taken
         else:
-            delays[wait] = max(delays[wait], taken - delays[number])
+            seconds[wait] = max(seconds[wait], taken - seconds[number])
+    return apart
+
+
+def train_ratio(
+    gears: GearNet, seconds: Sequence[float], ways: Mapping[Way, float]
+) -> tuple[CycleRatio, list[int]]:
+    """The maximum cycle ratio of a live gear train, with the seconds of each of its places and the
+    `ways` that robots go ahead, and the robots on the critical circuit (`busiest`). Raises
+    ValueError where it is not live."""
+    delays = list(seconds)
+    apart = ways_apart(gears, delays, ways)
     delays += apart.values()
     ratio = max_cycle_ratio(with_ways(marked(gears), gears, apart), delays)
     owners = dict(enumerate(gears.slots))

@@ -27,7 +27,7 @@ from factory.problem.template import Template
 from factory.support.bounds import Allowance
 from factory.support.errors import FactoryError
 from factory.support.settings import Settings
-from factory.timing.prediction import pace
+from factory.timing.timed import pace
 
 LAID = 120
 """Trees are laid out until they have more robots together, unless a time is given."""

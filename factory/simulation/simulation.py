@@ -36,7 +36,7 @@ from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import AUTO, MOST, Settings
 from factory.timing.cycle_time import CycleTime
 from factory.timing.on_demand import cycle_of
-from factory.timing.prediction import duration
+from factory.timing.timed import duration
 from factory.timing.timing import Timing
 
 if TYPE_CHECKING:

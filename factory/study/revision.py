@@ -28,7 +28,7 @@ from factory.plant.factory import Factory
 from factory.plant.matching import matching, shifted
 from factory.plant.pairing import Pairing
 from factory.support.errors import Diagnostic, RunError, usage_error
-from factory.timing.prediction import pace
+from factory.timing.timed import pace
 
 Pin = Literal["all", "hands", "none"]
 """What is pinned of the old layout."""

@@ -1,4 +1,5 @@
-"""The timed net of a layout: its coordinated net with the time that a token stays in each place."""
+"""The timed net of a layout: its coordinated net with the time that a token stays in each place.
+What follows from it for a run."""
 
 from __future__ import annotations
 
@@ -6,9 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
+from factory.layout.layout import Layout
 from factory.nets.cycle_ratio import CycleRatio, max_cycle_ratio
 from factory.nets.marked import MarkedNet
-from factory.nets.ways import Way, busiest, with_ways
+from factory.nets.ways import Way, busiest, ways_apart, with_ways
+from factory.support.settings import Settings
 from factory.timing.cycle_time import CycleTime, cycle_time
 from factory.timing.pool import with_wip
 from factory.timing.timing import AS_IT_IS, Change, Timing
@@ -112,11 +115,7 @@ def timed(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None) -> 
         places = replace(net.net, places=(*net.net.places, *more))
         net = MarkedNet(places, (*net.tokens, *tokens))
         seconds += [0.0] * len(more)
-    went = timing.ways(change)
-    for robot, number in [way for way in went if len(factory.net.gears[way[0]].places) == 2]:
-        # a way around a gear of one operation would lead back to where it begins
-        wait = factory.net.gears[robot].places[0]
-        seconds[wait] = max(seconds[wait], went.pop((robot, number)) - seconds[number])
+    went = ways_apart(factory.net, seconds, timing.ways(change))
     ways = dict(zip(went, range(len(seconds), len(seconds) + len(went)), strict=True))
     owners |= {place: (robot,) for (robot, _), place in ways.items()}
     net = with_ways(net, factory.net, went)
@@ -132,3 +131,25 @@ def _copied(timing: Timing, change: Change) -> MarkedNet:
     for place, beside in coordinated.beside.items():
         tokens[place] = tokens[beside]
     return replace(coordinated.net, tokens=tuple(tokens))
+
+
+def pace(layout: Layout, settings: Settings) -> tuple[CycleTime, tuple[float, ...]]:
+    """The cycle time of a layout in MuJoCo, and how long each operation takes [s]."""
+    timing = Timing(layout, settings)
+    return timed(timing).cycle, timing.delays
+
+
+def duration(timing: Timing, cycle: float, units: int) -> float:
+    """At most how long it takes to make so many `units` from the empty factory [s]: the first by
+    the slowest chain of operations from a part to dropoff, a `cycle` for each that follows, and for
+    each further one of a period."""
+    factory, delays = timing.factory, timing.delays
+    ready = [0.0] * len(factory.robots)
+    for number in factory.order:
+        operation = factory.operations[number]
+        if factory.drops(number) or operation.turn:
+            continue
+        done = max(ready[robot] for robot in operation.robots) + delays[operation.index]
+        for robot in operation.robots:
+            ready[robot] = done
+    return max(ready) + delays[-1] + (units + factory.period - 2) * cycle

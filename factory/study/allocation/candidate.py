@@ -12,7 +12,7 @@ from factory.pipeline import Project
 from factory.study.allocation.bundles import Filling
 from factory.support.errors import FactoryError
 from factory.timing.cycle_time import CycleTime
-from factory.timing.prediction import pace
+from factory.timing.timed import pace
 
 
 @dataclass(frozen=True)
