@@ -21,8 +21,8 @@ from factory.planning.blocking import CLASHES, DEEPER, FREE, LOCKED, SCRAPES, Bl
 from factory.planning.cannot import cores, interlocks, removal
 from factory.planning.divisions import divisions
 from factory.planning.exact import Best, Expected, Tree, TreeTask, tables
-from factory.planning.growing import Divider, Site, bettered, divided, units_of
-from factory.planning.judging import Judge, Judged
+from factory.planning.growing import Divider, bettered, divided, units_of
+from factory.planning.judging import Judged, Site
 from factory.planning.parts import InPlace
 from factory.planning.searching import Sought, budget_of, trees
 from factory.planning.source import placed
@@ -94,10 +94,14 @@ def piled(members: tuple[int, ...]) -> Iterator[Tree]:
                     yield (*tree, last)
 
 
+def site(found: Blocking, stance: Stance) -> Site:
+    """The problem in a stance, of units that cost nothing."""
+    return Site(found, stance, EXPECTED, np.zeros((2, len(found))))
+
+
 def judged(found: Blocking, stance: Stance, all_: Iterator[Tree]) -> list[Judged]:
     """The trees of which no join is locked."""
-    judge = Judge(found, stance, EXPECTED)
-    return [one for one in map(judge.judged, all_) if not one.count(LOCKED)]
+    return [one for one in map(site(found, stance).judged, all_) if not one.count(LOCKED)]
 
 
 @settings(max_examples=20, deadline=None)
@@ -167,7 +171,7 @@ def test_least_price_and_cycle_are_those_of_all_trees(found: Blocking, stance: S
     assert price == best.price
     assert time == pytest.approx(best.seconds) or best.relays
     tree = Best(task, None).tree(task.subsets.whole, at)
-    assert Judge(found, stance, EXPECTED).judged(tree).price == price
+    assert site(found, stance).judged(tree).price == price
 
 
 @settings(max_examples=25, deadline=None)
@@ -179,7 +183,7 @@ def test_no_tree_of_that_price_has_fewer_robots(found: Blocking, stance: Stance)
     if not np.isfinite(best.made[at, -1]):
         assert not all_
         return
-    mine = Judge(found, stance, EXPECTED).judged(best.tree(task.subsets.whole, at))
+    mine = site(found, stance).judged(best.tree(task.subsets.whole, at))
     for other in all_:
         assert (mine.price, mine.robots) <= (other.price, other.robots)
 
@@ -196,13 +200,12 @@ def test_dividing_finds_a_tree_whenever_there_is_one(
     if interlocks(found):
         return
     random = np.random.default_rng(seed)
-    site = Site(found, stance, EXPECTED, np.zeros((2, len(found))))
-    tree = divided(site, random, 1.0)
-    judge = Judge(found, stance, EXPECTED)
+    problem = site(found, stance)
+    tree = divided(problem, random, 1.0)
     assert units_of(tree) == tuple(range(len(found)))
-    assert judge.judged(tree).count(LOCKED) == 0
-    last = judge.judged(tree)
-    betters = bettered(site, tree, np.inf, lambda: False, random)
+    last = problem.judged(tree)
+    assert last.count(LOCKED) == 0
+    betters = bettered(problem, tree, np.inf, lambda: False, random)
     for better in islice(betters, 3):
         assert better.price <= last.price and units_of(better.tree) == units_of(tree)
         assert better.count(LOCKED) == 0
@@ -262,7 +265,7 @@ def test_what_is_free_is_what_check_calls_free(source: InPlace, stance: Stance, 
         made.append(
             (*pile, come) if isinstance(pile, tuple) and rng.random() < 0.7 else (pile, come)
         )
-    joins = Judge(found, stance, EXPECTED).judged(made[0]).joins
+    joins = site(found, stance).judged(made[0]).joins
 
     def named(tree: Tree) -> Tree:
         return source.parts[tree].label if isinstance(tree, int) else tuple(map(named, tree))
@@ -302,7 +305,7 @@ def test_stances_are_the_rotations_up_to_half_a_turn() -> None:
     whole = {tuple(m.ravel().tolist()) for r in turned for m in (r, half @ r)}
     assert len(whole) == 24
     assert all(np.linalg.det(r) == pytest.approx(1.0) for r in turned)
-    assert np.array_equal(turned[0], np.eye(3)) and stances()[0].upright
+    assert np.array_equal(turned[0], np.eye(3)) and stances()[0] == Stance()
     for stance in stances():
         assert abs(stance.rotation[0, stance.axes[0]]) == 1
         assert stance.rotation[2, stance.axes[2]] == stance.up

@@ -170,13 +170,9 @@ def _bodies(source: InPlace) -> tuple[Finder, ConvexBodies, Ints]:
     low = np.min([solid.low for solid in solids.values()], axis=0)
     high = np.max([solid.high for solid in solids.values()], axis=0)
     convex = bodies(Product(solids, low, high), list(solids))
-    return Finder(convex, _one_meeting(tuple(solids))), convex, unit
-
-
-def _one_meeting(parts: tuple[str, ...]) -> Meetings:
-    """A single meeting of all parts."""
-    meeting = Meeting("", (), 0, 0, 0, len(parts), either=True)
-    return Meetings(parts, (meeting,), np.zeros(len(parts) - 1, np.int64), np.zeros(1, np.int64))
+    every = Meeting("", (), 0, 0, 0, len(solids), either=True)
+    borders, levels = np.zeros(len(solids) - 1, np.int64), np.zeros(1, np.int64)
+    return Finder(convex, Meetings(tuple(solids), (every,), borders, levels)), convex, unit
 
 
 def _hidden(overlaps: Overlaps, unit: Ints, labels: Sequence[str]) -> tuple[Drawn, ...]:

@@ -145,7 +145,10 @@ def tables(task: TreeTask, late: Late = never) -> Tables:
             mine = np.maximum(below, base + np.where(slides, 0.0, lift))
             best = _first_least(cost * LONG + mine, starts)
             price[axis, wholes], time[axis, wholes] = cost[best], mine[best]
-        _relayed(wholes, price, time)
+        for axis in (0, 1):
+            turned = wholes[price[1 - axis, wholes] + RELAY < price[axis, wholes]]
+            price[axis, turned] = price[1 - axis, turned] + RELAY
+            time[axis, turned] = time[1 - axis, turned]
     return Tables(price, time)
 
 
@@ -155,13 +158,6 @@ def _first_least(values: Array, starts: Masks) -> Masks:
     counts = np.diff(starts, append=len(values))
     equal = np.flatnonzero(values == np.repeat(least, counts))
     return np.asarray(equal[np.searchsorted(equal, starts)])
-
-
-def _relayed(wholes: Masks, price: Array, time: Array) -> None:
-    for axis in (0, 1):
-        turned = wholes[price[1 - axis, wholes] + RELAY < price[axis, wholes]]
-        price[axis, turned] = price[1 - axis, turned] + RELAY
-        time[axis, turned] = time[1 - axis, turned]
 
 
 class Best:

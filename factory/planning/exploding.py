@@ -50,17 +50,13 @@ class Explosion:
         index = {label: number for number, label in enumerate(self.parts)}
         offsets = np.zeros((len(self.parts), 3))
         for number, step in enumerate(self.steps):
-            left = 1.0 - _eased(min(max(done - number, 0.0), 1.0))
+            share = min(max(done - number, 0.0), 1.0)
+            left = 1.0 - share * share * (3 - 2 * share)  # with zero slope at either end
             if left > 0:
                 offsets[[index[label] for label in step.moving]] += (
                     left * step.distance * step.direction
                 )
         return offsets
-
-
-def _eased(share: float) -> float:
-    """A share from 0 to 1, with zero slope at either end."""
-    return share * share * (3 - 2 * share)
 
 
 def explosion(pag: PAG, matings: Matings, product: Product) -> Explosion:

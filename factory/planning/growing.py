@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from factory.geometry.meshes import Array
 from factory.planning.blocking import CLASHES, DEEPER, LOCKED, Blocking
 from factory.planning.cannot import Units
-from factory.planning.divisions import Late, divisions, never
-from factory.planning.exact import RELAY, Best, Expected, Tree, TreeTask
-from factory.planning.judging import Judge, Judged
-from factory.planning.subsets import APART, BLOCKED, LOOSE, PASSES, ROOT_AXIS, TIPS, Stance, subsets
+from factory.planning.divisions import Late, divisions
+from factory.planning.exact import RELAY, Best, Tree, TreeTask
+from factory.planning.judging import Judged, Site
+from factory.planning.subsets import APART, BLOCKED, LOOSE, PASSES, ROOT_AXIS, TIPS, subsets
 
 Sets = NDArray[np.bool_]
 
@@ -152,21 +152,7 @@ class Joined:
     axis: int = -1
 
 
-@dataclass(frozen=True)
-class Site:
-    """A planning problem in one stance: the blocking `graphs` of a product and expected times.
-    `unit_prices` (2, n): the price of each unit if its own inputs come along x or y of the
-    floor."""
-
-    graphs: Blocking
-    stance: Stance
-    expected: Expected
-    unit_prices: Array = field(repr=False)
-
-
-def solved(
-    site: Site, groups: Sequence[Joined], axis: int, bound: float | None, late: Late = never
-) -> Tree | None:
+def solved(site: Site, groups: Sequence[Joined], axis: int, bound: float | None) -> Tree | None:
     """The best tree of a few groups, whose inputs come along an axis of the floor; sub-assemblies
     are in pieces only where there is no other way. None where no tree has cycles below the bound.
     """
@@ -184,7 +170,7 @@ def solved(
     for apart in (False, True):
         possible = divisions(tables, stance.axes[2], stance.up, apart)
         task = TreeTask(possible, site.expected, prices)
-        best = Best(task, bound, late)
+        best = Best(task, bound)
         if np.isfinite(best.made[at, tables.whole]):
             return best.tree(tables.whole, at, leaf)
     return None
@@ -220,8 +206,7 @@ def bettered(
 ) -> Iterator[Judged]:
     """Ever better trees, from a first one on, within a bound on expected cycles [s], until it is
     late or ROUNDS neighbourhoods of each join brought no improvement."""
-    judge = Judge(site.graphs, site.stance, site.expected)
-    best = judge.judged(first)
+    best = site.judged(first)
     yield best
     idle = 0
     while not late():
@@ -236,7 +221,7 @@ def bettered(
         idle += 1
         if solution is None or solution == node:
             continue
-        other = judge.judged(_replaced(best.tree, place, solution))
+        other = site.judged(_replaced(best.tree, place, solution))
         if _worth(other, bound) < _worth(best, bound):
             best, idle = other, 0
             yield best

@@ -58,11 +58,16 @@ class Judged:
         return sum(join.level >= level for join in self.joins)
 
 
-class Judge:
-    """Judges trees of one product in one stance."""
+@dataclass(frozen=True)
+class Site:
+    """A planning problem in one stance: the blocking `graphs` of a product and expected times.
+    `unit_prices` (2, n): the price of each unit if its own inputs come along x or y of the
+    floor."""
 
-    def __init__(self, graphs: Blocking, stance: Stance, expected: Expected) -> None:
-        self.graphs, self.stance, self.expected = graphs, stance, expected
+    graphs: Blocking
+    stance: Stance
+    expected: Expected
+    unit_prices: Array = field(repr=False)
 
     def judged(self, tree: Tree) -> Judged:
         """The joins of a tree, and what they cost."""
@@ -116,7 +121,7 @@ class Judge:
 class _Walk:
     """The figures that are accumulated on a walk through a tree."""
 
-    judge: Judge
+    site: Site
     joins: list[Join] = field(default_factory=list)
     seconds: list[float] = field(default_factory=list)
     apart: int = 0
@@ -128,7 +133,7 @@ class _Walk:
     def made(self, tree: Tree, axis: int) -> tuple[Units, float]:
         """The units of a tree whose inputs come along an axis, and the time that the robot which
         holds it has spent [s]."""
-        expected = self.judge.expected
+        expected = self.site.expected
         if isinstance(tree, int):
             self.robots += 1
             return (tree,), expected.pace.lost
@@ -136,7 +141,7 @@ class _Walk:
             members, held = self.made(tree[0], 1 - axis)
             self._delivered(members, held)
             self.relays, self.robots = self.relays + 1, self.robots + 1
-            return members, float(expected.stop(self.judge.size(members)))
+            return members, float(expected.stop(self.site.size(members)))
         pile, held = self.made(tree[0], 1 - axis)
         self._delivered(pile, held)
         self.robots += 1
@@ -145,20 +150,20 @@ class _Walk:
             come, held = self.made(below, 1 - axis)
             self._delivered(come, held)
             onto = number > 0
-            join = self.judge.join(pile, come, axis, onto)
-            sizes = self.judge.size(come) if onto else max(map(self.judge.size, (come, pile)))
+            join = self.site.join(pile, come, axis, onto)
+            sizes = self.site.size(come) if onto else max(map(self.site.size, (come, pile)))
             time += float(expected.stop(sizes) + (expected.step(sizes) if onto else 0.0))
             if join.lowered:
-                time += float(expected.lift(self.judge.stroke(come, pile)))
+                time += float(expected.lift(self.site.stroke(come, pile)))
             self.joins.append(join)
             pile = tuple(sorted((*pile, *come)))
-            self.apart += not self.judge.graphs.hangs(pile)
-            self.tips += self.judge.tips(pile)
-            self.sizes += float(self.judge.size(pile))
+            self.apart += not self.site.graphs.hangs(pile)
+            self.tips += self.site.tips(pile)
+            self.sizes += float(self.site.size(pile))
         return pile, time
 
     def _delivered(self, members: Units, held: float) -> None:
-        self.seconds.append(held + float(self.judge.expected.delivering(self.judge.size(members))))
+        self.seconds.append(held + float(self.site.expected.delivering(self.site.size(members))))
 
 
 def walk_joins(tree: Tree) -> Iterator[Tree]:

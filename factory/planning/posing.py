@@ -3,7 +3,7 @@ along no axis."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -63,7 +63,9 @@ def posed(
         if overhang(source.parts, along(side)) <= TIPS:
             return Pose(source, np.eye(3), side, graphs)
     needs: dict[tuple[str, ...], Array] = {}
-    for turn, way in _candidates(source, stuck, along(drawn), up is None):
+    concerned = only(source, {x for one in stuck for x in one.labels}) if stuck else source
+    about = (False,) if up is not None else (False, True)  # the vertical first
+    for turn, way in (pair for tilted in about for pair in turns(concerned, along(drawn), tilted)):
         free = [_freed(source, one, turn, graphs_of) for one in stuck]
         for labels in filter(None, free):
             needs.setdefault(labels, way)
@@ -72,18 +74,6 @@ def posed(
             if not pose.stuck and pose.tips <= TIPS:
                 return pose
     return Pose(source, np.eye(3), drawn, graphs, stuck, tuple(needs.items()), tips)
-
-
-def _candidates(
-    source: InPlace, stuck: tuple[Interlock, ...], up: Array, tilted: bool
-) -> Iterator[tuple[Array, Array]]:
-    """Candidate rotations with the directions that they bring along an axis, those about the
-    vertical first."""
-    labels = {label for one in stuck for label in one.labels}
-    concerned = only(source, labels) if stuck else source
-    yield from turns(concerned, up, tilted=False)
-    if tilted:
-        yield from turns(concerned, up, tilted=True)
 
 
 def _freed(

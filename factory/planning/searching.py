@@ -15,8 +15,8 @@ from factory.geometry.meshes import Array
 from factory.planning.blocking import Blocking
 from factory.planning.divisions import Divisions, Late, TooLate, divisions
 from factory.planning.exact import Best, Expected, Tables, TreeTask, tables
-from factory.planning.growing import Site, bettered, divided
-from factory.planning.judging import Judge, Judged
+from factory.planning.growing import bettered, divided
+from factory.planning.judging import Judged, Site
 from factory.planning.subsets import MOST, ROOT_AXIS, Stance, Subsets, stances, subsets
 from factory.support.bounds import Allowance
 
@@ -139,13 +139,12 @@ def _proved(sought: Sought) -> Iterator[Judged]:
         ranks = _ranks(sought, table, apart, late)
         if ranks:
             break
-    judges = {r.stance: Judge(sought.graphs, r.stance, sought.expected) for r in ranks}
     for factor in BOUNDS[sought.aim]:
         for rank in ranks:
             task = _task(sought, rank.stance, rank.divisions)
             at = rank.divisions.level.index(rank.stance.axes[ROOT_AXIS])
             best = Best(task, factor * rank.seconds if factor < inf else inf, late)
-            yield judges[rank.stance].judged(best.tree(table.whole, at))
+            yield sought.site(rank.stance).judged(best.tree(table.whole, at))
 
 
 def _task(sought: Sought, stance: Stance, some: Divisions) -> TreeTask:
@@ -207,7 +206,7 @@ def _grown(sought: Sought) -> Iterator[Judged]:
         for even in EVEN:
             site = sought.site(stance)
             tree = divided(site, random, even)
-            first.append(Judge(sought.graphs, stance, sought.expected).judged(tree))
+            first.append(site.judged(tree))
             if late() or first[-1].price == 0.0:
                 break
         if late():

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from factory.geometry.alike import Alike, alike, shape_of
+from factory.geometry.alike import alike, shape_of
 from factory.geometry.decomposition import can_decompose
 from factory.geometry.mesh_file import ANEW
 from factory.geometry.meshes import Array, Indices, hull_mesh
@@ -69,7 +69,11 @@ def read_source(
     doubtful = check_places(named, made.has_tree, asked.unit is not None)
     if not (made.has_tree or asked.in_place):
         raise_if_any(check_in_place(named))
-    notes = (*made.notes, _kinds(named), *_twins(named, kinds))
+    twins = (
+        f"'{parts[one].label}' and '{parts[other].label}' are mirror images: two kinds"
+        for one, other in kinds.twins[:SHOWN]
+    )
+    notes = (*made.notes, _kinds(named), *twins)
     kept = _kept(made, asked.keep)
     kept_notes = tuple(f"'{k.label}' stays as it is: {len(k.parts)} parts" for k in kept)
     warnings = (*made.warnings, *warnings, *doubtful)
@@ -85,7 +89,10 @@ def _product(path: Path, templates: Mapping[str, Template], asked: SourceOptions
         hint = "a folder of meshes, a .glb, .3mf or .step file, a model .ldr or .mpd, or a .pag"
         raise InputError(Diagnostic("BadFile", message, None, hint))
     if path.is_dir() or suffix in (*SCENES, *MESHES):
-        _refuse_keep(asked, f"{quoted(path.name)} has no tree")
+        if asked.keep or asked.replan:
+            hint = "--keep and --replan are for a PAG, or --keep for an LDraw model"
+            message = f"{quoted(path.name)} has no tree"
+            raise InputError(Diagnostic("Usage", message, None, hint))
         return loose_product(path, bodies_in(path), asked.unit)
     if asked.unit is not None:
         message = f"{quoted(path.name)} is in metres, or states its unit"
@@ -139,12 +146,6 @@ def _stored(node: Assembly, pag: PAG, store: MeshStore, faults: list[Diagnostic]
         return node
 
 
-def _refuse_keep(asked: SourceOptions, why: str) -> None:
-    if asked.keep or asked.replan:
-        hint = "--keep and --replan are for a PAG, or --keep for an LDraw model"
-        raise InputError(Diagnostic("Usage", why, None, hint))
-
-
 def _kinds(parts: tuple[PlacedPart, ...]) -> str:
     """A note on the number of parts and kinds."""
     counts = Counter(part.kind for part in parts)
@@ -152,13 +153,6 @@ def _kinds(parts: tuple[PlacedPart, ...]) -> str:
     shown = ", ".join(several[:SHOWN]) + ", ..." * (len(several) > SHOWN)
     alike = f" ({shown})" if several else ", no two alike"
     return f"{len(parts)} parts of {len(counts)} kind{'s' * (len(counts) > 1)}{alike}"
-
-
-def _twins(parts: tuple[PlacedPart, ...], kinds: Alike) -> list[str]:
-    return [
-        f"'{parts[one].label}' and '{parts[other].label}' are mirror images: two kinds"
-        for one, other in kinds.twins[:SHOWN]
-    ]
 
 
 def _kept(made: Imported, labels: tuple[str, ...]) -> tuple[Kept, ...]:

@@ -26,11 +26,6 @@ class Stance:
     up: int = +1
 
     @property
-    def upright(self) -> bool:
-        """Whether the product stands as it was drawn, or turned about the vertical."""
-        return self.axes[2] == 2 and self.up > 0
-
-    @property
     def rotation(self) -> Array:
         """The rotation (3, 3) from the frame of the product to that of the floor: the one of two
         that turns by the smaller angle."""
@@ -51,7 +46,7 @@ def stances(up: tuple[int, int] | None = None) -> tuple[Stance, ...]:
     every = [Stance(axes, up) for axes in permutations(range(3)) for up in (+1, -1)]  # type: ignore[arg-type]
     if up is not None:
         every = [stance for stance in every if (stance.axes[2], stance.up) == up]
-    return tuple(sorted(every, key=lambda s: (not s.upright, s.axes[2] != 2, -s.up, s.axes)))
+    return tuple(sorted(every, key=lambda s: (s.axes[2] != 2, -s.up, s.axes)))
 
 
 Masks = NDArray[np.int64]

@@ -48,14 +48,9 @@ def turned(source: InPlace, turn: Array) -> InPlace:
 def only(source: InPlace, units: Collection[str]) -> InPlace:
     """A source with only some of its units."""
     kept = tuple(keep for keep in source.kept if keep.label in units)
-    inside = {label for name, parts in source.units() if name in units for label in parts_of(parts)}
+    inside = {p.label for name, parts in source.units() if name in units for p in parts}
     parts = tuple(part for part in source.parts if part.label in inside)
     return replace(source, parts=parts, kept=kept)
-
-
-def parts_of(parts: Sequence[PlacedPart]) -> Iterator[str]:
-    """The labels of parts."""
-    return (part.label for part in parts)
 
 
 def turns(source: InPlace, up: Array, tilted: bool) -> Iterator[tuple[Array, Array]]:
@@ -71,7 +66,8 @@ def turns(source: InPlace, up: Array, tilted: bool) -> Iterator[tuple[Array, Arr
         across = [up] if not tilted else [other for other in ways if abs(other @ way) < EXACT]
         for other in across[:2]:
             turn = _onto_axes(way, other, up)
-            if not any(_same_axes(turn, before) for before in seen):
+            same = (np.abs(turn @ before.T).max(axis=1) > 1 - SAME**2 for before in seen)
+            if not any(axes.all() for axes in same):  # in any order
                 seen.append(turn)
                 yield turn, way
         if len(seen) >= MOST:
@@ -90,11 +86,6 @@ def _onto_axes(way: Array, other: Array, up: Array) -> Array:
     if (upright @ up) * up[axis] < 0:
         rows[axis], rows[axis - 1] = -upright, -rows[axis - 1]
     return rows
-
-
-def _same_axes(one: Array, other: Array) -> bool:
-    """Whether two rotations have the same axes, in any order."""
-    return bool((np.abs(one @ other.T).max(axis=1) > 1 - SAME**2).all())
 
 
 def directions(parts: Sequence[PlacedPart]) -> list[Array]:
