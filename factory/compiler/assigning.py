@@ -29,8 +29,10 @@ from factory.support.errors import Diagnostic, InputError
 def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> GearNet:
     """N: for each operation a start, an end and a place; for each robot a gear through them.
 
-    Operation i has transitions 2i and 2i + 1 and place i; the wait places follow, robot by robot. A
-    removed robot has no operations, and a gear without places.
+    Operation i has transitions 2i and 2i + 1 and place i; the wait places follow, robot by robot,
+    as `r2:part1`. The empty-handed waits of a robot with several tours are told apart by the
+    operation to come, `r2:nopart/part3`. A removed robot has no operations, and a gear without
+    places.
     """
     transitions = tuple(
         Transition(f"{o.label}_{end}", o.position) for o in operations for end in ("s", "e")
@@ -53,20 +55,19 @@ def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> Ge
     gears = []
     for robot in robots:
         gear_places, gear_events = [], []
-        several = (
-            sum(operations[n].before[slot_of[n][robot.index]] == NOPART for n in robot.operations)
-            > 1
-        )
+        held = [operations[n].before[slot_of[n][robot.index]] for n in robot.operations]
+        several = held.count(NOPART) > 1
         for step, number in enumerate(robot.operations):
             before, operation = operations[robot.operations[step - 1]], operations[number]
             done, begun = before.end, operation.start
             slot = slot_of[number][robot.index]
             label = operation.before[slot]
+            is_one_of = several and label == NOPART
             stays = label != NOPART and operation.after[slot] != NOPART
             wait = len(places)
             places.append(
                 Place(
-                    _wait_name(robot, label, operation, several),
+                    f"{robot.name}:{label}" + (f"/{operation.label}" if is_one_of else ""),
                     (done,),
                     (begun,),
                     "hold" if stays else "wait",
@@ -84,14 +85,6 @@ def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> Ge
     redistribution: tuple[Redistribution, ...] = tuple(tuple(sorted(p)) for p in pairs)
     net = ThreadedNet(PetriNet(transitions, tuple(places)), redistribution)
     return GearNet(net, tuple(gears), tuple(g.places[0] for g in gears if g.places), tuple(slots))
-
-
-def _wait_name(robot: Robot, label: str, onward: Operation, several: bool) -> str:
-    """Name of the place where a robot waits for an operation `onward`: `r2:part1`. The empty-handed
-    waits of a robot with several tours are told apart by the operation, `r2:nopart/part3`."""
-    if label == NOPART and several:
-        return f"{robot.name}:{label}/{onward.label}"
-    return f"{robot.name}:{label}"
 
 
 def beside(pag: PAG, factories: Sequence[Factory]) -> Factory:

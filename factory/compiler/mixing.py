@@ -13,7 +13,7 @@ the pile first (`assigning`). Any other order of the tours of a line is dead.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import permutations
 from typing import NamedTuple
 
@@ -41,7 +41,7 @@ def turns_of(forest: Factory, on: Sequence[int], sequence: Sequence[str]) -> Tur
     """The turns of a sequence of products: for each unit and each robot of the forest the line
     (index) that does its tours, NOBODY for another product. `on`: the line of each robot."""
     unit = {product: number for number, product in enumerate(forest.sequence)}
-    makes = _product_of(forest)
+    makes = {robot: o.turn for o in forest.operations for robot in o.robots}
     return [
         [line if makes[robot] == unit[product] else NOBODY for robot, line in enumerate(on)]
         for product in sequence
@@ -188,11 +188,6 @@ def _begun_otherwise(forest: Factory, on: Sequence[int]) -> Iterator[int]:
         lines = frozenset(on[guest] for guest in begun_by(forest, robot))
         if begun.setdefault(line, lines) != lines:
             yield robot
-
-
-def _product_of(forest: Factory) -> Mapping[int, int]:
-    """The product (index) that each robot of the forest works for."""
-    return {robot: o.turn for o in forest.operations for robot in o.robots}
 
 
 def _fault(forest: Factory, robot: int) -> Diagnostic:

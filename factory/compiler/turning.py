@@ -31,12 +31,13 @@ def check_turned(
         while not (turns := _turns(robots, operation, catalogue)) and _hands_over(operation):
             label, operation = operation.label, taking[operation.label]
         if not turns:
+            others = [x for x in operation.inputs if x != label] or ["base"]
             yield Diagnostic(
                 "NeedsTurn",
                 f"'{part.label}' is presented turned by {part.parameter('fed'):g} rad about the"
                 f" vertical, and '{operation.template.name}' turns nothing",
                 part.position,
-                f"write {_placing(operation, label)}: a manipulator turns it",
+                f"write place ( {', '.join([*others, label])} ): a manipulator turns it",
             )
     yield from _not_lowered(robots, operations)
 
@@ -47,19 +48,10 @@ def _turns(robots: Sequence[Robot], operation: Operation, catalogue: Catalogue) 
 
 
 def _hands_over(operation: Operation) -> bool:
-    """Whether one robot takes over what another brings, and nothing else is done."""
-    return len(operation.inputs) == 1 and len(operation.robots) == 2 and not _tools(operation)
-
-
-def _tools(operation: Operation) -> bool:
-    """Whether a tool works in an operation, or its carrier brings what it keeps."""
-    return bool(operation.template.tools()) or operation.template.held != NOPART
-
-
-def _placing(operation: Operation, label: str) -> str:
-    """The operation as `place` would be written."""
-    others = [x for x in operation.inputs if x != label] or ["base"]
-    return f"place ( {', '.join([*others, label])} )"
+    """Whether one robot takes over what another brings, and nothing else is done: no tool works,
+    and the carrier brings nothing."""
+    alone = len(operation.inputs) == 1 and len(operation.robots) == 2
+    return alone and not operation.template.tools() and operation.pile == NOPART
 
 
 def _not_lowered(robots: Sequence[Robot], operations: Sequence[Operation]) -> Iterator[Diagnostic]:

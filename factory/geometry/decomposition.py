@@ -167,7 +167,8 @@ def _largest(normals: Array, areas: Array) -> Array:
 def _run_coacd(mesh: Mesh) -> tuple[Array, ...]:
     """The bodies that CoACD makes of a mesh, without slivers; empty if it fails. If the result
     would be one body, as of a plate with a shallow groove, the finest threshold is used."""
-    coarse, least = _threshold(mesh), CONCAVITY[0]
+    _, middle, longest = np.sort(np.ptp(mesh.vertices, axis=0))
+    coarse, least = float(np.clip(SLENDER * middle / longest, *CONCAVITY)), CONCAVITY[0]
     pieces = _cut(mesh, coarse)
     return _cut(mesh, least) if len(pieces) == 1 and least < coarse else pieces
 
@@ -184,12 +185,6 @@ def _cut(mesh: Mesh, threshold: float) -> tuple[Array, ...]:
         return ()
     least = SLIVER * sum(float(hull.volume) for hull in hulls)
     return tuple(np.asarray(hull.vertices) for hull in hulls if hull.volume > least)
-
-
-def _threshold(mesh: Mesh) -> float:
-    """The threshold of CoACD for a mesh."""
-    _, middle, longest = np.sort(np.ptp(mesh.vertices, axis=0))
-    return float(np.clip(SLENDER * middle / longest, *CONCAVITY))
 
 
 def _library() -> Any:

@@ -56,15 +56,6 @@ class GlbBody:
     colours: tuple[Colour, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class _Shape:
-    """A mesh in its own frame: the primitives that have triangles, and their colours."""
-
-    name: str
-    bodies: tuple[Triangles, ...]
-    colours: tuple[Colour, ...]
-
-
 @np.errstate(all="ignore")
 def read_glb(content: bytes) -> list[GlbBody]:
     """The bodies of a GLB file, one per node that has triangles, in the order of the scene. Raises
@@ -78,7 +69,7 @@ def read_glb(content: bytes) -> list[GlbBody]:
             raise _broken(f"its nodes have more than {MOST} triangles together")
         if shape.bodies:
             placed = tuple(moved_by(matrix, *body) for body in shape.bodies)
-            bodies.append(GlbBody((_name(node), shape.name), placed, shape.colours))
+            bodies.append(GlbBody((_name(node), shape.names[1]), placed, shape.colours))
     return bodies
 
 
@@ -143,7 +134,7 @@ class _Glb:
 
     def __init__(self, document: Object, arrays: bytes) -> None:
         self.document, self.arrays = document, arrays
-        self._shapes: dict[int, _Shape] = {}
+        self._shapes: dict[int, GlbBody] = {}
         needed = self.document.get("extensionsRequired")
         for name in needed if isinstance(needed, list) else ():
             if "compression" in str(name):
@@ -199,14 +190,15 @@ class _Glb:
         }
         return [number for number in range(len(every)) if number not in below]
 
-    def shape(self, number: object) -> _Shape:
-        """A mesh, read once."""
+    def shape(self, number: object) -> GlbBody:
+        """A mesh in its own frame, at no node, with its primitives that have triangles; read
+        once."""
         mesh = self.entry("meshes", number)
         if number not in self._shapes:
             self._shapes[number] = self._read(mesh)  # type: ignore[index]
         return self._shapes[number]  # type: ignore[index]
 
-    def _read(self, mesh: Object) -> _Shape:
+    def _read(self, mesh: Object) -> GlbBody:
         primitives = []
         for primitive in self.listed(mesh, "primitives"):
             if not isinstance(primitive, dict):
@@ -214,7 +206,8 @@ class _Glb:
             body = self._triangles(primitive)
             if len(body[1]):
                 primitives.append((body, self._colour(primitive)))
-        return _Shape(_name(mesh), tuple(b for b, _ in primitives), tuple(c for _, c in primitives))
+        bodies, colours = tuple(b for b, _ in primitives), tuple(c for _, c in primitives)
+        return GlbBody(("", _name(mesh)), bodies, colours)
 
     def _triangles(self, primitive: Object) -> Triangles:
         mode, attributes = primitive.get("mode", TRIANGLES), primitive.get("attributes")

@@ -41,7 +41,7 @@ def mended(vertices: Array, faces: Indices) -> tuple[Array, Indices, str]:
         return vertices, turned, "was inside out" if (turned != faces).any() else ""
     for step, was in (
         (_weld, "had cracks"),
-        (_drop_twins, "had duplicate triangles"),
+        (lambda body: body.update_faces(body.unique_faces()), "had duplicate triangles"),
         (_fill, FILLED),
         (_wind, "had triangles of inconsistent orientation"),
     ):
@@ -108,11 +108,6 @@ def _weld(mesh: trimesh.Trimesh) -> None:
     mesh.merge_vertices(digits_vertex=int(np.ceil(-np.log10(step))))
     faces = np.asarray(mesh.faces)
     mesh.update_faces((faces != np.roll(faces, 1, axis=1)).all(axis=1))
-
-
-def _drop_twins(mesh: trimesh.Trimesh) -> None:
-    """Remove duplicate triangles."""
-    mesh.update_faces(mesh.unique_faces())
 
 
 def _fill(mesh: trimesh.Trimesh) -> None:

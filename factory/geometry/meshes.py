@@ -144,20 +144,12 @@ def mend_remark(was: str) -> Remark:
     return Remark(f"{was}; it was repaired", "meshes were repaired: closed, or turned outwards")
 
 
-def too_far_remark(reach: float) -> Remark:
-    """The remark on a mesh whose colliding bodies are larger than it."""
-    return Remark(
-        f"intersects itself: the bodies that collide for it reach {1000 * reach:.2g} mm too far",
-        "meshes intersect themselves: the bodies that collide for them reach too far",
-        "join what intersects, or write it as bodies that are closed",
-    )
-
-
 def usable(name: str, vertices: Array, faces: Indices) -> tuple[Mesh, Remark | None]:
     """A mesh that the engine accepts, and a remark if it is not the given one."""
     for axes in (np.eye(3), _principal_axes(vertices)):
         low, high = (vertices @ axes.T).min(axis=0), (vertices @ axes.T).max(axis=0)
-        if _is_flat(high - low):
+        extent = high - low
+        if extent.min() < 1e-3 * extent.max() or extent.min() < 1e-5:
             return _box_mesh(name, low, high, axes), FLAT
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     if float(np.prod(high - low)) < LEAST_BOX:
@@ -176,10 +168,6 @@ def _principal_axes(vertices: Array) -> Array:
     spread = vertices - vertices.mean(axis=0)
     axes = np.linalg.eigh(spread.T @ spread)[1].T
     return np.asarray(axes if np.linalg.det(axes) > 0 else -axes)
-
-
-def _is_flat(extent: Array) -> bool:
-    return bool(extent.min() < 1e-3 * extent.max() or extent.min() < 1e-5)
 
 
 def _box_mesh(name: str, low: Array, high: Array, axes: Array) -> Mesh:
@@ -237,7 +225,12 @@ def measured(mesh: Mesh, remark: Remark | None = None) -> MassProperties:
     hull = mesh.hull
     if mesh.reach > TOO_FAR:
         hull = hull_of(np.concatenate(mesh.pieces))
-        remark = remark or too_far_remark(mesh.reach)
+        far = f"the bodies that collide for it reach {1000 * mesh.reach:.2g} mm too far"
+        remark = remark or Remark(
+            f"intersects itself: {far}",
+            "meshes intersect themselves: the bodies that collide for them reach too far",
+            "join what intersects, or write it as bodies that are closed",
+        )
     centre, volume = np.asarray(properties.center_mass), float(properties.volume)
     return MassProperties(mesh, remark, volume, centre, inertia, hull.corners)
 

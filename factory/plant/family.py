@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from factory.plant.matching import Matching, matching, shifted
-from factory.problem.pag import PAG, AllowedOverlap, Assembly, Mix
+from factory.problem.pag import PAG, Assembly, Mix
 from factory.support.errors import Diagnostic, InputError
 
 Renamed = dict[str, str]
@@ -52,12 +52,17 @@ def family(one: PAG, other: PAG, counts: tuple[int, int], folder: Path) -> Famil
             raise InputError(Diagnostic("BadMix", message, pag[pag.root].position))
     nodes = [_relocated(node, one.folder, folder) for node in one.nodes]
     nodes += [
-        _called(_relocated(node, other.folder, folder), names)
+        replace(
+            _relocated(node, other.folder, folder),
+            label=names[node.label],
+            inputs=tuple(names[label] for label in node.inputs),
+        )
         for node in moved.nodes
         if node.label not in labels
     ]
     mix = Mix(((one.root, counts[0]), (names[other.root], counts[1])))
-    allowed = (*one.allowed, *(_allowed(a, names) for a in other.allowed))
+    renamed = (replace(a, parts=tuple(names[part] for part in a.parts)) for a in other.allowed)
+    allowed = (*one.allowed, *renamed)
     file = str(folder / "family.pag")
     made = PAG(one.root, tuple(nodes), None, str(folder), file, tuple(dict.fromkeys(allowed)), mix)
     return Family(made, names, common, matched)
@@ -106,15 +111,6 @@ def _names(one: PAG, other: PAG, labels: Renamed) -> Renamed:
             names[node.label] = name
             taken.add(name)
     return names
-
-
-def _called(node: Assembly, names: Renamed) -> Assembly:
-    inputs = tuple(names[label] for label in node.inputs)
-    return replace(node, label=names[node.label], inputs=inputs)
-
-
-def _allowed(allowed: AllowedOverlap, names: Renamed) -> AllowedOverlap:
-    return replace(allowed, parts=tuple(names[part] for part in allowed.parts))
 
 
 def _relocated(node: Assembly, old: str, new: Path) -> Assembly:

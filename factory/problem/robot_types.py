@@ -65,15 +65,14 @@ class Catalogue:
         return other if self.fits(other, one) else None
 
 
-def load_catalogue(folder: Path | None = None) -> Catalogue:
-    """The catalogue of a folder; by default the shipped one, with those of entry points.
+def load_catalogue() -> Catalogue:
+    """The shipped catalogue, with those of entry points.
 
     Raises InputError where a file is not readable TOML, or a type extends one that is not there,
     or itself, or is there already.
     """
-    folders = [mjcf_folder(), *extension_folders("robots")] if folder is None else [folder]
     types: dict[str, RobotType] = {}
-    for path in (each / "catalogue.toml" for each in folders):
+    for path in (each / "catalogue.toml" for each in (mjcf_folder(), *extension_folders("robots"))):
         more = _types(path)
         if twice := sorted(more.keys() & types.keys()):
             raise InputError(_trouble(path, f"there is a robot type '{twice[0]}' already"))

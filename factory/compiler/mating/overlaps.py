@@ -122,8 +122,8 @@ class Finder:
         kept = load_arrays(FOLDER, name)
         if kept is None:
             bodies, parts, rough = self._search(axis, wanted)
-            arrays = (*_arrays(bodies), *_arrays(parts), rough)
-            kept = dict(zip((*KEYS, *DRAWN, ROUGH), arrays, strict=True))
+            arrays = [a for rows in (bodies, parts) for a in (*rows[:3], *astuple(rows[3]))]
+            kept = dict(zip((*KEYS, *DRAWN, ROUGH), (*arrays, rough), strict=True))
             store_arrays(FOLDER, name, kept)
         return self._by_parts(_pairs(kept, KEYS), _pairs(kept, DRAWN), kept[ROUGH])
 
@@ -156,17 +156,13 @@ class Finder:
         depths.graze[idle] = -np.inf
         kept = np.array(depths.faulty.any(axis=1))
         tested = np.flatnonzero(self.drawn.tested(part[moving], part[standing]))
-        first = tested[self._firsts(meeting[tested], moving[tested], standing[tested])]
+        key = self._key_of(meeting[tested], part[moving[tested]], part[standing[tested]])
+        first = tested[np.unique(key, return_index=True)[1]]  # of each pair of parts
         kept[first] = True
         by_parts = part[moving[first]], part[standing[first]]
         exact = self.drawn.depths(*by_parts, idle[first], axis)
         by_bodies = meeting[kept], moving[kept], standing[kept], depths.at(np.flatnonzero(kept))
         return by_bodies, (meeting[first], *by_parts, exact), self.drawn.rough
-
-    def _firsts(self, meeting: Ints, moving: Ints, standing: Ints) -> Ints:
-        """The first row of each pair of parts."""
-        part = self.bodies.part
-        return np.unique(self._key_of(meeting, part[moving], part[standing]), return_index=True)[1]
 
     def _key_of(self, meeting: Ints, moving: Ints, standing: Ints) -> Ints:
         """A number (n,) of each pair of parts at a meeting, ascending as they are sorted."""
@@ -290,10 +286,6 @@ class Finder:
         as_drawn.put(rows, exact[3])
         hulls = rough[one] | rough[other]
         return Overlaps(meeting, one, other, as_drawn, colliding, hulls, bodies, ends)
-
-
-def _arrays(pairs: Pairs) -> tuple[NDArray[Any], ...]:
-    return (*pairs[:3], *astuple(pairs[3]))
 
 
 def _pairs(kept: Mapping[str, NDArray[Any]], keys: Sequence[str]) -> Pairs:
