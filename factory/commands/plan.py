@@ -23,8 +23,9 @@ from factory.support.progress import StepBar, Waiting
 
 if TYPE_CHECKING:
     from factory.geometry.meshes import Array
+    from factory.geometry.overlapping import Overlapping
     from factory.pipeline import Project
-    from factory.planning.parts import Drawn, InPlace
+    from factory.planning.parts import InPlace
     from factory.planning.plan import CannotAssemble, Planned, PlannedJoin, PlanOptions
     from factory.planning.searching import Aim
     from factory.plant.approaches import Approach, Kind
@@ -282,7 +283,7 @@ def _way(approach: Approach, orientation: Array) -> str:
     return f"{'slides' if approach.kind == 'slide' else 'is blocked'} from {' or '.join(ways)}"
 
 
-def _hidden_at(join: PlannedJoin, placed: InPlace, planned: Planned) -> list[Drawn]:
+def _hidden_at(join: PlannedJoin, placed: InPlace, planned: Planned) -> list[Overlapping]:
     """The pairs of parts of an operation whose overlap is hidden by convex hulls."""
     units = {part.label: label for label, parts in placed.units() for part in parts}
     return [
@@ -293,7 +294,7 @@ def _hidden_at(join: PlannedJoin, placed: InPlace, planned: Planned) -> list[Dra
     ]
 
 
-def _for_hulls(pairs: Sequence[Drawn]) -> str:
+def _for_hulls(pairs: Sequence[Overlapping]) -> str:
     """The number of pairs that were planned with convex hulls, in words."""
     some = "a pair overlaps" if len(pairs) == 1 else f"{len(pairs)} pairs overlap"
     return f", for hulls only: {some}" if pairs else ""

@@ -16,7 +16,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from factory.control.mode import Array, Index, Mode, lock, lock_index
+from factory.control.mode import Array, Index, Mode, lock
 from factory.problem.template import Point, Template
 from factory.support.errors import Diagnostic, InputError, did_you_mean
 from factory.support.extensions import bad_extension, blaming, extensions, position_of
@@ -45,7 +45,7 @@ class Setting:
     def __post_init__(self) -> None:
         for name in ("lower", "upper", "r", "station", "width", "standoff"):
             object.__setattr__(self, name, lock(getattr(self, name)))
-        object.__setattr__(self, "gate", lock_index(self.gate))
+        object.__setattr__(self, "gate", lock(self.gate, np.intp))
 
     def coordinate(self, point: Point) -> float:
         """The arc length [m] of a template's point on its robot's guidepath.

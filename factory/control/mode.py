@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,16 +33,9 @@ SOFTNESS = 100.0
 """Distance to the goal [eps] beyond which gamma grows linearly, no longer as a square."""
 
 
-def lock(values: ArrayLike) -> Array:
-    """A read-only copy of `values`, float64."""
-    array = np.array(values, np.float64)
-    array.setflags(write=False)
-    return array
-
-
-def lock_index(values: ArrayLike) -> Index:
-    """A read-only copy of `values`, integers."""
-    array = np.array(values, np.intp)
+def lock(values: ArrayLike, kind: type[np.number[Any]] = np.float64) -> NDArray[Any]:
+    """A read-only copy of `values`, numbers of a kind."""
+    array = np.array(values, kind)
     array.setflags(write=False)
     return array
 
@@ -120,8 +114,8 @@ class Mode:
         for name, (values, shape) in shaped.items():
             object.__setattr__(self, name, lock(_shaped(name, values, shape)))
         gate = np.full(count, -1) if ungated else self.gate
-        object.__setattr__(self, "gate", lock_index(_shaped("gate", gate, (count,))))
-        object.__setattr__(self, "pairs", lock_index(_shaped("pairs", self.pairs, (-1, 2))))
+        object.__setattr__(self, "gate", lock(_shaped("gate", gate, (count,)), np.intp))
+        object.__setattr__(self, "pairs", lock(_shaped("pairs", self.pairs, (-1, 2)), np.intp))
         _check_robots(self)
         object.__setattr__(self, "order", _ordered(self.gate))
         _check_pairs(self)

@@ -160,7 +160,10 @@ def _searched(one: PartShape, other: PartShape, slack: float) -> RigidMotion | N
     far = np.flatnonzero(np.abs(other.radii - one.radii[second]) <= 2 * slack)
     span, tries = float(np.linalg.norm(anchors[0] - anchors[1])), 0
     sample = one.spokes[np.linspace(0, len(one.spokes) - 1, SAMPLE).astype(int)]
-    loose = slack * max(1.0, one.size / _lever(anchors))
+    lever = float(np.linalg.norm(np.cross(*anchors))) / max(
+        float(np.linalg.norm(anchors[0])), 1e-30
+    )
+    loose = slack * max(1.0, one.size / lever)
     for start in near:
         gaps = np.linalg.norm(other.spokes[far] - other.spokes[start], axis=1)
         for end in far[np.abs(gaps - span) <= 4 * slack]:
@@ -190,11 +193,6 @@ def _anchors(shape: PartShape, slack: float) -> tuple[int, int]:
     away /= max(float(away.max()), 1e-30)
     second = int(np.lexsort((-away, np.where(away > 0.3, count, len(count) + 1)))[0])
     return first, second
-
-
-def _lever(pair: Array) -> float:
-    """The distance of the second of two vectors (2, 3) from the line of the first."""
-    return float(np.linalg.norm(np.cross(*pair)) / max(float(np.linalg.norm(pair[0])), 1e-30))
 
 
 def _frame(pair: Array) -> Array:

@@ -121,9 +121,9 @@ def written_out(statements: Statements, findings: Findings) -> list[Definition]:
     """The definitions without copies and places, in which a label is one Token. Errors (Syntax,
     DuplicateLabel, WrongInputs, BadValue) go to the findings."""
     definitions = statements.definitions
-    if not any(isinstance(one.label, CopiedLabel) or one.places for one in definitions):
+    copied = statements.copied
+    if not copied and not any(one.places for one in definitions):
         return list(definitions)
-    copied = [one.label for one in definitions if isinstance(one.label, CopiedLabel)]
     groups = {str(label.name): label.labels() for label in copied}
     wrong = {str(label.name) for label in copied if not 1 <= label.number <= COPIES}
     twice = groups.keys() & {one.label for one in definitions if isinstance(one.label, Token)}
@@ -208,8 +208,7 @@ def allowances_of(
 ) -> tuple[AllowedOverlap, ...]:
     """The overlaps that a text allows, with depths in a unit; the name of copies stands for each
     copy. Errors (BadValue, UndefinedLabel) go to the findings."""
-    copied = [one.label for one in statements.definitions if isinstance(one.label, CopiedLabel)]
-    groups = {str(label.name): [str(copy) for copy in label.labels()] for label in copied}
+    groups = {str(label.name): [*map(str, label.labels())] for label in statements.copied}
     parts = {node.label: not node.inputs for node in nodes}
     overlaps: list[AllowedOverlap] = []
     for permission in statements.permissions:

@@ -107,6 +107,11 @@ class Statements:
         """Whether the text has a mix of products, well formed or not."""
         return bool(self.mixes) or "mix" in self.broken
 
+    @property
+    def copied(self) -> list[CopiedLabel]:
+        """The labels of definitions that make copies."""
+        return [one.label for one in self.definitions if isinstance(one.label, CopiedLabel)]
+
 
 def labels_of(label: Token | CopiedLabel) -> list[Token]:
     """The labels that a statement defines."""

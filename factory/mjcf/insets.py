@@ -16,9 +16,8 @@ from types import MappingProxyType
 
 from factory.compiler.mating.paths import TOLERANCE
 from factory.geometry.insets import breadth
-from factory.geometry.solids import Product
 from factory.layout.layout import Layout
-from factory.plant.approaches import Overlap, Pair
+from factory.plant.approaches import Pair
 
 LEFT = 0.5
 """A body keeps at least this share of its thickness."""
@@ -42,46 +41,32 @@ class Insets:
 def insets_of(layout: Layout, overlap: float) -> Insets:
     """What is taken from the shapes of a layout's parts where they overlap by no more than
     `overlap` [m]; nothing where that is 0."""
-    thickness = _Thickness(layout.product)
+    radii: dict[tuple[str, int], float] = {}
+
+    def radius(part: str, number: int) -> float:
+        """That of the largest ball in a convex body [m], of equal meshes found once."""
+        solid = layout.product.solids[part]
+        key = solid.mesh.name if solid.mesh else part, number
+        if key not in radii:
+            radii[key] = breadth(solid, number)
+        return radii[key]
+
     depths: dict[str, dict[int, float]] = {}
     excluded: list[Pair] = []
     for overlapping in layout.overlaps:
+        receding = [
+            (part, number, ceil(far / 2 * 1e6 - 1e-3) / 1e6)
+            for one, other, far in overlapping.bodies
+            for part, number in zip(overlapping.parts, (one, other), strict=True)
+        ]
         if (
             not overlap
             or overlapping.deep > overlap + TOLERANCE
-            or not thickness.allows(overlapping)
+            or any(half > (1 - LEFT) * radius(part, number) for part, number, half in receding)
         ):
             excluded.append(overlapping.parts)
             continue
-        for one, other, far in overlapping.bodies:
-            for part, number in zip(overlapping.parts, (one, other), strict=True):
-                mine = depths.setdefault(part, {})
-                mine[number] = max(mine.get(number, 0.0), _half(far))
+        for part, number, half in receding:
+            mine = depths.setdefault(part, {})
+            mine[number] = max(mine.get(number, 0.0), half)
     return Insets(depths, tuple(excluded))
-
-
-def _half(far: float) -> float:
-    return ceil(far / 2 * 1e6 - 1e-3) / 1e6
-
-
-class _Thickness:
-    """The radii of the largest balls in a product's convex bodies, each found once."""
-
-    def __init__(self, product: Product) -> None:
-        self._product = product
-        self._radius: dict[tuple[str, int], float] = {}
-
-    def allows(self, overlap: Overlap) -> bool:
-        """Whether all bodies that overlap can recede from each other."""
-        return all(
-            _half(far) <= (1 - LEFT) * self._of(part, number)
-            for one, other, far in overlap.bodies
-            for part, number in zip(overlap.parts, (one, other), strict=True)
-        )
-
-    def _of(self, part: str, number: int) -> float:
-        solid = self._product.solids[part]
-        key = (solid.mesh.name if solid.mesh else part, number)
-        if key not in self._radius:
-            self._radius[key] = breadth(solid, number)
-        return self._radius[key]

@@ -37,11 +37,8 @@ def mesh_file(mesh: Mesh) -> tuple[str, bytes]:
 def piece_files(mesh: Mesh) -> list[tuple[str, bytes]]:
     """The files of the convex bodies that collide in a mesh's place: names, counted from 1, and
     contents."""
-    files = []
-    for number, vertices in enumerate(mesh.pieces, 1):
-        name = f"{mesh.name}.{number}"
-        files.append((f"{name}.stl", stl(hull_mesh(name, vertices))))
-    return files
+    named = ((f"{mesh.name}.{n}", vertices) for n, vertices in enumerate(mesh.pieces, 1))
+    return [(f"{name}.stl", stl(hull_mesh(name, vertices))) for name, vertices in named]
 
 
 def inset_name(mesh: Mesh, number: int, depth: float) -> str:

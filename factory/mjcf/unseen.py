@@ -32,17 +32,12 @@ def leave_out_what_is_shown(root: Element) -> None:
                 asset.remove(mesh)
 
 
-def _is_needed(geom: Element) -> bool:
-    """Whether a geom of such a class weighs or touches, or is a pad, from which distances are
-    measured."""
-    return bool(SHOWN.keys() & geom.keys()) or bool(pad_of(geom.get("name") or ""))
-
-
 def _leave_out(body: Element, classes: set[str | None]) -> None:
     for child in list(body):
+        is_pad = bool(pad_of(child.get("name") or ""))  # from which distances are measured
         if child.tag == "body":
             _leave_out(child, classes)
             if not len(child):
                 body.remove(child)
-        elif child.get("class") in classes and not _is_needed(child):
+        elif child.get("class") in classes and not (SHOWN.keys() & child.keys() or is_pad):
             body.remove(child)

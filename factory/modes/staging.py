@@ -20,7 +20,7 @@ from factory.layout.exclusions import awaited_positions
 from factory.layout.hands.limbs import rises_first
 from factory.layout.layout import Layout
 from factory.modes.modes import operation_starts
-from factory.plant.factory import Operation
+from factory.plant.factory import Factory, Operation
 from factory.support.settings import Settings
 
 
@@ -72,8 +72,9 @@ def stages(layout: Layout, modes: Sequence[Mode]) -> tuple[HeadStart, ...]:
                 empty = operation.awaits_empty(slot) or not operation.inputs
                 ahead, goal = empty and robot in awaited, awaited.get(robot, goal)
             if ahead and abs(float(start[slot]) - goal) > ROUNDING:
-                starts_ahead.append(_ahead(operation, mode, slot, goal, float(start[slot])))
-                starts_ahead += _adjusting(layout, operation, mode, slot, start)
+                at = float(start[slot])
+                starts_ahead.append(_ahead(layout.factory, operation, mode, robot, goal, at))
+                starts_ahead += _adjusting(layout, operation, mode, robot, start)
     return tuple(starts_ahead)
 
 
@@ -82,37 +83,37 @@ def _rising(
 ) -> Iterator[HeadStart]:
     """The way up of a lift before the first operation of its robot, and after that the way back
     from its `start` to where the robot is `awaited`, if it is."""
-    robot = operation.robots[slot]
-    if not layout.factory.begins(robot, operation.index):
+    factory, robot = layout.factory, operation.robots[slot]
+    if not factory.begins(robot, operation.index):
         return
-    axis = layout.factory.lift_axis[robot]
-    raised = layout.factory.axes[operation.index].index(axis)
-    stage = _ahead(operation, mode, raised, float(mode.goals[raised]), 0.0)
-    yield replace(stage, robot=robot, axis=axis)
+    axis = factory.lift_axis[robot]
+    goal = float(mode.goals[factory.axes[operation.index].index(axis)])
+    yield _ahead(factory, operation, mode, axis, goal, 0.0)
     if awaited is not None and abs(start - awaited) > ROUNDING:
-        yield replace(_ahead(operation, mode, slot, awaited, start), follows=True)
+        yield replace(_ahead(factory, operation, mode, robot, awaited, start), follows=True)
 
 
 def _adjusting(
-    layout: Layout, operation: Operation, mode: Mode, slot: int, start: Array
+    layout: Layout, operation: Operation, mode: Mode, robot: int, start: Array
 ) -> Iterator[HeadStart]:
     """The way of a lift to where it is for the next tour, once its robot is at home."""
-    robot = operation.robots[slot]
-    if robot not in layout.factory.adjusted or not layout.factory.begins(robot, operation.index):
+    factory = layout.factory
+    if robot not in factory.adjusted or not factory.begins(robot, operation.index):
         return
-    axis = layout.factory.lift_axis[robot]
-    raised = layout.factory.axes[operation.index].index(axis)
+    axis = factory.lift_axis[robot]
+    raised = factory.axes[operation.index].index(axis)
     goal, at = float(mode.goals[raised]), float(start[raised])
     if abs(goal - at) > ROUNDING:
-        stage = _ahead(operation, mode, raised, goal, at)
-        yield replace(stage, robot=robot, axis=axis, follows=True)
+        yield replace(_ahead(factory, operation, mode, axis, goal, at), follows=True)
 
 
-def _ahead(operation: Operation, mode: Mode, slot: int, goal: float, start: float) -> HeadStart:
+def _ahead(
+    factory: Factory, operation: Operation, mode: Mode, axis: int, goal: float, start: float
+) -> HeadStart:
+    slot = factory.axes[operation.index].index(axis)
     only = slice(slot, slot + 1)
     alone = Mode(np.array([goal]), mode.lower[only], mode.upper[only], mode.eps)
-    robot = operation.robots[slot] if slot < len(operation.robots) else -1
-    return HeadStart(robot, operation.index, slot, alone, start, robot)
+    return HeadStart(factory.robot_of(axis), operation.index, slot, alone, start, axis)
 
 
 def stages_of(layout: Layout, modes: Sequence[Mode], settings: Settings) -> tuple[HeadStart, ...]:

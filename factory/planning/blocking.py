@@ -23,8 +23,9 @@ from factory.compiler.mating.meetings import Ints, Meeting, Meetings
 from factory.compiler.mating.overlaps import Finder, Overlaps
 from factory.compiler.mating.paths import TOLERANCE
 from factory.geometry.meshes import Array
+from factory.geometry.overlapping import Overlapping
 from factory.geometry.solids import Product
-from factory.planning.parts import Drawn, InPlace
+from factory.planning.parts import InPlace
 from factory.planning.standing import Feet
 
 FREE, SCRAPES, DEEPER, LOCKED, CLASHES = range(5)
@@ -67,7 +68,7 @@ class Blocking:
     low: Array = field(repr=False)
     high: Array = field(repr=False)
     depths: Array = field(default_factory=lambda: np.zeros((3, 0, 0)), repr=False)
-    hidden: tuple[Drawn, ...] = field(default=(), repr=False)
+    hidden: tuple[Overlapping, ...] = field(default=(), repr=False)
     feet: Feet | None = field(default=None, repr=False)
     base: int = -1
 
@@ -175,7 +176,7 @@ def _bodies(source: InPlace) -> tuple[Finder, ConvexBodies, Ints]:
     return Finder(convex, Meetings(tuple(solids), (every,), borders, levels)), convex, unit
 
 
-def _hidden(overlaps: Overlaps, unit: Ints, labels: Sequence[str]) -> tuple[Drawn, ...]:
+def _hidden(overlaps: Overlaps, unit: Ints, labels: Sequence[str]) -> tuple[Overlapping, ...]:
     """The parts of two units that overlap in the finished product according to hulls alone; any
     axis shows them."""
     finished = overlaps.depths.finished
@@ -185,7 +186,7 @@ def _hidden(overlaps: Overlaps, unit: Ints, labels: Sequence[str]) -> tuple[Draw
     rows = np.flatnonzero(drawn_in)[np.argsort(-finished[drawn_in], kind="stable")]
     one, other = (array[rows].tolist() for array in (overlaps.one, overlaps.other))
     pairs = zip(one, other, finished[rows].tolist(), strict=True)
-    return tuple(Drawn(labels[one], labels[other], depth) for one, other, depth in pairs)
+    return tuple(Overlapping(labels[one], labels[other], depth) for one, other, depth in pairs)
 
 
 def _enter(overlaps: Overlaps, unit: Ints, levels: NDArray[np.int8], deep: Array) -> None:

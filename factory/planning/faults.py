@@ -83,9 +83,8 @@ def _twice(parts: Sequence[PlacedPart]) -> list[Diagnostic]:
         same = seen.setdefault(part.kind, [])
         reach = EQUAL * float(np.linalg.norm(part.solid.high - part.solid.low))
         for other in same:
-            if np.abs(other.solid.low - part.solid.low).max() > reach:
-                continue
-            if np.abs(other.solid.high - part.solid.high).max() > reach:
+            off = other.solid.low - part.solid.low, other.solid.high - part.solid.high
+            if np.abs(off).max() > reach:
                 continue
             if cKDTree(other.vertices).query(part.vertices)[0].max() <= reach:
                 message = f"'{part.label}' has the shape and the place of '{other.label}'"

@@ -33,15 +33,6 @@ TRIED = 40
 
 
 @dataclass(frozen=True, slots=True)
-class Division:
-    """Two sides of some units, the one with the base first, and the price of dividing them."""
-
-    one: Units
-    other: Units
-    price: float
-
-
-@dataclass(frozen=True, slots=True)
 class Divider:
     """Divides units by the blocking graphs of a product."""
 
@@ -49,9 +40,10 @@ class Divider:
 
     def best(
         self, members: Units, axes: tuple[int, ...], random: np.random.Generator, even: float = 1.0
-    ) -> Division | None:
-        """The division of least price along one of some axes; among equals, the more `even` one is
-        preferred (0: no preference). None if the units interlock along all these axes."""
+    ) -> tuple[Units, Units] | None:
+        """The two sides, that with the base first, of the division of least price along one of some
+        axes; among equals, the more `even` one is preferred (0: no preference). None if the units
+        interlock along all these axes."""
         units = np.array(members)
         sets, prices = self._candidates(units, axes, random)
         if not len(sets):
@@ -66,9 +58,7 @@ class Divider:
             if price <= prices[n]:
                 break
         one, other = (tuple(units[s].tolist()) for s in (sets[chosen], ~sets[chosen]))
-        if self.graphs.base in other:
-            one, other = other, one
-        return Division(one, other, float(best))
+        return (other, one) if self.graphs.base in other else (one, other)
 
     def _unsound(self, members: list[int]) -> float:
         """The price of a side that is in pieces, or would tip over."""
@@ -194,7 +184,7 @@ def divided(site: Site, random: np.random.Generator, even: float) -> Tree:
             along = 1 - axis if turned else axis
             division = divider.best(members, (stance.axes[along], stance.axes[2]), random, even)
             if division is not None:
-                tree = tuple(below(side, 1 - along) for side in (division.one, division.other))
+                tree = tuple(below(side, 1 - along) for side in division)
                 return (tree,) if turned else tree
         raise ValueError("interlocked")
 

@@ -11,6 +11,7 @@ from types import MappingProxyType
 from factory.geometry.decomposition import FULL
 from factory.geometry.meshes import Array, Indices, Mesh, is_closed
 from factory.geometry.overlap import drawn
+from factory.geometry.overlapping import Overlapping
 from factory.geometry.solids import Solid
 from factory.nets.verdict import listing
 from factory.problem.pag import PAG, AllowedOverlap, Assembly
@@ -24,16 +25,6 @@ NAMED = 12
 """The most parts that a message names, the deepest overlap first."""
 
 
-@dataclass(frozen=True, slots=True)
-class Drawn:
-    """The labels of two parts that overlap in the finished product according to the hull of one of
-    them, and the depth [m]."""
-
-    one: str
-    other: str
-    depth: float
-
-
 def hull_stands(mesh: Mesh | None) -> bool:
     """Whether a closed mesh that is notably smaller than its hull is represented by the hull."""
     if mesh is None or mesh.pieces or not is_closed(mesh.faces):
@@ -41,9 +32,10 @@ def hull_stands(mesh: Mesh | None) -> bool:
     return 0 < mesh.share < FULL
 
 
-def refuse_hidden(source: InPlace, pairs: Sequence[Drawn]) -> None:
-    """Raises InputError (Hulls) if there are such pairs, with a diagnostic for each part that is
-    represented by its hull. A product with a tree only gets warnings, as from `check`."""
+def refuse_hidden(source: InPlace, pairs: Sequence[Overlapping]) -> None:
+    """Raises InputError (Hulls) if there are pairs that overlap in the finished product according
+    to the hull of one of them, with a diagnostic for each part that is represented by its hull. A
+    product with a tree only gets warnings, as from `check`."""
     if not pairs or source.tree is not None:
         return
     faults = []
@@ -78,16 +70,6 @@ class PlacedPart:
     kind: str
     solid: Solid = field(repr=False)
     node: Assembly = field(repr=False)
-
-    @property
-    def pieces(self) -> tuple[Array, ...]:
-        """The vertices (k, 3) [m] of the convex bodies that it is made of, in place."""
-        return self.solid.pieces
-
-    @property
-    def colour(self) -> tuple[float, ...]:
-        """Red, green, blue and opacity, each from 0 to 1."""
-        return self.solid.rgba
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ import numpy as np
 from factory.compiler.expanding import expand
 from factory.compiler.mating.mating import matings
 from factory.geometry.meshes import Array
+from factory.geometry.overlapping import Overlapping
 from factory.geometry.product import product_geometry
 from factory.layout.durations import Pace
 from factory.pipeline import Project, all_templates
@@ -20,7 +21,7 @@ from factory.planning.exact import Expected
 from factory.planning.fastening import fastened, fasteners, renumbered
 from factory.planning.judging import Join, Judged
 from factory.planning.laying import LaidOut, Layouts
-from factory.planning.parts import Drawn, InPlace, refuse_hidden
+from factory.planning.parts import InPlace, refuse_hidden
 from factory.planning.posing import Pose, along, posed, said, screwing, toppling
 from factory.planning.searching import Aim, Sought, Trees, budget_of, trees
 from factory.planning.standing import feet
@@ -121,7 +122,7 @@ class Planned:
     figures: PlanFigures
     optimal: bool
     project: Project | None = field(default=None, repr=False, compare=False)
-    hidden: tuple[Drawn, ...] = field(default=(), repr=False)
+    hidden: tuple[Overlapping, ...] = field(default=(), repr=False)
     notes: tuple[str, ...] = ()
 
 
@@ -252,26 +253,20 @@ def _result(pose: Pose, laid: LaidOut, optimal: bool, layouts: int) -> Planned:
     judged = laid.judged
     figures = PlanFigures(
         operations=len(judged.joins),
-        blocked=judged.count(CLASHES),
+        blocked=laid.blocked if layouts else judged.count(CLASHES),
         through=judged.count(LOCKED) - judged.count(CLASHES),
         left_out=judged.count(DEEPER) - judged.count(LOCKED),
         scrape=judged.count(SCRAPES) - judged.count(DEEPER),
         apart=judged.apart,
         tips=judged.tips,
         relays=judged.relays,
-        robots=judged.robots,
+        robots=laid.robots if layouts else judged.robots,
         expected=judged.seconds,
+        not_held=laid.held if layouts else None,
+        layouts=layouts,
+        cycle=laid.seconds if layouts and np.isfinite(laid.seconds) else None,
+        area=laid.area if layouts and np.isfinite(laid.area) else None,
     )
-    if layouts:
-        figures = replace(
-            figures,
-            blocked=laid.blocked,
-            robots=laid.robots,
-            not_held=laid.held,
-            layouts=layouts,
-            cycle=laid.seconds if np.isfinite(laid.seconds) else None,
-            area=laid.area if np.isfinite(laid.area) else None,
-        )
     axes = sorted({join.direction[0] for join in judged.joins})
     room = {axis: rooms(pose.source, axis) for axis in axes}
     joins = tuple(_join(join, pose, room[join.direction[0]]) for join in judged.joins)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import count
+from itertools import chain, count
 from math import ceil
 from types import MappingProxyType
 from typing import Any, Generic, TypeVar, Union
@@ -78,14 +78,16 @@ def planned_product(
     kept = {keep.label: keep.nodes for keep in source.kept}
     taken = {part.label for part in source.parts}
     taken |= {node.label for nodes in kept.values() for node in nodes}
-    root = _free(label_of(source.name) or "product", taken)
-    names, made, stack = count(1), list[Assembly](), [(root, tree)]
+    title = label_of(source.name) or "product"
+    root = _free(chain([title], (f"{title}-{n}" for n in count(1))), taken)
+    names = (f"sub{n}" for n in count(1))
+    made, stack = list[Assembly](), [(root, tree)]
     while stack:
         label, below = stack.pop()
         if isinstance(below, Screwed):
             for screw in below.screws[::-1]:
                 last = screw == below.screws[0] and isinstance(below.tree, str)
-                pile = below.tree if last else _numbered(names, taken)
+                pile = below.tree if last else _free(names, taken)
                 made.append(Assembly(label, "screw", (str(pile), screw)))
                 label = str(pile)
             below = below.tree
@@ -93,7 +95,7 @@ def planned_product(
             continue
         inputs = []
         for child in below:
-            inputs.append(child if isinstance(child, str) else _numbered(names, taken))
+            inputs.append(child if isinstance(child, str) else _free(names, taken))
             stack.append((inputs[-1], child))
         made.append(Assembly(label, "mate" if len(inputs) > 1 else "relay", tuple(inputs)))
     whole = [node for nodes in kept.values() for node in nodes if node.inputs]
@@ -131,17 +133,9 @@ def _meant(
         yield AllowedOverlap(ceil(1e5 * depth) / 1e5, labels)
 
 
-def _free(name: str, taken: set[str]) -> str:
-    """A label like a name that no other node has; it is taken from now on."""
-    label = next(
-        label for n in count() if (label := name if n == 0 else f"{name}-{n}") not in taken
-    )
-    taken.add(label)
-    return label
-
-
-def _numbered(names: count[int], taken: set[str]) -> str:
-    label = next(label for n in names if (label := f"sub{n}") not in taken)
+def _free(names: Iterator[str], taken: set[str]) -> str:
+    """The first of some names that no other node has; it is taken from now on."""
+    label = next(name for name in names if name not in taken)
     taken.add(label)
     return label
 

@@ -59,7 +59,9 @@ class Pairing:
             number = self.operations.get(last.index)
             return None if number is None else self.new.operations[number].robots[slot]
         labels = self.matching.labels
-        carried = [label for label in _carried(self.old, robot) if label in labels]
+        program = (self.old.operations[n] for n in self.old.robots[robot].operations)
+        made = [o.label for o in program if o.carrier == robot and o.label in self.old.pag.by_label]
+        carried = [label for label in made if label in labels]
         if not carried:
             return None
         other = self.new.by_label[labels[carried[-1]]].carrier
@@ -106,11 +108,3 @@ def _joined(factory: Factory, operation: Operation) -> tuple[str, str, frozenset
     labels = factory.pag.by_label
     inputs = frozenset(label for label in operation.inputs if label in labels)
     return _stem(factory, operation), operation.template.name, inputs
-
-
-def _carried(factory: Factory, robot: int) -> Iterator[str]:
-    """The labels of the PAG that a robot carries, in the order of its program."""
-    for number in factory.robots[robot].operations:
-        o = factory.operations[number]
-        if o.carrier == robot and o.label in factory.pag.by_label:
-            yield o.label

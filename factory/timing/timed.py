@@ -75,18 +75,12 @@ class Timed:
     @property
     def cycle(self) -> CycleTime:
         """The cycle time and its bottleneck: a robot where its gear alone allows no less."""
-        gears = cycle_time(self.timing.factory, self.seconds[: self._compiled], self._taken)
+        compiled = len(self.timing.factory.net.threaded.places)
+        taken = {way: self.seconds[place] for way, place in self.ways.items()}
+        gears = cycle_time(self.timing.factory, self.seconds[:compiled], taken)
         if gears.seconds >= self.pace * (1 - SAME):
             return gears
         return CycleTime(self.pace, self.bottleneck)
-
-    @property
-    def _compiled(self) -> int:
-        return len(self.timing.factory.net.threaded.places)
-
-    @property
-    def _taken(self) -> dict[Way, float]:
-        return {way: self.seconds[place] for way, place in self.ways.items()}
 
 
 def timed(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None) -> Timed:

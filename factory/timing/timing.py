@@ -253,8 +253,7 @@ class Timing:
         """How long one robot moves in an operation, without stops on its way [s]."""
         mode = self.modes[number]
         axis = self.factory.axes[number][slot]
-        limits = self.limits
-        profile = SpeedProfile(float(limits.speed[axis]), float(limits.acceleration[axis]))
+        profile = self._profile(axis, AS_IT_IS)
         way = 0.0 if mode.is_still else abs(float(self.left[number][slot] - mode.goals[slot]))
         if self.world == "mujoco":
             return profile.rest(way)

@@ -96,7 +96,8 @@ class _Judge:
 
     def mating(self, number: int, asked: str = "") -> Mating:
         """The best approach: that of the stricter level, or sliding if both are equal; lowering of
-        the input that is `asked` for, if that can be lowered."""
+        the input that is `asked` for, if that can be lowered, else of the one with the shorter
+        stroke, the last if both are equal."""
         meeting = self.meetings.all[number]
         slides, clashing = self.slides[number].tolist(), self.clashing[number].tolist()
         slide, lower = max(slides), max(self.lowers[number].tolist())
@@ -114,7 +115,9 @@ class _Judge:
             columns = [column for column in (0, 1) if slides[column] == slide]
             approach = self._along(number, "slide", columns)
         else:
-            approach = self._lowering(number, lower)
+            stroke = self._strokes(meeting)
+            columns = [c for c in (1, 0) if self.lowers[number, c] == lower]
+            approach = self._lowered(number, min(columns, key=stroke.__getitem__))
         position = self.at[meeting.label] or meeting.position
         return Mating(meeting.label, meeting.inputs, approach, slide, lower, position)
 
@@ -124,13 +127,6 @@ class _Judge:
         sides = tuple(SIGNS[column] for column in columns)
         overlaps = tuple(self._overlaps(number, axis, column) for column in columns)
         return Approach(kind, axis, sides, "", 0.0, overlaps)
-
-    def _lowering(self, number: int, level: int) -> Approach:
-        """Lowering of the input with the shorter stroke if both can be lowered, else of the
-        last."""
-        stroke = self._strokes(self.meetings.all[number])
-        columns = [c for c in (1, 0) if self.lowers[number, c] == level]
-        return self._lowered(number, min(columns, key=lambda c: stroke[c]))
 
     def _lowered(self, number: int, column: int) -> Approach:
         """Lowering of the first input (0) or the last (1)."""

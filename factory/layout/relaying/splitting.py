@@ -17,10 +17,8 @@ from factory.layout.relaying.in_line import InLine, hands_in_line
 from factory.layout.relaying.ways import Way
 from factory.layout.shapes import payload_boxes
 from factory.layout.visits import visits_of
-from factory.plant.approaches import Approach
 from factory.plant.factory import Factory
 from factory.problem.pag import NOPART
-from factory.problem.plan import Plan
 from factory.problem.robot_types import Catalogue
 from factory.problem.template import Template
 
@@ -81,7 +79,11 @@ def with_relays(
     """The factory with a given number of additional robots on the way of each label. Linear."""
     plan = replace(before.plan, relays={label: n for label, n in numbers.items() if n})
     nodes = handed_over(nodes_of(before), plan.relays, templates)
-    approaches = _approaches(before, plan)
+    approaches = {  # a relay turns nothing
+        o.label: replace(o.approach, lowered=delivered(o.approach.lowered, plan))
+        for o in before.operations
+        if o.approach is not None
+    }
     return compile_nodes(before.pag, nodes, templates, catalogue, approaches, plan)
 
 
@@ -93,15 +95,6 @@ def _hands(layout: Layout, factory: Factory, cut: Mapping[int, Sequence[Piece]])
     lines = {r: [p.robot for p in reversed(pieces)] for r, pieces in cut.items() if len(pieces) > 1}
     relays = {o.index for o in factory.making if origin_of(o.label) != o.label}
     return hands_in_line(layout, factory, [origins[r.index] for r in factory.robots], lines, relays)
-
-
-def _approaches(factory: Factory, plan: Plan) -> dict[str, Approach]:
-    """Approaches of inputs are unchanged: a relay turns nothing."""
-    return {
-        o.label: replace(o.approach, lowered=delivered(o.approach.lowered, plan))
-        for o in factory.operations
-        if o.approach is not None
-    }
 
 
 def _pieces(
