@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import factory
-from factory.mjcf.weld_frames import Slides, WeldFrames, check_holders, gaps, held_at
+from factory.mjcf.weld_frames import WeldFrames, check_holders, gaps, held_at
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 
@@ -53,18 +53,6 @@ def test_gaps_are_what_the_engine_has_to_close(model: mujoco.MjModel) -> None:
     assert len(position) == model.neq
     found = gaps(model, welds, d.xpos, d.xmat)
     assert found == pytest.approx(np.linalg.norm(position, axis=1), abs=1e-12)
-
-
-def test_velocities_of_holders_are_the_engines(model: mujoco.MjModel) -> None:
-    d, draw = anywhere(model, 2), np.random.default_rng(2)
-    d.qvel[:] = draw.normal(size=model.nv)
-    mujoco.mj_forward(model, d)
-    holders = np.unique(model.eq_obj1id)
-    found = Slides.of(model, d).velocity(holders, np.array(d.qvel))
-    jacobian = np.empty((3, model.nv))
-    for row, body in enumerate(holders):
-        mujoco.mj_jacBody(model, d, jacobian, None, body)
-        assert found[row] == pytest.approx(jacobian @ d.qvel, abs=1e-9)
 
 
 def test_a_holder_that_turns_is_refused() -> None:

@@ -8,7 +8,7 @@ joints, or three where guidepaths have bends, of which the holder's first may tu
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,41 +32,6 @@ ROWS = 6
 
 
 @dataclass(frozen=True, eq=False)
-class Slides:
-    """The joints that carry each body (nbody, k), its own before those of its parent: addresses
-    `qpos` and `dof` of each, and the direction `way` (nbody, k, 3) of one that slides, 0 for none.
-    A body has one slide, or two where it follows a guidepath with bends: k is 2 or 4. Where the
-    axis of its own stands that turns it about the vertical (`anchor`, nbody, 3), and how far by
-    each unit of its coordinate (`spin`, nbody): 1 or -1, 0 for none."""
-
-    qpos: Index = field(repr=False)
-    dof: Index = field(repr=False)
-    way: Array = field(repr=False)
-    anchor: Array = field(repr=False)
-    spin: Array = field(repr=False)
-
-    @classmethod
-    def of(cls, m: mujoco.MjModel, d: mujoco.MjData) -> Slides:
-        """Those of a model, whose kinematics in `d` are up to date."""
-        most = 1 + int((m.body_jntnum > 1).any())
-        joints = m.body_jntadr[:, None] + np.arange(most)
-        joints[np.arange(most) >= m.body_jntnum[:, None]] = -1
-        turns = (joints[:, 0] >= 0) & (m.jnt_type[joints[:, 0]] == HINGE)
-        joints[(m.jnt_type[joints] != SLIDE) & (m.jnt_type[joints] != HINGE)] = -1
-        joint = np.concatenate([joints, joints[m.body_parentid]], axis=1)
-        slides = (joint >= 0) & (m.jnt_type[joint] == SLIDE)
-        way = np.where(slides[:, :, None], d.xaxis[joint], 0.0)
-        spin = np.where(turns, d.xaxis[joints[:, 0]][:, 2].round(), 0.0)
-        return cls(m.jnt_qposadr[joint], m.jnt_dofadr[joint], way, d.xanchor[joints[:, 0]], spin)
-
-    def velocity(self, bodies: Index, qvel: Array) -> Array:
-        """Velocities of bodies that only slide (..., n, 3) [m/s] from all speeds (..., nv)."""
-        return np.asarray(
-            np.einsum("...nk,nkj->...nj", qvel[..., self.dof[bodies]], self.way[bodies])
-        )
-
-
-@dataclass(frozen=True, eq=False)
 class WeldFrames:
     """Where n welds hold the origins of their parts: at `base` (n, 3) + sum over k of
     `way` (n, k, 3) · qpos[`along` (n, k)] [m], turned by the quaternion `turn` (n, 4). A holder
@@ -84,26 +49,19 @@ class WeldFrames:
     def of(cls, m: mujoco.MjModel, d: mujoco.MjData) -> WeldFrames:
         """Those of all welds of a model, in order; `d` is in any configuration, and its kinematics
         are up to date."""
-        slides, holder = Slides.of(m, d), m.eq_obj1id
-        along, way, spin = slides.qpos[holder], slides.way[holder], slides.spin[holder]
+        along, way, anchor, spin = (array[m.eq_obj1id] for array in _joints(m, d))
         base = held_at(m, np.arange(m.neq), d.xpos, d.xmat)
         base -= (way * d.qpos[along][:, :, None]).sum(axis=1)
-        turn, angle = _products(d.xquat[holder], m.eq_data[:, 6:10]), spin * d.qpos[along[:, 0]]
-        away = base[:, :2] - slides.anchor[holder][:, :2]
+        turn = _products(d.xquat[m.eq_obj1id], m.eq_data[:, 6:10])
+        angle = spin * d.qpos[along[:, 0]]
+        away = base[:, :2] - anchor[:, :2]
         arm = np.where(spin[:, None] != 0, _turned(away, -angle), 0.0)
         base[:, :2] += np.where(spin[:, None] != 0, arm - away, 0.0)
         return cls(base, along, way, _spun(turn, -angle), spin, arm)
 
     def chosen(self, welds: Index) -> WeldFrames:
         """Those of some welds, in that order."""
-        return WeldFrames(
-            self.base[welds],
-            self.along[welds],
-            self.way[welds],
-            self.turn[welds],
-            self.spin[welds],
-            self.arm[welds],
-        )
+        return WeldFrames(*(getattr(self, array.name)[welds] for array in fields(self)))
 
     def at(self, slides: Array) -> Array:
         """Where they are (n, 3) [m] at coordinates of their joints (n, k), which are
@@ -116,6 +74,24 @@ class WeldFrames:
     def turned(self, slides: Array) -> Array:
         """How they are turned (n, 4), quaternions, at coordinates of their joints (n, 2)."""
         return _spun(self.turn, self.spin * slides[:, 0]) if self.spin.any() else self.turn
+
+
+def _joints(m: mujoco.MjModel, d: mujoco.MjData) -> tuple[Index, Array, Array, Array]:
+    """The joints that carry each body (nbody, k), its own before those of its parent, of a model
+    whose kinematics in `d` are up to date: their addresses in qpos, and the direction (nbody, k, 3)
+    of one that slides, 0 for none. A body has one slide, or two where it follows a guidepath with
+    bends: k is 2 or 4. Where the axis of its own that turns it about the vertical stands (nbody,
+    3), and how far by each unit of its coordinate (nbody): 1 or -1, 0 for none."""
+    most = 1 + int((m.body_jntnum > 1).any())
+    joints = m.body_jntadr[:, None] + np.arange(most)
+    joints[np.arange(most) >= m.body_jntnum[:, None]] = -1
+    turns = (joints[:, 0] >= 0) & (m.jnt_type[joints[:, 0]] == HINGE)
+    joints[(m.jnt_type[joints] != SLIDE) & (m.jnt_type[joints] != HINGE)] = -1
+    joint = np.concatenate([joints, joints[m.body_parentid]], axis=1)
+    slides = (joint >= 0) & (m.jnt_type[joint] == SLIDE)
+    way = np.where(slides[:, :, None], d.xaxis[joint], 0.0)
+    spin = np.where(turns, d.xaxis[joints[:, 0]][:, 2].round(), 0.0)
+    return m.jnt_qposadr[joint], way, d.xanchor[joints[:, 0]], spin
 
 
 def check_holders(m: mujoco.MjModel, welds: Index) -> None:
