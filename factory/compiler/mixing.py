@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import permutations
-from typing import NamedTuple
 
 from factory.compiler.folding import begun_by, kind_of, sides_of
 from factory.plant.factory import Factory
@@ -28,13 +27,9 @@ NECKLACES = 8
 """All orders are tried of a period of so many units."""
 
 
-class _Key(NamedTuple):
-    """What the tours of a line have in common: the line that they come to (by number, -1 for the
-    outfeed), and what they bring in which way."""
-
-    onto: int
-    brings: object
-    kind: object
+_Key = tuple[int, str, object]
+"""What the tours of a line have in common: the line that they come to (by number, -1 for the
+outfeed), and what they bring in which way."""
 
 
 def turns_of(forest: Factory, on: Sequence[int], sequence: Sequence[str]) -> Turns:
@@ -144,23 +139,23 @@ class _Begins:
         """The key of a robot's tour, whose carrier is on a line already."""
         last = self.forest.last(robot)
         if self.forest.drops(last.index):
-            return _Key(-1, "product", None)
+            return -1, "product", None
         onto, slot = on[last.carrier], last.robots.index(robot)
         if last.before[slot] == NOPART:
-            return _Key(onto, "tool", kind_of(self.forest, robot))
+            return onto, "tool", kind_of(self.forest, robot)
         guests = [
             s for s, x in enumerate(last.before) if x != NOPART and last.robots[s] != last.carrier
         ]
         label = self._written(last.index, slot)
         if last.pile != NOPART or len(guests) != 2:
-            return _Key(onto, label, kind_of(self.forest, robot))
+            return onto, label, kind_of(self.forest, robot)
         one, other = self.sides.setdefault(onto, (set(), set()))
         first, second = (self._written(last.index, s) for s in guests)
         if first in other or second in one:
             first, second = second, first
         one.add(first)
         other.add(second)
-        return _Key(onto, "second" if label == second else "first", "begins")
+        return onto, "second" if label == second else "first", "begins"
 
     def _written(self, operation: int, slot: int) -> str:
         o = self.forest.operations[operation]
