@@ -9,7 +9,6 @@ import numpy as np
 
 from factory.control.mode import Index
 from factory.mjcf import names
-from factory.mjcf.shells import trunks
 from factory.support.engine import mujoco
 
 FREE = 6
@@ -17,6 +16,17 @@ FREE = 6
 
 FAR = 10.0
 """Distances are measured up to this [m]."""
+
+
+def trunks(m: mujoco.MjModel) -> Index:
+    """For each body of an engine's model (nbody,) the body that it is a shell of; else itself. A
+    *shell* holds the geoms of one part in the body that a sub-assembly has become, fixed and
+    without mass: the engine leaves pairs of bodies out of contact, not pairs of geoms, so a part
+    that overlaps another too deep has a body of its own in what it is fused into."""
+    trunk = np.arange(m.nbody)
+    shells = [b for b in range(m.nbody) if names.kind(m.body(b).name) == names.SHELL]
+    trunk[shells] = m.body_parentid[shells]
+    return trunk
 
 
 class Pads:

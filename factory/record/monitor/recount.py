@@ -15,9 +15,8 @@ import numpy as np
 
 from factory.mjcf import names
 from factory.mjcf.masks import NOBODY, masks_of, robot_code
-from factory.mjcf.pads import Pads
+from factory.mjcf.pads import Pads, trunks
 from factory.mjcf.replica import Replica
-from factory.mjcf.shells import trunks
 from factory.mjcf.weld_frames import GRIP, HOLD, PARK
 from factory.record.log.reader import Log
 from factory.record.monitor.anatomy import Anatomy

@@ -13,7 +13,7 @@ import numpy as np
 from factory.control.mode import Index, Truth
 from factory.mjcf import names
 from factory.mjcf.masks import masks_of
-from factory.mjcf.shells import trunks
+from factory.mjcf.pads import trunks
 from factory.plant.fused_bodies import Inside
 from factory.support.engine import mujoco
 
