@@ -297,6 +297,20 @@ def test_a_monitor_with_another_word_does_not_accept_a_run() -> None:
     assert not seen.report(record.lasting).refines_net
 
 
+def test_a_monitor_notices_a_standstill_where_changes_stand(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    startable = Supervisor._startable
+    monkeypatch.setattr(
+        Supervisor, "_startable", lambda self: startable(self) if self.world.time < 3.0 else []
+    )
+    demand = Demand(changes=(("a", 0), ("b", 2)))
+    simulation = Simulation(little().layout, RunRequest(units=4, demand=demand))
+    seen = beside(simulation)
+    simulation.run([seen.observe])
+    assert "Stalled" in [violation.code for violation in seen.report().violations]
+
+
 def test_a_robot_that_rests_in_the_way_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     layout = little().layout
     assert on_demand(layout).certificate is not None
