@@ -48,8 +48,7 @@ def allocated(
     if not aim.asks:
         return project
     if isinstance(aim.robots, int):
-        bounds = (least_robots(one.pag, project.templates) for one in project.each)
-        least = max(bounds, key=lambda bound: bound.total)
+        least = least_robots(project.pag, project.templates)
         if aim.robots < least.total:
             hint = f"--robots {least.total}"
             raise InputError(Diagnostic("TooFewRobots", str(least), None, hint))
