@@ -150,14 +150,39 @@ def test_common_inputs_come_on_one_line_in_whatever_order() -> None:
     assert lines == {frozenset({"y"}), frozenset({"base", "base@2"}), frozenset({"x", "z@2"})}
 
 
-def test_products_that_begin_otherwise_are_refused() -> None:
-    """One begins with two parts, the other with a sub-assembly and a part."""
-    part = [Tree(f"p{n}") for n in range(6)]
-    inner = Tree("s", "mate", (part[0], part[1]))
-    trees = Tree("a", "mate", (inner, part[2])), Tree("b", "mate", (part[3], part[4]))
+P = [Tree(f"p{n}") for n in range(7)]
+S, T, U = (Tree(label, "mate", (P[n], P[n + 1])) for label, n in (("s", 0), ("t", 3), ("u", 5)))
+"""Parts and sub-assemblies."""
+
+
+def test_inputs_without_a_common_label_come_on_lines_of_their_kind() -> None:
+    """`a` begins with a sub-assembly and a part, `b` with a part and a sub-assembly."""
+    trees = Tree("a", "mate", (S, P[2])), Tree("b", "mate", (P[5], T))
+    factory = mixed_factory(family_of(trees, ("a", "b")))
+    lines = {frozenset(factory.deliveries(robot.index)) for robot in factory.robots[1:]}
+    assert {frozenset({"s", "t@2"}), frozenset({"p2", "p5@2"})} <= lines
+
+
+@pytest.mark.parametrize(
+    ("trees", "message"),
+    [
+        (
+            (Tree("a", "mate", (S, P[2])), Tree("b", "mate", (P[3], P[4]))),
+            "'b' and 'a' have to begin on one robot, and their inputs cannot come on the same two"
+            " lines: part p3 slides and part p4 slides; sub-assembly s slides and part p2 slides",
+        ),
+        (
+            (Tree("a", "mate", (S, P[2])), Tree("b", "mate", (Tree("v", "mate", (T, P[5])), P[2]))),
+            "'v' and 's' have to begin on one robot, and their inputs cannot come on the same two"
+            " lines: sub-assembly t slides and part p5 slides; part p0 slides and part p1 slides",
+        ),
+    ],
+)
+def test_products_that_begin_otherwise_are_refused(trees: tuple[Tree, Tree], message: str) -> None:
+    """What is named is what begins otherwise, be it a sub-assembly further down."""
     with pytest.raises(InputError) as caught:
         mixed_factory(family_of(trees, ("a", "b")))
-    assert caught.value.diagnostics[0].code == "BadLine"
+    assert [(d.code, d.message) for d in caught.value.diagnostics] == [("BadLine", message)]
 
 
 @pytest.mark.parametrize("seed", range(0, 40, 4))
@@ -286,6 +311,13 @@ def test_what_could_slide_is_lowered_where_its_line_lowers(tmp_path: Path, run: 
     assert run("check", alone, "--json").json["approaches"]["lower"] == 0
     done = run("run", file, "--units", 6, "--jitter", 0.3, "--json")
     assert (done.status, done.json["robots"], done.json["unintended_contacts"]) == (0, 3, 0)
+    file.write_text(
+        LAMPS.replace("shaded =", "shaded = mate ( one, foot ); one =")
+        .replace("bare =", "bare = mate ( other, foot ); other =")
+        .replace("base =", "foot = atomic ( box = (40, 40, 20), pos = (41, 0, 10) ); base =")
+    )
+    done = run("run", file, "--units", 6, "--jitter", 0.3, "--json")
+    assert (done.status, done.json["robots"], done.json["unintended_contacts"]) == (0, 5, 0)
 
 
 BESIDE_EACH_OTHER = {
@@ -373,14 +405,16 @@ def test_labels_of_a_line_are_held_where_its_carrier_can_stand(
     assert (done.status, done.json["unintended_contacts"]) == (0, 0)
 
 
-def test_products_end_at_one_height(shaped: Path, run: Terminal) -> None:
-    """A product that is 5 mm higher would hang over the tray that takes it away."""
-    base = "base = atomic ( box = ( 0.2, 0.1, 0.02 ), pos = ( 0, 0, 0.01 ) );"
-    high = base.replace("base", "other").replace("0.02", "0.015").replace("0.01 )", "0.0125 )")
+@pytest.mark.parametrize("higher", [5.0, 0.2])
+def test_products_end_at_one_height(shaped: Path, run: Terminal, higher: float) -> None:
+    """A product that is higher by so many millimetres would hang over the tray that takes it
+    away."""
+    high = f"other = atomic ( box = ( 0.2, 0.1, {0.02 - higher / 1e3:.4f} ),"
+    high += f" pos = ( 0, 0, {0.01 + higher / 2e3:.4f} ) );"
     shaped.write_text(SHAPED.replace("mate ( base, z )", "mate ( other, z )") + "\n" + high)
     done = run("run", shaped, "--json")
     assert (done.status, done.codes) == (1, ["Layout"])
-    assert "'b@2' ends 5.00 mm higher than 'a'" in done.json["errors"][0]["message"]
+    assert f"'b@2' ends {higher:.2f} mm higher than 'a'" in done.json["errors"][0]["message"]
 
 
 DIPPING = """
@@ -448,14 +482,42 @@ def test_few_robots_make_a_mix(tmp_path: Path, run: Terminal) -> None:
     assert done.json["units_by_product"] == {"a": 4, "b": 2}
     refused = run("check", file, "--robots", 1, "--json")
     assert (refused.status, refused.codes) == (2, ["TooFewRobots"])
+    for words in (("--relay",), ("--deputies", "--demand", "7")):
+        refused = run("run", file, *words, "--json")
+        assert (refused.status, refused.codes) == (2, ["BadValue"])
 
 
-@pytest.mark.parametrize("options", [("--relay",), ("--deputies",)])
-def test_options_for_one_product_are_refused(
-    file: Path, run: Terminal, options: tuple[str, ...]
-) -> None:
-    done = run("run", file, "--world", "ideal", *options, "--json")
-    assert (done.status, done.codes) == (2, ["BadMix"])
+def test_a_search_says_what_keeps_robots_of_a_mix_apart(tmp_path: Path, run: Terminal) -> None:
+    file = tmp_path / "lamps.pag"
+    file.write_text(
+        LAMPS.replace("shade )", "shade, y )").replace("globe )", "globe, y )")
+        .replace("sphere = 20, pos = (0, 0, 40)", "box = (20, 20, 30), pos = (0, 0, 35)")
+        + "; y = atomic ( box = (10, 10, 10), pos = (0, 25, 5) )"
+    )
+    refused = run("check", file, "--robots", 2, "--json").json["errors"][0]["message"]
+    assert "; 'y' and 'base' cannot share a robot: they begin or end in different ways" in refused
+
+
+def test_a_mix_has_a_pareto_front(tmp_path: Path, run: Terminal) -> None:
+    """Its points run as they are predicted, and take no less than the bound on a unit."""
+    file = tmp_path / "family.pag"
+    file.write_text(LITTLE.replace("x, y )", "x, y, w )") + "; w = atomic()")
+    front = run("pareto", file, "--validate", 9, "-o", tmp_path / "front", "--json").json
+    assert len(front["points"]) > 1 and front["least_robots"] == 2
+    for point in front["points"]:
+        assert abs(point["validation"]["error"]) < 0.03 and not point["validation"]["failures"]
+        assert 0 < point["bound_s"] <= point["predicted_cycle_time_s"]
+
+
+def test_a_deputy_takes_over_in_a_mix(tmp_path: Path, run: Terminal) -> None:
+    file, faults = tmp_path / "family.pag", tmp_path / "dead.toml"
+    file.write_text(LITTLE.replace("x, y )", "x, y, w )") + "; w = atomic()")
+    faults.write_text('[[fault]]\nkind = "dead"\nrobot = "r2"\nat = 6')
+    options = "--deputies", "--faults", faults, "--swap", 3, "--units", 9, "--jitter", 0.3
+    done = run("run", file, *options, "--json")
+    assert (done.status, done.json["unintended_contacts"]) == (0, 0)
+    assert done.json["units_by_product"] == {"a": 6, "b": 3}
+    assert [(x["dead"], x["deputy"]) for x in done.json["exchanges"]] == [("r2", "r3")]
 
 
 def test_labels_of_a_mix_share_a_robot_where_asked(tmp_path: Path) -> None:

@@ -113,9 +113,7 @@ class Search:
     def why(self) -> str:
         """What keeps two lines of the best apart, in words; "" where nothing is known to."""
         best = self.best.single
-        if best.pag.mix is not None:
-            return ""
-        words = next(kept_apart(best.approached, lines_of(best.plan), best.catalogue), "")
+        words = next(kept_apart(best.approached, lines_of(best.planned.plan), best.catalogue), "")
         return f"; {words}" if words else ""
 
     def singles(self) -> Iterator[Candidate]:
