@@ -490,7 +490,8 @@ def test_few_robots_make_a_mix(tmp_path: Path, run: Terminal) -> None:
 def test_a_search_says_what_keeps_robots_of_a_mix_apart(tmp_path: Path, run: Terminal) -> None:
     file = tmp_path / "lamps.pag"
     file.write_text(
-        LAMPS.replace("shade )", "shade, y )").replace("globe )", "globe, y )")
+        LAMPS.replace("shade )", "shade, y )")
+        .replace("globe )", "globe, y )")
         .replace("sphere = 20, pos = (0, 0, 40)", "box = (20, 20, 30), pos = (0, 0, 35)")
         + "; y = atomic ( box = (10, 10, 10), pos = (0, 25, 5) )"
     )

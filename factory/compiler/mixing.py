@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import permutations
-from typing import NamedTuple
 
 from factory.compiler.folding import begun_by, delivery, kind_of, sides_of
 from factory.plant.factory import Factory
@@ -28,20 +27,16 @@ NECKLACES = 8
 """All orders are tried of a period of so many units."""
 
 
-class _Key(NamedTuple):
-    """What the tours of a line have in common: the line that they come to (by number, -1 for the
-    outfeed), and what they bring in which way."""
-
-    onto: int
-    brings: object
-    kind: object
+_Key = tuple[int, object, object]
+"""What the tours of a line have in common: the line that they come to (by number, -1 for the
+outfeed), and what they bring in which way."""
 
 
 def turns_of(forest: Factory, on: Sequence[int], sequence: Sequence[str]) -> Turns:
     """The turns of a sequence of products: for each unit and each robot of the forest the line
     (index) that does its tours, NOBODY for another product. `on`: the line of each robot."""
     unit = {product: number for number, product in enumerate(forest.sequence)}
-    makes = _product_of(forest)
+    makes = {robot: o.turn for o in forest.operations for robot in o.robots}
     return [
         [line if makes[robot] == unit[product] else NOBODY for robot, line in enumerate(on)]
         for product in sequence
@@ -124,13 +119,10 @@ def lowered_alike(products: Sequence[Factory]) -> dict[int, dict[str, str]]:
 def _lines(forest: Factory, apart: Collection[int], catalogue: Catalogue) -> list[int]:
     """The line of each robot: the first with its key that it fits on, a new one for those to be
     kept `apart`."""
-    on: list[int] = []
-    tours: list[list[int]] = []
-    lines: dict[_Key, list[int]] = {}
+    on, tours, lines = list[int](), list[list[int]](), dict[_Key, list[int]]()
     begins = _Begins(forest)
     for robot in range(len(forest.robots)):
-        key = begins.key(robot, on)
-        several = lines.setdefault(key, [])
+        several = lines.setdefault(begins.key(robot, on), [])
         fitting = (n for n in several if _fits(forest, [*tours[n], robot], catalogue))
         line = len(tours) if robot in apart else next(fitting, len(tours))
         if line == len(tours):
@@ -153,33 +145,28 @@ class _Begins:
         """The key of a robot's tour, whose carrier is on a line already."""
         last = delivery(self.forest, robot)
         if self.forest.drops(last.index):
-            return _Key(-1, "product", None)
+            return -1, "product", None
         onto, slot = on[last.carrier], last.robots.index(robot)
         if last.before[slot] == NOPART:
-            return _Key(onto, "tool", kind_of(self.forest, robot))
+            return onto, "tool", kind_of(self.forest, robot)
         guests = [
             s for s, x in enumerate(last.before) if x != NOPART and last.robots[s] != last.carrier
         ]
         label = self._written(last.index, slot)
         if last.before[last.template.carrier - 1] != NOPART or len(guests) != 2:
-            return _Key(onto, label, kind_of(self.forest, robot))
+            return onto, label, kind_of(self.forest, robot)
         one, other = self.sides.setdefault(onto, ({}, {}))
-        pair = {self._written(last.index, s): last.robots[s] for s in guests}
-        (first, by_first), (second, by_second) = pair.items()
-        if not pair.keys() & {*one, *other} and one:
-            turned = self._alike(one, by_second) and self._alike(other, by_first)
-            turned &= not (self._alike(one, by_first) and self._alike(other, by_second))
-        else:
-            turned = first in other or second in one
-        if turned:
-            first, second = second, first
-        one.setdefault(first, pair[first])
-        other.setdefault(second, pair[second])
-        return _Key(onto, "second" if label == second else "first", "begins")
+        by = {self._written(last.index, s): last.robots[s] for s in guests}
 
-    def _alike(self, side: Mapping[str, int], robot: int) -> bool:
-        """Whether a tour may come as those on a side do."""
-        return _alike(self.forest, [*side.values(), robot])
+        def like(pair: tuple[str, ...]) -> tuple[int, bool]:
+            """How many labels are on their sides already; whether all come as those there do."""
+            tours = [[*side.values(), by[x]] for side, x in zip((one, other), pair, strict=True)]
+            return (pair[0] in one) + (pair[1] in other), all(_alike(self.forest, t) for t in tours)
+
+        first, second = max((tuple(by), tuple(by)[::-1]), key=like)
+        one.setdefault(first, by[first])
+        other.setdefault(second, by[second])
+        return onto, "second" if label == second else "first", "begins"
 
     def _written(self, operation: int, slot: int) -> str:
         o = self.forest.operations[operation]
@@ -188,14 +175,11 @@ class _Begins:
 
 def _fits(forest: Factory, tours: Sequence[int], catalogue: Catalogue) -> bool:
     """Whether the tours of different products, or tools, can be on one line."""
-    kind = forest.robots[tours[0]].type
+    kind: str | None = forest.robots[tours[0]].type
     for robot in tours:
-        met = catalogue.meet(kind, forest.robots[robot].type)
-        if met is None:
-            return False
-        kind = met
-    deliveries = [delivery(forest, robot).index for robot in tours]
-    return len({*deliveries}) == len(deliveries) and _alike(forest, tours)
+        kind = kind and catalogue.meet(kind, forest.robots[robot].type)
+    deliveries = {delivery(forest, robot).index for robot in tours}
+    return kind is not None and len(deliveries) == len(tours) and _alike(forest, tours)
 
 
 def _alike(forest: Factory, tours: Sequence[int]) -> bool:
@@ -214,11 +198,6 @@ def _begun_otherwise(forest: Factory, on: Sequence[int]) -> Iterator[tuple[int, 
         first, others = begun.setdefault(line, (robot, lines))
         if others != lines:
             yield robot, first
-
-
-def _product_of(forest: Factory) -> Mapping[int, int]:
-    """The product (index) that each robot of the forest works for."""
-    return {robot: o.turn for o in forest.operations for robot in o.robots}
 
 
 def _fault(forest: Factory, here: int, there: int, apart: Mapping[int, int]) -> Diagnostic:
@@ -241,7 +220,9 @@ def _fault(forest: Factory, here: int, there: int, apart: Mapping[int, int]) -> 
 def _ways_in(forest: Factory, robot: int) -> str:
     """How the inputs come with which a tour begins, in words."""
     first = forest.operations[forest.robots[robot].operations[0]]
-    inputs = [(n, forest.by_label[label]) for n, label in enumerate(first.before) if label != NOPART]
+    inputs = [
+        (n, forest.by_label[label]) for n, label in enumerate(first.before) if label != NOPART
+    ]
     return " and ".join(
         f"{'sub-assembly' if o.inputs else 'part'} {o.written}"
         f" {'is lowered' if slot == first.lowered else 'slides'}"

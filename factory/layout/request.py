@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 SEVERAL_TOURS = Diagnostic(
     "BadValue",
     "--relay does not go with robots that have several tours: a relay cuts the way of one tour",
-    hint="leave out --relay, or what shares robots: a mix, --robots, --parallel, [lines] in factory.toml",
+    hint="leave out --relay, or what shares robots: a mix, --robots, --parallel, [lines]",
 )
 
 TILE = 0.24
