@@ -391,6 +391,25 @@ s6.b = mate ( s3, s2.b );
 s7.b = mate ( s5.b, s6.b );
 p3.b = atomic ( box = ( 0.007, 0.042, 0.028 ), pos = ( -0.072, -0.0335, 0.02 ) );
 p7.b = atomic ( box = ( 0.0196, 0.0098, 0.0049 ), pos = ( -0.057, 0.034, 0.0655 ) );""",
+    "a hand goes home as soon as its lift is nearly up": """mix = 1 s4, 1 s4.b;
+s1 = mate ( p1, p2, p3 );
+s2 = mate ( p6, p7, p8 );
+s3 = mate ( s1, p4, p5, s2 );
+s4 = mate ( p0, s3 );
+p0 = atomic ( box = ( 0.02, 0.01, 0.03 ), pos = ( 0, 0, 0.015 ) );
+p1 = atomic ( sphere = 0.015, pos = ( 0.006, -0.02, 0.015 ) );
+p2 = atomic ( box = ( 0.01, 0.02, 0.04 ), pos = ( -0.004, 0.016, 0.02 ) );
+p3 = atomic ( box = ( 0.02, 0.1, 0.01 ), pos = ( 0.001, 0.057, 0.046 ) );
+p4 = atomic ( cylinder = ( 0.005, 0.02 ), pos = ( -0.015, 0.081, 0.051 ) );
+p5 = atomic ( box = ( 0.1, 0.06, 0.02 ), pos = ( 0.044, 0.02, 0.062 ) );
+p6 = atomic ( box = ( 0.03, 0.06, 0.04 ), pos = ( -0.006, 0.106, 0.081 ) );
+p7 = atomic ( box = ( 0.06, 0.06, 0.03 ), pos = ( -0.0515, 0.127, 0.076 ) );
+p8 = atomic ( box = ( 0.06, 0.04, 0.02 ), pos = ( 0.039, 0.132, 0.071 ) );
+s1.b = mate ( p1, p2, p3.b );
+s2.b = mate ( p6, p7 );
+s3.b = mate ( s1.b, p4, p5, s2.b );
+s4.b = mate ( p0, s3.b );
+p3.b = atomic ( box = ( 0.018, 0.09, 0.009 ), pos = ( 0.001, 0.057, 0.046 ) );""",
 }
 """Families whose layouts were refused, each for a cause of its own."""
 
