@@ -391,6 +391,25 @@ s6.b = mate ( s3, s2.b );
 s7.b = mate ( s5.b, s6.b );
 p3.b = atomic ( box = ( 0.007, 0.042, 0.028 ), pos = ( -0.072, -0.0335, 0.02 ) );
 p7.b = atomic ( box = ( 0.0196, 0.0098, 0.0049 ), pos = ( -0.057, 0.034, 0.0655 ) );""",
+    "what is lowered comes on the line of what is lowered, deeper, too": """mix = 3 s5, 1 s5.b;
+s1 = mate ( p4, p5 );
+s2 = mate ( s1, p3 );
+s3 = mate ( p0, p1 );
+s4 = mate ( s3, p2 );
+s5 = mate ( s4, s2 );
+p0 = atomic ( box = ( 0.03, 0.01, 0.04 ), pos = ( 0, 0, 0.02 ) );
+p1 = atomic ( box = ( 0.1, 0.03, 0.1 ), pos = ( 0.037, 0.02, 0.05 ) );
+p2 = atomic ( box = ( 0.1, 0.04, 0.04 ), pos = ( 0.031, 0.033, 0.12 ) );
+p3 = atomic ( box = ( 0.1, 0.01, 0.01 ), pos = ( -0.0635, 0.015, 0.005 ) );
+p4 = atomic ( box = ( 0.06, 0.04, 0.03 ), pos = ( 0.067, -0.015, 0.015 ) );
+p5 = atomic ( box = ( 0.01, 0.01, 0.02 ), pos = ( -0.024, 0.004, 0.1105 ) );
+s2.b = mate ( pressed1, p3.b );
+s3.b = mate ( p0, p1.b );
+s4.b = mate ( s3.b, p2 );
+s5.b = mate ( s4.b, s2.b );
+p1.b = atomic ( box = ( 0.098, 0.0294, 0.098 ), pos = ( 0.037, 0.02, 0.05 ) );
+p3.b = atomic ( box = ( 0.098, 0.0098, 0.0098 ), pos = ( -0.0635, 0.015, 0.005 ) );
+pressed1 = press ( s1 );""",
     "a hand goes home as soon as its lift is nearly up": """mix = 1 s4, 1 s4.b;
 s1 = mate ( p1, p2, p3 );
 s2 = mate ( p6, p7, p8 );

@@ -106,12 +106,14 @@ def lowered_alike(products: Sequence[Factory]) -> dict[int, dict[str, str]]:
         (stays,) = {*model.inputs} - {low}
         sides: tuple[list[tuple[int, int]], ...] = [], []
         for number, first in begins:
-            lowered = low if low in first.inputs else [x for x in first.inputs if x != stays][-1]
-            if model.lowered >= 0 > first.lowered:
+            others = [x for x in first.inputs if x != stays]
+            lowered = low if low in others else [*others, *others][model.inputs.index(low)]
+            if first.lowered >= 0:
+                lowered = first.before[first.lowered]
+            elif model.lowered >= 0:
                 lowered_inputs[number][first.label] = lowered
-            for label in first.inputs:
-                robot = first.robots[first.before.index(label)]
-                sides[label == lowered].append((number, robot))
+            for slot in map(first.before.index, first.inputs):
+                sides[first.before[slot] == lowered].append((number, first.robots[slot]))
         todo += sides
     return lowered_inputs
 
@@ -220,9 +222,7 @@ def _fault(forest: Factory, here: int, there: int, apart: Mapping[int, int]) -> 
 def _ways_in(forest: Factory, robot: int) -> str:
     """How the inputs come with which a tour begins, in words."""
     first = forest.operations[forest.robots[robot].operations[0]]
-    inputs = [
-        (n, forest.by_label[label]) for n, label in enumerate(first.before) if label != NOPART
-    ]
+    inputs = [(n, forest.by_label[first.before[n]]) for n in map(first.before.index, first.inputs)]
     return " and ".join(
         f"{'sub-assembly' if o.inputs else 'part'} {o.written}"
         f" {'is lowered' if slot == first.lowered else 'slides'}"
