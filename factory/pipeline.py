@@ -249,7 +249,7 @@ class Project:
         from factory.layout.sequencing import sequenced
 
         inputs = self.pag.mix, self.product, self.catalogue, self.settings
-        return self._shared(sequenced(self.approached, *inputs).plan)
+        return self._shared(sequenced(self.approached, *inputs))
 
     def _shared(self, plan: Plan) -> Factory:
         from factory.compiler.assigning import shared

@@ -150,14 +150,39 @@ def test_common_inputs_come_on_one_line_in_whatever_order() -> None:
     assert lines == {frozenset({"y"}), frozenset({"base", "base@2"}), frozenset({"x", "z@2"})}
 
 
-def test_products_that_begin_otherwise_are_refused() -> None:
-    """One begins with two parts, the other with a sub-assembly and a part."""
-    part = [Tree(f"p{n}") for n in range(6)]
-    inner = Tree("s", "mate", (part[0], part[1]))
-    trees = Tree("a", "mate", (inner, part[2])), Tree("b", "mate", (part[3], part[4]))
+P = [Tree(f"p{n}") for n in range(7)]
+S, T, U = (Tree(label, "mate", (P[n], P[n + 1])) for label, n in (("s", 0), ("t", 3), ("u", 5)))
+"""Parts and sub-assemblies."""
+
+
+def test_inputs_without_a_common_label_come_on_lines_of_their_kind() -> None:
+    """`a` begins with a sub-assembly and a part, `b` with a part and a sub-assembly."""
+    trees = Tree("a", "mate", (S, P[2])), Tree("b", "mate", (P[5], T))
+    factory = mixed_factory(family_of(trees, ("a", "b")))
+    lines = {frozenset(factory.deliveries(robot.index)) for robot in factory.robots[1:]}
+    assert {frozenset({"s", "t@2"}), frozenset({"p2", "p5@2"})} <= lines
+
+
+@pytest.mark.parametrize(
+    ("trees", "message"),
+    [
+        (
+            (Tree("a", "mate", (S, P[2])), Tree("b", "mate", (P[3], P[4]))),
+            "'b' and 'a' have to begin on one robot, and their inputs cannot come on the same two"
+            " lines: part p3 slides and part p4 slides; sub-assembly s slides and part p2 slides",
+        ),
+        (
+            (Tree("a", "mate", (S, P[2])), Tree("b", "mate", (Tree("v", "mate", (T, P[5])), P[2]))),
+            "'v' and 's' have to begin on one robot, and their inputs cannot come on the same two"
+            " lines: sub-assembly t slides and part p5 slides; part p0 slides and part p1 slides",
+        ),
+    ],
+)
+def test_products_that_begin_otherwise_are_refused(trees: tuple[Tree, Tree], message: str) -> None:
+    """What is named is what begins otherwise, be it a sub-assembly further down."""
     with pytest.raises(InputError) as caught:
         mixed_factory(family_of(trees, ("a", "b")))
-    assert caught.value.diagnostics[0].code == "BadLine"
+    assert [(d.code, d.message) for d in caught.value.diagnostics] == [("BadLine", message)]
 
 
 @pytest.mark.parametrize("seed", range(0, 40, 4))
@@ -286,6 +311,13 @@ def test_what_could_slide_is_lowered_where_its_line_lowers(tmp_path: Path, run: 
     assert run("check", alone, "--json").json["approaches"]["lower"] == 0
     done = run("run", file, "--units", 6, "--jitter", 0.3, "--json")
     assert (done.status, done.json["robots"], done.json["unintended_contacts"]) == (0, 3, 0)
+    file.write_text(
+        LAMPS.replace("shaded =", "shaded = mate ( one, foot ); one =")
+        .replace("bare =", "bare = mate ( other, foot ); other =")
+        .replace("base =", "foot = atomic ( box = (40, 40, 20), pos = (41, 0, 10) ); base =")
+    )
+    done = run("run", file, "--units", 6, "--jitter", 0.3, "--json")
+    assert (done.status, done.json["robots"], done.json["unintended_contacts"]) == (0, 5, 0)
 
 
 BESIDE_EACH_OTHER = {
@@ -359,6 +391,44 @@ s6.b = mate ( s3, s2.b );
 s7.b = mate ( s5.b, s6.b );
 p3.b = atomic ( box = ( 0.007, 0.042, 0.028 ), pos = ( -0.072, -0.0335, 0.02 ) );
 p7.b = atomic ( box = ( 0.0196, 0.0098, 0.0049 ), pos = ( -0.057, 0.034, 0.0655 ) );""",
+    "what is lowered comes on the line of what is lowered, deeper, too": """mix = 3 s5, 1 s5.b;
+s1 = mate ( p4, p5 );
+s2 = mate ( s1, p3 );
+s3 = mate ( p0, p1 );
+s4 = mate ( s3, p2 );
+s5 = mate ( s4, s2 );
+p0 = atomic ( box = ( 0.03, 0.01, 0.04 ), pos = ( 0, 0, 0.02 ) );
+p1 = atomic ( box = ( 0.1, 0.03, 0.1 ), pos = ( 0.037, 0.02, 0.05 ) );
+p2 = atomic ( box = ( 0.1, 0.04, 0.04 ), pos = ( 0.031, 0.033, 0.12 ) );
+p3 = atomic ( box = ( 0.1, 0.01, 0.01 ), pos = ( -0.0635, 0.015, 0.005 ) );
+p4 = atomic ( box = ( 0.06, 0.04, 0.03 ), pos = ( 0.067, -0.015, 0.015 ) );
+p5 = atomic ( box = ( 0.01, 0.01, 0.02 ), pos = ( -0.024, 0.004, 0.1105 ) );
+s2.b = mate ( pressed1, p3.b );
+s3.b = mate ( p0, p1.b );
+s4.b = mate ( s3.b, p2 );
+s5.b = mate ( s4.b, s2.b );
+p1.b = atomic ( box = ( 0.098, 0.0294, 0.098 ), pos = ( 0.037, 0.02, 0.05 ) );
+p3.b = atomic ( box = ( 0.098, 0.0098, 0.0098 ), pos = ( -0.0635, 0.015, 0.005 ) );
+pressed1 = press ( s1 );""",
+    "a hand goes home as soon as its lift is nearly up": """mix = 1 s4, 1 s4.b;
+s1 = mate ( p1, p2, p3 );
+s2 = mate ( p6, p7, p8 );
+s3 = mate ( s1, p4, p5, s2 );
+s4 = mate ( p0, s3 );
+p0 = atomic ( box = ( 0.02, 0.01, 0.03 ), pos = ( 0, 0, 0.015 ) );
+p1 = atomic ( sphere = 0.015, pos = ( 0.006, -0.02, 0.015 ) );
+p2 = atomic ( box = ( 0.01, 0.02, 0.04 ), pos = ( -0.004, 0.016, 0.02 ) );
+p3 = atomic ( box = ( 0.02, 0.1, 0.01 ), pos = ( 0.001, 0.057, 0.046 ) );
+p4 = atomic ( cylinder = ( 0.005, 0.02 ), pos = ( -0.015, 0.081, 0.051 ) );
+p5 = atomic ( box = ( 0.1, 0.06, 0.02 ), pos = ( 0.044, 0.02, 0.062 ) );
+p6 = atomic ( box = ( 0.03, 0.06, 0.04 ), pos = ( -0.006, 0.106, 0.081 ) );
+p7 = atomic ( box = ( 0.06, 0.06, 0.03 ), pos = ( -0.0515, 0.127, 0.076 ) );
+p8 = atomic ( box = ( 0.06, 0.04, 0.02 ), pos = ( 0.039, 0.132, 0.071 ) );
+s1.b = mate ( p1, p2, p3.b );
+s2.b = mate ( p6, p7 );
+s3.b = mate ( s1.b, p4, p5, s2.b );
+s4.b = mate ( p0, s3.b );
+p3.b = atomic ( box = ( 0.018, 0.09, 0.009 ), pos = ( 0.001, 0.057, 0.046 ) );""",
 }
 """Families whose layouts were refused, each for a cause of its own."""
 
@@ -373,14 +443,16 @@ def test_labels_of_a_line_are_held_where_its_carrier_can_stand(
     assert (done.status, done.json["unintended_contacts"]) == (0, 0)
 
 
-def test_products_end_at_one_height(shaped: Path, run: Terminal) -> None:
-    """A product that is 5 mm higher would hang over the tray that takes it away."""
-    base = "base = atomic ( box = ( 0.2, 0.1, 0.02 ), pos = ( 0, 0, 0.01 ) );"
-    high = base.replace("base", "other").replace("0.02", "0.015").replace("0.01 )", "0.0125 )")
+@pytest.mark.parametrize("higher", [5.0, 0.2])
+def test_products_end_at_one_height(shaped: Path, run: Terminal, higher: float) -> None:
+    """A product that is higher by so many millimetres would hang over the tray that takes it
+    away."""
+    high = f"other = atomic ( box = ( 0.2, 0.1, {0.02 - higher / 1e3:.4f} ),"
+    high += f" pos = ( 0, 0, {0.01 + higher / 2e3:.4f} ) );"
     shaped.write_text(SHAPED.replace("mate ( base, z )", "mate ( other, z )") + "\n" + high)
     done = run("run", shaped, "--json")
     assert (done.status, done.codes) == (1, ["Layout"])
-    assert "'b@2' ends 5.00 mm higher than 'a'" in done.json["errors"][0]["message"]
+    assert f"'b@2' ends {higher:.2f} mm higher than 'a'" in done.json["errors"][0]["message"]
 
 
 DIPPING = """
@@ -448,14 +520,43 @@ def test_few_robots_make_a_mix(tmp_path: Path, run: Terminal) -> None:
     assert done.json["units_by_product"] == {"a": 4, "b": 2}
     refused = run("check", file, "--robots", 1, "--json")
     assert (refused.status, refused.codes) == (2, ["TooFewRobots"])
+    for words in (("--relay",), ("--deputies", "--demand", "7")):
+        refused = run("run", file, *words, "--json")
+        assert (refused.status, refused.codes) == (2, ["BadValue"])
 
 
-@pytest.mark.parametrize("options", [("--relay",), ("--deputies",)])
-def test_options_for_one_product_are_refused(
-    file: Path, run: Terminal, options: tuple[str, ...]
-) -> None:
-    done = run("run", file, "--world", "ideal", *options, "--json")
-    assert (done.status, done.codes) == (2, ["BadMix"])
+def test_a_search_says_what_keeps_robots_of_a_mix_apart(tmp_path: Path, run: Terminal) -> None:
+    file = tmp_path / "lamps.pag"
+    file.write_text(
+        LAMPS.replace("shade )", "shade, y )")
+        .replace("globe )", "globe, y )")
+        .replace("sphere = 20, pos = (0, 0, 40)", "box = (20, 20, 30), pos = (0, 0, 35)")
+        + "; y = atomic ( box = (10, 10, 10), pos = (0, 25, 5) )"
+    )
+    refused = run("check", file, "--robots", 2, "--json").json["errors"][0]["message"]
+    assert "; 'y' and 'base' cannot share a robot: they begin or end in different ways" in refused
+
+
+def test_a_mix_has_a_pareto_front(tmp_path: Path, run: Terminal) -> None:
+    """Its points run as they are predicted, and take no less than the bound on a unit."""
+    file = tmp_path / "family.pag"
+    file.write_text(LITTLE.replace("x, y )", "x, y, w )") + "; w = atomic()")
+    front = run("pareto", file, "--validate", 9, "-o", tmp_path / "front", "--json").json
+    assert len(front["points"]) > 1 and front["least_robots"] == 2
+    for point in front["points"]:
+        assert abs(point["validation"]["error"]) < 0.03 and not point["validation"]["failures"]
+        assert 0 < point["bound_s"] <= point["predicted_cycle_time_s"]
+
+
+def test_a_deputy_takes_over_in_a_mix(tmp_path: Path, run: Terminal) -> None:
+    file, faults = tmp_path / "family.pag", tmp_path / "dead.toml"
+    file.write_text(LITTLE.replace("x, y )", "x, y, w )") + "; w = atomic()")
+    faults.write_text('[[fault]]\nkind = "dead"\nrobot = "r2"\nat = 6')
+    options = "--deputies", "--faults", faults, "--swap", 3, "--units", 9, "--jitter", 0.3
+    done = run("run", file, *options, "--json")
+    assert (done.status, done.json["unintended_contacts"]) == (0, 0)
+    assert done.json["units_by_product"] == {"a": 6, "b": 3}
+    assert [(x["dead"], x["deputy"]) for x in done.json["exchanges"]] == [("r2", "r3")]
 
 
 def test_labels_of_a_mix_share_a_robot_where_asked(tmp_path: Path) -> None:

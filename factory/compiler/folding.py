@@ -25,7 +25,7 @@ from itertools import pairwise
 from factory.compiler.assigning import with_crew
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
-from factory.problem.plan import Plan
+from factory.problem.plan import NOBODY, Plan
 from factory.problem.robot_types import Catalogue
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 
@@ -81,10 +81,11 @@ def line_of(count: int, lines: Iterable[Line]) -> list[int]:
 
 
 def lines_of(plan: Plan) -> tuple[Line, ...]:
-    """The lines of a plan for one unit: the tours of each robot that has several."""
+    """The lines of a plan: the tours of each robot that has several, by the first turn in which
+    they are done."""
     on: dict[int, list[int]] = {}
-    for tour, robot in enumerate(plan.turns[0] if plan.turns else ()):
-        on.setdefault(robot, []).append(tour)
+    for tour, robots in enumerate(zip(*plan.turns, strict=True)):
+        on.setdefault(next(r for r in robots if r != NOBODY), []).append(tour)
     return tuple(tuple(tours) for tours in on.values() if len(tours) > 1)
 
 
@@ -144,14 +145,14 @@ def kept_apart(factory: Factory, lines: Sequence[Line], catalogue: Catalogue) ->
     ones that are not needed at once. Lines are named by the labels of their first tours."""
     on = line_of(len(factory.robots), lines)
     heads: dict[int, list[int]] = {}
-    for robot in dict.fromkeys(on[1:]):
+    for robot in dict.fromkeys(line for line in on if line):
         if kind_of(factory, robot)[0] != "tool":
             heads.setdefault(on[factory.last(robot).carrier], []).append(robot)
     for one, other in (pair for group in heads.values() for pair in pairwise(group)):
-        if factory.last(one) is factory.last(other):
+        tours = [robot for robot in range(len(on)) if on[robot] in (one, other)]
+        if len({factory.last(robot).index for robot in tours}) < len(tours):
             continue
         message = mismatch(factory, one, other, on, catalogue)
-        tours = [robot for robot in range(len(on)) if on[robot] in (one, other)]
         if not message and not set.intersection(*(sides_of(factory, r) for r in tours)):
             message = "they cannot come from one side"
         if message:

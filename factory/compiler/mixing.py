@@ -13,7 +13,7 @@ the pile first (`assigning`). Any other order of the tours of a line is dead.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import permutations
 
 from factory.compiler.folding import begun_by, kind_of, sides_of
@@ -27,7 +27,7 @@ NECKLACES = 8
 """All orders are tried of a period of so many units."""
 
 
-_Key = tuple[int, str, object]
+_Key = tuple[int, object, object]
 """What the tours of a line have in common: the line that they come to (by number, -1 for the
 outfeed), and what they bring in which way."""
 
@@ -78,12 +78,12 @@ def lines_of_mix(forest: Factory, catalogue: Catalogue) -> list[int]:
     """The line of each robot of the forest, numbered in the order of the robots. Raises InputError
     (BadLine) where what begins the tours of the output robot does not come in one way in all
     products."""
-    apart: set[int] = set()
+    apart, outputs = dict[int, int](), [dropoff.carrier for dropoff in forest.dropoffs]
     while True:
         on = _lines(forest, apart, catalogue)
-        split = [*_begun_otherwise(forest, on)]
-        outputs = [dropoff.carrier for dropoff in forest.dropoffs]
-        faults = [_fault(forest, r) for r in outputs if r in split or on[r] != on[outputs[0]]]
+        split = dict(_begun_otherwise(forest, on))
+        otherwise = [r for r in outputs if r in split or on[r] != on[outputs[0]]]
+        faults = [_fault(forest, r, outputs[0], apart) for r in otherwise]
         if faults:
             raise InputError(faults)
         if not split:
@@ -92,32 +92,39 @@ def lines_of_mix(forest: Factory, catalogue: Catalogue) -> list[int]:
 
 
 def lowered_alike(products: Sequence[Factory]) -> dict[int, dict[str, str]]:
-    """By products (index) whose output robot begins with two inputs that slide, where that of
-    another begins with one that is lowered: the operation, and the input to be lowered there, so
-    that one line with a lift can bring both."""
-    begins = [one.first(one.dropoff.carrier) for one in products]
-    model = next((first for first in begins if first.lowered >= 0), None)
-    lowered_inputs = dict[int, dict[str, str]]()
-    for number, first in enumerate(begins):
-        inputs = [label for label in first.before if label != NOPART]
-        if model is not None and first.lowered < 0 and len(inputs) == 2:
-            lowered = model.before[model.lowered]
-            stays = [x for x in inputs if x in model.before and x != lowered]
-            others = [x for x in inputs if x not in stays]
-            lowered_inputs[number] = {first.label: lowered if lowered in inputs else others[-1]}
+    """By products (index): the operations that begin with two inputs that slide, where one of
+    another product that begins on the same line has one that is lowered; and the input to be
+    lowered there, so that one line with a lift can bring both."""
+    lowered_inputs: dict[int, dict[str, str]] = {number: {} for number in range(len(products))}
+    todo = [[(number, one.dropoff.carrier) for number, one in enumerate(products)]]
+    for line in todo:
+        begins = [(n, products[n].first(r)) for n, r in line]
+        if {len(first.inputs) for _, first in begins} != {2}:
+            continue
+        model = max((first for _, first in begins), key=lambda first: first.lowered >= 0)
+        low = model.before[model.lowered] if model.lowered >= 0 else model.inputs[-1]
+        (stays,) = {*model.inputs} - {low}
+        sides: tuple[list[tuple[int, int]], ...] = [], []
+        for number, first in begins:
+            others = [x for x in first.inputs if x != stays]
+            lowered = low if low in others else [*others, *others][model.inputs.index(low)]
+            if first.lowered >= 0:
+                lowered = first.before[first.lowered]
+            elif model.lowered >= 0:
+                lowered_inputs[number][first.label] = lowered
+            for slot in map(first.before.index, first.inputs):
+                sides[first.before[slot] == lowered].append((number, first.robots[slot]))
+        todo += sides
     return lowered_inputs
 
 
-def _lines(forest: Factory, apart: set[int], catalogue: Catalogue) -> list[int]:
+def _lines(forest: Factory, apart: Collection[int], catalogue: Catalogue) -> list[int]:
     """The line of each robot: the first with its key that it fits on, a new one for those to be
     kept `apart`."""
-    on: list[int] = []
-    tours: list[list[int]] = []
-    lines: dict[_Key, list[int]] = {}
+    on, tours, lines = list[int](), list[list[int]](), dict[_Key, list[int]]()
     begins = _Begins(forest)
     for robot in range(len(forest.robots)):
-        key = begins.key(robot, on)
-        several = lines.setdefault(key, [])
+        several = lines.setdefault(begins.key(robot, on), [])
         fitting = (n for n in several if _fits(forest, [*tours[n], robot], catalogue))
         line = len(tours) if robot in apart else next(fitting, len(tours))
         if line == len(tours):
@@ -129,11 +136,12 @@ def _lines(forest: Factory, apart: set[int], catalogue: Catalogue) -> list[int]:
 
 
 class _Begins:
-    """The keys of tours. The two inputs that begin the tours of a line come on the same two lines:
-    those with a label that one of these has brought already on that, the others on the other."""
+    """The keys of tours. The two inputs that begin the tours of a line come on the same two lines
+    (`sides`, by their carrier's): those with a label that one of these has brought already on that,
+    the others on the other; without such a label in the order in which they are alike."""
 
     def __init__(self, forest: Factory) -> None:
-        self.forest, self.sides = forest, dict[int, tuple[set[str], set[str]]]()
+        self.forest, self.sides = forest, dict[int, tuple[dict[str, int], dict[str, int]]]()
 
     def key(self, robot: int, on: Sequence[int]) -> _Key:
         """The key of a robot's tour, whose carrier is on a line already."""
@@ -149,12 +157,17 @@ class _Begins:
         label = self._written(last.index, slot)
         if last.pile != NOPART or len(guests) != 2:
             return onto, label, kind_of(self.forest, robot)
-        one, other = self.sides.setdefault(onto, (set(), set()))
-        first, second = (self._written(last.index, s) for s in guests)
-        if first in other or second in one:
-            first, second = second, first
-        one.add(first)
-        other.add(second)
+        one, other = self.sides.setdefault(onto, ({}, {}))
+        by = {self._written(last.index, s): last.robots[s] for s in guests}
+
+        def like(pair: tuple[str, ...]) -> tuple[int, bool]:
+            """How many labels are on their sides already; whether all come as those there do."""
+            tours = [[*side.values(), by[x]] for side, x in zip((one, other), pair, strict=True)]
+            return (pair[0] in one) + (pair[1] in other), all(_alike(self.forest, t) for t in tours)
+
+        first, second = max((tuple(by), tuple(by)[::-1]), key=like)
+        one.setdefault(first, by[first])
+        other.setdefault(second, by[second])
         return onto, "second" if label == second else "first", "begins"
 
     def _written(self, operation: int, slot: int) -> str:
@@ -164,33 +177,39 @@ class _Begins:
 
 def _fits(forest: Factory, tours: Sequence[int], catalogue: Catalogue) -> bool:
     """Whether the tours of different products, or tools, can be on one line."""
-    kinds = {kind_of(forest, robot) for robot in tours}
-    kind = forest.robots[tours[0]].type
+    kind: str | None = forest.robots[tours[0]].type
     for robot in tours:
-        met = catalogue.meet(kind, forest.robots[robot].type)
-        if met is None:
-            return False
-        kind = met
-    deliveries = [forest.last(robot).index for robot in tours]
+        kind = kind and catalogue.meet(kind, forest.robots[robot].type)
+    deliveries = {forest.last(robot).index for robot in tours}
+    return kind is not None and len(deliveries) == len(tours) and _alike(forest, tours)
+
+
+def _alike(forest: Factory, tours: Sequence[int]) -> bool:
+    """Whether tours are of one kind, and can all come from one side."""
+    kinds = {kind_of(forest, robot) for robot in tours}
     sides = set.intersection(*(sides_of(forest, robot) for robot in tours))
-    return len(kinds) == 1 and len({*deliveries}) == len(deliveries) and bool(sides)
+    return len(kinds) == 1 and bool(sides)
 
 
-def _begun_otherwise(forest: Factory, on: Sequence[int]) -> Iterator[int]:
-    """The tours that begin with inputs from other lines than the first tour of their line."""
-    begun: dict[int, frozenset[int]] = {}
+def _begun_otherwise(forest: Factory, on: Sequence[int]) -> Iterator[tuple[int, int]]:
+    """The tours that begin with inputs from other lines than the first tour of their line; and
+    that."""
+    begun: dict[int, tuple[int, frozenset[int]]] = {}
     for robot, line in enumerate(on):
         lines = frozenset(on[guest] for guest in begun_by(forest, robot))
-        if begun.setdefault(line, lines) != lines:
-            yield robot
+        first, others = begun.setdefault(line, (robot, lines))
+        if others != lines:
+            yield robot, first
 
 
-def _fault(forest: Factory, robot: int) -> Diagnostic:
-    """Why the output robot cannot begin the tours of two products."""
-    here, there = robot, forest.dropoff.carrier
+def _fault(forest: Factory, here: int, there: int, apart: Mapping[int, int]) -> Diagnostic:
+    """Why one robot cannot begin two tours (of robots of the forest), or what begins them, where
+    that had to be kept `apart`."""
+    while (guest := next((r for r in begun_by(forest, here) if r in apart), None)) is not None:
+        here, there = guest, apart[guest]
     first, other = (forest.first(r) for r in (here, there))
     message = (
-        f"'{first.written}' and '{other.written}' begin products on one robot, and their inputs"
+        f"'{first.written}' and '{other.written}' have to begin on one robot, and their inputs"
         f" cannot come on the same two lines: {_ways_in(forest, here)}; {_ways_in(forest, there)}"
     )
     hint = (
@@ -203,8 +222,9 @@ def _fault(forest: Factory, robot: int) -> Diagnostic:
 def _ways_in(forest: Factory, robot: int) -> str:
     """How the inputs come with which a tour begins, in words."""
     first = forest.first(robot)
+    inputs = [(n, forest.by_label[first.before[n]]) for n in map(first.before.index, first.inputs)]
     return " and ".join(
-        f"{forest.by_label[label].written} {'is lowered' if slot == first.lowered else 'slides'}"
-        for slot, label in enumerate(first.before)
-        if label != NOPART
+        f"{'sub-assembly' if o.inputs else 'part'} {o.written}"
+        f" {'is lowered' if slot == first.lowered else 'slides'}"
+        for slot, o in inputs
     )

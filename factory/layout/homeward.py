@@ -49,10 +49,12 @@ class Homeward(Nearness):
         robot, layout = one.robot, self._layout
         home = layout.guidepaths[robot].length
         heights = [z for _, span in one.sweeps for z in span]
-        low = max(heights) if rises_first(layout, robot) else min(heights)
+        low, high = min(heights), max(heights)
+        if rises_first(layout, robot) and round(high - low, 6) > SPARE:
+            low = high  # unless it counts as up from the beginning
 
         def clear(at: float) -> bool:
-            there = replace(one, sweeps=(((at, home), (low, max(heights))),))
+            there = replace(one, sweeps=(((at, home), (low, high)),))
             pair = nearest(there, other, layout.clearance)
             return pair is None or self.nearer(pair) is None
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 SEVERAL_TOURS = Diagnostic(
     "BadValue",
     "--relay does not go with robots that have several tours: a relay cuts the way of one tour",
-    hint="leave out --relay, or what shares robots: --robots, --parallel, [lines] in factory.toml",
+    hint="leave out --relay, or what shares robots: a mix, --robots, --parallel, [lines]",
 )
 
 TILE = 0.24
@@ -72,6 +72,8 @@ class Ground:
         from factory.layout.embedding import lay_out
         from factory.plant.fused_bodies import repeated
 
+        if self.relay and factory.folded:
+            raise InputError(SEVERAL_TOURS)
         pace = Pace.of(settings)
         factory, product = judged(factory, product), repeated(product, factory)
         if self.deputies:
@@ -87,9 +89,6 @@ class Ground:
         if self.relays:
             from factory.layout.relaying import relayed
 
-            factory.pag.check_alone("--relay")
-            if self.relay and factory.folded:
-                raise InputError(SEVERAL_TOURS)
             layout = relayed(layout, settings, self.cycle, self.floor, hands)
         return layout
 
@@ -121,7 +120,6 @@ class Ground:
         from factory.layout.standby import laid_out_for, part_of
         from factory.problem.robot_types import load_catalogue
 
-        factory.pag.check_alone("--deputies")
         plain = replace(self, deputies=False)
 
         def lay_out(pairs: tuple[Pair, ...]) -> Layout:

@@ -7,7 +7,6 @@ layout, with the least time of each operation in any layout (`bounds`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import islice
 
 from factory.compiler.assigning import shared
@@ -27,27 +26,20 @@ MOST, SAME = 100, 1e-6
 """The most sequences that are compared; ratios that differ by less are equal."""
 
 
-@dataclass(frozen=True, slots=True)
-class Sequenced:
-    """The plan of a mix with the best sequence, and how many sequences were compared."""
-
-    plan: Plan
-    tried: int
-
-
 def sequenced(
     forest: Factory, mix: Mix, product: Product, catalogue: Catalogue, settings: Settings
-) -> Sequenced:
-    """The plan of a mix whose products are made by a forest of factories. Where the estimates of
-    sequences are equal, the even one is taken. Raises InputError (BadLine)."""
+) -> Plan:
+    """The plan of a mix with the best sequence, whose products are made by a forest of factories.
+    Where the estimates of sequences are equal, the even one is taken. Raises InputError
+    (BadLine)."""
     on, times = lines_of_mix(forest, catalogue), dict[tuple[str, str], float]()
-    plans, seconds = list[Plan](), list[float]()
-    sequences = [*islice(orders(mix), MOST)]
-    for sequence in sequences:
-        plans.append(forest.plan.then(turns_of(forest, on, sequence)))
-        if len(sequences) == 1:
-            break
-        factory = shared(forest, plans[-1], catalogue)
+    sequences = islice(orders(mix), MOST)
+    plans = [forest.plan.then(turns_of(forest, on, sequence)) for sequence in sequences]
+    if len(plans) == 1:
+        return plans[0]
+    seconds = list[float]()
+    for plan in plans:
+        factory = shared(forest, plan, catalogue)
         made = factory.sequence
         if not times:
             solids, pace = repeated(product, factory), Pace.of(settings)
@@ -57,6 +49,5 @@ def sequenced(
         each = [times[made[o.turn], o.written] for o in factory.operations]
         idle = [0.0] * (len(factory.net.threaded.places) - len(each))
         seconds.append(train_ratio(factory.net, [*each, *idle], {})[0].seconds)
-    best = min(seconds, default=0.0) + SAME
-    first = next((n for n, ratio in enumerate(seconds) if ratio <= best), 0)
-    return Sequenced(plans[first], len(plans))
+    best = min(seconds) + SAME
+    return next(plan for plan, ratio in zip(plans, seconds, strict=True) if ratio <= best)

@@ -78,6 +78,10 @@ class Word:
         assert self.demand is not None
         return self.demand.letter(len(self.units), self.made, self.now)
 
+    def lets_in(self, unit: int) -> bool:
+        """Whether there is room for a unit of the net; on demand, for each that is made."""
+        return self.demand is not None or self.wip is None or unit < self.made + self.wip
+
     def are_made(self, made: int, since: float) -> bool:
         """Whether all units are made that were ordered by a time [s], if so many are; never where
         changes stand, by which there is always another one asked for."""

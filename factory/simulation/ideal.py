@@ -52,11 +52,8 @@ class IdealWorld:
         """A feeder gives a part for every unit asked for, and that may be let in."""
         if not self.hooks.admit(operation, unit):
             return False
-        if operation.inputs or self.word.demand:
-            return True
-        wip = self._request.wip
-        inside = wip is None or unit < self.delivered() + wip
-        return inside and unit < self.word.most
+        wanted = self.word.demand is not None or unit < self.word.most
+        return bool(operation.inputs) or (wanted and self.word.lets_in(unit))
 
     def apply(self, started: Sequence[Job], ended: Sequence[Job]) -> None:
         """Parts follow labels; only finished products are counted."""

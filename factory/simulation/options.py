@@ -23,8 +23,8 @@ APART = (
     ("[tees]", ("--robots", "--cycle", "--relay"), "they change the robots that share a stem"),
     (
         "--demand",
-        ("--distributed", "--from"),
-        "one supervisor skips what nobody has ordered, from the beginning on",
+        ("--distributed", "--from", "--deputies"),
+        "one supervisor skips what nobody has ordered, from the beginning on, in one net",
     ),
     (
         "--distributed",

@@ -120,7 +120,7 @@ class Feeders:
     def presents(self, label: str, unit: int) -> bool:
         """Whether a robot may come for the part of a unit: it will be down before the robot, and
         may be let in."""
-        if not self.supply.admits(unit):
+        if not self.supply.word.lets_in(unit):
             return False
         number = self._number[label]
         if self.shows(label) != unit:

@@ -23,7 +23,6 @@ class Supply:
         self.word = Word(factory.sequence, *asked, made=before)
         self.next = {o.label: factory.unit(o, counts.get(o.end, 0)) for o in leaves}
         self._begun = {o.label: factory.unit(o, counts.get(o.start, 0) - 1) + 1 for o in leaves}
-        self._wip = request.wip
         self.recovers = request.recovers
 
     def rounds(self) -> dict[str, int]:
@@ -45,10 +44,6 @@ class Supply:
     def is_known(self, label: str) -> bool:
         """Whether the next unit is known."""
         return self.word.makes(self.next[label]) is not None
-
-    def admits(self, unit: int) -> bool:
-        """Whether a unit may be let in."""
-        return bool(self.word.demand) or self._wip is None or unit < self.word.made + self._wip
 
 
 @dataclass(slots=True)

@@ -58,7 +58,8 @@ class Least:
 
 
 def least_robots(pag: PAG, templates: Mapping[str, Template]) -> Least:
-    """The bound for a product. Linear."""
+    """The bound for a product; for a mix, of the product that needs most, with the tools of all.
+    Linear."""
     nodes = expand(pag, templates)
     needs: dict[str, int] = {}
     for label, node in nodes.items():
@@ -66,11 +67,12 @@ def least_robots(pag: PAG, templates: Mapping[str, Template]) -> Least:
     tools = {
         (node.template.name, slot) for node in nodes.values() for slot in node.template.tools()
     }
-    path, label = [(pag.root, needs[pag.root])], pag.root
+    root = label = max(pag.products, key=needs.__getitem__)
+    path = [(root, needs[root])]
     while nodes[label].inputs and needs[label] > 1:
         label = max(nodes[label].inputs, key=lambda x: needs[x])
         path.append((label, needs[label]))
-    return Least(needs[pag.root], len(tools), tuple(path))
+    return Least(needs[root], len(tools), tuple(path))
 
 
 def _needed(node: Node, templates: Mapping[str, Template], inputs: list[int]) -> int:

@@ -57,10 +57,11 @@ class Candidate:
 
     @property
     def work(self) -> float:
-        """Time of all its robots in operations in a cycle [robot s]. Divided by the number of
+        """Time of all its robots in operations for a unit [robot s]. Divided by the number of
         robots it is a lower bound on the cycle time of any factory with these operations."""
-        pairs = zip(self.project.layout.factory.operations, self._timed[1], strict=True)
-        return sum(len(operation.robots) * delay for operation, delay in pairs)
+        factory = self.project.layout.factory
+        pairs = zip(factory.operations, self._timed[1], strict=True)
+        return sum(len(operation.robots) * delay for operation, delay in pairs) / factory.period
 
     @cached_property
     def _timed(self) -> tuple[CycleTime, tuple[float, ...]]:

@@ -163,7 +163,7 @@ class Estimator:
     def of(self, one: Candidate, robots: float = inf) -> Iterator[Estimate]:
         """The estimates of a candidate with a robot for each label, also with lines; none where
         more operations are blocked than in the product as written."""
-        if one.blocked <= self.written.blocked:
+        if one.is_possible and one.blocked <= self.written.blocked:
             bare = max(0, one.bare - self.written.bare)
             yield from (replace(e, bare=bare) for e in self._filled(one, robots))
 

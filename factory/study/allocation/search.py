@@ -48,8 +48,7 @@ def allocated(
     if not aim.asks:
         return project
     if isinstance(aim.robots, int):
-        bounds = (least_robots(one.pag, project.templates) for one in project.each)
-        least = max(bounds, key=lambda bound: bound.total)
+        least = least_robots(project.pag, project.templates)
         if aim.robots < least.total:
             hint = f"--robots {least.total}"
             raise InputError(Diagnostic("TooFewRobots", str(least), None, hint))
@@ -114,9 +113,7 @@ class Search:
     def why(self) -> str:
         """What keeps two lines of the best apart, in words; "" where nothing is known to."""
         best = self.best.single
-        if best.pag.mix is not None:
-            return ""
-        words = next(kept_apart(best.approached, lines_of(best.plan), best.catalogue), "")
+        words = next(kept_apart(best.approached, lines_of(best.planned.plan), best.catalogue), "")
         return f"; {words}" if words else ""
 
     def singles(self) -> Iterator[Candidate]:

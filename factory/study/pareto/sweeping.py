@@ -100,7 +100,6 @@ class FrontSweep:
         self.changes = Allowance(factories, effort.seconds)
         self.budget = Allowance(factories, effort.seconds)
         bare = replace(project.ground, relay=False, cycle=None)
-        project.pag.check_alone("a Pareto front")
         self.estimator = Estimator(project.with_plan(Plan()).with_ground(bare), effort.branches)
         self.written: FrontPoint | None = None
         self.points: list[FrontPoint] = []
@@ -213,7 +212,8 @@ class FrontSweep:
             (one for one in self.estimates if one.filling is None), key=lambda one: -one.seconds
         )
         fast = {one.robots: one for one in plain}.values()  # of those with as many robots the best
-        every = [*map(self._candidate, sorted(fast, key=lambda one: one.seconds)[:RELAYED])]
+        fastest = map(self._candidate, sorted(fast, key=lambda one: one.seconds)[:RELAYED])
+        every = [one for one in fastest if not one.project.planned.folded]
         for number, one in enumerate(every):
             if self.budget.over():
                 return False
