@@ -14,6 +14,8 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import groupby
+from operator import itemgetter
 from types import MappingProxyType
 
 from factory.nets.marked import NONE, MarkedNet, token_free
@@ -158,11 +160,11 @@ class _Paths:
             if net.tokens[p] + net.tokens[q] + least[both[0]] + least[both[1]] == 1
         }
         asked = (way for both in tight.values() for way in both)
-        paths = {
-            way: tuple(self._path(way, least[way], reach))
-            for reach, some in self._reaches(asked)
-            for way in some
-        }
+        paths = dict[Pair, Circuit]()
+        for reach, some in self._reaches(asked):
+            for _, to_end in groupby(some, itemgetter(1)):
+                steps = dict[Pair, _Arc]()
+                paths |= {way: tuple(self._path(way, least[way], reach, steps)) for way in to_end}
         made = {(p, q): (p, *paths[on], q, *paths[back]) for (p, q), (on, back) in tight.items()}
         return [made.get(pair) for pair in pairs]
 
@@ -189,15 +191,19 @@ class _Paths:
                         single[event] |= (free if arc.tokens else single)[arc.after]
             yield _Reach(bits, (free, single)), [way for end in bits for way in to_end[end]]
 
-    def _path(self, way: Pair, tokens: int, reach: _Reach) -> Iterator[int]:
-        """The places of a path with the least number of tokens."""
+    def _path(
+        self, way: Pair, tokens: int, reach: _Reach, steps: dict[Pair, _Arc]
+    ) -> Iterator[int]:
+        """The places of a path with the least number of tokens; `steps`: the arcs taken so far to
+        its end, by the transition and the tokens left there."""
         event, end = way
         while event != end:
-            arc = next(
-                arc
-                for arc in self._out[event]
-                if arc.tokens <= tokens and reach.leads((arc.after, end), tokens - arc.tokens)
-            )
+            if (arc := steps.get((event, tokens))) is None:
+                arc = steps[event, tokens] = next(
+                    arc
+                    for arc in self._out[event]
+                    if arc.tokens <= tokens and reach.leads((arc.after, end), tokens - arc.tokens)
+                )
             assert isinstance(arc.of, int), "order places that are yet to be made have no number"
             yield arc.of
             event, tokens = arc.after, tokens - arc.tokens
