@@ -238,6 +238,15 @@ def test_forms_leave_no_robot_without_a_hand() -> None:
     assert certificate.holds
 
 
+def test_hands_are_given_up_for_the_robots_that_are_asked_for(run: Terminal) -> None:
+    """Where all forms that leave a hand for each label take too many robots, those of the fewest
+    lines are laid out."""
+    done = run("check", EXAMPLES / "chair.pag", "--robots", "7", "--effort", "2", "--json")
+    assert done.status == 0, done.err
+    assert done.json["robots"] == 7
+    assert "NoGrip" in {warning["code"] for warning in done.json["warnings"]}
+
+
 def test_few_robots_do_it_in_the_time_that_is_predicted(run: Terminal) -> None:
     paper = EXAMPLES / "paper.pag"
     done = run("run", paper, "--robots", "4", "--units", "4", "--json")

@@ -82,11 +82,13 @@ class Estimate:
 class Estimator:
     """Estimates for the product of a `project` with one robot for each label and no relays;
     `branches` that its factories have several times. `refused`: forms (a join and its pile) that
-    leave a label without a hand, as has been seen so far."""
+    leave a label without a hand, as has been seen so far. `bare`: forms are those of the fewest
+    lines, whatever these leave without a hand."""
 
     project: Project
     branches: Branches = ()
     refused: set[tuple[str, int]] = field(default_factory=set, compare=False)
+    bare: bool = False
     _alone: dict[tuple[int, ...], Project] = field(default_factory=dict, compare=False)
 
     @cached_property
@@ -131,7 +133,8 @@ class Estimator:
         each, the one with one robot for each label, then those with lines."""
         tried = {tuple(self.written.forms.values())}
         yield from self.of(self.written, robots)
-        for order in ORDERS if self.is_free else ():
+        orders = ORDERS[1:2] if self.bare else ORDERS
+        for order in orders if self.is_free else ():
             for one in self.held(order, budget, robots=robots):
                 key = tuple(one.forms.values())
                 if key not in tried:
@@ -154,7 +157,8 @@ class Estimator:
                 one, before = self.candidate(forms), forms
                 if not one.is_possible:
                     break
-                blame = {*blamed(one.single, forms)} if one.bare > self.written.bare else set()
+                worse = not self.bare and one.bare > self.written.bare
+                blame = {*blamed(one.single, forms)} if worse else set()
                 if blame <= self.refused:
                     yield one
                     break

@@ -128,9 +128,10 @@ class Search:
         aim, most = self.aim, self.aim.robots
         robots = most if isinstance(most, int) else inf
         front = self.estimator.front(self.forms, robots)
-        if not front:
+        bare = replace(self.estimator, refused=set(), bare=True)
+        for fewer in (robots, inf):
             self.forms.spent = 0
-            front = self.estimator.front(self.forms)
+            front = front or bare.front(self.forms, fewer)
         front.sort(key=lambda one: aim.rank(one.robots, one.seconds, one.bare))
         for one in front:
             if self.budget.over(SHARED):
