@@ -355,6 +355,8 @@ def test_a_search_for_few_robots_shows_the_best(
     assert run("check", PAPER, "--robots", "least", "--no-hands").status == 0
     assert "searching for few robots" in told[-1]
     assert re.search(r"best: 3 robots, \d\.\d\d s", told[-1])
+    assert run("check", PAPER, "--cycle", "3", "--effort", "1", "--no-hands").status == 0
+    assert "searching for few robots (1, 1," in told[-1]
 
 
 def test_a_search_for_few_robots_can_be_stopped(run: Terminal, monkeypatch) -> None:

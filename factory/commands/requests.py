@@ -173,7 +173,7 @@ class ProjectOptions:
         units = prod(k for _, k in several)
         effort = self.effort or usual_effort(len(project.pag) * units)
         aim = Aim(self.robots, self.cycle, effort, self.limit or inf, several)
-        looked_at, warnings = count(1), list[Diagnostic]()
+        looked_at, warnings = count(), list[Diagnostic]()
         with StepBar("searching for few robots", silent) as steps:
 
             def seen(_: Candidate, best: Candidate) -> None:

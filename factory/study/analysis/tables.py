@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from factory.plant.factory import Operation
-from factory.problem.pag import NOPART
 from factory.study.analysis.analysing import Analysis, Scenario, listed
 from factory.study.analysis.measured import ComparedFigure, Comparison
 
@@ -46,37 +44,6 @@ def summary(analysis: Analysis) -> Iterator[str]:
         f"first product after {flow.first:.2f} s, {flow.units} after {flow.last:.2f} s; "
         f"--wip {analysis.least_wip} or more keeps the full pace"
     )
-    yield from spare_branches(analysis)
-
-
-def spare_branches(analysis: Analysis) -> Iterator[str]:
-    """For each label that several robots bring in turn, though one branch would keep the pace: how
-    long the slowest robot of a branch takes for a unit."""
-    factory, net = analysis.timing.factory, analysis.net
-    brought = dict[str, dict[int, Operation]]()
-    for robot in factory.robots:
-        for tour in factory.tours[robot.index]:
-            last = factory.operations[tour[-1]]
-            label = last.before[last.robots.index(robot.index)]
-            if label != NOPART:
-                written = factory.by_label[label].written
-                brought.setdefault(written, {}).setdefault(robot.index, last)
-    for written, robots in brought.items():
-        if len(robots) < 2 or len({last.carrier for last in robots.values()}) > 1:
-            continue
-        parts = {*factory.contents[written]}
-        branch = {
-            r
-            for o in factory.making
-            if parts.issuperset(factory.contents[o.label])
-            for r in o.robots
-        }
-        slowest = max(sum(net.seconds[n] for n in factory.robots[r].operations) for r in branch)
-        if slowest < net.pace:
-            yield (
-                f"one branch for {written} would do: its robots take {slowest:.3f} s a unit; a"
-                " further one gains nothing, and others go further past it"
-            )
 
 
 def critical_words(analysis: Analysis) -> str:
