@@ -159,7 +159,7 @@ def test_certificate_entries_are_inherited_and_forged_ones_refused(truck_to_van:
         (replace(mine, regions={**mine.regions, here: there + 1}), "entry"),
         (replace(mine, regions={**mine.regions, here: 10**6}), "no such region"),
         (replace(mine, inherited=mine.inherited + 1), "miscounted"),
-        (replace(mine, offset=mine.offset + 0.01), "elsewhere"),
+        (replace(mine, shift=(mine.shift[0], 0.01)), "elsewhere"),
     ):
         assert any(words in fault for fault in forged.refuted(old, new, found.pairing)), words
     false = replace(old, faults=(Fault("it is not clear", ("r1", "r2")),))

@@ -79,9 +79,8 @@ def revise(
     if picture is not None:
         from factory.exporting.revision_picture import draw_revision
 
-        write_all(
-            {picture: draw_revision((before.layout, revision.new.layout), revision.kept).encode()}
-        )
+        layouts, moved = (before.layout, revision.new.layout), revision.inheritance.shift
+        write_all({picture: draw_revision(layouts, revision.kept, moved).encode()})
         files.append(str(picture))
     if out.as_json:
         also = {"live": change.as_json()} if change else {}

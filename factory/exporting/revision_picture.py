@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from factory.layout.dimensions import CARRIAGE
-from factory.layout.guidepath import Guidepath
+from factory.layout.guidepath import Guidepath, Point2
 from factory.layout.layout import Layout
 from factory.layout.pins import StayingRobot
 from factory.support.canvas import Canvas, millimetres, page_box
@@ -27,13 +27,14 @@ LEGEND = (
 )
 
 
-def draw_revision(layouts: tuple[Layout, Layout], kept: tuple[StayingRobot, ...]) -> str:
-    """The document; `layouts`: the old and the new, of which robots are `kept`."""
+def draw_revision(
+    layouts: tuple[Layout, Layout], kept: tuple[StayingRobot, ...], shift: Point2
+) -> str:
+    """The document; `layouts`: the old and the new, of which robots are `kept`; `shift`: by how
+    much the new lies elsewhere [m]."""
     canvas, (old, new) = Canvas(), layouts
     floor = page_box(new.floor)
     canvas.rectangle(floor, "floor")
-    shift = new.guidepaths[0].middle(new.guidepaths[0].length)[0]
-    shift -= old.guidepaths[0].middle(old.guidepaths[0].length)[0]
     stay = {k.new: "stays" if k.whole else "changed" if k.place else "moved" for k in kept}
     size = 600.0 * CARRIAGE
     for robot in sorted({*range(len(old.guidepaths))} - {k.old for k in kept}):
@@ -57,13 +58,13 @@ def draw_revision(layouts: tuple[Layout, Layout], kept: tuple[StayingRobot, ...]
     return canvas.document(f"{title}: what stays", page, STYLE)
 
 
-def _ends(path: Guidepath, shift: float = 0.0) -> Iterator[tuple[float, float]]:
+def _ends(path: Guidepath, shift: Point2 = (0.0, 0.0)) -> Iterator[tuple[float, float]]:
     for at in (path.reach, path.length):
         x, y = path.carriage(at)
-        yield millimetres((x + shift, y))
+        yield millimetres((x + shift[0], y + shift[1]))
 
 
-def _beyond(path: Guidepath, shift: float = 0.0) -> tuple[float, float]:
+def _beyond(path: Guidepath, shift: Point2 = (0.0, 0.0)) -> tuple[float, float]:
     """Where the name of a robot stands: behind the end of its guidepath."""
     x, y = path.carriage(path.length + 0.7 * CARRIAGE)
-    return millimetres((x + shift, y))
+    return millimetres((x + shift[0], y + shift[1]))

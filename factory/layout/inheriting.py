@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from factory.layout.certificate import ALWAYS, Certificate, Region
+from factory.layout.guidepath import Point2
 from factory.layout.layout import Layout
 from factory.layout.pins import SAME
 from factory.plant.pairing import Pairing
@@ -22,13 +23,13 @@ from factory.plant.pairing import Pairing
 @dataclass(frozen=True)
 class Inheritance:
     """Which `regions` of a certificate (index) are which of another's, and how many `pairs` there
-    are of different robots in one layer, of which so many are `inherited`. `offset`: by how much
-    the floor of the new layout lies further along the output robot's path [m]."""
+    are of different robots in one layer, of which so many are `inherited`. `shift`: by how much
+    the floor of the new layout lies elsewhere [m]."""
 
     regions: Mapping[int, int] = field(repr=False)
     pairs: int
     inherited: int
-    offset: float
+    shift: Point2
 
     @property
     def computed(self) -> int:
@@ -36,17 +37,15 @@ class Inheritance:
         return self.pairs - self.inherited
 
     @classmethod
-    def of(cls, old: Layout, new: Layout, pairing: Pairing) -> Inheritance:
+    def of(cls, old: Layout, new: Layout, pairing: Pairing, shift: Point2) -> Inheritance:
         """What the certificate of a layout has from that of another. Both have one."""
         assert old.certificate is not None and new.certificate is not None, "both are certified"
-        first, second = (made.guidepaths[0] for made in (old, new))
-        offset = second.middle(second.length)[0] - first.middle(first.length)[0]
-        named = {_named(r, pairing, offset): n for n, r in enumerate(old.certificate.regions)}
+        named = {_named(r, pairing, shift): n for n, r in enumerate(old.certificate.regions)}
         mine = [_key(region) for region in new.certificate.regions]
         regions = {n: named[key] for n, key in enumerate(mine) if key in named}
         kept = [r for n, r in enumerate(new.certificate.regions) if n in regions]
         counts = _pairs([*new.certificate.regions]), _pairs(kept)
-        return cls(regions, *counts, round(offset, 6))
+        return cls(regions, *counts, shift)
 
     def refuted(self, old: Certificate, new: Certificate, pairing: Pairing) -> Iterator[str]:
         """What is wrong with it: an entry that is not in the old certificate, or is of something
@@ -59,8 +58,8 @@ class Inheritance:
                 continue
             one, before = new.regions[number], old.regions[other]
             name = f"entry {number}, {one.label or 'a body'} of {new.robots[one.robot]}"
-            boxes = np.array(one.box) - (self.offset, self.offset, 0.0, 0.0), np.array(before.box)
-            if np.abs(boxes[0] - boxes[1]).max() > SAME or one.z != before.z:
+            away = np.array(one.box) - before.box - np.repeat(self.shift, 2)
+            if np.abs(away).max() > SAME or one.z != before.z:
                 yield f"{name}: it is elsewhere than in the old certificate"
             if (one.layer, one.kind) != (before.layer, before.kind):
                 yield f"{name}: it is of another kind"
@@ -77,7 +76,7 @@ def _key(region: Region) -> tuple[object, ...]:
     return region.robot, region.layer, region.kind, box, region.z, region.label, region.mode
 
 
-def _named(region: Region, pairing: Pairing, offset: float) -> tuple[object, ...]:
+def _named(region: Region, pairing: Pairing, shift: Point2) -> tuple[object, ...]:
     """The key of an old region as it would be in the new certificate."""
     old, new = pairing.old, pairing.new
     label = region.label
@@ -85,8 +84,8 @@ def _named(region: Region, pairing: Pairing, offset: float) -> tuple[object, ...
         number = pairing.operations.get(old.by_label[label].index)
         label = "" if number is None else new.operations[number].label
         label = label or f"no longer {region.label}"
-    low, high, *across = region.box
-    box = tuple(round(v, 6) + 0.0 for v in (low + offset, high + offset, *across))
+    moved = np.array(region.box) + np.repeat(shift, 2)
+    box = tuple((moved.round(6) + 0.0).tolist())
     mode = region.mode if region.mode == ALWAYS else pairing.operations.get(region.mode, -2)
     robot = pairing.robots.get(region.robot, -1)
     return robot, region.layer, region.kind, box, region.z, label, mode

@@ -9,6 +9,7 @@ import numpy as np
 
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
+from factory.layout.guidepath import Point2
 from factory.layout.hands.hand import Hand, Point3
 from factory.layout.layout import Layout, carriers
 from factory.layout.stops import carried
@@ -67,22 +68,28 @@ class Pins:
             {new: ends_of(old, robot) for robot, new in kept.items()},
         )
 
-    def in_place(self, layout: Layout, robot: int) -> bool:
-        """Whether a robot's guidepath ends where it did; that of the output robot its B end."""
-        away = np.abs(ends_of(layout, robot) - self.ends[robot])
-        return bool(away[int(robot == 0) :].max() < SAME)
+    def in_place(self, layout: Layout) -> tuple[Point2, frozenset[int]]:
+        """By how much the floor of a layout lies elsewhere [m], and the robots whose guidepaths end
+        there where they did; of the output robot's the B end. Of all such displacements the one
+        that leaves most in place."""
+        places = dict[Point2, set[int]]()
+        for robot, before in self.ends.items():
+            away = (ends_of(layout, robot) - before)[int(robot == 0) :].round(6) + 0.0
+            if np.ptp(away, axis=0).max() < SAME:
+                x, y = away[-1].tolist()
+                places.setdefault((x, y), set()).add(robot)
+        shift = max(places, key=lambda shift: len(places[shift]))
+        return shift, frozenset(places[shift])
 
     def displaced(self, layout: Layout) -> int:
         """Number of robots that are not in place."""
-        return sum(not self.in_place(layout, robot) for robot in self.ends)
+        return len(self.ends) - len(self.in_place(layout)[1])
 
 
 def ends_of(layout: Layout, robot: int) -> Array:
-    """Where the product's middle is at the A and the B end of a guidepath, from where it is at the
-    B end of the output robot's (2, 2) [m]."""
-    path, first = layout.guidepaths[robot], layout.guidepaths[0]
-    both = np.array([path.middle(path.reach), path.middle(path.length)])
-    return np.asarray((both - first.middle(first.length)).round(6) + 0.0)
+    """Where the product's middle is at the A and the B end of a guidepath (2, 2) [m]."""
+    path = layout.guidepaths[robot]
+    return np.array([path.middle(path.reach), path.middle(path.length)])
 
 
 def same_module(layouts: tuple[Layout, Layout], robots: tuple[int, int]) -> bool:

@@ -49,6 +49,7 @@ class Revision:
     def kept(self) -> tuple[StayingRobot, ...]:
         """The robots that stay."""
         pairing, layouts = self.pairing, (self.old.layout, self.new.layout)
+        _, in_place = self.pins.in_place(self.new.layout)
         return tuple(
             StayingRobot(
                 robot,
@@ -56,7 +57,7 @@ class Revision:
                 pairing.keeps_program(robot),
                 pairing.keeps_contents(robot),
                 same_module(layouts, (robot, other)),
-                self.pins.in_place(self.new.layout, other),
+                other in in_place,
             )
             for robot, other in pairing.robots.items()
         )
@@ -76,7 +77,8 @@ class Revision:
     @cached_property
     def inheritance(self) -> Inheritance:
         """What the certificate of the layout has from the old one."""
-        return Inheritance.of(self.old.layout, self.new.layout, self.pairing)
+        shift, _ = self.pins.in_place(self.new.layout)
+        return Inheritance.of(self.old.layout, self.new.layout, self.pairing, shift)
 
     def as_json(self, afresh: float | None = None) -> dict[str, Any]:
         """The document of `revise --json`; `afresh`: the cycle time of a fresh layout [s]."""

@@ -155,10 +155,9 @@ def places(
     if on_raster:
         points = np.concatenate([points, _raster(low, high, product.middle, across)])
     asked = np.array(wanted, float).reshape(-1, 3)
-    points = np.concatenate([points, asked])
     small = float((high.max(axis=0) - low.min(axis=0))[across].min()) <= SMALL
     radii, smaller = (*RADII, *[FINE] * small), (*SMALLER, *[len(RADII)] * small)
-    points = _rounded(points, float((high - low)[:, across].min()), product.middle)
+    points = _rounded(points, float((high - low)[:, across].min()), product.middle, asked)
     out = surfaces.outermost(parts, points, side)
     points, out = points[np.isfinite(out)], out[np.isfinite(out)]
     points[:, axis] = way * out
@@ -278,11 +277,11 @@ def _lines(low: Array, high: Array, centre: Array) -> Array:
     return np.concatenate(points_on)
 
 
-def _rounded(points: Array, least: float, middle: Array) -> Array:
+def _rounded(points: Array, least: float, middle: Array, asked: Array) -> Array:
     """Points (n, 3) in whole millimetres from the product's middle, or in tenths if the `least`
-    width of a body is small; unique."""
+    width of a body is small, and those `asked` for as they are; unique."""
     step = 1e-3 if least > 8e-3 else 1e-4
-    rounded = middle + np.round((points - middle) / step) * step
+    rounded = np.concatenate([middle + np.round((points - middle) / step) * step, asked])
     ordered = rounded[np.lexsort(rounded.T[::-1])]
     new = (ordered[1:] != ordered[:-1]).any(axis=1)
     return np.asarray(ordered[np.append(True, new)])
