@@ -224,6 +224,15 @@ def test_two_manipulators_serve_one_robot(tmp_path: Path) -> None:
     assert run.predicted_cycle_time_s == pytest.approx(run.cycle_time_s, rel=0.02)
 
 
+def test_what_is_joined_before_can_be_placed(tmp_path: Path) -> None:
+    """The robot that brings it to the manipulator heads across, as one that brings it itself."""
+    text = TWO.replace("place ( base, peg, key )", "place ( base, both ); both = mate ( peg, key )")
+    layout = read(
+        written(tmp_path, text.replace(", fed = -0.4", "").replace(", fed = 0.8", ""))
+    ).layout
+    assert_good(Simulation(layout, RunRequest(units=3, seed=1, jitter=0.3)).run())
+
+
 @pytest.mark.parametrize(("degrees", "made"), [(0.3, True), (1.0, False)])
 def test_a_peg_turned_wrong_jams(cell: Layout, degrees: float, made: bool) -> None:
     """Contact is real: the pocket leaves 0.2 mm of play."""

@@ -83,15 +83,20 @@ def meetings(nodes: Mapping[str, Node]) -> Meetings:
     """The meetings of a product, from its operations in postorder (as `expand` gives them).
 
     The output robot heads along x, so its inputs come along y; what a robot of its own brings is
-    made by a robot that heads across; what the carrier holds was made on its own way.
+    made by a robot that heads across; what the carrier holds was made on its own way, and what a
+    manipulator picks on the way on which it is brought.
     """
     spans, parts = _spans(nodes)
     root = next(reversed([*nodes]), "")
     turns, levels = {root: 1}, {root: 0}
-    for label in reversed(list(nodes)):
-        for number, name in enumerate(nodes[label].inputs):
-            turns[name] = turns[label] if number == nodes[label].held else 1 - turns[label]
+    picked = set[str]()
+    for label, node in reversed(nodes.items()):
+        brought = node.template.brought
+        for number, name in enumerate(node.inputs):
+            is_along = number == node.held or label in picked
+            turns[name] = turns[label] if is_along else 1 - turns[label]
             levels[name] = levels[label] + 1
+            picked |= {name} if brought and nodes[name].template.name == brought else set()
     made: list[Meeting] = []
     borders = np.zeros(max(0, len(parts) - 1), np.int64)
     for label, node in nodes.items():
