@@ -22,7 +22,7 @@ from factory.problem.plan import Plan
 from factory.study.revision import Revision, revised
 from factory.support.errors import InputError
 from tests.command_line import spawn
-from tests.revisions import edited, kept_share, shuffled
+from tests.revisions import KINDS, edited, kept_share, shuffled
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 
@@ -182,6 +182,25 @@ def test_single_edits_of_the_chair_leave_most_robots_in_place() -> None:
         shares.append(sum(kept.place for kept in found.kept) / len(found.kept))
     assert min(shares) > 0.8
     assert sum(shares) / len(shares) > 0.95
+
+
+@pytest.mark.parametrize(
+    ("name", "joined", "place", "module"),
+    [("truck", "body", 17, 22), ("gearbox", "gearbox", 19, 19), ("gearbox", "input", 16, 16)],
+)
+def test_an_added_part_moves_few(name: str, joined: str, place: int, module: int) -> None:
+    """The other robots of a floor, or the new one's own branch; hands stay to the micrometre."""
+    old, seed = project(example(name)), {"body": 700, "gearbox": 705, "input": 703}[joined]
+    height = round(float(old.product.high[2] - old.product.low[2]), 3)
+    kinds = KINDS if name == "truck" else ("add",)
+    new = edited(old.pag, random.Random(seed), 1, kinds, height)
+    assert new[joined].inputs[-1] == "added1"
+    found = revised(old, project(new))
+    assert sum(kept.place for kept in found.kept) >= place
+    assert sum(kept.module for kept in found.kept) >= module
+    before, after = found.old.layout.certificate, found.new.layout.certificate
+    assert before is not None and after is not None
+    assert [*found.inheritance.refuted(before, after, found.pairing)] == []
 
 
 def test_command_writes_a_plan_that_keeps_the_names(tmp_path: Path) -> None:

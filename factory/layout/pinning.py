@@ -19,7 +19,7 @@ from factory.layout.dimensions import TOOL_TRAVEL, Clearance, up
 from factory.layout.drafting import LayoutDraft
 from factory.layout.durations import Pace, cycle_of
 from factory.layout.hands.choosing import Hands
-from factory.layout.layout import Layout, carriers
+from factory.layout.layout import Layout, branch_of, carriers
 from factory.layout.optimising import arrange, shape_of
 from factory.layout.packing import Task
 from factory.layout.pins import Pins
@@ -38,8 +38,9 @@ BEYOND = 0.3
 OUT = 3.0
 """A path leads out that is clear when it is so much longer [m]."""
 
-TRIED = 6
-"""So many stations of what is new are followed until the layout is clear."""
+TRIED = 2
+"""So many stations of what is new, with a free path and without, are followed until the layout is
+clear."""
 
 AGAIN = 4
 """So often robots move whose hands would collide."""
@@ -91,6 +92,7 @@ class Pinning:
         pins: Pins,
     ) -> None:
         self.factory, self.product, self.pins = factory, product, pins
+        self.names = {robot.name: robot.index for robot in factory.robots}
         self.payloads, self.on = payload_boxes(factory, product), carriers(factory)
         self.task = Task(factory, clearance, pace, [1.0] * len(self.on), hands=hands)
         self._shapes: dict[tuple[int, ...], list[Shape]] = {}
@@ -157,9 +159,9 @@ class Pinning:
         return self.factory.robots[robot].operations[-1]
 
     def _placed(self, seen: _Seen, robot: int) -> _Seen:
-        """The stretch with a new robot where it displaces none: the best of all stations with a
-        free path; else where least is lacking, after moves."""
-        branch, clear, others = self._branch(robot), list[_Seen](), list[_Seen]()
+        """The stretch with a new robot where it displaces fewest, after moves: of the best stations
+        with a free path, and the best without."""
+        branch, clear, others = branch_of(self.on, robot), list[_Seen](), list[_Seen]()
         for side in (-1, +1):
             sides = {r: s for r, s in enumerate(seen.stretch.sides) if r} | {robot: side}
             if admissible(self.factory, sides) != sides:
@@ -171,29 +173,26 @@ class Pinning:
                     near = self._out(stretch, robot, branch) or near
                 if not self._lacks(near, branch):
                     clear.append(near)
-        if clear:
-            return min(clear, key=lambda way: way.score)
-        others.sort(key=lambda way: way.score)
-        cleared = [self._cleared(way) for way in others[:TRIED]]
+        best = (sorted(ways, key=lambda way: way.score)[:TRIED] for ways in (clear, others))
+        cleared = [self._cleared(way) for ways in best for way in ways]
         return min(cleared, key=lambda way: (way.lacking > 0, way.score), default=seen)
 
-    def _out(self, stretch: Stretch, robot: int, branch: set[int]) -> _Seen | None:
+    def _out(self, stretch: Stretch, robot: int, branch: list[int]) -> _Seen | None:
         """The stretch with a robot as far out as needed; None if its path is blocked."""
         if self._lacks(self._seen(self._further(stretch, robot, OUT)), branch):
             return None
         ways = (self._seen(self._further(stretch, robot, by)) for by in JUMPS[1:])
         return next((way for way in ways if not self._lacks(way, branch)), None)
 
-    def _lacks(self, seen: _Seen, branch: set[int]) -> bool:
+    def _lacks(self, seen: _Seen, branch: list[int]) -> bool:
         """Whether a fault concerns some of these robots."""
-        names = {self.factory.robots[robot].name for robot in branch}
-        return any(not names.isdisjoint(fault.robots) for fault in seen.faults)
+        return any(self.names[name] in branch for fault in seen.faults for name in fault.robots)
 
     def _stations(self, stretch: Stretch, sides: dict[int, int], robot: int) -> Iterator[Stretch]:
         """A stretch with a new robot on a side, at stations all along its carrier's path, and
         beyond its ends."""
         packed, carrier = self._packed(sides), self.on[robot]
-        inside = self._branch(robot)
+        inside = branch_of(self.on, robot)
         travel = [packed.travel[r] if r in inside else t for r, t in enumerate(stretch.travel)]
         carried_by = {n for r in inside for n in carried(self.factory, r)}
         stations = [
@@ -211,14 +210,6 @@ class Pinning:
             far[carrier] = round(max(far[carrier] + back, at + STEP), 6)
             yield Stretch(tuple(far), tuple(moved), tuple(sides.get(r, 0) for r in range(len(far))))
 
-    def _branch(self, robot: int) -> set[int]:
-        """A robot and all that brings it something."""
-        branch = {robot}
-        for other in range(robot + 1, len(self.on)):
-            if self.on[other] in branch:
-                branch.add(other)
-        return branch
-
     def _cleared(self, seen: _Seen) -> _Seen:
         """The stretch after moves, until it is clear or none helps."""
         for _ in range(MOVES):
@@ -234,8 +225,7 @@ class Pinning:
     def _moves(self, stretch: Stretch, fault: Fault) -> Iterator[Stretch]:
         """Moves by which two robots that are too near get apart: either one, or its branch of their
         common path, goes further out or comes to a later station."""
-        names = {r.name: r.index for r in self.factory.robots}
-        chains = [self._chain(names[name]) for name in dict.fromkeys(fault.robots)]
+        chains = [self._chain(self.names[name]) for name in dict.fromkeys(fault.robots)]
         tops = list[int]()
         for chain in chains:
             others = {r for other in chains if other is not chain for r in other}
@@ -265,11 +255,8 @@ class Pinning:
         """With a robot and those after it at later stations of their carrier, whose way from there
         is as long as it was, or shorter."""
         carrier, number = self.on[robot], self._delivery(robot)
-        made, travel, stations = (
-            carried(self.factory, carrier),
-            [*stretch.travel],
-            [*stretch.stations],
-        )
+        made, travel = carried(self.factory, carrier), [*stretch.travel]
+        stations = [*stretch.stations]
         for n in made:
             if n == number or stations[n] > stations[number]:
                 stations[n] = round(stations[n] + by, 6)

@@ -90,7 +90,7 @@ def meetings(nodes: Mapping[str, Node]) -> Meetings:
     root = next(reversed([*nodes]), "")
     turns, levels = {root: 1}, {root: 0}
     picked = set[str]()
-    for label, node in reversed(nodes.items()):
+    for label, node in reversed([*nodes.items()]):
         brought = node.template.brought
         for number, name in enumerate(node.inputs):
             is_along = number == node.held or label in picked
