@@ -85,7 +85,7 @@ def _named(region: Region, pairing: Pairing, shift: Point2) -> tuple[object, ...
         label = "" if number is None else new.operations[number].label
         label = label or f"no longer {region.label}"
     moved = np.array(region.box) + np.repeat(shift, 2)
-    box = tuple((moved.round(6) + 0.0).tolist())
+    box = tuple(round(value, 6) + 0.0 for value in moved.tolist())
     mode = region.mode if region.mode == ALWAYS else pairing.operations.get(region.mode, -2)
     robot = pairing.robots.get(region.robot, -1)
     return robot, region.layer, region.kind, box, region.z, label, mode
