@@ -281,7 +281,11 @@ def _rounded(points: Array, least: float, middle: Array, asked: Array) -> Array:
     """Points (n, 3) in whole millimetres from the product's middle, or in tenths if the `least`
     width of a body is small, and those `asked` for as they are; unique."""
     step = 1e-3 if least > 8e-3 else 1e-4
-    rounded = np.concatenate([middle + np.round((points - middle) / step) * step, asked])
+    every = np.concatenate([points, asked])
+    rounded = middle + np.round((every - middle) / step) * step
+    other = np.abs(rounded - every) > 1e-6
+    other[: len(points)] = False
+    rounded[other] = every[other]
     ordered = rounded[np.lexsort(rounded.T[::-1])]
     new = (ordered[1:] != ordered[:-1]).any(axis=1)
     return np.asarray(ordered[np.append(True, new)])
