@@ -174,6 +174,24 @@ def test_products_leave_in_the_order_asked_for(word: str, world: str) -> None:
         assert run.physics.unintended_contacts == 0
 
 
+def test_a_robot_goes_ahead_of_what_is_skipped() -> None:
+    """To where the product that is skipped would be begun, beyond where its next one is: the
+    monitor took it for the start of the operation after that."""
+    lines = ["mix = 3 s11, 1 s11.b;"]
+    for end, others in (("", ()), (".b", (1, 7, 8))):
+        for n in range(1, 12):
+            before = f"s{n - 1}{end}" if n > 1 else "p0"
+            inputs = [before, f"p{n}.b" if n in others else f"p{n}"]
+            inputs = inputs[::-1] if n == 9 else inputs
+            template = "insert" if n in (2, 4) else "mate"
+            lines.append(f"s{n}{end} = {template} ( {', '.join(inputs)} );")
+        lines += [f"p{n}.b = atomic ( density = 321 );" for n in others]
+    text = "\n".join([*lines, *(f"p{n} = atomic ();" for n in range(12))]).rstrip(";")
+    project = Project(read_pag(text, little().templates), little().templates, little().catalogue)
+    request = RunRequest(units=3, demand=ordered(["s11"] * 3))
+    assert watched(Simulation(project.layout, request)).succeeded
+
+
 @pytest.mark.parametrize("wip", [1, 2, None])
 def test_the_cycle_time_of_a_word_is_predicted(wip: int | None) -> None:
     run = simulated("aababbbbaababbab", wip=wip).run()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, takewhile
 from time import perf_counter
 
 import numpy as np
@@ -194,8 +194,16 @@ class Monitor:
         self.explanation.saw(operation.start, unit, self.clock.begun, begun, shown, name)
 
     def _passed(self, robot: int) -> None:
-        """A robot passes its goal without stopping: its operation ended before its arrival."""
-        operation, _ = self._here(robot)
+        """A robot passes its goal without stopping: its operation ended before its arrival, or the
+        robot goes on ahead of one before, of a unit that is not made."""
+        way, spot = self.motion.way[robot], self.motion.spot[robot]
+        turn, operation, _ = next(self._coming(robot))
+        before = (self._at(robot, number) for number in range(turn - 1, -1, -1))
+        skipped = (o for o, _ in takewhile(lambda at: not self.subject.is_made(*at), before))
+        early = (o for o in skipped if self.subject.goes_ahead(o, robot))
+        if beyond := [s for o in early if way * ((s := self.subject.goal(o, robot)) - spot) > 0]:
+            self.motion.leave(robot, beyond[0])
+            return
         words = f"it passes its goal of {self.subject.name(operation)} without stopping"
         self._blame("Early", robot, operation.label, words)
         self.judged[operation.index] += 1
