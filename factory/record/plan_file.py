@@ -112,7 +112,8 @@ def _table(path: Path, schema: str) -> dict[str, Any]:
     table = json.loads(read_bytes(path, TEXT))
     if not isinstance(table, dict) or table.get("schema") != schema:
         stated = table.get("schema") if isinstance(table, dict) else table
-        raise ValueError(f"its schema must be '{schema}', not {stated!r:.40}")
+        words = f"its schema must be '{schema}', not {stated!r:.40}"
+        raise ValueError(words + "; give the plan.json beside it" * (stated == LAYOUT_SCHEMA))
     return table
 
 
