@@ -13,7 +13,7 @@ from factory.compiler.deputies import chosen_pairs, deputies, standing_by
 from factory.compiler.folding import fold
 from factory.compiler.mating.mating import judged
 from factory.compiler.parallel import in_parallel
-from factory.compiler.taking_over import taken_over
+from factory.compiler.taking_over import Takeover
 from factory.compiler.tees import on_stems
 from factory.layout.durations import Pace
 from factory.layout.shapes import payload_boxes
@@ -66,7 +66,7 @@ def variants(file: Path) -> Iterator[tuple[str, Factory]]:
                         continue
                     yield f"{name}, {label} = {k}", made
                     yield from takeovers(f"{name}, {label} = {k}", made, catalogue)
-        if pairs := chosen_pairs(factory, deputies(factory, catalogue)):
+        if pairs := chosen_pairs(deputies(factory, catalogue)):
             yield f"{name}, deputies stand by", standing_by(factory, pairs)
         yield from takeovers(name, factory, catalogue)
 
@@ -75,7 +75,7 @@ def takeovers(name: str, factory: Factory, catalogue: Catalogue) -> Iterator[tup
     """The factories in which deputies have taken over, with those that are gone and without."""
     for dead, row in enumerate(deputies(factory, catalogue)):
         for deputy in row[:TAKEOVERS]:
-            over = taken_over(factory, dead, deputy, catalogue)
+            over = Takeover(factory, dead, deputy)
             yield f"{name}, r{deputy + 1} for r{dead + 1}", over.crew
             yield f"{name}, without r{dead + 1}, r{deputy + 1}", over.after
 

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 
 from factory.compiler.deputies import deputies
-from factory.compiler.taking_over import taken_over
+from factory.compiler.taking_over import Takeover
 from factory.mjcf.replica import Replica
 from factory.nets.undo import tokens_after
 from factory.nets.undone import Undone
@@ -75,7 +75,7 @@ def test_a_deputy_leads_to_markings_of_the_net_of_before(seed: int, rng: random.
     _, _, before = made(seed, rng, 20)
     pairs = [(dead, row[0]) for dead, row in enumerate(deputies(before, catalogue())) if row]
     for dead, deputy in pairs[:2]:
-        net = taken_over(before, dead, deputy, catalogue()).after.net
+        net = Takeover(before, dead, deputy).after.net
         marking, fired = net.initial_marking, [0] * len(net.threaded.transitions)
         for _ in range(80):
             event = rng.choice(sorted(enabled(net.threaded.net, marking)))

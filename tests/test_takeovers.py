@@ -16,7 +16,7 @@ from benches.faults.takeovers import PAPER as INSERTS
 from benches.faults.takeovers import interval_after
 from factory.compiler import taking_over
 from factory.compiler.deputies import chosen_pairs, deputies, rounds_of, standing_by
-from factory.compiler.taking_over import Takeover, crew_with, nets_after, with_moved
+from factory.compiler.taking_over import crew_with, nets_after
 from factory.layout.clearance import certify
 from factory.layout.layout import Layout
 from factory.layout.request import Ground
@@ -79,7 +79,7 @@ def test_robots_and_deputies_in_turn_are_live(seed: int, rng: random.Random) -> 
     its tours."""
     _, _, folded = made(seed, rng, 9)
     rows = deputies(folded, catalogue())
-    pairs = chosen_pairs(folded, rows)
+    pairs = chosen_pairs(rows)
     assert {robot for robot, _ in pairs} == {robot for robot, row in enumerate(rows) if row}
     assert all(deputy in rows[robot] for robot, deputy in pairs)
     turns = rounds_of(pairs)
@@ -100,12 +100,12 @@ def test_the_layout_is_certified_for_either() -> None:
     assert certify(layout).holds and layout.standby is not None
     assert {*layout.payloads} == {o.label for o in layout.factory.making}
     for dead, deputy in deputies_in(layout).items():
-        crew = crew_with(layout.factory, {dead: deputy})
+        crew = crew_with(layout.factory, dead, deputy)
         part = part_of(layout, crew)
         assert part is not None and certify(part).holds
         assert {*part.magazine(deputy)} == {"part2", "part3"} and not part.magazine(dead)
         assert part_of(laid_out(False), crew) is None
-    strange = crew_with(layout.factory, {2: 1})
+    strange = crew_with(layout.factory, 2, 1)
     assert part_of(layout, strange) is None, "no such tour is laid out"
 
 
@@ -274,9 +274,7 @@ def test_products(name: str) -> None:
     layout = read(ROOT / "examples" / f"{name}.pag", ground=Ground(deputies=True)).layout
     assert certify(layout).holds
     for dead, deputy in deputies_in(layout).items():
-        moved = {dead: deputy}
-        found = Takeover(layout.factory, with_moved(layout.factory, moved), dead, moved)
-        part = part_of(layout, found.crew)
+        part = part_of(layout, crew_with(layout.factory, dead, deputy))
         assert part is not None and certify(part).holds
     assert part is not None
     assert_good(Simulation(without_gone(part), RunRequest("mujoco", 2)).run())

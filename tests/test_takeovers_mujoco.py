@@ -16,7 +16,7 @@ import pytest
 from benches.faults.takeovers import PAPER as INSERTS
 from benches.faults.takeovers import interval_after
 from factory.commands.run import summarise
-from factory.compiler.taking_over import Takeover, crew_with
+from factory.compiler.taking_over import crew_with
 from factory.control.mode import Limits
 from factory.exporting import Subject, exporters
 from factory.exporting.motion import motion_of
@@ -215,7 +215,7 @@ def test_the_model_has_what_deputies_need() -> None:
 def test_a_crew_has_the_tours_that_are_left() -> None:
     """What is left when a robot is gone is a part of the same whole, with its feeders."""
     layout = laid_out(INSERTS)
-    crew = part_of(layout, crew_with(layout.factory, {1: 3}))
+    crew = part_of(layout, crew_with(layout.factory, 1, 3))
     assert crew is not None and crew.whole is layout.whole
     assert [*map(crew.magazine, range(4))] == [("part1",), (), (), ("part2", "part3")]
     assert feeder_of(crew, "part2") == feeder_of(layout, "part2")
@@ -224,12 +224,11 @@ def test_a_crew_has_the_tours_that_are_left() -> None:
 def test_a_monitor_knows_who_goes_ahead() -> None:
     """By the numbers that robots have in the crew that stays."""
     layout = laid_out(STEPS)
-    moved = {1: 2}
-    found = Takeover(layout.factory, deputising.with_moved(layout.factory, moved), 1, moved)
-    crew = part_of(layout, found.crew)
+    left = crew_with(layout.factory, 1, 2)
+    crew = part_of(layout, left)
     assert crew is not None
     early = {(operation, (0, 2).index(robot)) for operation, robot in goes_early(crew)}
-    assert early and early <= subject_of(layout, Settings()).after(found.crew).early
+    assert early and early <= subject_of(layout, Settings()).after(left).early
 
 
 # --- planted faults -------------------------------------------------------------------------------

@@ -1,9 +1,8 @@
 """Taking over: a robot dies, and its deputy does its tours from then on (Theorem 8, exchange).
 
-N' has the operations of N and a robot fewer, or a branch fewer; robots that stay keep their names.
-How often each transition has fired is the state, so N' goes on from the greatest counts n' <= n
-that lead to a marking of it, where what the robots that are gone had in hand is undone
-(`factory.nets.undo`).
+N' has the operations of N and a robot fewer; robots that stay keep their names. How often each
+transition has fired is the state, so N' goes on from the greatest counts n' <= n that lead to a
+marking of it, where what the robot that is gone had in hand is undone (`factory.nets.undo`).
 
 Guarantees: N' is a gear train, live, safe and reversible, and n' is reachable in it.
 """
@@ -15,7 +14,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from factory.compiler.assigning import assigned
-from factory.compiler.deputies import Moved, moved_to
 from factory.nets.gears import GearNet
 from factory.nets.petri import Marking
 from factory.nets.undo import exchange, marking_after
@@ -23,30 +21,32 @@ from factory.nets.undone import Entry, Undone, exchanges
 from factory.nets.verify import proved
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
-from factory.problem.robot_types import Catalogue
 
 
 @dataclass(frozen=True)
 class Takeover:
-    """The change from a factory `before` to a factory `after`, in which the robot `dead` (index)
-    and its branch are removed and others have their tours (`moved`)."""
+    """The change from a factory `before`, in which the robot `dead` (index) is removed and its
+    `deputy` has its tours. `crew`: the factory then, with the robot numbers of `before`; its net
+    has the places of that of `after`, in their order."""
 
     before: Factory
-    after: Factory
     dead: int
-    moved: Moved
+    deputy: int
 
     @cached_property
     def crew(self) -> Factory:
-        """`after` with the robot numbers of `before`: removed robots have no operations. Its net
-        has the places of that of `after`, in their order."""
-        return crew_with(self.before, self.moved)
+        return crew_with(self.before, self.dead, self.deputy)
+
+    @cached_property
+    def after(self) -> Factory:
+        """The factory without the dead robot; it is not checked."""
+        return without_gone(self.crew)
 
     @property
     def names(self) -> tuple[str, str]:
         """Names of the dead robot and its deputy."""
         robots = self.before.robots
-        return robots[self.dead].name, robots[self.moved[self.dead]].name
+        return robots[self.dead].name, robots[self.deputy].name
 
     def exchanged(self, fired: Sequence[int], t: float) -> tuple[tuple[int, ...], Undone]:
         """Counts n' after the exchange of the counts n (`fired`, from m_0 on) at time t [s], and
@@ -54,19 +54,12 @@ class Takeover:
         live."""
         net = self.after.net
         proved(net)
-        asked = lost(self.before, fired, self.moved)
+        asked = lost(self.before, fired, self.dead)
         counts = exchange(net, fired, asked, self.after.joins)
         at = _next(self.before, marking_after(self.before.net, fired), self.dead)
         what = t, at.label, "{} is dead, and {} takes its tours".format(*self.names)
         undone = Undone.between(net, what, asked, fired, counts, exchanged=True)
         return counts, replace(undone, robots=self.names)
-
-
-def taken_over(factory: Factory, dead: int, deputy: int, catalogue: Catalogue) -> Takeover:
-    """The change when a deputy takes over for a robot (indices). Raises InputError (BadLine) if it
-    is not a deputy."""
-    moved = moved_to(factory, dead, deputy, catalogue)
-    return Takeover(factory, with_moved(factory, moved), dead, moved)
 
 
 def nets_after(factory: Factory, entries: Iterable[Entry]) -> Iterator[GearNet]:
@@ -80,21 +73,16 @@ def crews_after(factory: Factory, entries: Iterable[Entry]) -> Iterator[Factory]
     number = {robot.name: robot.index for robot in factory.robots}
     for entry in exchanges(entries):
         dead, deputy = (number[name] for name in entry.robots)
-        factory = crew_with(factory, {dead: deputy})
+        factory = crew_with(factory, dead, deputy)
         yield factory
 
 
-def with_moved(factory: Factory, moved: Moved) -> Factory:
-    """The factory with moved tours, without removed robots; it is not checked."""
-    return without_gone(crew_with(factory, moved))
-
-
-def crew_with(factory: Factory, moved: Moved) -> Factory:
-    """The factory with moved tours and all its robots; it is not checked. Removed robots have no
-    operations, and their lifts stay where they are."""
-    robots = factory.robots
-    crew = assigned(factory, robots, [[moved.get(robot.index, robot.index) for robot in robots]])
-    return replace(crew, adjusted=factory.adjusted | (factory.strokes.keys() & moved.keys()))
+def crew_with(factory: Factory, dead: int, deputy: int) -> Factory:
+    """The factory with the tours of a dead robot moved to its deputy (indices), and all its robots;
+    it is not checked. The dead one has no operations, and its lift stays where it is."""
+    every = range(len(factory.robots))
+    crew = assigned(factory, factory.robots, [[deputy if n == dead else n for n in every]])
+    return replace(crew, adjusted=factory.adjusted | (factory.strokes.keys() & {dead}))
 
 
 def without_gone(factory: Factory) -> Factory:
@@ -106,22 +94,14 @@ def without_gone(factory: Factory) -> Factory:
     return replace(assigned(factory, robots, every), adjusted=adjusted)
 
 
-def lost(factory: Factory, fired: Sequence[int], robots: Iterable[int]) -> tuple[int, ...]:
-    """The transitions that are undone when robots (indices) are removed: all ends that made their
-    payloads, once for each copy in their hands, or the start of an operation begun empty-handed.
-
-    The material rule counts the contents of one pile: a part in a pile and another copy of it in
-    the next hand are two.
-    """
-    ends, begun, marking = list[int](), set[int](), marking_after(factory.net, fired)
-    for robot in robots:
-        o = _next(factory, marking, robot)
-        label = o.before[o.robots.index(robot)]
-        if label != NOPART:
-            ends += _ends_in(factory, label)
-        elif fired[o.start] > fired[o.end]:
-            begun.add(o.start)
-    return (*ends, *sorted(begun))
+def lost(factory: Factory, fired: Sequence[int], robot: int) -> tuple[int, ...]:
+    """The transitions that are undone when a robot (index) is removed: all ends that made its
+    payload, or the start of an operation begun empty-handed."""
+    o = _next(factory, marking_after(factory.net, fired), robot)
+    label = o.before[o.robots.index(robot)]
+    if label != NOPART:
+        return (*_ends_in(factory, label),)
+    return (o.start,) if fired[o.start] > fired[o.end] else ()
 
 
 def _ends_in(factory: Factory, label: str) -> list[int]:

@@ -126,7 +126,7 @@ class Ground:
             whole = standing_by(factory, pairs)
             return plain.lay_out(whole, product, settings, None if pairs else hands)
 
-        standby = chosen_pairs(factory, deputies(factory, catalogue or load_catalogue()))
+        standby = chosen_pairs(deputies(factory, catalogue or load_catalogue()))
         whole = laid_out_for(standby, lay_out)
         layout = part_of(replace(whole, product=product, standby=whole), factory)
         assert layout is not None, "its robots have their own tours"

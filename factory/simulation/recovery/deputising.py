@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Container
 from dataclasses import dataclass
 
-from factory.compiler.taking_over import Takeover, with_moved
+from factory.compiler.taking_over import Takeover
 from factory.layout.layout import Layout
 from factory.layout.scrapping import not_carried_back
 from factory.layout.standby import deputies_in, part_of
@@ -59,8 +59,7 @@ class Deputising:
         books, factory = self._books, self._books.factory
         if deputy in dead or not factory.robots[deputy].operations:
             return None
-        moved = {robot: deputy}
-        takeover = Takeover(factory, with_moved(factory, moved), robot, moved)
+        takeover = Takeover(factory, robot, deputy)
         layout = part_of(books.layout, takeover.crew)
         return Successors(takeover, layout) if layout else None
 
