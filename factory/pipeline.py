@@ -105,15 +105,14 @@ class Project:
         from factory.compiler.folding import fold, lines_of_labels
 
         factory = self.planned
-        made = fold(factory, lines_of_labels(factory, lines), self.catalogue)
-        return self.with_plan(made.plan)
+        return self.with_plan(fold(factory, lines_of_labels(factory, lines), self.catalogue))
 
     def with_branches(self, branches: Sequence[tuple[str, int]]) -> Project:
         """The project in which the branches that bring some labels are there several times. Raises
         InputError (Parallel)."""
         from factory.compiler.parallel import in_parallel
 
-        return self.with_plan(in_parallel(self.planned, branches).plan)
+        return self.with_plan(in_parallel(self.planned, branches))
 
     def with_tees(self, stems: Sequence[Sequence[str]]) -> Project:
         """The project in which two robots share a stem, by the labels that they bring. Raises

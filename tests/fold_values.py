@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import cache
 from itertools import combinations
 
-from factory.compiler.assigning import gear_net
+from factory.compiler.assigning import gear_net, shared
 from factory.compiler.compiler import compile_pag
 from factory.compiler.folding import (
     Line,
@@ -19,6 +19,7 @@ from factory.compiler.folding import (
     sides_of,
 )
 from factory.compiler.mating.mating import judged
+from factory.compiler.parallel import in_parallel
 from factory.layout.durations import Pace
 from factory.layout.embedding import lay_out
 from factory.layout.layout import Layout
@@ -28,6 +29,7 @@ from factory.pipeline import Project, all_templates
 from factory.plant.approaches import Approach
 from factory.plant.factory import Factory
 from factory.problem.pag import PAG
+from factory.problem.plan import Plan
 from factory.problem.robot_types import Catalogue, load_catalogue
 from factory.support.settings import Settings
 from tests.pag_values import SHAPES, TEMPLATES, catalogue, paper, random_pag
@@ -58,6 +60,12 @@ def three_robots() -> Factory:
     factory = plain(inserted(paper()))
     lines = ((robot_of(factory, "part2"), robot_of(factory, "part3")),)
     return folded(factory, lines, catalogue())
+
+
+def branched(factory: Factory, *branches: tuple[str, int]) -> Factory:
+    """A factory, perhaps a fold, with branches that are there several times."""
+    base = replace(factory, plan=Plan())
+    return shared(base, in_parallel(base, branches), catalogue())
 
 
 def robot_of(factory: Factory, label: str) -> int:
@@ -143,7 +151,7 @@ def fold_layout(seed: int, settings: Settings) -> Layout:
     project = Project(pag, templates, load_catalogue(), settings)
     factory, known = judged(project.compiled, project.product), project.catalogue
     lines = lines_of_one_side(factory, known, rng)
-    made = fold(factory, lines, known)
+    made = shared(factory, fold(factory, lines, known), known)
     return lay_out(made, project.product, pace=Pace.of(settings))
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from factory.compiler.assigning import shared
 from factory.compiler.deputies import chosen_pairs, deputies, standing_by
 from factory.compiler.folding import fold
 from factory.compiler.mating.mating import judged
@@ -51,7 +52,8 @@ def variants(file: Path) -> Iterator[tuple[str, Factory]]:
     yield "as written", base
     shift = Shift.of(base, catalogue, payload_boxes(base, project.product), Pace())
     every = dict.fromkeys(map(shift.lines, islice(shift.fillings(1.3), 60)))
-    folds = [fold(base, lines, catalogue) for lines in islice(filter(None, every), FILLINGS)]
+    plans = [fold(base, lines, catalogue) for lines in islice(filter(None, every), FILLINGS)]
+    folds = [shared(base, plan, catalogue) for plan in plans]
     for number, folded in enumerate(folds):
         yield f"fold {number}", folded
     for name, factory in (("written", base), *((f"fold {n}", f) for n, f in enumerate(folds[-2:]))):
@@ -59,7 +61,7 @@ def variants(file: Path) -> Iterator[tuple[str, Factory]]:
             for label in factory.deliveries(robot.index)[:1]:
                 for k in (2, 3):
                     try:
-                        made = in_parallel(factory, [(label, k)])
+                        made = shared(base, in_parallel(factory, [(label, k)]), catalogue)
                     except InputError:
                         continue
                     if on_stems(made)[0] is not made:  # tees have tests of their own

@@ -108,7 +108,7 @@ def test_setpoints_shown_are_those_that_drives_read(name: str) -> None:
     """After every call, in `ctrl`: in a course; and where it is over, the references."""
     simulation = ready(name)
     world, supervisor = simulation.physical, simulation.supervisor
-    control, inside = world.motion.drives.control, 0
+    control, inside = world.m.actuator_ctrladr[world.motion.drives._actuators], 0
     for number in range(200):
         supervisor.step(1 if number % 3 else MOST)
         axes = supervisor.active.axes

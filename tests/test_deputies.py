@@ -14,9 +14,9 @@ from hypothesis import assume, given, reject, settings
 from hypothesis import strategies as st
 
 from factory.compiler import taking_over
+from factory.compiler.assigning import shared
 from factory.compiler.deputies import MOST, Siblings, deputies
 from factory.compiler.folding import Line, fold
-from factory.compiler.parallel import in_parallel
 from factory.compiler.taking_over import Takeover
 from factory.nets.marked import marked
 from factory.nets.petri import Marking
@@ -32,6 +32,7 @@ from factory.problem.robot_types import load_catalogue
 from factory.support.errors import InputError, RunError
 from tests.command_line import ROOT, Terminal
 from tests.fold_values import (
+    branched,
     inserted,
     lines_of_one_side,
     plain,
@@ -58,7 +59,7 @@ SLOW = (
 
 
 def slow(*branches: tuple[str, int]) -> Factory:
-    return in_parallel(plain(table_of(SLOW)), branches)
+    return branched(plain(table_of(SLOW)), *branches)
 
 
 def made(seed: int, rng: random.Random, size: int = 14) -> tuple[Factory, list[Line], Factory]:
@@ -67,7 +68,7 @@ def made(seed: int, rng: random.Random, size: int = 14) -> tuple[Factory, list[L
     base = with_sides(plain(inserted(pag, rng.choice((0.5, 1.0)), seed)), rng)
     lines = lines_of_one_side(base, catalogue(), rng)
     try:
-        return base, lines, fold(base, lines, catalogue())
+        return base, lines, shared(base, fold(base, lines, catalogue()), catalogue())
     except InputError:
         reject()
 
@@ -275,7 +276,7 @@ def test_what_is_gone_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
         count, rng = 0, random.Random(4)
         for seed in range(60):
             base = plain(inserted(random_pag(8, seed, "any", 3)))
-            folded = fold(base, (), catalogue()) if seed % 2 else base
+            folded = shared(base, fold(base, (), catalogue()), catalogue()) if seed % 2 else base
             rows = deputies(folded, catalogue())
             for dead, row in enumerate(rows):
                 for deputy in row[:1]:
@@ -337,11 +338,11 @@ def test_a_wrong_order_is_refused_with_its_circuit() -> None:
 
 def test_check_of_branches(run: Terminal, tmp_path: Path) -> None:
     """The parts of both branches count, whether or not they have shapes."""
-    text = "root = c; c = insert(p, b); b = weld(a); a = insert(q, r);"
+    text = "root = c; c = insert(p, b); b = insert(w, s); w = weld(a); a = insert(q, r);"
     file = tmp_path / "slow.pag"
-    file.write_text(text + " ".join(f"{x} = atomic();" for x in "pqr"))
+    file.write_text(text + " ".join(f"{x} = atomic();" for x in "pqrs"))
     done = run("check", file, "--parallel", "b=2", "--json")
     assert done.status == 0, done.err
     found = done.json["deputies"]
-    assert len(found) == 7
+    assert len(found) == 9
     assert len([robot for robot, row in found.items() if row]) == 4

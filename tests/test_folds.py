@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 from factory.compiler import folding
+from factory.compiler.assigning import shared
 from factory.compiler.folding import (
     Line,
     fold,
@@ -181,7 +182,8 @@ def test_two_tools_of_one_operation_stay_two() -> None:
     table = [("z", "clamp", ("y",)), ("y", "clamp", ("x",)), ("x", "insert", ("u", "c"))]
     table += [("u", "insert", ("a", "b"))] + [(part, "atomic", ()) for part in "abc"]
     factory = plain(table_of(table))
-    made = fold(factory, lines_of_labels(factory, [("b", "c")]), catalogue())
+    plan = fold(factory, lines_of_labels(factory, [("b", "c")]), catalogue())
+    made = shared(factory, plan, catalogue())
     does = [[made.operations[n].label for n in robot.operations] for robot in made.robots[1:]]
     assert sorted(does) == [["b", "u", "c", "x"], ["y", "z"], ["y", "z"]]
     assert verify(made.net).holds
@@ -617,8 +619,8 @@ def test_two_inputs_of_one_operation_share_no_robot() -> None:
 def test_without_lines_nothing_changes() -> None:
     for shape in SHAPES:
         factory = plain(random_pag(20, 3, shape))
-        assert fold(factory, [], catalogue()) == factory
-        assert fold(factory, [(robot.index,) for robot in factory.robots], catalogue()) == factory
+        for lines in ([], [(robot.index,) for robot in factory.robots]):
+            assert shared(factory, fold(factory, lines, catalogue()), catalogue()) == factory
         assert list(factory.order) == [
             *reversed(range(len(factory.operations) - 1)),
             factory.dropoff.index,
@@ -627,7 +629,8 @@ def test_without_lines_nothing_changes() -> None:
 
 def test_the_same_lines_from_labels() -> None:
     factory = plain(inserted(paper()))
-    made = fold(factory, lines_of_labels(factory, [("part3", "part2")]), catalogue())
+    plan = fold(factory, lines_of_labels(factory, [("part3", "part2")]), catalogue())
+    made = shared(factory, plan, catalogue())
     assert made == three_robots()
     assert [robot.name for robot in made.robots] == ["r1", "r2", "r3"]
     assert made.deliveries(1) == ("part2", "part3")

@@ -44,7 +44,7 @@ from factory.timing.cycle_time import cycle_time
 from factory.timing.pool import part_pool
 from factory.timing.timing import Timing
 from tests.command_line import Terminal
-from tests.fold_values import plain, random_fold, simulated_cycle, swapped, table_of
+from tests.fold_values import branched, plain, random_fold, simulated_cycle, swapped, table_of
 from tests.pag_values import paper
 from tests.state_space import explored
 
@@ -78,7 +78,7 @@ def beside() -> PAG:
 
 def replicated(k: int, label: str = "sub2") -> Factory:
     """Its factory with so many branches."""
-    return in_parallel(plain(slow()), ((label, k),))
+    return branched(plain(slow()), (label, k))
 
 
 def truth(factory: Factory, limit: int = 150_000) -> tuple[bool, bool, bool]:
@@ -93,7 +93,7 @@ def truth(factory: Factory, limit: int = 150_000) -> tuple[bool, bool, bool]:
 
 def test_one_branch_changes_nothing() -> None:
     factory = plain(slow())
-    assert in_parallel(factory, (("sub2", 1),)) is factory
+    assert in_parallel(factory, (("sub2", 1),)) is factory.plan
 
 
 @pytest.mark.parametrize("k", [2, pytest.param(3, marks=pytest.mark.slow)])
@@ -149,7 +149,7 @@ def test_random_branches(seed: int) -> None:
     labels = [label for label in labels if label != "nopart"]
     chosen = [(label, rng.randint(1, 3)) for label in rng.sample(labels, min(2, len(labels)))]
     try:
-        found = in_parallel(factory, chosen)
+        found = branched(factory, *chosen)
     except InputError as error:
         assert "one robot brings" in str(error) or "room for 2" in str(error)
         return
@@ -168,7 +168,7 @@ def test_random_branches(seed: int) -> None:
 
 def test_a_station_out_of_turn_is_refused() -> None:
     """Two units of the output robot's program exchanged: dead, with a circuit that says so."""
-    factory = in_parallel(plain(beside()), (("sub2", 3),))
+    factory = branched(plain(beside()), ("sub2", 3))
     assert verify(factory.net).holds
     for one, other in ((0, 1), (1, 2), (0, 2)):
         verdict = verify(swapped(factory, 0, one, other))
@@ -401,7 +401,7 @@ def test_a_branch_that_is_there_twice_has_the_hands_of_one(name: str) -> None:
 def test_stations_of_a_branch_are_passed_one_way() -> None:
     """A carrier goes ahead from stop to stop on each of its tours, though it meets the second
     branch in the second tour first after one that is further on."""
-    factory = in_parallel(plain(beside()), (("sub2", 3),))
+    factory = branched(plain(beside()), ("sub2", 3))
     carrier = factory.operations[factory.dropoffs[0].index].carrier
     stops, returns = stops_of(factory, carrier)
     places = {o.index: n for n, stop in enumerate(stops) for o in stop.operations}

@@ -16,6 +16,7 @@ import factory
 from factory.foreign_nets.behaviour import analyse
 from factory.lang import read_pag
 from factory.mjcf import loading, model
+from factory.nets.cycle_ratio import max_cycle_ratio
 from factory.nets.marked import MarkedNet, marked
 from factory.pipeline import all_templates
 from factory.plant.factory import Factory
@@ -23,7 +24,7 @@ from factory.simulation.modelling import physical_model
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
-from factory.timing.cycle_time import cycle_time, marked_graph_cycle_time
+from factory.timing.cycle_time import cycle_time
 from factory.timing.pool import part_pool, with_wip
 from tests.examples import without_hands
 from tests.net_values import net_from
@@ -124,7 +125,7 @@ def test_the_cycle_time_is_the_maximum_cycle_ratio(factory: Factory, data: st.Da
     count = len(factory.net.threaded.places)
     delays = data.draw(st.lists(st.integers(0, 50), min_size=count, max_size=count))
     seconds = [float(d) for d in delays]
-    found = marked_graph_cycle_time(factory.net, seconds)
+    found = max_cycle_ratio(marked(factory.net), seconds)
     assert found.seconds == pytest.approx(cycle_time(factory.net, seconds).seconds)
     gears = {frozenset(gear.places) for gear in factory.net.gears}
     assert frozenset(found.circuit) in gears
@@ -151,16 +152,20 @@ def test_the_maximum_cycle_ratio_is_that_of_every_circuit(seed: int) -> None:
         / sum(net.tokens[i] for kind, i in c if kind == "p")
         for c in nx.simple_cycles(graph)
     ]
-    found = marked_graph_cycle_time(net, [float(d) for d in delays])
+    found = max_cycle_ratio(net, [float(d) for d in delays])
     assert found.seconds == pytest.approx(float(max(ratios)))
 
 
 def test_wip_can_slow_a_factory_down() -> None:
     factory = factory_of(paper())
     delays = [1.0] * len(factory.operations)
-    free = marked_graph_cycle_time(factory.net, delays).seconds
-    assert marked_graph_cycle_time(with_wip(factory, 1), delays).seconds == 5.0 > free
-    assert marked_graph_cycle_time(with_wip(factory, 3), delays).seconds == free
+
+    def seconds(net: MarkedNet) -> float:
+        idle = [0.0] * (len(net.tokens) - len(delays))
+        return max_cycle_ratio(net, [*delays, *idle]).seconds
+
+    assert seconds(with_wip(factory, 1)) == 5.0 > seconds(marked(factory.net))
+    assert seconds(with_wip(factory, 3)) == seconds(marked(factory.net))
 
 
 @pytest.mark.parametrize(
@@ -173,7 +178,7 @@ def test_wip_can_slow_a_factory_down() -> None:
 )
 def test_only_live_marked_graphs_have_a_cycle_time(rows: list[tuple[str, str, int]]) -> None:
     with pytest.raises(ValueError, match=r"live marked graph|no circuit"):
-        marked_graph_cycle_time(net_from(rows), {})
+        max_cycle_ratio(net_from(rows), [0.0] * len(rows))
 
 
 def test_a_pool_too_large_for_the_engine_bounds_the_units_inside(monkeypatch) -> None:

@@ -262,8 +262,9 @@ def test_robots_stop_where_their_operation_ends(paper: Layout) -> None:
     simulation = Simulation(paper, RunRequest(units=2, settings=settings))
     run = simulation.run()
     assert_good(run)
-    motion, d = simulation.physical.motion, simulation.physical.d
-    assert np.all(d.ctrl[motion.drives.control[: motion.axes.tray] + 1] == 0.0)
+    motion, m, d = (getattr(simulation.physical, name) for name in ("motion", "m", "d"))
+    control = m.actuator_ctrladr[motion.drives._actuators]
+    assert np.all(d.ctrl[control[: motion.axes.tray] + 1] == 0.0)
     assert np.all(motion.robots.v[: motion.axes.tray] == 0.0)
 
 

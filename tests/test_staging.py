@@ -327,8 +327,9 @@ def test_a_robot_is_in_one_mode_at_a_time(world: Any) -> None:
         gone = set(before.ahead) - set(active.ahead)
         overtaken += sum(abs(x[robots[n - count]] - goals[n - count]) > 0.01 for n in gone)
         if world == "mujoco":
-            motion = made.physical.motion
-            driven = made.physical.d.ctrl[motion.drives.control[active.axes]]
+            motion, m = made.physical.motion, made.physical.m
+            control = m.actuator_ctrladr[motion.drives._actuators[active.axes]]
+            driven = made.physical.d.ctrl[control]
             assert (driven == motion.robots.x[active.axes]).all()
     assert overtaken > 2
 

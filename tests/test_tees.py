@@ -26,7 +26,7 @@ from factory.simulation.watched import watched
 from factory.support.errors import InputError
 from factory.support.settings import Settings
 from tests.command_line import Terminal
-from tests.fold_values import plain, table_of
+from tests.fold_values import branched, plain, table_of
 from tests.pag_values import paper
 
 SLOW = 4.0
@@ -80,7 +80,7 @@ def carried_out(layout: Layout, units: int = 10, **more: object) -> Run:
 
 def test_robots_on_one_stem() -> None:
     """Those that bring a label to the same mate, and those of their branches."""
-    factory = in_parallel(plain(paper()), (("sub2", 2),))
+    factory = branched(plain(paper()), ("sub2", 2))
     names = {robot.name: robot for robot in factory.robots}
     first = heads(factory)
     pairs = {(first[n], n) for n in range(len(first)) if first[n] != n}
@@ -96,7 +96,7 @@ def test_robots_on_one_stem() -> None:
 
 def test_the_factory_on_stems_is_that_of_one_branch_unit_by_unit() -> None:
     """With each operation where it was, its net live."""
-    factory = in_parallel(plain(paper()), (("sub2", 2),))
+    factory = branched(plain(paper()), ("sub2", 2))
     stems, place = on_stems(factory)
     assert len(stems.robots) == len(plain(paper()).robots)
     assert verify(stems.net).holds

@@ -21,7 +21,7 @@ from factory.geometry.product import product_geometry
 from factory.layout.layout import Layout
 from factory.layout.request import Ground
 from factory.mjcf import timestep
-from factory.mjcf.timestep import ALLOWED, FRICTION, STEPS, USUAL, predicted_error, timed
+from factory.mjcf.timestep import ALLOWED, FRICTION, STEPS, USUAL, timed
 from factory.problem.pag import PAG, Parameter
 from factory.record.state import State
 from factory.simulation.modelling import physical_model
@@ -82,13 +82,20 @@ def laid(seed: int) -> Layout:
     return Ground().lay_out(made, product_geometry(made.pag), asked(seed)[0])
 
 
+def predicted_error(settings: Settings, layout: Layout, jitter: float) -> float:
+    """The largest error of an axis against its reference that a run may show [m]; a gap between two
+    robots, and the residual of a weld, may be twice that."""
+    return max(axis.error(settings) for axis in timestep._axes(settings, layout, jitter))
+
+
 def measured(
     simulation: Simulation, max_time: float | None = None, touching: bool = False
 ) -> dict[str, float]:
     """The figures that a timestep is chosen by, of a run that goes well, but for things that touch
     where they may."""
     world, worst = simulation.physical, [0.0]
-    qpos, control = world.motion.axes.qpos, world.motion.drives.control
+    qpos = world.motion.axes.qpos
+    control = world.m.actuator_ctrladr[world.motion.drives._actuators]
 
     def observe(_: State) -> None:
         error = np.abs(world.d.qpos[qpos] - world.d.ctrl[control])

@@ -182,10 +182,9 @@ def robots() -> str:
     ]
     for name, robot in load_catalogue().types.items():
         extends = f" Extends `{robot.extends}`." if robot.extends else ""
-        ways = ", ".join(robot.stretches)
         lines += [
             heading(2, name),
-            f"{prose(robot.summary).capitalize()}. Its workspace stretches {ways}.{extends}",
+            f"{prose(robot.summary).capitalize()}.{extends}",
             code(robot.mjcf.read_text("utf-8"), "xml"),
         ]
     catalogue = (mjcf_folder() / "catalogue.toml").read_text("utf-8")

@@ -33,8 +33,8 @@ Line = tuple[int, ...]
 """The tours of a line, as the robots of the factory that is folded."""
 
 
-def fold(factory: Factory, lines: Iterable[Line], catalogue: Catalogue) -> Factory:
-    """The factory with one robot for each of the `lines`, and for each robot on no line. Raises
+def fold(factory: Factory, lines: Iterable[Line], catalogue: Catalogue) -> Plan:
+    """The plan with one robot for each of the `lines`, and for each robot on no line. Raises
     InputError (BadLine) with every reason why the lines are not a fold."""
     shared = [line for line in lines if len(line) > 1]
     faults = [fault for line in shared for fault in line_faults(factory, line, shared, catalogue)]
@@ -42,15 +42,20 @@ def fold(factory: Factory, lines: Iterable[Line], catalogue: Catalogue) -> Facto
         raise InputError(faults)
     if shared:
         shared += _tool_lines(factory, shared)
-    return folded(factory, shared, catalogue)
+    return factory.plan.then([_turn(factory, shared)])
 
 
 def folded(factory: Factory, lines: Iterable[Line], catalogue: Catalogue) -> Factory:
     """The factory with one robot for each of the `lines` of a fold, which is not checked, and for
     each robot on no line."""
+    return with_crew(factory, [_turn(factory, lines)], catalogue)
+
+
+def _turn(factory: Factory, lines: Iterable[Line]) -> list[int]:
+    """For each robot of the factory the one robot of its line."""
     on = line_of(len(factory.robots), lines)
     number = {head: n for n, head in enumerate(sorted({*on}))}
-    return with_crew(factory, [[number[head] for head in on]], catalogue)
+    return [number[head] for head in on]
 
 
 def _tool_lines(factory: Factory, lines: Sequence[Line]) -> list[Line]:

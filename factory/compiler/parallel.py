@@ -17,13 +17,13 @@ Guarantees: so, or it is refused (Parallel).
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from itertools import accumulate
 from math import lcm
 
-from factory.compiler.assigning import assigned
 from factory.compiler.tees import ROOM
 from factory.plant.factory import Factory
 from factory.problem.pag import NOPART
+from factory.problem.plan import Plan
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 from factory.support.settings import MOST_BRANCHES
 
@@ -31,8 +31,8 @@ Branches = Sequence[tuple[str, int]]
 """Labels, and how often the branch that brings each is to be there."""
 
 
-def in_parallel(factory: Factory, branches: Branches) -> Factory:
-    """The factory with branches that are there several times. Raises InputError (Parallel) with
+def in_parallel(factory: Factory, branches: Branches) -> Plan:
+    """The plan with branches that are there several times. Raises InputError (Parallel) with
     everything that forbids it."""
     faults = [*_faults(factory, branches)]
     if faults:
@@ -47,18 +47,12 @@ def in_parallel(factory: Factory, branches: Branches) -> Factory:
         names = ", ".join(f"{label} = {k}" for label, k in branches)
         message = f"{names} would make {units} units in one period; {MOST_BRANCHES} are the most"
         raise InputError(_fault(message, None, "take numbers with a small common multiple"))
-    return _unrolled(factory, lines, period) if period > 1 else factory
-
-
-def _unrolled(factory: Factory, lines: Sequence[int], period: int) -> Factory:
-    """The factory of a period of units, with so many robots for each."""
-    first = [sum(lines[:robot]) for robot in range(len(lines))]
-    places = [r.index for r in factory.robots for _ in range(lines[r.index])]
-    robots = [
-        replace(factory.robots[robot], index=n, name=f"r{n + 1}") for n, robot in enumerate(places)
-    ]
-    turns = [[first[r] + t % count for r, count in enumerate(lines)] for t in range(period)]
-    return assigned(factory, robots, turns)
+    if period == 1:
+        return factory.plan
+    first = [0, *accumulate(lines)]
+    return factory.plan.then(
+        [[first[r] + t % count for r, count in enumerate(lines)] for t in range(period)]
+    )
 
 
 def _brings(factory: Factory, label: str) -> int:

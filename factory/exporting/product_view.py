@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from factory.exporting.subject import safe_name
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product, Solid
 from factory.support.canvas import Box, Canvas, Point
@@ -120,7 +121,7 @@ class ViewSheet:
 def picture_names(kind: str, labels: Iterable[str]) -> list[str]:
     """File names of the pictures of some labels: numbered, so that no two are the same, with the
     characters of the label that are safe in a name."""
-    safe = ("".join(c if c.isalnum() or c in "-_." else "_" for c in label) for label in labels)
+    safe = map(safe_name, labels)
     return [f"{kind}-{n:03d}-{name[:40]}.svg" for n, name in enumerate(safe, start=1)]
 
 

@@ -199,9 +199,9 @@ def play(net: MarkedNet, firings: Mapping[int, int]) -> tuple[int, ...]:
     return tuple(sequence)
 
 
-def run_down(net: MarkedNet, most: int = RUN_DOWN) -> tuple[int, ...] | None:
+def run_down(net: MarkedNet) -> tuple[int, ...] | None:
     """A sequence from m_0 after which nothing is enabled any more; None where a marked graph has
-    none of at most so many firings: what is enabled in one stays so until it fires, so each way to
+    none of at most RUN_DOWN firings: what is enabled in one stays so until it fires, so each way to
     fire comes as far."""
     tokens, firing = list(net.tokens), list[int]()
     ready = [event for event in range(len(net.net.transitions)) if event not in net.blocked]
@@ -209,7 +209,7 @@ def run_down(net: MarkedNet, most: int = RUN_DOWN) -> tuple[int, ...] | None:
         event = ready.pop()
         if not all(tokens[p] for p in net.net.preset[event]):
             continue
-        if len(firing) == most:
+        if len(firing) == RUN_DOWN:
             return None
         firing.append(event)
         net.fire(tokens, event)

@@ -138,9 +138,9 @@ def near_file(folder: str, path: str) -> str:
     return did_you_mean(path, shown, f"'{suffix}' files there") if alike else ""
 
 
-def quoted(text: str, width: int = 60) -> str:
+def quoted(text: str) -> str:
     """A found text in quotes, on one line: unprintable characters escaped, long texts cut."""
-    cut = text if len(text) <= width else text[: width - 3] + "..."
+    cut = text if len(text) <= 60 else text[:57] + "..."
     shown = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in cut)
     if shown.startswith('"'):
         return shown

@@ -134,12 +134,6 @@ def _usual(candidates: Sequence[Settings]) -> Settings:
     return next(s for s in candidates if s.steps >= USUAL)
 
 
-def predicted_error(settings: Settings, layout: Layout, jitter: float = 0.0) -> float:
-    """The largest error of an axis against its reference that a run may show [m]; a gap between two
-    robots, and the residual of a weld, may be twice that."""
-    return max(axis.error(settings) for axis in _axes(settings, layout, jitter))
-
-
 def _good(settings: Settings, axes: Sequence[DrivenAxis]) -> bool:
     """Whether no error is beyond what is allowed, every end stop holds, and no axis is kept out of
     its goal ball, but for one that is kept out with the usual timestep as well."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import groupby
 from operator import itemgetter
 from types import MappingProxyType
@@ -49,13 +49,11 @@ class Ordered:
     """A live marked graph `net` with order places, the last of its places, and what they are for.
 
     `places`: by each pair that they order the order places that it asked for, which may be none
-    where all are implied by others. `overlapping`: the pairs that the sequence marks together, for
-    which there is no order place.
+    where all are implied by others.
     """
 
     net: MarkedNet
     places: Mapping[Pair, tuple[int, ...]]
-    overlapping: tuple[Pair, ...] = field(default=())
 
 
 def ordered(
@@ -74,10 +72,8 @@ def ordered(
     """
     when = times(net, sequence)
     paths, added = _Paths(net), dict[Pair, list[_Arc]]()
-    overlapping = []
     for p, q in dict.fromkeys(pairs):
         if overlap(net, when, (p, q)):
-            overlapping.append((p, q))
             continue
         added[p, q] = []
         for both in ((p, q), (q, p)):
@@ -96,7 +92,7 @@ def ordered(
     places = {
         pair: tuple(number[arc] for arc in arcs if arc in number) for pair, arcs in added.items()
     }
-    return Ordered(_with_order(net, kept), places, tuple(overlapping))
+    return Ordered(_with_order(net, kept), places)
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,15 +21,13 @@ LIFT = "lift"
 
 @dataclass(frozen=True, slots=True)
 class RobotType:
-    """T: its name, MJCF file, the type it extends ("" for none) and its purpose. `stretches`: the
-    directions in which its workspace may be made longer (`along`); `moves`: what its axes do: go
-    `along` a guidepath, `up`, or `turn` about the vertical. `fixed`: it stands at its station, and
-    turns what it holds; `lowers`: it lowers what it delivers."""
+    """T: its name, MJCF file, the type it extends ("" for none) and its purpose. `moves`: what
+    its axes do: go `along` a guidepath, `up`, or `turn` about the vertical. `fixed`: it stands at
+    its station, and turns what it holds; `lowers`: it lowers what it delivers."""
 
     name: str
     mjcf: Path
     extends: str = ""
-    stretches: tuple[str, ...] = ("along",)
     summary: str = ""
     moves: tuple[str, ...] = ("along",)
     fixed: bool = False
@@ -90,7 +88,6 @@ def _types(path: Path) -> dict[str, RobotType]:
                 name,
                 path.parent / str(entry["mjcf"]),
                 str(entry.get("extends", "")),
-                tuple(entry.get("stretches", ("along",))),
                 str(entry.get("summary", "")),
                 tuple(entry.get("moves", ("along",))),
                 bool(entry.get("fixed", False)),

@@ -56,7 +56,7 @@ LIMITS = (
         at="contact_first_s",
     ),
     FigureLimit("EngineWarning", "engine_warnings", 0, "{:g} engine warnings"),
-    FigureLimit("HandOffGap", "handoff_gap_max_mm", 1.0, "a hand-off with a gap of {:.2f} mm"),
+    FigureLimit("HandOffGap", "handoff_gap_max_mm", 1, "a hand-off with a gap of {:.2f} mm"),
     FigureLimit("HandOffTurn", "handoff_angle_max_deg", 0.1, "a hand-off turned by {:.2f}°"),
     FigureLimit("GripGap", "grip_gap_max_mm", 0.5, "a pad {:.2f} mm from the part it takes"),
     FigureLimit(
@@ -75,6 +75,9 @@ LIMITS = (
     ),
 )
 """The bounds on the bodies, in addition to the findings of the monitor."""
+
+MOST = {limit.figure: limit.most for limit in LIMITS}
+"""The bound on each figure."""
 
 NAMES = tuple(dict.fromkeys(limit.names for limit in LIMITS if limit.names))
 """The figures that list bodies in contact or out of place."""

@@ -1,5 +1,4 @@
-"""Cycle times: of a gear net by its gears, of a gear train, and of any live marked graph, by its
-critical circuit."""
+"""Cycle times: of a gear net by its gears, and of a gear train by its critical circuit."""
 
 from __future__ import annotations
 
@@ -7,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from factory.nets.cycle_ratio import CycleRatio, max_cycle_ratio
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked
 from factory.nets.ways import train_ratio
@@ -70,13 +68,3 @@ def _seconds(net: MarkedNet, delays: Delays) -> list[float]:
     if any(not delay >= 0 for delay in seconds):
         raise ValueError("delays must be numbers, and not negative")
     return seconds
-
-
-def marked_graph_cycle_time(net: GearNet | MarkedNet, delays: Delays) -> CycleRatio:
-    """The greatest quotient of delays [s] and tokens over the circuits of a net, and one circuit
-    that attains it.
-
-    Raises ValueError where the net is no marked graph, has no circuit or is not live.
-    """
-    subject = marked(net)
-    return max_cycle_ratio(subject, _seconds(subject, delays))

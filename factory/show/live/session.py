@@ -73,8 +73,7 @@ class WallClock:
     """Real time against simulated time, which passes `speed` times as fast; 0: without limit.
     `begun`, `marks`: pairs (real, simulated) [s], at the start and recently."""
 
-    def __init__(self, speed: float = 1.0) -> None:
-        self.speed = speed
+    speed = 1.0
 
     def start(self, time: float) -> None:
         """Restart at a simulated time."""

@@ -32,7 +32,7 @@ class Drives:
     axes of which at most one moves; their buffers are of one size, and side by side.
 
     `mass` [kg] (axes,): what the force of a setpoint accelerates; `own` without a load. `weight`
-    [N] (axes,): what it carries. `control` (axes,): where an axis's setpoint is in `ctrl`. Where a
+    [N] (axes,): what it carries.  Where a
     guidepath has bends an axis has two drives, one for each slide (`across`).
     """
 
@@ -48,7 +48,6 @@ class Drives:
         self._across = across
         if across is not None:
             actuators = np.concatenate([actuators, across.actuator])
-        self.control = m.actuator_ctrladr[actuators]
         self.timestep = float(m.opt.timestep)
         self._d, self._actuators = d, actuators
         self._history = m.actuator_delay, m.actuator_history[:, 0]

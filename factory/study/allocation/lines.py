@@ -86,7 +86,7 @@ class Shift:
 
     def plan(self, filling: Filling) -> Plan:
         """The plan with the lines for a filling."""
-        return fold(self.timing.factory, self.lines(filling), self.catalogue).plan
+        return fold(self.timing.factory, self.lines(filling), self.catalogue)
 
 
 def joined(sets: Iterable[set[int]]) -> tuple[Line, ...]:

@@ -287,13 +287,13 @@ def _share(timing: Timing, net: TimedNet, number: int) -> Share:
     return Share(robot.name, moving, working, max(0.0, spent - moving - working), cycle - spent)
 
 
-def steady_units(timing: Timing, wip: int | None = None) -> int:
+def steady_units(timing: Timing) -> int:
     """Least number of products, 4 to 100, from which on the predicted mean interval between
     dropoffs over their last half (the `cycle_time_s` of a run) is that of the long run.
 
     Robots before the bottleneck fill first; until then products come at the pace of other robots.
     """
-    net = timed_net(timing, wip=wip)
+    net = timed_net(timing)
     dates = leaving_dates(timing, net.firings(MOST))[:MOST]
     return reached(dates, net.pace, net.units)
 

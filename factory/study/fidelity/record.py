@@ -5,10 +5,11 @@ Those that a run measures itself have the name and the value of `run --json`."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
+from factory.record.verdict import MOST
 from factory.support.errors import Diagnostic
 
 
@@ -87,9 +88,8 @@ _ALL = (
         "handoff_gap_max_mm",
         "mm",
         "Largest distance between the two frames a weld joins, just before it is switched on.",
-        1,
     ),
-    Quantity("handoff_angle_max_deg", "deg", "Largest angle between them, likewise.", 0.1),
+    Quantity("handoff_angle_max_deg", "deg", "Largest angle between them, likewise."),
     Quantity(
         "weld_residual_max_mm",
         "mm",
@@ -101,9 +101,8 @@ _ALL = (
         "mm",
         "Largest displacement of any vertex of any part from its place in the product, when it is "
         "dropped off, after a rigid fit on the first part.",
-        0.1,
     ),
-    Quantity("product_angle_max_deg", "deg", "Largest angle of a part from its place.", 0.1),
+    Quantity("product_angle_max_deg", "deg", "Largest angle of a part from its place."),
     Quantity(
         "hidden_penetration_max_mm",
         "mm",
@@ -117,7 +116,6 @@ _ALL = (
         "mm",
         "Largest distance between the pads of a robot, a feeder or the tray and the nearest of the "
         "bodies that it takes, when it takes its first.",
-        0.5,
     ),
     Quantity(
         "grip_strength_share_max",
@@ -137,12 +135,14 @@ _ALL = (
     Quantity("force_peak_percent", "%", "Largest force of a drive over its limit.", 100),
     Quantity("drive_work_J", "J", "Work of all drives: the integral of |force x speed|."),
     Quantity("moved_mass_kg", "kg", "Mass of everything that can move: carriages, tray, parts."),
-    Quantity("unintended_contacts", "onsets", "Onsets of unintended contact.", 0),
-    Quantity("engine_warnings", "warnings", "Warnings of the engine.", 0),
+    Quantity("unintended_contacts", "onsets", "Onsets of unintended contact."),
+    Quantity("engine_warnings", "warnings", "Warnings of the engine."),
 )
 
-QUANTITIES: Mapping[str, Quantity] = MappingProxyType({q.key: q for q in _ALL})
-"""Every quantity by its key, in the order of the reports."""
+QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
+    {q.key: replace(q, limit=MOST.get(q.key, q.limit)) for q in _ALL}
+)
+"""Every quantity by its key, in the order of the reports, with the limits of a run's verdict."""
 
 
 Figures = Mapping[str, float | None]
