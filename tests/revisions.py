@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import random
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from factory.compiler.compiler import compile_pag
+from factory.layout import inheriting
+from factory.layout.certificate import ALWAYS, Certificate
+from factory.layout.inheriting import Inheritance
+from factory.layout.pins import SAME
 from factory.pipeline import all_templates
 from factory.plant.matching import matching
 from factory.plant.pairing import Pairing
@@ -110,3 +116,29 @@ def kept_share(pag: PAG, new: PAG) -> Counter[str]:
     names = ("old", "paired", "program", "contents")
     counts = (len(pairing.old.robots), len(pairing.robots), len(same), contents)
     return Counter(dict(zip(names, counts, strict=True)))
+
+
+def refuted(
+    mine: Inheritance, old: Certificate, new: Certificate, pairing: Pairing
+) -> Iterator[str]:
+    """What is wrong with what a certificate has inherited: an entry that is not in the old
+    certificate, or is of something else. Uses nothing of how it was found."""
+    if not old.holds:
+        yield "the old certificate does not hold"
+    for number, other in mine.regions.items():
+        if not (0 <= number < len(new.regions) and 0 <= other < len(old.regions)):
+            yield f"entry {number}: there is no such region"
+            continue
+        one, before = new.regions[number], old.regions[other]
+        name = f"entry {number}, {one.label or 'a body'} of {new.robots[one.robot]}"
+        away = np.array(one.box) - before.box - np.repeat(mine.shift, 2)
+        if np.abs(away).max() > SAME or one.z != before.z:
+            yield f"{name}: it is elsewhere than in the old certificate"
+        if (one.layer, one.kind) != (before.layer, before.kind):
+            yield f"{name}: it is of another kind"
+        mode = pairing.operations.get(before.mode, ALWAYS) if before.mode >= 0 else ALWAYS
+        if pairing.robots.get(before.robot) != one.robot or mode != one.mode:
+            yield f"{name}: it is of another robot, or in another mode"
+    kept = [r for n, r in enumerate(new.regions) if n in mine.regions]
+    if (mine.pairs, mine.inherited) != (inheriting._pairs([*new.regions]), inheriting._pairs(kept)):
+        yield "the pairs are miscounted"

@@ -8,7 +8,8 @@ import pytest
 
 import factory.simulation.modelling as modelling
 from factory.commands.monitor import say_failures
-from factory.layout.bins import Bin, bin_regions, bins_of
+from factory.layout import bins
+from factory.layout.bins import Bin, bins_of
 from factory.layout.certificate import BIN_BODY, Region
 from factory.layout.clearance import ClearanceSearch
 from factory.layout.dimensions import LAYERS
@@ -21,11 +22,23 @@ from tests.simulation_values import layout_of
 from tests.test_recovery import assert_recovered, run_with
 
 
-def unsettled(layout: Layout, bins: tuple[Bin, ...]) -> list[tuple[Region, Region]]:
+def bin_regions(layout: Layout, made: tuple[Bin, ...]) -> list[Region]:
+    """The floor that bins take, and the ways of things into them."""
+    whole = layout.whole
+    by_label = piles(whole.factory, whole.product)
+    result = list[Region]()
+    for one in made:
+        held = bins._held(whole, one.robot, by_label, frozenset())
+        flown = [each for each in held if layout.named(each[0]) in one.labels]
+        result += [*bins._stands(one), *bins._flights(one, flown)]
+    return result
+
+
+def unsettled(layout: Layout, made: tuple[Bin, ...]) -> list[tuple[Region, Region]]:
     """Pairs of regions that are too near by the check that certifies a layout, one of a bin or of
     what flies into it."""
     others = regions(layout, piles(layout.factory, layout.product))
-    added = bin_regions(layout, bins)
+    added = bin_regions(layout, made)
     mine, search = {id(region) for region in added}, ClearanceSearch(layout, [*others, *added])
     return [
         (one, other)
@@ -45,9 +58,9 @@ def flights(added: list[Region]) -> set[int]:
 @pytest.mark.parametrize("name", ["paper", "chest"])
 def test_bins_are_clear_of_everything(name: str) -> None:
     layout = layout_of(name)
-    bins = bins_of(layout)
-    assert bins and unsettled(layout, bins) == []
-    assert len({one.robot for one in bins}) == len(bins)
+    made = bins_of(layout)
+    assert made and unsettled(layout, made) == []
+    assert len({one.robot for one in made}) == len(made)
 
 
 def test_a_bin_elsewhere_is_found() -> None:

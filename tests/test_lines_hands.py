@@ -17,7 +17,6 @@ from factory.layout import hanging
 from factory.layout.clearance import certify
 from factory.layout.feeding import feeder_of
 from factory.layout.hands import holding
-from factory.layout.hands.choosing import Hands
 from factory.layout.hands.hand import AIR, Hand
 from factory.layout.hands.limbs import limbs
 from factory.layout.hands.places import Places
@@ -296,16 +295,6 @@ def test_nothing_is_shifted_where_no_robot_has_several_tours() -> None:
     assert project("shelf", hands=0).layout.factory.adjusted == frozenset()
     (robot,) = project("shelf").layout.factory.adjusted
     assert project("shelf").factory.robots[robot].type == "lift"
-
-
-def test_it_is_known_before_which_can_share_a_hand() -> None:
-    alone = project("two kinds", shared=False)
-    hands = Hands(alone.layout.factory, alone.product)
-    brings = {alone.layout.factory.deliveries(r)[0]: r for r in (1, 2)}
-    assert not hands.together([brings["low"], brings["ball"]])
-    blocks = project("blocks", shared=False)
-    hands = Hands(blocks.layout.factory, blocks.product)
-    assert hands.together([1, 2, 3])
 
 
 def test_what_no_hand_of_a_line_can_hold_is_said() -> None:

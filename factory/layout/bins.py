@@ -8,7 +8,7 @@ the clearance certificate. Where there is no room there is no bin.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -85,18 +85,6 @@ def bins_of(layout: Layout) -> tuple[Bin, ...]:
             made.append(bin_)
             added += _stands(bin_)
     return tuple(replace(one, labels=frozenset(map(named, one.labels))) for one in made)
-
-
-def bin_regions(layout: Layout, bins: Iterable[Bin]) -> list[Region]:
-    """The floor that bins take, and the ways of things into them."""
-    whole = layout.whole
-    by_label = piles(whole.factory, whole.product)
-    result = list[Region]()
-    for one in bins:
-        held = _held(whole, one.robot, by_label, frozenset())
-        flown = [each for each in held if layout.named(each[0]) in one.labels]
-        result += [*_stands(one), *_flights(one, flown)]
-    return result
 
 
 Held = list[tuple[str, Pile]]

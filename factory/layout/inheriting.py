@@ -8,15 +8,14 @@ them still holds, word for word; only pairs with a region that is new are comput
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.layout.certificate import ALWAYS, Certificate, Region
+from factory.layout.certificate import ALWAYS, Region
 from factory.layout.guidepath import Point2
 from factory.layout.layout import Layout
-from factory.layout.pins import SAME
 from factory.plant.pairing import Pairing
 
 
@@ -46,29 +45,6 @@ class Inheritance:
         kept = [r for n, r in enumerate(new.certificate.regions) if n in regions]
         counts = _pairs([*new.certificate.regions]), _pairs(kept)
         return cls(regions, *counts, shift)
-
-    def refuted(self, old: Certificate, new: Certificate, pairing: Pairing) -> Iterator[str]:
-        """What is wrong with it: an entry that is not in the old certificate, or is of something
-        else. Uses nothing of how it was found."""
-        if not old.holds:
-            yield "the old certificate does not hold"
-        for number, other in self.regions.items():
-            if not (0 <= number < len(new.regions) and 0 <= other < len(old.regions)):
-                yield f"entry {number}: there is no such region"
-                continue
-            one, before = new.regions[number], old.regions[other]
-            name = f"entry {number}, {one.label or 'a body'} of {new.robots[one.robot]}"
-            away = np.array(one.box) - before.box - np.repeat(self.shift, 2)
-            if np.abs(away).max() > SAME or one.z != before.z:
-                yield f"{name}: it is elsewhere than in the old certificate"
-            if (one.layer, one.kind) != (before.layer, before.kind):
-                yield f"{name}: it is of another kind"
-            mode = pairing.operations.get(before.mode, ALWAYS) if before.mode >= 0 else ALWAYS
-            if pairing.robots.get(before.robot) != one.robot or mode != one.mode:
-                yield f"{name}: it is of another robot, or in another mode"
-        kept = [r for n, r in enumerate(new.regions) if n in self.regions]
-        if (self.pairs, self.inherited) != (_pairs([*new.regions]), _pairs(kept)):
-            yield "the pairs are miscounted"
 
 
 def _key(region: Region) -> tuple[object, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -164,13 +163,3 @@ class _Walk:
 
     def _delivered(self, members: Units, held: float) -> None:
         self.seconds.append(held + float(self.site.expected.delivering(self.site.size(members))))
-
-
-def walk_joins(tree: Tree) -> Iterator[Tree]:
-    """All sub-trees that join or relay something, inner ones first, in the order of
-    `Judged.joins`."""
-    if isinstance(tree, int):
-        return
-    for below in tree:
-        yield from walk_joins(below)
-    yield tree

@@ -83,10 +83,10 @@ def one_line(text: str) -> str:
     return "".join(c if c.isprintable() else " " for c in text)
 
 
-def _window(source: str, caret: int, width: int = 100) -> tuple[str, int]:
+def _window(source: str, caret: int) -> tuple[str, int]:
     """The part of a long source line around the caret, and the caret's column in it."""
-    start = max(0, caret - width // 2) if len(source) > width else 0
-    return source[start : start + width], caret - start
+    start = max(0, caret - 50) if len(source) > 100 else 0
+    return source[start : start + 100], caret - start
 
 
 class FactoryError(Exception):

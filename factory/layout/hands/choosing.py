@@ -21,9 +21,8 @@ from factory.geometry.solids import Product
 from factory.layout.hands.hand import Hand, Point3
 from factory.layout.hands.holding import Holding, held
 from factory.layout.hands.in_the_way import InTheWay
-from factory.layout.hands.one_hand import Fit, OneHand
+from factory.layout.hands.one_hand import OneHand
 from factory.layout.hands.places import PUSH, centre_of
-from factory.layout.hands.reach import back
 from factory.layout.hands.surfaces import Way
 from factory.layout.stops import stops_of
 from factory.plant.factory import Factory, Robot
@@ -99,7 +98,6 @@ class Hands:
         self.one_hand = OneHand(self.in_the_way, adjusted)
         self._chosen: dict[tuple[tuple[int, ...], object], tuple[Hand, ...]] = {}
         self._settled = set[tuple[int, ...]]()
-        self._fits: dict[int, frozenset[Fit]] = {}
         self.travels: dict[int, float] = {}
         self._on = {tour: of for of in self.tours.of for tour in of}
 
@@ -119,21 +117,6 @@ class Hands:
         places = [hand.places[0] for hand in self._of(tours, u, t)]
         offsets = np.round(np.array(places[:1]) - places, 6) + 0.0
         return tuple((x, y, z) for x, y, z in offsets.tolist())
-
-    def together(self, robots: Sequence[int]) -> bool:
-        """Whether robots with one tour each could share a hand, by estimate: in some frame a hand
-        of one kind holds what each of them brings. Sizes of tips and the hands of other lines are
-        not considered."""
-        tours = [tour for robot in robots for tour in self.tours.of[robot]]
-        if any(not held(self.holding.factory, tour) for tour in tours):
-            return True
-        for tour in tours:
-            if tour not in self._fits:
-                self._fits[tour] = self.one_hand.fits(tour)
-        common = frozenset.intersection(*(self._fits[tour] for tour in tours))
-        if not any(map(self.holding.is_carrier, tours)):
-            return bool(common)
-        return any((u, back(t), kind, z) in common for u, t, kind, z in common)
 
     def carries(self, robot: int) -> bool:
         """Whether other robots come to a robot, with an input or to work on its payload."""
