@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from factory.exporting.subject import safe_name
+from factory.exporting.subject import file_name
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product, Solid
 from factory.support.canvas import Box, Canvas, Point
@@ -121,8 +121,8 @@ class ViewSheet:
 def picture_names(kind: str, labels: Iterable[str]) -> list[str]:
     """File names of the pictures of some labels: numbered, so that no two are the same, with the
     characters of the label that are safe in a name."""
-    safe = map(safe_name, labels)
-    return [f"{kind}-{n:03d}-{name[:40]}.svg" for n, name in enumerate(safe, start=1)]
+    safe = (file_name(label, set())[:40] for label in labels)
+    return [f"{kind}-{n:03d}-{name}.svg" for n, name in enumerate(safe, start=1)]
 
 
 def bodies_of(product: Product, label: str) -> tuple[Array, ...]:

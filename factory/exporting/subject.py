@@ -100,15 +100,10 @@ def wanted(subject: Subject, ending: str) -> Iterator[tuple[str, str]]:
         yield node.label, f"{name}{ending}"
 
 
-def safe_name(label: str) -> str:
-    """A label with "_" for each character that a file name should not have."""
-    return "".join(c if c.isalnum() or c in "-_." else "_" for c in label)
-
-
 def file_name(label: str, taken: set[str]) -> str:
     """A file name for a label, distinct from those `taken` whatever the case; the label itself
     where that is a safe name."""
-    safe = safe_name(label).strip(".") or "_"
+    safe = "".join(c if c.isalnum() or c in "-_." else "_" for c in label).strip(".") or "_"
     name, number = safe[:80], 2
     while name.casefold() in taken:
         name, number = f"{safe[:80]}~{number}", number + 1

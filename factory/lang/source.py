@@ -138,6 +138,11 @@ def near_file(folder: str, path: str) -> str:
     return did_you_mean(path, shown, f"'{suffix}' files there") if alike else ""
 
 
+def counted(number: int, noun: str) -> str:
+    """How many there are of what a noun names: `1 part`, `2 parts`."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
 def quoted(text: str) -> str:
     """A found text in quotes, on one line: unprintable characters escaped, long texts cut."""
     cut = text if len(text) <= 60 else text[:57] + "..."

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from lark import Token
 
 from factory.lang.failures import FailureReader
-from factory.lang.source import Findings, quoted
+from factory.lang.source import Findings, counted, quoted
 from factory.lang.template_syntax import Labels, ParameterClause, RawLaw, TemplateDraft, Words
 from factory.lang.values import GEOMETRY, ValueReader
 from factory.lang.words import LABEL_HINT, is_label, is_number, number
@@ -126,7 +126,7 @@ class TemplateMaker:
             return None
         robot = int(match[2]) if len(match[2]) < 9 else 0
         if robot < 1 or (count is not None and robot > count):
-            most = _counted(count, "robot") if count else "robots from 1 on"
+            most = counted(count, "robot") if count else "robots from 1 on"
             hint = f"R has {most}; points are named {match[1]}1 to {match[1]}{count or 'k'}"
             self._bad(f"{quoted(' '.join(words))} names robot {match[2]}", first, hint)
             return None
@@ -141,7 +141,7 @@ class TemplateMaker:
         if count is not None and len(points) != count:
             hint = "F moves every robot of R: write one point for each, in order"
             at = raw.goals[0][0] if raw.goals else raw.name
-            goals, robots = _counted(len(points), "goal"), _counted(count, "robot")
+            goals, robots = counted(len(points), "goal"), counted(count, "robot")
             self._bad(f"F has {goals} for {robots}", at, hint)
         eps = self._radius(raw.eps)
         dwell = self._dwell(raw.dwell, parameters) if raw.dwell else None
@@ -246,7 +246,7 @@ class TemplateMaker:
         for side, words in zip("ab", labels, strict=True):
             if count is not None and len(words) != count:
                 hint = f"write one label for each robot of R, as in {_LABELS_HINT}"
-                labelled, robots = _counted(len(words), "label"), _counted(count, "robot")
+                labelled, robots = counted(len(words), "label"), counted(count, "robot")
                 message = f"{side} has {labelled} for {robots}"
                 self._bad(message, words[0] if words else self._head("<a; b>"), hint)
             for word in words:
@@ -302,10 +302,6 @@ class TemplateMaker:
                 )
                 hint = "only the carrier holds something afterwards: write nopart"
                 self.findings.add("GearNotClosed", message, word, hint)
-
-
-def _counted(count: int, noun: str) -> str:
-    return f"{count} {noun}" + "s" * (count != 1)
 
 
 def _multiple(match: re.Match[str]) -> float | None:

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from factory.control.mode import Array
+from factory.lang.source import counted
 from factory.mjcf import names
 from factory.record.monitor.subject import MonitorSubject
 from factory.rendering.action import Snapshot
@@ -66,7 +67,8 @@ class Take:
         """The line below the title, about the factory."""
         factory = self.subject.factory
         parts, robots = len(factory.leaves), len(factory.robots)
-        return f"{_count(parts, 'part')}, {_count(robots, 'robot')}, {_count(self.units, 'unit')}"
+        units = counted(self.units, "unit")
+        return f"{counted(parts, 'part')}, {counted(robots, 'robot')}, {units}"
 
 
 class Camerawork(Closing):
@@ -134,10 +136,6 @@ class Panels:
             drawn = panel.draw(time, qpos[self.slides], elapsed)
             composed[area.top : area.top + area.height, area.left : area.left + area.width] = drawn
         return composed
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def pictureless() -> InputError:

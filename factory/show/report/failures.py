@@ -7,6 +7,7 @@ from html import escape
 from math import isfinite
 from typing import Any
 
+from factory.lang.source import counted
 from factory.record.failures import Death, Failing, Failures, deaths
 from factory.show.report.recording import Recording
 
@@ -69,13 +70,13 @@ def _summary(failures: Failures) -> str:
     """The counts of all failures, in words."""
     struck = ", ".join(f"{n} {kind.replace('_', ' ')}" for kind, n in failures.struck.items() if n)
     figures = (
-        _count(len(failures.found), "failure"),
-        f"{_count(failures.undone, 'transition')} undone",
+        counted(len(failures.found), "failure"),
+        f"{counted(failures.undone, 'transition')} undone",
         f"{failures.scrapped} scrapped",
-        f"{_count(failures.spares, 'spare')} used",
-        f"{_count(failures.contacts, 'contact')} with fallen or misplaced parts",
+        f"{counted(failures.spares, 'spare')} used",
+        f"{counted(failures.contacts, 'contact')} with fallen or misplaced parts",
     )
-    detection = f"{failures.missed} missed, {_count(failures.false_alarms, 'false alarm')}"
+    detection = f"{failures.missed} missed, {counted(failures.false_alarms, 'false alarm')}"
     return f"Faults: {struck or 'none'}; {detection}. {', '.join(figures)}."
 
 
@@ -91,7 +92,3 @@ def _row(recording: Recording, one: Failing) -> str:
     cells = (one.done, names or "–", ", ".join(one.scrapped) or "–")
     values = "".join(f"<td>{escape(cell)}</td>" for cell in cells)
     return f"<tr><th>{one.t:.2f} s</th><td>{escape(one.what)}</td>{values}</tr>"
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"
