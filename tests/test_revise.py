@@ -262,22 +262,25 @@ def test_equal_names_with_other_content_are_told_apart(tmp_path: Path) -> None:
     assert read_pag(write_pag(made.pag), all_templates()) == made.pag
 
 
-def test_meshes_of_a_family_are_found_from_its_folder(tmp_path: Path) -> None:
+def basic() -> PAG:
+    """A gearbox without its wheel."""
     gearbox = example("gearbox")
-    nodes = tuple(n for n in gearbox.nodes if n.label != "wheel")
-    less = replace(
-        gearbox,
-        root="basic",
-        nodes=tuple(
-            replace(
-                n,
-                label="basic" if n.label == "gearbox" else n.label,
-                inputs=tuple(x for x in n.inputs if x != "wheel"),
-            )
-            for n in nodes
-        ),
-    )
-    made = family(gearbox, less, (1, 1), tmp_path)
+    nodes = {node.label: node for node in gearbox.nodes if node.label != "wheel"}
+    made = nodes.pop("gearbox")
+    inputs = tuple(x for x in made.inputs if x != "wheel")
+    made = replace(made, label="basic", inputs=inputs)
+    return replace(gearbox, root="basic", nodes=(made, *nodes.values()))
+
+
+def test_screws_that_come_to_one_place_on_two_lines_are_not_a_tee() -> None:
+    """Where one has to go further back, it gets a longer way."""
+    layout = project(basic()).layout
+    assert layout.certificate is not None and layout.certificate.holds
+    assert layout.stems == frozenset()
+
+
+def test_meshes_of_a_family_are_found_from_its_folder(tmp_path: Path) -> None:
+    made = family(example("gearbox"), basic(), (1, 1), tmp_path)
     meshes = (str(part.parameter("mesh")) for part in made.pag.parts())
     assert all((tmp_path / mesh).is_file() for mesh in meshes)
 

@@ -122,15 +122,16 @@ class Layout(Keeping, Pictured):
 
     @cached_property
     def stems(self) -> frozenset[int]:
-        """The robots (index) whose guidepaths end at the same point as another's."""
-        ends = [(path.a, path.heading) for path in self.guidepaths]
+        """The robots (index) whose guidepaths end at the same point of the same line as
+        another's."""
+        ends = [(path.a, path.heading, path.offset) for path in self.guidepaths]
         several = {end for end, count in Counter(ends).items() if count > 1}
         return frozenset(robot for robot, end in enumerate(ends) if end in several)
 
     def share_stem(self, one: int, other: int) -> bool:
-        """Whether the guidepaths of two robots end at the same point."""
-        first, second = self.guidepaths[one], self.guidepaths[other]
-        return (first.a, first.heading) == (second.a, second.heading)
+        """Whether the guidepaths of two robots end at the same point of the same line."""
+        ends = [(path.a, path.heading, path.offset) for path in self.guidepaths]
+        return ends[one] == ends[other]
 
     @property
     def area(self) -> float:
