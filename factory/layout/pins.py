@@ -97,7 +97,7 @@ def same_module(layouts: tuple[Layout, Layout], robots: tuple[int, int]) -> bool
     output robot's path does not count."""
     paths = [made.guidepaths[robot] for made, robot in zip(layouts, robots, strict=True)]
     hands = [made.hand(robot) for made, robot in zip(layouts, robots, strict=True)]
-    holds = [hand and (hand.kind, hand.tip, hand.places) for hand in hands]
+    holds = [hand and (hand.kind, hand.tip, hand.places, hand.radius) for hand in hands]
     lengths = np.array([[path.offset, path.arm, path.travel * (robots[0] > 0)] for path in paths])
     return holds[0] == holds[1] and bool(np.abs(lengths[0] - lengths[1]).max() < SAME)
 

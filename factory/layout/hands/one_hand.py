@@ -108,7 +108,8 @@ class OneHand:
         return best
 
     def like(self, hand: Hand, tour: int, frames: Frames) -> tuple[Hand, ...]:
-        """The hand of one tour that holds by the same places as another; empty if it cannot."""
+        """The hand of one tour that holds by the same places as another, by the same pads where it
+        can; empty if it cannot."""
         if hand.kind not in self._kinds(tour) or not self._possible(hand.kind, tour, frames):
             return ()
         groups = self._groups(hand.kind, tour, frames, 0.0)
@@ -118,7 +119,8 @@ class OneHand:
         away[~np.isfinite(groups.cost(hand.tip))] = np.inf
         if not away.min(initial=np.inf) < LEVEL:
             return ()
-        same = groups.among(np.array([away.argmin()]))
+        wider = np.abs(groups.places.radius[groups.chosen] - hand.radius).max(axis=1)
+        same = groups.among(np.lexsort((wider, away.round(6)))[:1])
         if hand.kind == "behind" and not self._below_pads([tour], [same]):
             return ()
         return self._hands(hand.kind, [tour], frames, hand.tip, [same])
