@@ -122,16 +122,15 @@ class Layout(Keeping, Pictured):
 
     @cached_property
     def stems(self) -> frozenset[int]:
-        """The robots (index) whose guidepaths end at the same point of the same line as
-        another's."""
+        """The robots (index) whose guidepaths end at one point of a line with another's."""
         ends = [(path.a, path.heading, path.offset) for path in self.guidepaths]
         several = {end for end, count in Counter(ends).items() if count > 1}
         return frozenset(robot for robot, end in enumerate(ends) if end in several)
 
     def share_stem(self, one: int, other: int) -> bool:
         """Whether the guidepaths of two robots end at the same point of the same line."""
-        ends = [(path.a, path.heading, path.offset) for path in self.guidepaths]
-        return ends[one] == ends[other]
+        first, second = self.guidepaths[one], self.guidepaths[other]
+        return (first.a, first.heading, first.offset) == (second.a, second.heading, second.offset)
 
     @property
     def area(self) -> float:
