@@ -45,8 +45,8 @@ def pinned(files: Sequence[str], kinds: Sequence[str], count: int = 20) -> None:
     for file in files:
         old = read(file)
         height = round(float(old.product.high[2] - old.product.low[2]), 3)
-        kept, ratios, refused, seed = list[StayingRobot](), list[float](), 0, 700
-        while len(ratios) + refused < count and seed < 900:
+        kept, ratios, less, seed = list[StayingRobot](), list[float](), 0, 700
+        while len(ratios) < count and seed < 900:
             new = edited(old.pag, random.Random(seed), 1, kinds, height)
             seed += 1
             if new == old.pag:
@@ -55,11 +55,8 @@ def pinned(files: Sequence[str], kinds: Sequence[str], count: int = 20) -> None:
                 fresh = replace(old, pag=new).layout
             except RunError:
                 continue
-            try:
-                found = revised(old, replace(old, pag=new))
-            except RunError:
-                refused += 1
-                continue
+            found = revised(old, replace(old, pag=new))
+            less += found.pinned != "all"
             kept += found.kept
             cycles = (pace(made, old.settings)[0].seconds for made in (found.new.layout, fresh))
             ratios.append(next(cycles) / next(cycles))
@@ -70,7 +67,7 @@ def pinned(files: Sequence[str], kinds: Sequence[str], count: int = 20) -> None:
         print(
             f"{old.pag.root}, {len(ratios)} edits ({', '.join(kinds)}): in place {place:.1f} %,"
             f" module {module:.1f} %, cycle {sum(ratios) / len(ratios):.3f} of afresh, at most"
-            f" {max(ratios):.3f}; {refused} not certified",
+            f" {max(ratios):.3f}; {less} with less pinned",
             flush=True,
         )
 

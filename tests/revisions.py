@@ -10,9 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from factory.compiler.compiler import compile_pag
-from factory.layout import inheriting
 from factory.layout.certificate import ALWAYS, Certificate
-from factory.layout.inheriting import Inheritance
+from factory.layout.inheriting import Inheritance, pairs_of
 from factory.layout.pins import SAME
 from factory.pipeline import all_templates
 from factory.plant.matching import matching
@@ -121,8 +120,8 @@ def kept_share(pag: PAG, new: PAG) -> Counter[str]:
 def refuted(
     mine: Inheritance, old: Certificate, new: Certificate, pairing: Pairing
 ) -> Iterator[str]:
-    """What is wrong with what a certificate has inherited: an entry that is not in the old
-    certificate, or is of something else. Uses nothing of how it was found."""
+    """What is wrong with an inheritance: an entry that is not in the old certificate, or is of
+    something else. Uses nothing of how it was found."""
     if not old.holds:
         yield "the old certificate does not hold"
     for number, other in mine.regions.items():
@@ -140,5 +139,5 @@ def refuted(
         if pairing.robots.get(before.robot) != one.robot or mode != one.mode:
             yield f"{name}: it is of another robot, or in another mode"
     kept = [r for n, r in enumerate(new.regions) if n in mine.regions]
-    if (mine.pairs, mine.inherited) != (inheriting._pairs([*new.regions]), inheriting._pairs(kept)):
+    if (mine.pairs, mine.inherited) != (pairs_of([*new.regions]), pairs_of(kept)):
         yield "the pairs are miscounted"

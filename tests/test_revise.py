@@ -16,11 +16,11 @@ from factory.layout.clearance import certify
 from factory.nets.verify import verify
 from factory.pipeline import Project, all_templates
 from factory.plant.family import family
-from factory.plant.matching import label_digests, matching, shifted
+from factory.plant.matching import below, label_digests, matching, shifted
 from factory.problem.pag import PAG, Mix, Parameter
 from factory.problem.plan import Plan
 from factory.study.revision import Revision, revised
-from factory.support.errors import InputError
+from factory.support.errors import Diagnostic, InputError, RunError
 from tests.command_line import spawn
 from tests.revisions import KINDS, edited, kept_share, refuted, shuffled
 
@@ -45,11 +45,20 @@ def van() -> PAG:
     return PAG("van", (made, boxed, *others, box), None, example("truck").folder)
 
 
+def hooded() -> PAG:
+    """A truck whose hood is joined before its cab."""
+    truck = example("truck")
+    body = replace(truck["body"], inputs=("rolling", "hood", "cab"))
+    return replace(truck, nodes=tuple(body if n.label == "body" else n for n in truck.nodes))
+
+
 def test_what_becomes_of_the_labels_of_the_truck() -> None:
     found = matching(example("truck"), van())
     assert (found.gone, found.added) == (["log1", "log2"], [])
     assert found.renamed == {"truck": "van", "loaded": "boxed", "bed": "box"}
     assert found.changed == {"bed": "box"}
+    assert found.reordered == {}
+    assert matching(example("truck"), hooded()).reordered == {"body": "body"}
     assert kept_share(example("truck"), van()) == {
         **{"old": 23, "paired": 21, "program": 20, "contents": 19}
     }
@@ -70,8 +79,8 @@ def test_mappings_are_one_to_one_and_keep_ancestors(name: str) -> None:
         labels = matching(pag, new).labels
         assert len({*labels.values()}) == len(labels)
         for label, other in labels.items():
-            below, there = ({*_below(tree, x)} for tree, x in ((pag, label), (new, other)))
-            assert {labels[x] for x in below if x in labels} <= there
+            inputs, there = ({*below(tree, x)} for tree, x in ((pag, label), (new, other)))
+            assert {labels[x] for x in inputs if x in labels} <= there
 
 
 def test_few_edits_keep_most_robots() -> None:
@@ -119,13 +128,6 @@ def test_a_step_put_in_is_stepped_over() -> None:
     assert kept_share(old, new)["paired"] == kept_share(old, new)["old"] == 5
 
 
-def _below(pag: PAG, label: str) -> list[str]:
-    todo = [label]
-    for x in todo:
-        todo += pag[x].inputs
-    return todo
-
-
 def project(pag: PAG) -> Project:
     return Project(pag, all_templates())
 
@@ -170,7 +172,7 @@ def test_the_same_product_keeps_everything() -> None:
     pag = example("chair")
     found = revised(project(pag), project(shifted(shuffled(pag, random.Random(4)), (0.1, 0, 0))))
     assert all(kept.whole for kept in found.kept) and len(found.kept) == 19
-    assert found.inheritance.computed == 0
+    assert found.inheritance.inherited == found.inheritance.pairs
     assert found.pairing.matching.shift == (0.1, 0.0, 0.0)
 
 
@@ -220,6 +222,24 @@ def test_command_writes_a_plan_that_keeps_the_names(tmp_path: Path) -> None:
     assert [gear["robot"] for gear in checked.json["gears"]][2] == "r5"
     kept = spawn("revise", str(out / "plan.json"), files[1], "--json").json["kept"]
     assert all(robot["place"] and robot["module"] for robot in kept) and len(kept) == 21
+
+
+def test_what_no_pinned_layout_is_found_for_is_laid_out_with_less(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """And with nothing where no layout has the old hands; names are kept."""
+    monkeypatch.setattr("factory.layout.pinning.AGAIN", 0)
+    old, new = project(example("truck")), project(van())
+    found = revised(old, new)
+    assert (found.asked, found.pinned) == ("all", "hands")
+    assert "--pin all: no layout found; this is that of --pin hands" in [*found.words()]
+
+    def refused(*_: object) -> None:
+        raise RunError(Diagnostic("Layout", "the old hands are in the way"))
+
+    monkeypatch.setattr("factory.study.revision.Hands", refused)
+    found = revised(old, new)
+    assert (found.pinned, found.new.layout.factory.robots[2].name) == ("none", "r5")
 
 
 def test_shared_robots_are_refused() -> None:

@@ -11,7 +11,8 @@ import click
 from factory.commands.options import OUTPUT, PATH, TEMPLATES, pag_files
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
-from factory.support.console import emit, say
+from factory.support.console import emit, say, warn
+from factory.support.errors import RunError
 from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     "--pin",
     type=click.Choice(["all", "hands", "none"]),
     default="all",
-    help="What of OLD's layout is kept where that can be.",
+    help="What of OLD's layout is kept, or less where no layout has that.",
 )
 @click.option("--afresh", is_flag=True, help="Also say the cycle time of a layout made afresh.")
 @click.option("--live", is_flag=True, help="Also lay out a floor for both, to change during a run.")
@@ -57,13 +58,17 @@ def revise(
 
     writable(new, picture)
     writable_folder(output)
-    options = ProjectOptions(old, folders)
+    options, seconds = ProjectOptions(old, folders), None
     before = options.project(out.silent)
     after = replace(options, file=new).project(out.silent, before.settings)
     with Waiting("laying out with what stays", out.silent):
         revision = revised(before, after, pin)
         verdict = proved(revision.new.layout.factory.net)
-        seconds = pace(after.layout, after.settings)[0].seconds if afresh else None
+        if afresh:
+            try:
+                seconds = pace(after.layout, after.settings)[0].seconds
+            except RunError as error:
+                warn(replace(d, message=f"laid out afresh: {d.message}") for d in error.diagnostics)
         change = LiveChange.of(before, after, output or Path()) if live else None
     files: list[str] = []
     if output is not None:
@@ -80,7 +85,7 @@ def revise(
         from factory.exporting.revision_picture import draw_revision
 
         layouts, moved = (before.layout, revision.new.layout), revision.inheritance.shift
-        write_all({picture: draw_revision(layouts, revision.kept, moved).encode()})
+        write_all({picture: draw_revision(revision.title, layouts, revision.kept, moved).encode()})
         files.append(str(picture))
     if out.as_json:
         also = {"live": change.as_json()} if change else {}

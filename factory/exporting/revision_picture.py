@@ -11,50 +11,56 @@ from factory.layout.pins import StayingRobot
 from factory.support.canvas import Canvas, millimetres, page_box
 
 STYLE = """
-.floor { fill: #fbfbfa; stroke: #9aa5b1; stroke-width: 2; }
-.stays, .changed, .moved, .new, .gone { fill: none; stroke-width: 10; stroke-linecap: round; }
+.floor { fill: #fbfbfa; stroke: #9aa5b1; stroke-width: 2; } .outfeed { fill: #e9edf1; }
+.stays, .changed, .moved, .new, .gone, .was { fill: none; stroke-width: 10; stroke-linecap: round; }
 .stays { stroke: #2f855a; } .changed { stroke: #2a5c9a; } .moved { stroke: #d9731a; }
-.new { stroke: #b42318; } .gone { stroke: #9aa5b1; stroke-dasharray: 14 18; }
-.r { font-weight: bold; } .gone-name { fill: #9aa5b1; }
+.new { stroke: #b42318; } .gone { stroke: #9aa5b1; } .was { stroke: #1f2933; stroke-width: 3; }
+.gone, .was { stroke-dasharray: 14 18; } .r { font-weight: bold; } .gone-name { fill: #9aa5b1; }
 """
 
 LEGEND = (
     ("stays", "stays as it is"),
     ("changed", "in place; program, contents, hand or arm change"),
     ("moved", "stays, in another place or of another length"),
+    ("was", "where that was"),
     ("new", "new"),
     ("gone", "gone"),
 )
 
 
 def draw_revision(
-    layouts: tuple[Layout, Layout], kept: tuple[StayingRobot, ...], shift: Point2
+    title: str, layouts: tuple[Layout, Layout], kept: tuple[StayingRobot, ...], shift: Point2
 ) -> str:
     """The document; `layouts`: the old and the new, of which robots are `kept`; `shift`: by how
     much the new lies elsewhere [m]."""
     canvas, (old, new) = Canvas(), layouts
-    floor = page_box(new.floor)
+    floor = left, right, top, bottom = page_box(new.floor)
     canvas.rectangle(floor, "floor")
+    out = page_box(new.outfeed)
+    canvas.rectangle(out, "outfeed")
     stay = {k.new: "stays" if k.whole else "changed" if k.place else "moved" for k in kept}
-    size = 600.0 * CARRIAGE
+    unit = max(14.0, (right - left) / 60)
+    size = min(600.0 * CARRIAGE, unit)
+    canvas.label(((out[0] + out[1]) / 2, (out[2] + out[3]) / 2), "outfeed", size, "grey")
     for robot in sorted({*range(len(old.guidepaths))} - {k.old for k in kept}):
         canvas.line("gone", *_ends(old.guidepaths[robot], shift))
         name = old.factory.robots[robot].name
         canvas.label(_beyond(old.guidepaths[robot], shift), name, size, "r gone-name")
     for robot, path in enumerate(new.guidepaths):
         canvas.line(stay.get(robot, "new"), *_ends(path))
+    for k in kept:
+        if not k.place:
+            canvas.line("was", *_ends(old.guidepaths[k.old], shift))
     for robot, path in zip(new.factory.robots, new.guidepaths, strict=True):
         canvas.label(_beyond(path), robot.name, size, "r")
-    left, right, top, bottom = floor
-    unit = max(14.0, (right - left) / 60)
-    title = f"{old.factory.pag.root} -> {new.factory.pag.root}"
     canvas.text((left, top - unit), title, 1.5 * unit, "h")
     y = bottom + unit
-    for style, words in LEGEND:
+    drawn = "".join(canvas.elements)
+    for style, words in (entry for entry in LEGEND if f'class="{entry[0]}"' in drawn):
         y += 1.4 * unit
-        canvas.line(style, (left, y - 0.3 * unit), (left + 2 * unit, y - 0.3 * unit))
+        canvas.line(style, (left, y), (left + 2 * unit, y))
         canvas.text((left + 2.6 * unit, y), words, unit)
-    page = left - unit, max(right, left + 36 * unit) + unit, top - 4 * unit, y + unit
+    page = left - 2 * size, max(right, left + 36 * unit) + 2 * size, top - 4 * unit, y + unit
     return canvas.document(f"{title}: what stays", page, STYLE)
 
 

@@ -30,11 +30,6 @@ class Inheritance:
     inherited: int
     shift: Point2
 
-    @property
-    def computed(self) -> int:
-        """How many pairs are new."""
-        return self.pairs - self.inherited
-
     @classmethod
     def of(cls, old: Layout, new: Layout, pairing: Pairing, shift: Point2) -> Inheritance:
         """What the certificate of a layout has from that of another. Both have one."""
@@ -43,7 +38,7 @@ class Inheritance:
         mine = [_key(region) for region in new.certificate.regions]
         regions = {n: named[key] for n, key in enumerate(mine) if key in named}
         kept = [r for n, r in enumerate(new.certificate.regions) if n in regions]
-        counts = _pairs([*new.certificate.regions]), _pairs(kept)
+        counts = pairs_of([*new.certificate.regions]), pairs_of(kept)
         return cls(regions, *counts, shift)
 
 
@@ -58,8 +53,7 @@ def _named(region: Region, pairing: Pairing, shift: Point2) -> tuple[object, ...
     label = region.label
     if label in old.by_label:
         number = pairing.operations.get(old.by_label[label].index)
-        label = "" if number is None else new.operations[number].label
-        label = label or f"no longer {region.label}"
+        label = f"no longer {label}" if number is None else new.operations[number].label
     moved = np.array(region.box) + np.repeat(shift, 2)
     box = tuple(round(value, 6) + 0.0 for value in moved.tolist())
     mode = region.mode if region.mode == ALWAYS else pairing.operations.get(region.mode, -2)
@@ -67,7 +61,7 @@ def _named(region: Region, pairing: Pairing, shift: Point2) -> tuple[object, ...
     return robot, region.layer, region.kind, box, region.z, label, mode
 
 
-def _pairs(regions: list[Region]) -> int:
+def pairs_of(regions: list[Region]) -> int:
     """How many pairs of regions in one layer are of different robots."""
     layers = Counter(region.layer for region in regions)
     robots = Counter((region.layer, region.robot) for region in regions)

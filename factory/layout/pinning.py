@@ -152,11 +152,8 @@ class Pinning:
             for robot in range(1, len(self.on))
             if robot not in self.pins.travel
             and self.on[robot] in self.pins.travel
-            and self._delivery(robot) != carried(self.factory, self.on[robot])[0]
+            and self.factory.last(robot).index != carried(self.factory, self.on[robot])[0]
         ]
-
-    def _delivery(self, robot: int) -> int:
-        return self.factory.robots[robot].operations[-1]
 
     def _placed(self, seen: _Seen, robot: int) -> _Seen:
         """The stretch with a new robot where it displaces fewest, after moves: of the best stations
@@ -204,7 +201,7 @@ class Pinning:
         for number in range(least, count):
             at, back = number * STEP, max(0.0, -number * STEP)
             moved, far = [*stations], [*travel]
-            moved[self._delivery(robot)] = at
+            moved[self.factory.last(robot).index] = at
             for n in made:
                 moved[n] = round(moved[n] + back, 6)
             far[carrier] = round(max(far[carrier] + back, at + STEP), 6)
@@ -254,7 +251,7 @@ class Pinning:
     def _later(self, stretch: Stretch, robot: int, by: float, longer: bool) -> Stretch:
         """With a robot and those after it at later stations of their carrier, whose way from there
         is as long as it was, or shorter."""
-        carrier, number = self.on[robot], self._delivery(robot)
+        carrier, number = self.on[robot], self.factory.last(robot).index
         made, travel = carried(self.factory, carrier), [*stretch.travel]
         stations = [*stretch.stations]
         for n in made:
@@ -289,6 +286,7 @@ class Pinning:
         layout = draft.layout(self.pins.travel[0])
         faults = tuple(searched(layout)[1])
         lacking = sum(fault.lacking or JAM for fault in faults)
-        score = lacking + WEIGHT * self.pins.displaced(layout) + LENGTH * layout.guidepath_length
+        displaced = len(self.pins.ends) - len(self.pins.in_place(layout)[1])
+        score = lacking + WEIGHT * displaced + LENGTH * layout.guidepath_length
         score += TIME * cycle_of(layout, self.task.pace)
         return _Seen(stretch, layout, faults, lacking, score)

@@ -81,10 +81,6 @@ class Pins:
         shift = max(places, key=lambda shift: len(places[shift]))
         return shift, frozenset(places[shift])
 
-    def displaced(self, layout: Layout) -> int:
-        """Number of robots that are not in place."""
-        return len(self.ends) - len(self.in_place(layout)[1])
-
 
 def ends_of(layout: Layout, robot: int) -> Array:
     """Where the product's middle is at the A and the B end of a guidepath (2, 2) [m]."""

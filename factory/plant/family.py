@@ -11,7 +11,7 @@ from collections import defaultdict
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from factory.plant.matching import Matching, matching, shifted
+from factory.plant.matching import Matching, below, matching, shifted
 from factory.problem.pag import PAG, Assembly, Mix
 from factory.support.errors import Diagnostic, InputError
 
@@ -84,21 +84,13 @@ def _common(matched: Matching) -> Renamed:
                 continue
             tried = [mapped[label]] if is_mapped and label in mapped else []
             tried = tried if is_mapped else pool[after[label]]
-            twin = next((x for x in tried if taken.isdisjoint(_below(old, x))), None)
+            twin = next((x for x in tried if taken.isdisjoint(below(old, x))), None)
             if twin is None:
                 stack += new[label].inputs
                 continue
-            taken |= {*_below(old, twin)}
-            common |= dict(zip(_below(new, label), _below(old, twin), strict=True))
+            taken |= {*below(old, twin)}
+            common |= dict(zip(below(new, label), below(old, twin), strict=True))
     return common
-
-
-def _below(pag: PAG, label: str) -> list[str]:
-    """A label and all below it; of equal sub-trees in the same order."""
-    labels = [label]
-    for one in labels:
-        labels += pag[one].inputs
-    return labels
 
 
 def _names(one: PAG, other: PAG, labels: Renamed) -> Renamed:

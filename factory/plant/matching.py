@@ -64,6 +64,17 @@ class Matching:
         operation or with other parameters."""
         return {old: new for old, new in self.labels.items() if self._is_changed(old, new)}
 
+    @cached_property
+    def reordered(self) -> dict[str, str]:
+        """The labels whose inputs that stay are joined in another order."""
+        labels, reordered = self.labels, dict[str, str]()
+        for old, new in labels.items():
+            before = [labels.get(x, "") for x in self.old[old].inputs]
+            stay = [y for y in self.new[new].inputs if y in before]
+            if stay != [y for y in before if y in stay]:
+                reordered[old] = new
+        return reordered
+
     def _is_changed(self, old: str, new: str) -> bool:
         if self.is_equal(old):
             return False
@@ -236,12 +247,15 @@ class _Matcher:
 
     def _bag(self, which: int, label: str) -> Counter[str]:
         """The digests of all labels below one, itself included."""
-        bags, pag = self.bags[which], (self.old, self.new)[which]
-        if label not in bags:
-            digests, todo = (self.before, self.after)[which], [label]
-            bag = bags[label] = Counter()
-            while todo:
-                below = todo.pop()
-                bag[digests[below]] += 1
-                todo += pag[below].inputs
-        return bags[label]
+        if label not in self.bags[which]:
+            pag, digests = ((self.old, self.before), (self.new, self.after))[which]
+            self.bags[which][label] = Counter(digests[x] for x in below(pag, label))
+        return self.bags[which][label]
+
+
+def below(pag: PAG, label: str) -> list[str]:
+    """A label and all below it; of equal sub-trees in the same order."""
+    labels = [label]
+    for one in labels:
+        labels += pag[one].inputs
+    return labels

@@ -76,8 +76,7 @@ class Pairing:
 
     def keeps_contents(self, robot: int) -> bool:
         """Whether all that a robot that stays ever holds is equal to what it held."""
-        new = self.robots[robot]
-        return self._contents(0, robot) == self._contents(1, new)
+        return self._contents(0, robot) == self._contents(1, self.robots[robot])
 
     def _contents(self, which: int, robot: int) -> list[list[str]]:
         factory, digests = (self.old, self.new)[which], self.matching.digests[which]

@@ -14,9 +14,6 @@ from factory.layout.resting import on_demand
 from factory.pipeline import Project
 from factory.plant.family import family
 
-FAMILY, ORDERS, OLD_UNITS = "family.pag", "live.csv", 6
-"""The files of a change, and after how many old units it is ordered there."""
-
 
 @dataclass(frozen=True)
 class LiveChange:
@@ -46,9 +43,9 @@ class LiveChange:
     @property
     def files(self) -> dict[str, str]:
         """The texts of the family, and of the orders of a change and one back, by their names."""
-        changes = (self.old, 0), (self.new, OLD_UNITS), (self.old, 2 * OLD_UNITS)
+        changes = (self.old, 0), (self.new, 6), (self.old, 12)
         rows = "".join(f"{product},{made}\n" for product, made in changes)
-        return {FAMILY: write_pag(self.both.pag), ORDERS: f"product,made\n{rows}"}
+        return {"family.pag": write_pag(self.both.pag), "live.csv": f"product,made\n{rows}"}
 
     def as_json(self) -> dict[str, Any]:
         """The key `live` of `revise --json`."""
@@ -59,6 +56,6 @@ class LiveChange:
         """The same for people."""
         robots, idle = len(self.both.layout.factory.robots), ", ".join(self.idle) or "none"
         yield (
-            f"live: {robots} robots make both; with --wip W at most W - 1 more {self.old} are made"
-            f" after the order, and then these are idle: {idle}"
+            f"live: {robots} robots make both; with --wip W at most W - 1 more units of"
+            f" {self.old} are made after the order, and then these are idle: {idle}"
         )

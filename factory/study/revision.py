@@ -7,11 +7,11 @@ arm; the *place* in the world.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import count, islice
-from typing import Any, Literal
+from itertools import count
+from typing import Any, Literal, get_args
 
 from factory.compiler.mating.mating import judged
 from factory.layout.dimensions import Clearance
@@ -27,23 +27,25 @@ from factory.pipeline import Project
 from factory.plant.factory import Factory
 from factory.plant.matching import matching, shifted
 from factory.plant.pairing import Pairing
-from factory.support.errors import Diagnostic, RunError, usage_error
+from factory.problem.pag import NOPART
+from factory.support.errors import RunError, usage_error
 from factory.timing.timed import pace
 
 Pin = Literal["all", "hands", "none"]
-"""What is pinned of the old layout."""
-
-SIMPLE = "give the PAG: `revise` compiles it with a robot for each tour"
+"""What is pinned of the old layout, the most first."""
 
 
 @dataclass(frozen=True)
 class Revision:
-    """A product's factory and that of its next revision; `new` has its layout."""
+    """A product's factory and that of its next revision; `new` has its layout, in which so much of
+    the old one is `pinned` of what was `asked`."""
 
     old: Project
     new: Project
     pairing: Pairing = field(repr=False)
     pins: Pins = field(repr=False)
+    asked: Pin
+    pinned: Pin
 
     @cached_property
     def kept(self) -> tuple[StayingRobot, ...]:
@@ -66,13 +68,19 @@ class Revision:
     def gone(self) -> list[str]:
         """The names of robots that are no longer needed."""
         stay = self.pairing.robots
-        return [r.name for r in self.old.layout.factory.robots if r.index not in stay]
+        return [r.name for r in self.pairing.old.robots if r.index not in stay]
 
     @property
     def added(self) -> list[str]:
         """The names of robots that are new."""
         stay = {*self.pairing.robots.values()}
-        return [r.name for r in self.new.layout.factory.robots if r.index not in stay]
+        return [r.name for r in self.pairing.new.robots if r.index not in stay]
+
+    @property
+    def title(self) -> str:
+        """What becomes what: the products, or their files where these have the same name."""
+        old, new = self.old.pag.root, self.new.pag.root
+        return f"{self.old.file.name} -> {self.new.file.name}" if old == new else f"{old} -> {new}"
 
     @cached_property
     def inheritance(self) -> Inheritance:
@@ -97,10 +105,12 @@ class Revision:
             "labels_changed": matched.changed,
             "labels_gone": matched.gone,
             "labels_added": matched.added,
+            "labels_reordered": matched.reordered,
             "moved_by_m": [*matched.shift],
+            "pinned": self.pinned,
             "pairs": self.inheritance.pairs,
             "pairs_inherited": self.inheritance.inherited,
-            "pairs_computed": self.inheritance.computed,
+            "pairs_computed": self.inheritance.pairs - self.inheritance.inherited,
             "cycle_time_s": {
                 "old": pace(self.old.layout, self.old.settings)[0].seconds,
                 "pinned": pace(self.new.layout, self.new.settings)[0].seconds,
@@ -111,50 +121,49 @@ class Revision:
     def words(self, afresh: float | None = None) -> Iterator[str]:
         """The same for people, line by line."""
         matched, document = self.pairing.matching, self.as_json(afresh)
-        changes = [
-            f"{len(labels)} {what} ({_listed(labels)})"
-            for what, labels in (
-                ("gone", matched.gone),
-                ("new", matched.added),
-                ("changed", [f"{x} -> {y}" if x != y else x for x, y in matched.changed.items()]),
-                ("renamed", [f"{x} -> {y}" for x, y in matched.renamed.items()]),
-            )
-            if labels
-        ]
-        words = ", ".join(changes) or "no label has changed"
-        yield f"{self.old.pag.root} -> {self.new.pag.root}: {words}"
-        robots, whole = document["robots"], sum(kept.whole for kept in self.kept)
-        yield f"robots: {robots['old']} -> {robots['new']}. {whole} stay as they are"
-        for words, grade in (
-            ("have another program", "program"),
-            ("hold something else", "contents"),
-            ("have another hand, length, offset or arm", "module"),
-            ("are in another place", "place"),
+        changes = (
+            ("gone", dict.fromkeys(matched.gone)),
+            ("new", dict.fromkeys(matched.added)),
+            ("changed", matched.changed),
+            ("in another order", matched.reordered),
+            ("renamed", matched.renamed),
+        )
+        listed = ", ".join(f"{len(x)} {what} ({_listed(x)})" for what, x in changes if x)
+        yield f"{self.title}: {listed or 'no label has changed'}"
+        whole = sum(kept.whole for kept in self.kept)
+        yield "robots: {old} -> {new}. {} as they were".format(whole, **document["robots"])
+        grades = (
+            ("with another program", "program"),
+            ("with other contents", "contents"),
+            ("with another hand, length, offset or arm", "module"),
+            ("in another place", "place"),
+        )
+        for words, some in (
+            *((w, [r["robot"] for r in document["kept"] if not r[grade]]) for w, grade in grades),
+            ("gone", [_last(self.pairing.old, name) for name in self.gone]),
+            ("new", [_last(self.pairing.new, name) for name in self.added]),
         ):
-            some = [r["robot"] for r in document["kept"] if not r[grade]]
             if some:
                 yield f"  {len(some)} {words}: {_listed(some)}"
-        for words, names in (("gone", self.gone), ("new", self.added)):
-            if names:
-                yield f"  {len(names)} {words}: {_listed(names)}"
-        pairs, inherited = document["pairs"], document["pairs_inherited"]
+        if self.pinned != self.asked:
+            yield f"--pin {self.asked}: no layout found; this is that of --pin {self.pinned}"
         yield (
-            f"certificate: of {pairs} pairs of regions {inherited} are those of"
-            f" {self.old.pag.root}, word for word; {pairs - inherited} computed"
+            "certificate: of {pairs} pairs of regions {pairs_inherited} are those of the old one,"
+            " word for word; {pairs_computed} computed".format(**document)
         )
-        times = document["cycle_time_s"]
         more = f", {afresh:.3f} s if laid out afresh" if afresh is not None else ""
-        yield f"cycle {times['old']:.3f} -> {times['pinned']:.3f} s{more}"
+        yield "cycle {old:.3f} -> {pinned:.3f} s{}".format(more, **document["cycle_time_s"])
 
 
 def revised(old: Project, new: Project, pin: Pin = "all") -> Revision:
     """The revision of a product, laid out with the old layout `all` pinned, its `hands` alone, or
-    `none` of it. Raises InputError (Usage) for shared robots, RunError (Layout) where
-    the pinned layout is not clear."""
+    `none` of it; where that is not clear, with less. Raises InputError (Usage) for shared robots,
+    RunError (Layout) where there is no layout even afresh."""
     for made in (old, new):
         made.pag.check_alone("revise")
         if not (made.plan.is_as_written and made.ground == Ground(made.ground.floor)):
-            raise usage_error(f"'{made.file}' has shared robots", SIMPLE)
+            hint = "give the PAG: `revise` compiles it with a robot for each tour"
+            raise usage_error(f"'{made.file}' has shared robots", hint)
     matched = matching(old.pag, new.pag)
     if any(matched.shift):
         x, y, z = matched.shift
@@ -167,12 +176,19 @@ def revised(old: Project, new: Project, pin: Pin = "all") -> Revision:
     factory = judged(new.plain, new.product)
     pairing = replace(pairing, new=factory)
     pins = Pins.of(was, pairing)
-    layout = new.layout if pin == "none" else _laid_out(new, was, factory, pins, pin)
-    new.__dict__["layout"] = layout
-    return Revision(old, new, pairing, pins)
+    ways: tuple[Pin, ...] = get_args(Pin)
+    for tried in ways[ways.index(pin) :]:
+        try:
+            new.__dict__["layout"] = _laid_out(new, was, factory, pins, tried)
+            return Revision(old, new, pairing, pins, pin, tried)
+        except RunError as error:
+            refused = error
+    raise refused
 
 
 def _laid_out(new: Project, was: Layout, factory: Factory, pins: Pins, pin: Pin) -> Layout:
+    if pin == "none":
+        return new.layout
     product, settings = framed(new.product, was.product), new.settings
     hands = Hands(factory, product, settings.acceleration, pins.hands) if was.hands else None
     if pin == "hands":
@@ -181,10 +197,7 @@ def _laid_out(new: Project, was: Layout, factory: Factory, pins: Pins, pin: Pin)
     pinning = Pinning(factory, product, size, speed, hands, pins)
     layout = pinning.layout()
     if layout is None:
-        faults = [fault.diagnostic() for fault in pinning.faults[:3]]
-        message = f"the layout of '{new.pag.root}' with that of '{was.factory.pag.root}' pinned"
-        hint = "--pin hands and --pin none lay it out afresh"
-        raise RunError([Diagnostic("Layout", f"{message} is not clear", None, hint), *faults])
+        raise RunError(fault.diagnostic() for fault in pinning.faults)
     return certified(layout, new.ground.floor, layout.certificate)
 
 
@@ -197,6 +210,16 @@ def _names(pairing: Pairing) -> tuple[str, ...]:
     return tuple(names.get(robot.index) or f"r{next(numbers)}" for robot in pairing.new.robots)
 
 
-def _listed(names: list[str], most: int = 8) -> str:
+def _last(factory: Factory, name: str) -> str:
+    """The name of a robot with what it does last, and to which label."""
+    robot = next(robot.index for robot in factory.robots if robot.name == name)
+    last = factory.last(robot)
+    held = last.before[last.robots.index(robot)]
+    return f"{name} ({last.template.name} {last.label if held == NOPART else held})"
+
+
+def _listed(names: Sequence[str] | Mapping[str, str | None], most: int = 8) -> str:
+    if isinstance(names, Mapping):
+        names = [x if y in (x, None) else f"{x} -> {y}" for x, y in names.items()]
     more = len(names) - most
-    return ", ".join(islice(names, most)) + (f" and {more} more" if more > 0 else "")
+    return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")
