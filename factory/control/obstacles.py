@@ -36,8 +36,8 @@ class Gates:
     its own goal, 0 up to OPEN * eps and `standoff` from eps on.
 
     All (g,): the gated `robot`, its `gate`, `inner` = OPEN * eps [m] and the `width` of the step
-    beyond it, `standoff` [m], `mode`; by how much the gate robot is off the place that is asked
-    about, `late` [m].
+    beyond it, `standoff` [m], `mode`; `lag` [m]: the measured position of the gate robot,
+    from that of its reference.
     """
 
     robot: Index
@@ -46,7 +46,7 @@ class Gates:
     width: Array
     standoff: Array
     mode: Index
-    late: Array | float = 0.0
+    lag: Array | float = 0.0
 
     @classmethod
     def of(cls, modes: Sequence[Mode], starts: Index) -> Gates:
@@ -68,9 +68,10 @@ class Gates:
         robot, gate = self.robot[at] + moved, self.gate[at] + moved
         return Gates(robot, gate, self.inner[at], self.width[at], self.standoff[at], mode)
 
-    def of_late(self, late: Array) -> Gates:
-        """The same for robots (n,) that are off the places that are asked about [m]."""
-        return replace(self, late=late[self.gate])
+    def lagging(self, lag: Array) -> Gates:
+        """The same gates, for robots (n,) whose measured positions are so far from those of their
+        references [m]."""
+        return replace(self, lag=lag[self.gate])
 
     def opens(self, before: Array, after: Array) -> bool:
         """Whether any gate begins to open between two `offset`s [m] of the robots from their
@@ -86,10 +87,10 @@ class Gates:
         """dtau / dx_gate (g,)."""
         z = self._phase(offset)
         steepness = self.standoff / self.width * (30.0 * (z * (1.0 - z)) ** 2)
-        return np.asarray(steepness * np.sign(offset[self.gate] + self.late))
+        return np.asarray(steepness * np.sign(offset[self.gate] + self.lag))
 
     def _phase(self, offset: Array) -> Array:
-        z = np.abs(offset.take(self.gate) + self.late)
+        z = np.abs(offset.take(self.gate) + self.lag)
         z -= self.inner
         z /= self.width
         np.maximum(z, 0.0, out=z)

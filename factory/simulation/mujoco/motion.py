@@ -174,10 +174,10 @@ class Motion:
     def _plan(self, bundle: Bundle) -> None:
         """The next stride of the active modes, each robot with the payload of its operation."""
         axes, robots = self.active, self.robots
-        late = self.axes.measured(self._d)[0][axes] - robots.x[axes]
-        late[np.abs(late) <= AHEAD] = 0.0
-        if late.any():
-            bundle = replace(bundle, gates=bundle.gates.of_late(late))
+        lag = self.axes.measured(self._d)[0][axes] - robots.x[axes]
+        lag[np.abs(lag) <= AHEAD] = 0.0
+        if lag.any():
+            bundle = replace(bundle, gates=bundle.gates.lagging(lag))
         self._begin(robots, axes, self._course(bundle, robots.x[axes], robots.v[axes]))
 
     def _begin(self, follower: Follower, axes: Index, course: Course) -> None:
