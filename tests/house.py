@@ -8,7 +8,6 @@ from __future__ import annotations
 import ast
 import graphlib
 import re
-import tomllib
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -346,16 +345,6 @@ def vague(house: House) -> Iterator[str]:
                     yield f"{module.name}.{node.name}: a variable is called '{name}'"
 
 
-def crowded_rooms(house: House) -> Iterator[str]:
-    """Rooms with more lines than their marks in `tests/lines.toml`, and the whole house."""
-    with (Path(__file__).parent / "lines.toml").open("rb") as file:
-        marks = tomllib.load(file)
-    counted = lines(house)
-    for room, count in sorted({**counted, "house": counted.total()}.items()):
-        if count > (most := marks.get(room, 0)):
-            yield f"{room}: {count} lines; at most {most}, by tests/lines.toml"
-
-
 def variants(house: House) -> Iterator[str]:
     """Rooms that name variants of a factory oftener than they may."""
     found: Counter[str] = Counter()
@@ -372,14 +361,6 @@ def anys(house: House, name: str) -> Iterator[str]:
     for node in ast.walk(house.modules[name].tree):
         if isinstance(node, ast.Name) and node.id == "Any":
             yield f"{name}:{node.lineno} says Any"
-
-
-def lines(house: House) -> Counter[str]:
-    """Lines of each room."""
-    found: Counter[str] = Counter()
-    for module in house.modules.values():
-        found[module.room] += len(module.text.splitlines())
-    return found
 
 
 @cache

@@ -16,7 +16,6 @@ from tests.house import (
     clocks,
     crowded_classes,
     crowded_functions,
-    crowded_rooms,
     engine_imports,
     engine_writes,
     long_modules,
@@ -45,7 +44,6 @@ LAWS: tuple[Law, ...] = (
     clocks,
     variants,
     vague,
-    crowded_rooms,
 )
 FIELDS = "\n".join(f"        self.a{n} = {n}" for n in range(13))
 BREACHES: tuple[tuple[Law, dict[str, str], str], ...] = (
@@ -143,7 +141,6 @@ BREACHES: tuple[tuple[Law, dict[str, str], str], ...] = (
     (clocks, {"tests/test_a.py": "import time"}, "tests.test_a reads a clock"),
     (vague, {"factory/nets/a.py": "def f():\n    found = 1"}, "nets.a.f: a variable is called"),
     (vague, {"factory/nets/a.py": "def f(own): ..."}, "nets.a.f: a variable is called 'own'"),
-    (crowded_rooms, {"factory/modes/a.py": "x = 1\n" * 9_999}, "modes: 9999 lines; at most"),
     (
         variants,
         {"factory/nets/a.py": "def f(plan):\n    return plan.is_folded, Relays(parallel=1)"},
