@@ -8,7 +8,10 @@ hole for it. It is attained in the common volume,
 
     depth = min over S in {A, B} of max over p in A ∩ B of |p, ∂S|,
 
-and is sampled at the corners of the common volume and along chords that are normal to its faces.
+and is sampled at the corners of the common volume and along chords that are normal to its faces. A
+common volume may be a film that is thinner than rounding, as that of a rod in a bore of the same
+diameter. A chord may then begin outside the film and cross the bore, so its middle counts only if
+it is in A and in B.
 
 The volume that A sweeps when it is shifted by v is the union of A and the prisms over its triangles
 that face v. They form one body that may overlap itself: it is solid wherever A passes.
@@ -16,6 +19,7 @@ that face v. They form one body that may overlap itself: it is solid wherever A 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 from weakref import finalize
@@ -43,6 +47,9 @@ LEAST = 1e-15
 
 BEYOND = 1e-9
 """The distance behind its face at which a chord begins [m]."""
+
+RAY = np.sqrt([2.0, 3.0, 5.0]) / np.sqrt(10.0)
+"""The direction of rays that tell inside from outside: no special one."""
 
 CHUNK = 400_000
 """The most distances between points and triangles that are computed at a time."""
@@ -164,6 +171,13 @@ def _merged(mesh: Any) -> tuple[Array, Indices]:
     return vertices, target[np.asarray(mesh.tri_verts, np.int64)]
 
 
+def united(bodies: Iterable[Any]) -> float:
+    """The volume of the union of bodies [m³]."""
+    from manifold3d import Manifold, OpType
+
+    return float(Manifold.batch_boolean([*bodies], OpType.Add).volume())
+
+
 def common(one: Any, other: Any, both: bool = True, samples: int = SAMPLES) -> Common:
     """The overlap of two bodies. `both`: the depth is the lesser of the two erosions; otherwise
     that of the `other`. With few `samples` the depth is a lower bound, computed faster."""
@@ -171,15 +185,16 @@ def common(one: Any, other: Any, both: bool = True, samples: int = SAMPLES) -> C
     volume = float(shared.volume())
     if shared.is_empty() or volume <= LEAST:
         return APART
-    points = _within(shared, samples)
+    points = _within(shared, one, other, samples)
     bodies = (one, other) if both else (other,)
     depths = min((_distances(points, body, shared) for body in bodies), key=np.max)
     return Common(volume, float(depths.max()), points[depths.argmax()])
 
 
-def _within(shared: Any, samples: int) -> Array:
-    """Sample points (n, 3) of a volume: corners, and the ends and middles of chords from the
-    centres of triangles, the larger triangles first. A volume with few triangles is subdivided."""
+def _within(shared: Any, one: Any, other: Any, samples: int) -> Array:
+    """Sample points (n, 3) of the volume that two bodies share: corners, and the ends and middles
+    of chords from the centres of triangles, the larger triangles first. A volume with few triangles
+    is subdivided."""
     fine = max(1, int(np.sqrt(samples / shared.num_tri())))
     vertices, faces = _merged(shared.refine(fine).to_mesh64())
     a, b, c = (vertices[faces[:, corner]] for corner in range(3))
@@ -193,8 +208,17 @@ def _within(shared: Any, samples: int) -> Array:
             begin, inward = (a[row] + b[row] + c[row]) / 3, -normals[row] / areas[row]
             hits = shared.ray_cast(begin + BEYOND * inward, begin + reach * inward)
             ends = [np.asarray(hit.position) for hit in hits[:1]]
-            points.append(np.array([begin, *ends, *((begin + end) / 2 for end in ends)]))
+            middles = [(begin + end) / 2 for end in ends]
+            inside = [m for m in middles if _is_inside(m, one) and _is_inside(m, other)]
+            points.append(np.array([begin, *ends, *inside]))
     return np.concatenate(points)
+
+
+def _is_inside(point: Array, body: Any) -> bool:
+    """Whether a point is inside a body: a ray from it leaves the body more often than it enters."""
+    box = np.array(body.bounding_box()).reshape(2, 3)
+    beyond = point + RAY * 2 * (np.linalg.norm(box[1] - box[0]) + np.abs(point - box).max())
+    return sum(np.sign(hit.normal @ RAY) for hit in body.ray_cast(point, beyond)) > 0
 
 
 def _distances(points: Array, body: Any, shared: Any) -> Array:
