@@ -58,11 +58,12 @@ CHUNK = 400_000
 @dataclass(frozen=True, slots=True)
 class Common:
     """The common volume [m³] of two solids, and its depth [m]; both 0 if they are disjoint.
-    `deepest` (3,): a point at that depth."""
+    `deepest` (3,): a point at that depth; `box` (2, 3): the corners of its box."""
 
     volume: float
     depth: float
     deepest: Array = field(default_factory=lambda: np.zeros(3), compare=False, repr=False)
+    box: Array = field(default_factory=lambda: np.zeros((2, 3)), compare=False, repr=False)
 
 
 APART = Common(0.0, 0.0)
@@ -137,7 +138,7 @@ def swept(body: Any, shift: Array) -> Any:
     from manifold3d import Error, Manifold
 
     mesh = body.to_mesh64()
-    vertices, faces = _merged(mesh)
+    vertices, faces = merged(mesh)
     normals = normals_of(vertices, faces)
     lengths = np.linalg.norm(normals, axis=1) * np.linalg.norm(shift)
     front = faces[normals @ shift > FACING * lengths]
@@ -163,7 +164,7 @@ def swept(body: Any, shift: Array) -> Any:
     return Manifold.compose([body, ahead])
 
 
-def _merged(mesh: Any) -> tuple[Array, Indices]:
+def merged(mesh: Any) -> tuple[Array, Indices]:
     """The vertices (n, 3) and faces (m, 3) of a manifold mesh, with vertices merged."""
     vertices = np.asarray(mesh.vert_properties)[:, :3]
     target = np.arange(len(vertices))
@@ -188,7 +189,8 @@ def common(one: Any, other: Any, both: bool = True, samples: int = SAMPLES) -> C
     points = _within(shared, one, other, samples)
     bodies = (one, other) if both else (other,)
     depths = min((_distances(points, body, shared) for body in bodies), key=np.max)
-    return Common(volume, float(depths.max()), points[depths.argmax()])
+    box = np.array(shared.bounding_box()).reshape(2, 3)
+    return Common(volume, float(depths.max()), points[depths.argmax()], box)
 
 
 def _within(shared: Any, one: Any, other: Any, samples: int) -> Array:
@@ -196,7 +198,7 @@ def _within(shared: Any, one: Any, other: Any, samples: int) -> Array:
     of chords from the centres of triangles, the larger triangles first. A volume with few triangles
     is subdivided."""
     fine = max(1, int(np.sqrt(samples / shared.num_tri())))
-    vertices, faces = _merged(shared.refine(fine).to_mesh64())
+    vertices, faces = merged(shared.refine(fine).to_mesh64())
     a, b, c = (vertices[faces[:, corner]] for corner in range(3))
     normals = np.cross(b - a, c - a)
     areas = np.linalg.norm(normals, axis=1)
@@ -224,7 +226,7 @@ def _is_inside(point: Array, body: Any) -> bool:
 def _distances(points: Array, body: Any, shared: Any) -> Array:
     """The distances (n,) [m] of points from the surface of a body, at most the longest edge of the
     box of the common volume."""
-    vertices, faces = _merged(body.to_mesh64())
+    vertices, faces = merged(body.to_mesh64())
     box = np.array(shared.bounding_box()).reshape(2, 3)
     most = float((box[1] - box[0]).max())
     corners = vertices[faces]

@@ -142,16 +142,15 @@ class DrawnWays:
         return found[key]
 
     def _cuts(self, moving: int, standing: int, axis: int, sign: int) -> bool:
-        """Whether one part on its way sweeps more of the other than the two share in the finished
-        product, and a layer as thick as the tolerance."""
-        share = self.finished(moving, standing).volume
-        for one, other, way in ((moving, standing, sign), (standing, moving, -sign)):
-            sweep, body = self._swept(one, axis, way), self._body(other)
-            cut = sweep ^ body
-            most = share + TOLERANCE * cut.surface_area()
-            if cut.volume() > most and united(piece ^ body for piece in sweep.decompose()) > most:
-                return True  # a sweep has places twice that it passes twice: united, they are once
-        return False
+        """Whether the smaller of two parts sweeps more of the larger on the way than the two share
+        in the finished product, and a layer as thick as the tolerance."""
+        if self._body(moving).volume() > self._body(standing).volume():
+            moving, standing, sign = standing, moving, -sign
+        sweep, body = self._swept(moving, axis, sign), self._body(standing)
+        cut, share = sweep ^ body, self.finished(moving, standing).volume
+        most = share + TOLERANCE * cut.surface_area()
+        # A sweep has places twice that it passes twice; its bodies united have them once.
+        return cut.volume() > most and united(part ^ body for part in sweep.decompose()) > most
 
     def _path(self, moving: int, standing: int, axis: int, sign: int) -> tuple[float, float]:
         """How deep the first part gets into the second on its way, and where [m]. The depth of a
