@@ -92,7 +92,7 @@ def _made(solid: Solid) -> Any:
         mesh = solid.mesh
         if mesh is None or not is_closed(mesh.faces):
             return None
-        return _bounded(mesh.vertices @ turn.T + solid.position, mesh.faces)
+        return bounded(mesh.vertices @ turn.T + solid.position, mesh.faces)
     if solid.kind == "box":
         body = Manifold.cube(2 * np.array(solid.size), True)
     elif solid.kind == "cylinder":
@@ -111,7 +111,7 @@ def _sides(radius: float) -> int:
     return int(np.clip(np.ceil(needed), *SIDES))
 
 
-def _bounded(vertices: Array, faces: Indices) -> Any:
+def bounded(vertices: Array, faces: Indices) -> Any:
     """The volume that a closed mesh bounds; None if it bounds none. Its bodies that share an edge
     are separated, then united."""
     from manifold3d import Error, Manifold, OpType

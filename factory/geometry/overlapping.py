@@ -8,6 +8,7 @@ from math import ceil
 
 import numpy as np
 
+from factory.geometry.decomposition import collides_as_hull
 from factory.geometry.facets import sagitta
 from factory.geometry.meshes import Indices
 from factory.geometry.overlap import common, drawn
@@ -129,6 +130,26 @@ def _found(product: Product, insides: Insides) -> DrawnOverlaps:
     pairs.sort(key=lambda pair: -pair.depth)
     left = (label for label, body in zip(labels, bodies, strict=True) if body is None)
     return DrawnOverlaps(tuple(pairs), tuple(left))
+
+
+def stood_in(solids: Sequence[Solid]) -> frozenset[str]:
+    """The parts that collide as their hulls although another part stands in a hole or a hollow of
+    theirs: it is in the hull by more than it is in the part as drawn."""
+    hulls = {solid.label for solid in solids if solid.mesh and collides_as_hull(solid.mesh)}
+    if not hulls:
+        return frozenset()
+    from manifold3d import Manifold
+
+    found: set[str] = set()
+    for pair in near_pairs(solids, -SILENT).tolist():
+        for solid, other in ((solids[one], drawn(solids[two])) for one, two in (pair, pair[::-1])):
+            body = drawn(solid) if solid.label in hulls - found else None
+            if body is not None and other is not None:
+                inside = Manifold.hull_points(solid.corners) ^ other
+                film = SILENT * inside.surface_area()
+                if inside.volume() > (body ^ other).volume() + film:
+                    found.add(solid.label)
+    return frozenset(found)
 
 
 def near_pairs(solids: Sequence[Solid], gap: float) -> Indices:
