@@ -16,13 +16,14 @@ import mujoco
 import numpy as np
 import pytest
 import trimesh
-from manifold3d import Manifold, OpType
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from manifold3d import Manifold, OpType
 
 import factory
 from factory.geometry import decomposition
 from factory.geometry.meshes import Array, Indices, Mesh, is_closed
+from factory.geometry.overlap import drawn
 from factory.geometry.pieces import (
     MOST_PIECES,
     ROUND,
@@ -33,7 +34,6 @@ from factory.geometry.pieces import (
     is_convex,
     sphere_piece,
 )
-from factory.geometry.overlap import drawn
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import Solid
 from factory.geometry.touching import bodies

@@ -1,8 +1,8 @@
-"""Exact decomposition of a body of prisms into convex ones: of a plate with holes, a bush, a stepped
-housing.
+"""Exact decomposition of a body of prisms into convex ones: of a plate with holes, a bush, a
+stepped housing.
 
 A *body of prisms* has an axis to which each of its faces is parallel or perpendicular. Planes
-through the perpendicular ones cut it into slabs of constant cross-section, and each cross-section is
+through the perpendicular ones cut it into slabs of constant cross-section. Each cross-section is
 triangulated; triangles are joined across the longest common sides, as long as the result is convex
 (Hertel and Mehlhorn, Fast triangulation of simple polygons, 1983).
 """
@@ -10,6 +10,7 @@ triangulated; triangles are joined across the longest common sides, as long as t
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -82,13 +83,15 @@ def _levels(vertices: Array, faces: Indices) -> list[float]:
     if not (upright | (np.ptp(heights, axis=1) <= EXACT)).all():
         return []
     each = np.sort(heights, axis=None)
-    return [float(part.mean()) for part in np.split(each, np.flatnonzero(np.diff(each) > EXACT) + 1)]
+    levels = np.split(each, np.flatnonzero(np.diff(each) > EXACT) + 1)
+    return [float(level.mean()) for level in levels]
 
 
 def _stacked(body: Any, levels: Sequence[float]) -> Iterator[tuple[Array, float, float]]:
-    """The prisms of a body: base (n, 2), lower and upper end. Slabs of one cross-section are one."""
+    """The prisms of a body: base (n, 2), lower and upper end. Slabs of one cross-section are
+    joined."""
     low, section = levels[0], None
-    for start, end in zip(levels, levels[1:], strict=False):
+    for start, end in pairwise(levels):
         here = body.slice((start + end) / 2)
         if section is not None and not _same(section, here):
             yield from ((base, low, start) for base in _convex(section))
