@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from factory.geometry.alike import PartShape, motion_between, moved, shape_of
-from factory.geometry.meshes import Array, Mesh, is_closed, normals_of, volume_of
+from factory.geometry.meshes import Array, Mesh, is_closed, is_flat, normals_of, volume_of
 from factory.geometry.pieces import FLATNESS, closed_bodies, components, is_convex, joined
 from factory.geometry.prisms import prisms
 from factory.support.cache import digest, load_arrays, packed, store_arrays, unpacked
@@ -60,15 +60,18 @@ AS_DRAWN = np.eye(3)
 LOADING = Lock()
 
 SLIVER = 1e-6
-"""Bodies below this share of the mesh's volume are omitted: the engine refuses flat ones."""
+"""Bodies below this share of the mesh's volume are omitted."""
 
 
 def in_pieces(mesh: Mesh, stood_in: bool = False) -> Mesh:
-    """The mesh with its convex bodies, if it has several. `stood_in`: whether another part stands
-    in it."""
+    """The mesh with its convex bodies, if it has several, and without flat ones. `stood_in`:
+    whether another part stands in it."""
     if not is_closed(mesh.faces) or _fills(mesh, 1 - FLATNESS):
         return mesh
-    bodies = closed_bodies(mesh.vertices, mesh.faces)
+    every = closed_bodies(mesh.vertices, mesh.faces)
+    bodies = [body for body in every if not is_flat(body[0])]
+    if 0 < len(bodies) < len(every):
+        mesh = Mesh(mesh.name, *joined(bodies))
     if len(bodies) > 1 and all(is_convex(*body) for body in bodies):
         return Mesh(mesh.name, *joined(bodies), tuple(vertices for vertices, _ in bodies))
     alone = [Mesh(mesh.name, *body) for body in bodies]
@@ -84,11 +87,11 @@ def _pieces(body: Mesh, stood_in: bool) -> tuple[Array, ...]:
     """The convex bodies of one body of a mesh."""
     if not _fills(body, 1 - FLATNESS):
         is_entered = stood_in or has_hole(body)
-        exact = prisms(body.vertices, body.faces) if is_entered else ()
-        if exact:
-            return exact
-        if can_decompose() and (is_entered or not _fills(body, FULL)):
-            return _decomposed(body)
+        pieces = prisms(body.vertices, body.faces) if is_entered else ()
+        if not pieces and can_decompose() and (is_entered or not _fills(body, FULL)):
+            pieces = _decomposed(body)
+        pieces = tuple(piece for piece in pieces if not is_flat(piece))
+        return pieces or (body.vertices,)
     return (body.vertices,)
 
 

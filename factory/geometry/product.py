@@ -31,6 +31,7 @@ from factory.geometry.mending import mended
 from factory.geometry.mesh_file import ANEW, UnreadableMesh, areas_of
 from factory.geometry.mesh_reader import read_mesh
 from factory.geometry.meshes import (
+    SHEETS,
     Array,
     Indices,
     MassProperties,
@@ -266,6 +267,7 @@ def _finished(key: str, vertices: Array, faces: Indices, entered: bool) -> MassP
         vertices, faces, was = mended(mesh.vertices, mesh.faces)
         remark = mend_remark(was) if was else None
         mesh = in_pieces(Mesh(mesh.name, vertices, faces), entered)
+        remark = SHEETS if len(mesh.faces) < len(faces) else remark
     prepared = measured(mesh, remark)
     _keep(key, prepared)
     return prepared
