@@ -430,6 +430,28 @@ def test_a_hole_that_another_part_stands_in_is_open(tmp_path: Path) -> None:
         assert {len(solids[label].pieces) for label in "pq"} == count
 
 
+@pytest.mark.parametrize("scale", [1e-3, 1e-1, 10.0])
+@pytest.mark.parametrize("flat", [(1, 1, 0), (1, 0, 0), (0, 0, 0), (1, 1, 1e-9)])
+def test_flat_bodies_are_left_out(
+    tmp_path: Path, flat: tuple[float, float, float], scale: float
+) -> None:
+    """A sheet with two sides, a line, a point, a film round two boxes of 0.1 m in an L: what is left
+    has its own box, and collides. Triangles without an area are not worth a word."""
+    boxes = [trimesh.creation.box((0.1, 0.1, h)) for h in (0.1, 0.3)]
+    boxes[1].apply_translation((0.2, 0, 0.1))
+    sheet = trimesh.creation.box((1, 1, 1)).apply_transform(np.diag([*flat, 1]))
+    sheet.apply_transform(trimesh.transformations.rotation_matrix(0.7, (1, 2, 3)))
+    trimesh.util.concatenate([sheet, *boxes]).export(tmp_path / "m.obj")
+    part = ("p", "atomic", "", {"mesh": "m.obj", "scale": scale})
+    pag = table_pag("p", part)  # type: ignore[arg-type]
+    product = product_geometry(PAG(pag.root, pag.nodes, folder=str(tmp_path)))
+    assert ("flat bodies" in str(product.warnings)) == (flat[1] == 1)
+    assert np.ptp([product.low, product.high], axis=0) == pytest.approx(
+        scale * np.array([0.3, 0.1, 0.3]), rel=1e-6
+    )
+    assert [len(piece) for piece in product.solids["p"].pieces] == [8, 8]
+
+
 def test_a_rod_may_not_be_as_coarse_as_it_is_thick(
     tmp_path: Path, library: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
