@@ -68,9 +68,9 @@ def in_pieces(mesh: Mesh, stood_in: bool = False) -> Mesh:
     whether another part stands in it."""
     if not is_closed(mesh.faces) or _fills(mesh, 1 - FLATNESS):
         return mesh
-    every = closed_bodies(mesh.vertices, mesh.faces)
-    bodies = [body for body in every if not is_flat(body[0])]
-    if 0 < len(bodies) < len(every):
+    shells = closed_bodies(mesh.vertices, mesh.faces)
+    bodies = [shell for shell in shells if not is_flat(shell[0])]
+    if 0 < len(bodies) < len(shells):
         mesh = Mesh(mesh.name, *joined(bodies))
     if len(bodies) > 1 and all(is_convex(*body) for body in bodies):
         return Mesh(mesh.name, *joined(bodies), tuple(vertices for vertices, _ in bodies))
@@ -79,7 +79,7 @@ def in_pieces(mesh: Mesh, stood_in: bool = False) -> Mesh:
         alone = [mesh]  # a cavity is no body
     each = [_pieces(body, stood_in) for body in alone or [mesh]]
     pieces = tuple(piece for pieces in each for piece in pieces)
-    is_apart = len(pieces) > 1 if can_decompose() else any(len(own) > 1 for own in each)
+    is_apart = len(pieces) > 1 if can_decompose() else any(len(some) > 1 for some in each)
     return replace(mesh, pieces=pieces) if is_apart else mesh
 
 

@@ -63,8 +63,8 @@ def _facets(region: Indices, convex: Array) -> set[tuple[int, bool]]:
     the regions (k, 2) on both sides of edges."""
     both = np.concatenate([region, region[:, ::-1]])
     sides = np.unique(np.column_stack([both[:, 0], np.tile(convex, 2), both[:, 1]]), axis=0)
-    found, count = np.unique(sides[:, :2], axis=0, return_counts=True)
-    return {(place, bool(way)) for place, way in found[count > 1].tolist()}
+    places, count = np.unique(sides[:, :2], axis=0, return_counts=True)
+    return {(place, bool(way)) for place, way in places[count > 1].tolist()}
 
 
 def _corners(region: Indices, edges: Indices) -> dict[int, Indices]:

@@ -140,16 +140,16 @@ def stood_in(solids: Sequence[Solid]) -> frozenset[str]:
         return frozenset()
     from manifold3d import Manifold
 
-    found: set[str] = set()
+    labels: set[str] = set()
     for pair in near_pairs(solids, -SILENT).tolist():
         for solid, other in ((solids[one], drawn(solids[two])) for one, two in (pair, pair[::-1])):
-            body = drawn(solid) if solid.label in hulls - found else None
+            body = drawn(solid) if solid.label in hulls - labels else None
             if body is not None and other is not None:
                 inside = Manifold.hull_points(solid.corners) ^ other
                 film = SILENT * inside.surface_area()
                 if inside.volume() > (body ^ other).volume() + film:
-                    found.add(solid.label)
-    return frozenset(found)
+                    labels.add(solid.label)
+    return frozenset(labels)
 
 
 def near_pairs(solids: Sequence[Solid], gap: float) -> Indices:

@@ -44,12 +44,12 @@ def prisms(vertices: Array, faces: Indices) -> tuple[Array, ...]:
         levels = _levels(placed, faces)
         if len(levels) < 2:
             continue
-        found = [*_stacked(bounded(placed, faces), levels)]
-        whole = sum(_area(base) * (high - low) for base, low, high in found) * size**3
-        if len(found) <= MOST_PIECES and abs(whole - volume) <= EXACT * volume:
+        stack = [*_stacked(bounded(placed, faces), levels)]
+        whole = sum(_area(base) * (high - low) for base, low, high in stack) * size**3
+        if len(stack) <= MOST_PIECES and abs(whole - volume) <= EXACT * volume:
             return tuple(
                 _prism(*prism) @ frame * size
-                for prism in found
+                for prism in stack
                 if _area(prism[0]) * (prism[2] - prism[1]) * size**3 > SLIVER * volume
             )
     return ()

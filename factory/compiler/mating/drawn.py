@@ -136,10 +136,10 @@ class DrawnWays:
 
     def finished(self, one: int, other: int) -> Common:
         """The overlap of two parts in the finished product."""
-        key, found = (self._labels[one], self._labels[other]), self._found.finished
-        if key not in found:
-            found[key] = common(self._body(one), self._body(other))
-        return found[key]
+        key, overlaps = (self._labels[one], self._labels[other]), self._found.finished
+        if key not in overlaps:
+            overlaps[key] = common(self._body(one), self._body(other))
+        return overlaps[key]
 
     def _cuts(self, moving: int, standing: int, axis: int, sign: int) -> bool:
         """Whether the smaller of two parts sweeps more of the larger on the way than the two share
