@@ -435,8 +435,8 @@ def test_a_hole_that_another_part_stands_in_is_open(tmp_path: Path) -> None:
 def test_flat_bodies_are_left_out(
     tmp_path: Path, flat: tuple[float, float, float], scale: float
 ) -> None:
-    """A sheet with two sides, a line, a point, a film round two boxes of 0.1 m in an L: what is left
-    has its own box, and collides. Triangles without an area are not worth a word."""
+    """A sheet with two sides, a line, a point, a film round two boxes of 0.1 m in an L: what is
+    left has its own box, and collides. Triangles without an area are not worth a word."""
     boxes = [trimesh.creation.box((0.1, 0.1, h)) for h in (0.1, 0.3)]
     boxes[1].apply_translation((0.2, 0, 0.1))
     sheet = trimesh.creation.box((1, 1, 1)).apply_transform(np.diag([*flat, 1]))

@@ -26,8 +26,8 @@ LEAST_MASS, LEAST_INERTIA = 1e-9, 1e-12
 """The least mass [kg] and principal moments [kg m²] that the engine accepts."""
 
 THINNEST, LEAST_PIECE = 1e-6, 1e-13
-"""The engine takes convex bodies for flat that are thinner than the first [m], or than this share of
-their distance from the origin, or are in a smaller box than the second [m³]."""
+"""The engine takes convex bodies for flat that are thinner than the first [m], or than this share
+of their distance from the origin, or are in a smaller box than the second [m³]."""
 
 TOO_FAR = 1e-5
 """Pieces that protrude from their mesh by no more than this are accurate [m]."""
