@@ -101,7 +101,7 @@ def has_hole(mesh: Mesh) -> bool:
     sides = np.sort(np.concatenate([mesh.faces[:, [n, (n + 1) % 3]] for n in range(3)]), axis=1)
     used, edges = np.unique(mesh.faces), np.unique(sides, axis=0)
     count = components(len(mesh.vertices), mesh.faces).max(initial=-1) + 1
-    return len(used) - len(edges) + len(mesh.faces) < 2 * count
+    return bool(len(used) - len(edges) + len(mesh.faces) < 2 * count)
 
 
 def collides_as_hull(mesh: Mesh) -> bool:

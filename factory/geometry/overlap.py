@@ -220,7 +220,7 @@ def _is_inside(point: Array, body: Any) -> bool:
     """Whether a point is inside a body: a ray from it leaves the body more often than it enters."""
     box = np.array(body.bounding_box()).reshape(2, 3)
     beyond = point + RAY * 2 * (np.linalg.norm(box[1] - box[0]) + np.abs(point - box).max())
-    return sum(np.sign(hit.normal @ RAY) for hit in body.ray_cast(point, beyond)) > 0
+    return bool(sum(np.sign(hit.normal @ RAY) for hit in body.ray_cast(point, beyond)) > 0)
 
 
 def _distances(points: Array, body: Any, shared: Any) -> Array:

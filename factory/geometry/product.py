@@ -84,8 +84,8 @@ def product_geometry(pag: PAG, files: Mapping[str, bytes] = MappingProxyType({})
     shaped = {n.label: reader.solid(n, i) for i, n in enumerate(leaves) if _has_shape(n)}
     solids = {label: solid for label, solid in shaped.items() if solid is not None}
     if entered := stood_in([*solids.values()]):
-        files = {_file(node) for node in leaves if node.label in entered}
-        again = [(n, i) for i, n in enumerate(leaves) if n.label in solids and _file(n) in files]
+        bored = {_file(node) for node in leaves if node.label in entered}
+        again = [(n, i) for i, n in enumerate(leaves) if n.label in solids and _file(n) in bored]
         reader.read([node for node, _ in again], entered=True)
         solids |= {n.label: solid for n, i in again if (solid := reader.solid(n, i)) is not None}
     lift = max((float(solid.high[2]) for solid in solids.values()), default=0.0)

@@ -150,7 +150,8 @@ class DrawnWays:
         cut, share = sweep ^ body, self.finished(moving, standing).volume
         most = share + TOLERANCE * cut.surface_area()
         # A sweep has places twice that it passes twice; its bodies united have them once.
-        return cut.volume() > most and united(part ^ body for part in sweep.decompose()) > most
+        is_more = bool(cut.volume() > most)
+        return is_more and united(part ^ body for part in sweep.decompose()) > most
 
     def _path(self, moving: int, standing: int, axis: int, sign: int) -> tuple[float, float]:
         """How deep the first part gets into the second on its way, and where [m]. The depth of a
