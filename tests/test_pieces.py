@@ -402,13 +402,13 @@ CORNERS = [(x, y) for x in (-0.08, 0.08) for y in (-0.05, 0.05)]
 
 @pytest.mark.parametrize("kind", ["obj", "stl"])
 def test_a_plate_with_holes_is_decomposed_exactly(tmp_path: Path, kind: str) -> None:
-    """However little the holes are, also if it is turned about any axis; none of its bodies closes
-    a hole. With a groove that is not along them, it is no body of prisms."""
+    """However small the holes are, also if it is turned about any axis: slivers are omitted, and
+    none of its bodies closes a hole. With a tapered hole, it is no body of prisms."""
     mesh = bored(PLATE, 0.02, *CORNERS)
     assert mesh.volume > 0.98 * mesh.convex_hull.volume
     for plate in (mesh, turned(mesh, 1)):
         solid = solid_of(tmp_path, plate, kind)
-        assert sum(hull_volume(p) for p in solid.pieces) == pytest.approx(mesh.volume, rel=1e-6)
+        assert sum(hull_volume(p) for p in solid.pieces) == pytest.approx(mesh.volume, rel=1e-3)
         bodies = Manifold.batch_boolean(list(map(Manifold.hull_points, solid.pieces)), OpType.Add)
         assert (bodies - drawn(solid)).volume() < 1e-6 * mesh.volume
     cone = Manifold.cylinder(0.02, 0.001, 0.01, 24, True)
@@ -424,7 +424,7 @@ def test_a_hole_that_another_part_stands_in_is_open(tmp_path: Path) -> None:
     plates = [(n, "atomic", "", {"mesh": "m.obj", "pos": at}) for n, at in places.items()]
     pin = ("pin", "atomic", "", {"cylinder": (0.004, 0.02), "pos": (0.05, 0.02, 0.005)})
     foot = ("pin", "atomic", "", {"cylinder": (0.004, 0.02), "pos": (-0.05, 0.02, 0.01)})
-    for part, count in ((foot, {1}), (pin, {39})):
+    for part, count in ((foot, {1}), (pin, {37})):
         pag = table_pag("s", ("s", "mate", "p q pin", {}), *plates, part)  # type: ignore[arg-type]
         solids = product_geometry(PAG(pag.root, pag.nodes, folder=str(tmp_path))).solids
         assert {len(solids[label].pieces) for label in "pq"} == count

@@ -28,8 +28,10 @@ SQUARE = 1e-3
 AXES = 6
 """The number of directions that are tried: those of the largest faces."""
 
-SLIVER = 1e-6
-"""Prisms below this share of the body's volume are omitted."""
+THIN, FEW = (5e-5, 1e-3), 1e-3
+"""Prisms that are thinner than the first [m], and than the second share of the body, are omitted,
+the thinnest first, up to a share of FEW of its volume: a thin one has no room to recede in a close
+fit, and what is beside it is solid."""
 
 Loop = tuple[int, ...]
 """The corners of a convex polygon by number, anticlockwise."""
@@ -45,13 +47,14 @@ def prisms(vertices: Array, faces: Indices) -> tuple[Array, ...]:
         if len(levels) < 2:
             continue
         stack = [*_stacked(bounded(placed, faces), levels)]
-        whole = sum(_area(base) * (high - low) for base, low, high in stack) * size**3
-        if len(stack) <= MOST_PIECES and abs(whole - volume) <= EXACT * volume:
-            return tuple(
-                _prism(*prism) @ frame * size
-                for prism in stack
-                if _area(prism[0]) * (prism[2] - prism[1]) * size**3 > SLIVER * volume
-            )
+        volumes = np.array([_area(base) * (high - low) for base, low, high in stack]) * size**3
+        if len(stack) <= MOST_PIECES and abs(volumes.sum() - volume) <= EXACT * volume:
+            thick = np.array([_breadth(base) for base, _, _ in stack]) * size
+            order = np.argsort(thick, kind="stable")
+            few = np.cumsum(volumes[order]) <= FEW * volume
+            thin = {*order[few & (thick[order] < min(THIN[0], THIN[1] * size))].tolist()}
+            kept = (prism for number, prism in enumerate(stack) if number not in thin)
+            return tuple(_prism(*prism) @ frame * size for prism in kept)
     return ()
 
 
@@ -153,6 +156,12 @@ def _turns_left(points: Array, a: int, b: int, c: int) -> bool:
 def _area(base: Array) -> float:
     x, y = base.T
     return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
+
+
+def _breadth(base: Array) -> float:
+    """A lower bound on the radius of the largest circle in a convex polygon."""
+    rim = np.linalg.norm(np.roll(base, -1, axis=0) - base, axis=1).sum()
+    return _area(base) / float(rim)
 
 
 def _prism(base: Array, low: float, high: float) -> Array:
