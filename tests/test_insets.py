@@ -137,6 +137,18 @@ def test_what_scrapes_along_each_other_gets_room() -> None:
     assert found.depths["b"] == {0: pytest.approx(CLEAR / 2, abs=1e-6)}
 
 
+def test_faces_do_not_recede_by_less_than_a_micrometre() -> None:
+    """Rounding takes a billionth of a millimetre from the room on the way: no body is renamed."""
+    layout = laid_out(
+        """root = r; r = mate ( s, b ); s = mate ( a, c );
+        a = atomic ( box = (0.04, 0.04, 0.04), pos = (0, 0, 0.02) );
+        c = atomic ( box = (0.01, 0.04, 0.04), pos = (0.2, 0, 0.02) );
+        b = atomic ( box = (0.01, 0.04, 0.04), pos = (0.025049999999, 0, 0.02) )"""
+    )
+    assert {o.parts for o in layout.overlaps} == {("a", "b")}
+    assert insets_of(layout, 0.5 * MM).depths == {}
+
+
 def test_what_is_too_thin_to_become_smaller_is_left_out() -> None:
     thin = PRESSED.replace("(0.04, 0.04, 0.04), pos = (0, 0,", "(0.04, 0.04, 0.0005), pos = (0, 0,")
     assert insets_of(laid_out(thin), 0.5 * MM).excluded == (("a", "b"),)

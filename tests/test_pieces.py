@@ -18,10 +18,12 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from manifold3d import Manifold, OpType
 
 import factory
 from factory.geometry import decomposition
 from factory.geometry.meshes import Array, Indices, Mesh, is_closed
+from factory.geometry.overlap import drawn
 from factory.geometry.pieces import (
     MOST_PIECES,
     ROUND,
@@ -267,10 +269,17 @@ def library(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
     yield calls
 
 
+def tapered(inner: float, outer: float, height: float) -> trimesh.Trimesh:
+    """A tube that is narrower at its upper end: no body of prisms."""
+    tube = trimesh.creation.annulus(inner, outer, height)
+    tube.vertices[tube.vertices[:, 2] > 0, :2] *= 0.95
+    return tube
+
+
 def test_what_else_is_closed_is_decomposed_once(
     tmp_path: Path, library: list[int], cache: Path
 ) -> None:
-    tube = trimesh.creation.annulus(0.05, 0.1, 0.1)
+    tube = tapered(0.05, 0.1, 0.1)
     first = solid_of(tmp_path, tube)
     shutil.rmtree(cache.parent / "meshes")
     again = solid_of(tmp_path, tube)
@@ -284,13 +293,13 @@ def test_a_library_that_fails_leaves_the_hull(
     tmp_path: Path, library: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys.modules["coacd"], "run_coacd", lambda *_, **__: 1 / 0)
-    assert len(solid_of(tmp_path, trimesh.creation.annulus(0.05, 0.1, 0.1)).pieces) == 1
+    assert len(solid_of(tmp_path, tapered(0.05, 0.1, 0.1)).pieces) == 1
 
 
 def test_each_body_is_decomposed_by_itself(tmp_path: Path, library: list[int]) -> None:
     """What touches would be a mesh that intersects itself, which the library puts on a grid."""
-    tube = trimesh.creation.annulus(0.05, 0.1, 0.1)
-    top = trimesh.creation.annulus(0.05, 0.1, 0.2).apply_translation((0, 0, 0.15))
+    tube = tapered(0.05, 0.1, 0.1)
+    top = tapered(0.05, 0.1, 0.2).apply_translation((0, 0, 0.15))
     foot = trimesh.creation.box((0.1, 0.1, 0.1)).apply_translation((1, 0, 0))
     assert len(solid_of(tmp_path, trimesh.util.concatenate([tube, top, foot])).pieces) == 5
     assert len(library) == 1 + 1  # two tubes, and the box as it is
@@ -329,7 +338,7 @@ def test_a_shape_is_decomposed_once_wherever_it_is(
 def test_copies_in_one_product_are_decomposed_once(
     tmp_path: Path, library: list[int], cache: Path
 ) -> None:
-    tube = trimesh.creation.annulus(0.05, 0.1, 0.1)
+    tube = tapered(0.05, 0.1, 0.1)
     parts = []
     for number in range(4):
         turned(tube, number).export(tmp_path / f"{number}.obj")
@@ -362,7 +371,7 @@ def test_bodies_that_reach_out_of_their_mesh_count_where_they_collide(
         return [(np.asarray(b.vertices), np.asarray(b.faces)) for b in boxes]
 
     monkeypatch.setattr(sys.modules["coacd"], "run_coacd", run_coacd)
-    tube = trimesh.creation.annulus(0.05, 0.1, 0.1)
+    tube = tapered(0.05, 0.1, 0.1)
     tube.export(tmp_path / "wide.obj")
     pag = table_pag("p", ("p", "atomic", "", {"mesh": "wide.obj"}))
     product = product_geometry(PAG(pag.root, pag.nodes, folder=str(tmp_path)))
@@ -378,6 +387,71 @@ def test_nearly_convex_meshes_are_not_decomposed(tmp_path: Path, library: list[i
     assert len(solid_of(tmp_path, bump).pieces) == 1 and not library
 
 
+def bored(body: Manifold, depth: float, *places: tuple[float, float]) -> trimesh.Trimesh:
+    """A body with round holes of 8 mm from its top, at z = 0, to a depth [m]."""
+    hole = Manifold.cylinder(2 * depth, 0.004, -1.0, 24, True)
+    for x, y in places:
+        body = body - hole.translate((x, y, 0.0))
+    mesh = body.to_mesh64()
+    return trimesh.Trimesh(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts))
+
+
+PLATE = Manifold.cube((0.2, 0.15, 0.01), True).translate((0.0, 0.0, -0.005))
+CORNERS = [(x, y) for x in (-0.08, 0.08) for y in (-0.05, 0.05)]
+
+
+@pytest.mark.parametrize("kind", ["obj", "stl"])
+def test_a_plate_with_holes_is_decomposed_exactly(tmp_path: Path, kind: str) -> None:
+    """However small the holes are, also if it is turned about any axis: slivers are omitted, and
+    none of its bodies closes a hole. With a tapered hole, it is no body of prisms."""
+    mesh = bored(PLATE, 0.02, *CORNERS)
+    assert mesh.volume > 0.98 * mesh.convex_hull.volume
+    for plate in (mesh, turned(mesh, 1)):
+        solid = solid_of(tmp_path, plate, kind)
+        assert sum(hull_volume(p) for p in solid.pieces) == pytest.approx(mesh.volume, rel=1e-3)
+        bodies = Manifold.batch_boolean(list(map(Manifold.hull_points, solid.pieces)), OpType.Add)
+        assert (bodies - drawn(solid)).volume() < 1e-6 * mesh.volume
+    cone = Manifold.cylinder(0.02, 0.001, 0.01, 24, True)
+    assert len(solid_of(tmp_path, bored(PLATE - cone, 0.02), kind).pieces) == 1
+
+
+def test_a_hole_that_another_part_stands_in_is_open(tmp_path: Path) -> None:
+    """A blind hole is closed by a hull unless a pin stands in it; the other part of that file is
+    decomposed too, and a plate on which something only stands is not."""
+    mesh = bored(PLATE, 0.005, (0.05, 0.02))
+    mesh.export(tmp_path / "m.obj")
+    places = {"p": (0, 0, 0), "q": (0, 0, 1)}
+    plates = [(n, "atomic", "", {"mesh": "m.obj", "pos": at}) for n, at in places.items()]
+    pin = ("pin", "atomic", "", {"cylinder": (0.004, 0.02), "pos": (0.05, 0.02, 0.005)})
+    foot = ("pin", "atomic", "", {"cylinder": (0.004, 0.02), "pos": (-0.05, 0.02, 0.01)})
+    for part, count in ((foot, {1}), (pin, {37})):
+        pag = table_pag("s", ("s", "mate", "p q pin", {}), *plates, part)  # type: ignore[arg-type]
+        solids = product_geometry(PAG(pag.root, pag.nodes, folder=str(tmp_path))).solids
+        assert {len(solids[label].pieces) for label in "pq"} == count
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e-1, 10.0])
+@pytest.mark.parametrize("flat", [(1, 1, 0), (1, 0, 0), (0, 0, 0), (1, 1, 1e-9)])
+def test_flat_bodies_are_left_out(
+    tmp_path: Path, flat: tuple[float, float, float], scale: float
+) -> None:
+    """A sheet with two sides, a line, a point, a film round two boxes of 0.1 m in an L: what is
+    left has its own box, and collides. Triangles without an area are not worth a word."""
+    boxes = [trimesh.creation.box((0.1, 0.1, h)) for h in (0.1, 0.3)]
+    boxes[1].apply_translation((0.2, 0, 0.1))
+    sheet = trimesh.creation.box((1, 1, 1)).apply_transform(np.diag([*flat, 1]))
+    sheet.apply_transform(trimesh.transformations.rotation_matrix(0.7, (1, 2, 3)))
+    trimesh.util.concatenate([sheet, *boxes]).export(tmp_path / "m.obj")
+    part = ("p", "atomic", "", {"mesh": "m.obj", "scale": scale})
+    pag = table_pag("p", part)  # type: ignore[arg-type]
+    product = product_geometry(PAG(pag.root, pag.nodes, folder=str(tmp_path)))
+    assert ("flat bodies" in str(product.warnings)) == (flat[1] == 1)
+    assert np.ptp([product.low, product.high], axis=0) == pytest.approx(
+        scale * np.array([0.3, 0.1, 0.3]), rel=1e-6
+    )
+    assert [len(piece) for piece in product.solids["p"].pieces] == [8, 8]
+
+
 def test_a_rod_may_not_be_as_coarse_as_it_is_thick(
     tmp_path: Path, library: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -391,7 +465,7 @@ def test_a_rod_may_not_be_as_coarse_as_it_is_thick(
 
     monkeypatch.setattr(sys.modules["coacd"], "run_coacd", run_coacd)
     for height in (0.1, 0.6, 2.0):
-        solid_of(tmp_path, trimesh.creation.annulus(0.05, 0.1, height))
+        solid_of(tmp_path, tapered(0.05, 0.1, height))
     assert given == pytest.approx([0.05, 0.1 / 3, 0.02], rel=0.01)
 
 
@@ -407,7 +481,7 @@ def test_a_shallow_groove_is_cut_finer(
         return cut(mesh)[: 2 if threshold < 0.03 else 1]  # type: ignore[no-any-return]
 
     monkeypatch.setattr(sys.modules["coacd"], "run_coacd", run_coacd)
-    assert len(solid_of(tmp_path, trimesh.creation.annulus(0.05, 0.1, 0.1)).pieces) == 2
+    assert len(solid_of(tmp_path, tapered(0.05, 0.1, 0.1)).pieces) == 2
     assert given == [0.05, 0.02]
 
 
@@ -426,7 +500,7 @@ def test_meshes_are_decomposed_side_by_side(
     monkeypatch.setattr(sys.modules["coacd"], "run_coacd", run_coacd)
     parts = []
     for number, size in enumerate((0.1, 0.2)):
-        trimesh.creation.annulus(size / 2, size, size).export(tmp_path / f"{number}.obj")
+        tapered(size / 2, size, size).export(tmp_path / f"{number}.obj")
         parts += [(f"p{number}{k}", "atomic", "", {"mesh": f"{number}.obj"}) for k in range(2)]
     pag = table_pag("s", ("s", "mate", "p00 p10 p01 p11", {}), *parts)  # type: ignore[arg-type]
     solids = product_geometry(PAG(pag.root, pag.nodes, folder=str(tmp_path))).solids

@@ -1,10 +1,12 @@
 """Decomposition of a mesh that is not convex into convex bodies, which collide in its place.
 
-A mesh that is open, or fills 98 % of its hull, is represented by its hull. A mesh of several closed
-convex bodies (a plate with a hole, written as wedges that touch) is exactly these bodies. Other
-closed meshes are decomposed by CoACD, body by body, if it is installed (the extra `decompose`);
-otherwise the hull is used. A body is decomposed in the frame of its own sides, so the result does
-not depend on its orientation. Results are cached, and reused for the same shape in any place.
+A mesh that is open is represented by its hull. A mesh of several closed convex bodies (a plate with
+a hole, written as wedges that touch) is exactly these bodies. Other closed meshes are decomposed
+body by body. A body that has a hole through it, or that another part stands in, is decomposed
+exactly if it is a body of prisms (`prisms`). Such a body, and any that fills less than 98 % of its
+hull, is otherwise decomposed by CoACD, if that is installed (the extra `decompose`); else its hull
+is used. CoACD decomposes a body in the frame of its own sides, so the result does not depend on its
+orientation. Its results are cached, and reused for the same shape in any place.
 """
 
 from __future__ import annotations
@@ -16,8 +18,9 @@ from typing import Any
 import numpy as np
 
 from factory.geometry.alike import PartShape, motion_between, moved, shape_of
-from factory.geometry.meshes import Array, Mesh, is_closed, normals_of, volume_of
-from factory.geometry.pieces import FLATNESS, closed_bodies, is_convex, joined
+from factory.geometry.meshes import Array, Mesh, is_closed, is_flat, normals_of, volume_of
+from factory.geometry.pieces import FLATNESS, closed_bodies, components, is_convex, joined
+from factory.geometry.prisms import prisms
 from factory.support.cache import digest, load_arrays, packed, store_arrays, unpacked
 from factory.support.environment import environment
 from factory.support.version import release
@@ -26,7 +29,8 @@ FOLDER = "pieces"
 """The folder of decompositions in the user's cache."""
 
 FULL = 0.98
-"""A closed mesh that fills more than this share of its hull is represented by it."""
+"""A closed mesh that fills more than this share of its hull is represented by it, unless it has a
+hole through it, or another part stands in it."""
 
 CONCAVITY, SLENDER = (0.02, 0.05), 0.1
 """Bounds on the deviation that CoACD allows (its `threshold`), in units of about half the longest
@@ -56,23 +60,53 @@ AS_DRAWN = np.eye(3)
 LOADING = Lock()
 
 SLIVER = 1e-6
-"""Bodies below this share of the mesh's volume are omitted: the engine refuses flat ones."""
+"""Bodies below this share of the mesh's volume are omitted."""
 
 
-def in_pieces(mesh: Mesh) -> Mesh:
-    """The mesh with its convex bodies, if it has several."""
+def in_pieces(mesh: Mesh, stood_in: bool = False) -> Mesh:
+    """The mesh with its convex bodies, if it has several, and without flat ones. `stood_in`:
+    whether another part stands in it."""
     if not is_closed(mesh.faces) or _fills(mesh, 1 - FLATNESS):
         return mesh
-    bodies = closed_bodies(mesh.vertices, mesh.faces)
+    shells = closed_bodies(mesh.vertices, mesh.faces)
+    bodies = [shell for shell in shells if not is_flat(shell[0])]
+    if 0 < len(bodies) < len(shells):
+        mesh = Mesh(mesh.name, *joined(bodies))
     if len(bodies) > 1 and all(is_convex(*body) for body in bodies):
         return Mesh(mesh.name, *joined(bodies), tuple(vertices for vertices, _ in bodies))
-    if _fills(mesh, FULL) or not can_decompose():
-        return mesh
     alone = [Mesh(mesh.name, *body) for body in bodies]
     if any(volume_of(body.vertices, body.faces) <= 0 for body in alone):
         alone = [mesh]  # a cavity is no body
-    pieces = tuple(piece for body in alone or [mesh] for piece in _decomposed(body))
-    return replace(mesh, pieces=pieces) if len(pieces) > 1 else mesh
+    each = [_pieces(body, stood_in) for body in alone or [mesh]]
+    pieces = tuple(piece for pieces in each for piece in pieces)
+    is_apart = len(pieces) > 1 if can_decompose() else any(len(some) > 1 for some in each)
+    return replace(mesh, pieces=pieces) if is_apart else mesh
+
+
+def _pieces(body: Mesh, stood_in: bool) -> tuple[Array, ...]:
+    """The convex bodies of one body of a mesh."""
+    if not _fills(body, 1 - FLATNESS):
+        is_entered = stood_in or has_hole(body)
+        pieces = prisms(body.vertices, body.faces) if is_entered else ()
+        if not pieces and can_decompose() and (is_entered or not _fills(body, FULL)):
+            pieces = _decomposed(body)
+        pieces = tuple(piece for piece in pieces if not is_flat(piece))
+        return pieces or (body.vertices,)
+    return (body.vertices,)
+
+
+def has_hole(mesh: Mesh) -> bool:
+    """Whether a closed surface has a hole through it, as a torus has: its Euler characteristic is
+    less than that of its components, were they spheres."""
+    sides = np.sort(np.concatenate([mesh.faces[:, [n, (n + 1) % 3]] for n in range(3)]), axis=1)
+    used, edges = np.unique(mesh.faces), np.unique(sides, axis=0)
+    count = components(len(mesh.vertices), mesh.faces).max(initial=-1) + 1
+    return bool(len(used) - len(edges) + len(mesh.faces) < 2 * count)
+
+
+def collides_as_hull(mesh: Mesh) -> bool:
+    """Whether a closed mesh that is smaller than its hull collides as that."""
+    return not mesh.pieces and is_closed(mesh.faces) and not _fills(mesh, 1 - FLATNESS)
 
 
 def can_decompose() -> bool:
@@ -87,9 +121,7 @@ def _fills(mesh: Mesh, share: float) -> bool:
 
 def _decomposed(mesh: Mesh) -> tuple[Array, ...]:
     """The bodies that CoACD makes of a mesh, or has made before (from the cache); the mesh itself
-    if it is convex, or CoACD fails."""
-    if _fills(mesh, FULL):
-        return (mesh.vertices,)
+    if CoACD fails."""
     shape = shape_of(mesh.vertices, mesh.faces)
     pieces = _kept(shape)
     if pieces is None:

@@ -25,6 +25,10 @@ LEAST_BOX = 1e-12
 LEAST_MASS, LEAST_INERTIA = 1e-9, 1e-12
 """The least mass [kg] and principal moments [kg m²] that the engine accepts."""
 
+THINNEST, LEAST_PIECE = 1e-6, 1e-13
+"""The engine takes convex bodies for flat that are thinner than the first [m], or than this share
+of their distance from the origin, or are in a smaller box than the second [m³]."""
+
 TOO_FAR = 1e-5
 """Pieces that protrude from their mesh by no more than this are accurate [m]."""
 
@@ -132,6 +136,11 @@ OPEN = Remark(
     "meshes are open: their convex hulls are used",
     "a closed mesh has its own mass, and collides as it is drawn",
 )
+SHEETS = Remark(
+    "has flat bodies, which are left out",
+    "meshes have flat bodies, which are left out",
+    "a body has three extents: give it a thickness",
+)
 HOLLOW = Remark(
     "bounds no volume; its convex hull is used instead",
     "meshes bound no volume: their convex hulls are used",
@@ -161,6 +170,13 @@ def usable(name: str, vertices: Array, faces: Indices) -> tuple[Mesh, Remark | N
             f"simplify it to {MOST_FACES} triangles at most",
         )
     return Mesh(name, vertices, faces), None
+
+
+def is_flat(points: Array) -> bool:
+    """Whether the convex hull of points (n, 3) is too thin, or too small, to be a body."""
+    across = np.ptp(points @ _principal_axes(points).T, axis=0)
+    least = THINNEST * max(1.0, float(np.abs(points).max()))
+    return bool(across.min() < least or across.prod() < LEAST_PIECE)
 
 
 def _principal_axes(vertices: Array) -> Array:

@@ -8,7 +8,10 @@ hole for it. It is attained in the common volume,
 
     depth = min over S in {A, B} of max over p in A ∩ B of |p, ∂S|,
 
-and is sampled at the corners of the common volume and along chords that are normal to its faces.
+and is sampled at the corners of the common volume and along chords that are normal to its faces. A
+common volume may be a film that is thinner than rounding, as that of a rod in a bore of the same
+diameter. A chord may then begin outside the film and cross the bore, so its middle counts only if
+it is in A and in B.
 
 The volume that A sweeps when it is shifted by v is the union of A and the prisms over its triangles
 that face v. They form one body that may overlap itself: it is solid wherever A passes.
@@ -16,6 +19,7 @@ that face v. They form one body that may overlap itself: it is solid wherever A 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 from weakref import finalize
@@ -44,6 +48,9 @@ LEAST = 1e-15
 BEYOND = 1e-9
 """The distance behind its face at which a chord begins [m]."""
 
+RAY = np.sqrt([2.0, 3.0, 5.0]) / np.sqrt(10.0)
+"""The direction of rays that tell inside from outside: no special one."""
+
 CHUNK = 400_000
 """The most distances between points and triangles that are computed at a time."""
 
@@ -51,11 +58,12 @@ CHUNK = 400_000
 @dataclass(frozen=True, slots=True)
 class Common:
     """The common volume [m³] of two solids, and its depth [m]; both 0 if they are disjoint.
-    `deepest` (3,): a point at that depth."""
+    `deepest` (3,): a point at that depth; `box` (2, 3): the corners of its box."""
 
     volume: float
     depth: float
     deepest: Array = field(default_factory=lambda: np.zeros(3), compare=False, repr=False)
+    box: Array = field(default_factory=lambda: np.zeros((2, 3)), compare=False, repr=False)
 
 
 APART = Common(0.0, 0.0)
@@ -84,7 +92,7 @@ def _made(solid: Solid) -> Any:
         mesh = solid.mesh
         if mesh is None or not is_closed(mesh.faces):
             return None
-        return _bounded(mesh.vertices @ turn.T + solid.position, mesh.faces)
+        return bounded(mesh.vertices @ turn.T + solid.position, mesh.faces)
     if solid.kind == "box":
         body = Manifold.cube(2 * np.array(solid.size), True)
     elif solid.kind == "cylinder":
@@ -103,7 +111,7 @@ def _sides(radius: float) -> int:
     return int(np.clip(np.ceil(needed), *SIDES))
 
 
-def _bounded(vertices: Array, faces: Indices) -> Any:
+def bounded(vertices: Array, faces: Indices) -> Any:
     """The volume that a closed mesh bounds; None if it bounds none. Its bodies that share an edge
     are separated, then united."""
     from manifold3d import Error, Manifold, OpType
@@ -130,7 +138,7 @@ def swept(body: Any, shift: Array) -> Any:
     from manifold3d import Error, Manifold
 
     mesh = body.to_mesh64()
-    vertices, faces = _merged(mesh)
+    vertices, faces = merged(mesh)
     normals = normals_of(vertices, faces)
     lengths = np.linalg.norm(normals, axis=1) * np.linalg.norm(shift)
     front = faces[normals @ shift > FACING * lengths]
@@ -156,12 +164,19 @@ def swept(body: Any, shift: Array) -> Any:
     return Manifold.compose([body, ahead])
 
 
-def _merged(mesh: Any) -> tuple[Array, Indices]:
+def merged(mesh: Any) -> tuple[Array, Indices]:
     """The vertices (n, 3) and faces (m, 3) of a manifold mesh, with vertices merged."""
     vertices = np.asarray(mesh.vert_properties)[:, :3]
     target = np.arange(len(vertices))
     target[np.asarray(mesh.merge_from_vert, np.int64)] = np.asarray(mesh.merge_to_vert, np.int64)
     return vertices, target[np.asarray(mesh.tri_verts, np.int64)]
+
+
+def united(bodies: Iterable[Any]) -> float:
+    """The volume of the union of bodies [m³]."""
+    from manifold3d import Manifold, OpType
+
+    return float(Manifold.batch_boolean([*bodies], OpType.Add).volume())
 
 
 def common(one: Any, other: Any, both: bool = True, samples: int = SAMPLES) -> Common:
@@ -171,17 +186,19 @@ def common(one: Any, other: Any, both: bool = True, samples: int = SAMPLES) -> C
     volume = float(shared.volume())
     if shared.is_empty() or volume <= LEAST:
         return APART
-    points = _within(shared, samples)
+    points = _within(shared, one, other, samples)
     bodies = (one, other) if both else (other,)
     depths = min((_distances(points, body, shared) for body in bodies), key=np.max)
-    return Common(volume, float(depths.max()), points[depths.argmax()])
+    box = np.array(shared.bounding_box()).reshape(2, 3)
+    return Common(volume, float(depths.max()), points[depths.argmax()], box)
 
 
-def _within(shared: Any, samples: int) -> Array:
-    """Sample points (n, 3) of a volume: corners, and the ends and middles of chords from the
-    centres of triangles, the larger triangles first. A volume with few triangles is subdivided."""
+def _within(shared: Any, one: Any, other: Any, samples: int) -> Array:
+    """Sample points (n, 3) of the volume that two bodies share: corners, and the ends and middles
+    of chords from the centres of triangles, the larger triangles first. A volume with few triangles
+    is subdivided."""
     fine = max(1, int(np.sqrt(samples / shared.num_tri())))
-    vertices, faces = _merged(shared.refine(fine).to_mesh64())
+    vertices, faces = merged(shared.refine(fine).to_mesh64())
     a, b, c = (vertices[faces[:, corner]] for corner in range(3))
     normals = np.cross(b - a, c - a)
     areas = np.linalg.norm(normals, axis=1)
@@ -193,14 +210,23 @@ def _within(shared: Any, samples: int) -> Array:
             begin, inward = (a[row] + b[row] + c[row]) / 3, -normals[row] / areas[row]
             hits = shared.ray_cast(begin + BEYOND * inward, begin + reach * inward)
             ends = [np.asarray(hit.position) for hit in hits[:1]]
-            points.append(np.array([begin, *ends, *((begin + end) / 2 for end in ends)]))
+            middles = [(begin + end) / 2 for end in ends]
+            inside = [m for m in middles if _is_inside(m, one) and _is_inside(m, other)]
+            points.append(np.array([begin, *ends, *inside]))
     return np.concatenate(points)
+
+
+def _is_inside(point: Array, body: Any) -> bool:
+    """Whether a point is inside a body: a ray from it leaves the body more often than it enters."""
+    box = np.array(body.bounding_box()).reshape(2, 3)
+    beyond = point + RAY * 2 * (np.linalg.norm(box[1] - box[0]) + np.abs(point - box).max())
+    return bool(sum(np.sign(hit.normal @ RAY) for hit in body.ray_cast(point, beyond)) > 0)
 
 
 def _distances(points: Array, body: Any, shared: Any) -> Array:
     """The distances (n,) [m] of points from the surface of a body, at most the longest edge of the
     box of the common volume."""
-    vertices, faces = _merged(body.to_mesh64())
+    vertices, faces = merged(body.to_mesh64())
     box = np.array(shared.bounding_box()).reshape(2, 3)
     most = float((box[1] - box[0]).max())
     corners = vertices[faces]

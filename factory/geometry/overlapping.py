@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 
+from factory.geometry.decomposition import collides_as_hull
+from factory.geometry.facets import sagitta
 from factory.geometry.meshes import Indices
 from factory.geometry.overlap import common, drawn
 from factory.geometry.solids import Product, Solid
@@ -28,14 +31,20 @@ NAMED = 6
 
 @dataclass(frozen=True, slots=True)
 class Overlapping:
-    """Two parts, in the order of the product, and the depth of their overlap [m]."""
+    """Two parts, in the order of the product, the depth of their overlap, and the `sagitta` of the
+    facets by which round surfaces are drawn where they overlap [m]: an overlap that is not deeper
+    may be these facets alone."""
 
     one: str
     other: str
     depth: float
+    sagitta: float = 0.0
 
     def __str__(self) -> str:
-        return f"{self.one} and {self.other} overlap by {1e3 * self.depth:.2f} mm when finished"
+        words = f"{self.one} and {self.other} overlap by {1e3 * self.depth:.2f} mm when finished"
+        if self.depth <= self.sagitta:
+            return f"{words}, which may be their facets (sagitta {1e3 * self.sagitta:.3f} mm)"
+        return words
 
     def fault(self, allowed: Sequence[AllowedOverlap]) -> Diagnostic | None:
         """The fault (Overlap), unless the overlap is allowed."""
@@ -45,6 +54,9 @@ class Overlapping:
         words = f"{self}, and {1e3 * most:.2f} mm is allowed" if most else str(self)
         option = f"--allow {self.one}:{self.other}"
         hint = f"correct the drawing or, if the overlap is intended, allow it: {option}"
+        if self.depth <= self.sagitta:
+            option = f"{option}:{ceil(1e5 * self.sagitta) / 100:g}mm"
+            hint = f"export round surfaces with more facets, or allow these: {option}"
         return Diagnostic("Overlap", words, None, hint)
 
 
@@ -111,12 +123,33 @@ def _found(product: Product, insides: Insides) -> DrawnOverlaps:
         if insides and not any(both <= inside for inside in insides):
             continue
         if bodies[one] is not None and bodies[other] is not None:
-            depth = common(bodies[one], bodies[other]).depth
-            if depth > SILENT:
-                pairs.append(Overlapping(labels[one], labels[other], depth))
+            shared = common(bodies[one], bodies[other])
+            if shared.depth > SILENT:
+                off = max(sagitta(bodies[n], *shared.box) for n in (one, other))
+                pairs.append(Overlapping(labels[one], labels[other], shared.depth, off))
     pairs.sort(key=lambda pair: -pair.depth)
     left = (label for label, body in zip(labels, bodies, strict=True) if body is None)
     return DrawnOverlaps(tuple(pairs), tuple(left))
+
+
+def stood_in(solids: Sequence[Solid]) -> frozenset[str]:
+    """The parts that collide as their hulls although another part stands in a hole or a hollow of
+    theirs: it is in the hull by more than it is in the part as drawn."""
+    hulls = {solid.label for solid in solids if solid.mesh and collides_as_hull(solid.mesh)}
+    if not hulls:
+        return frozenset()
+    from manifold3d import Manifold
+
+    labels: set[str] = set()
+    for pair in near_pairs(solids, -SILENT).tolist():
+        for solid, other in ((solids[one], drawn(solids[two])) for one, two in (pair, pair[::-1])):
+            body = drawn(solid) if solid.label in hulls - labels else None
+            if body is not None and other is not None:
+                inside = Manifold.hull_points(solid.corners) ^ other
+                film = SILENT * inside.surface_area()
+                if inside.volume() > (body ^ other).volume() + film:
+                    labels.add(solid.label)
+    return frozenset(labels)
 
 
 def near_pairs(solids: Sequence[Solid], gap: float) -> Indices:

@@ -31,6 +31,7 @@ from factory.geometry.mending import mended
 from factory.geometry.mesh_file import ANEW, UnreadableMesh, areas_of
 from factory.geometry.mesh_reader import read_mesh
 from factory.geometry.meshes import (
+    SHEETS,
     Array,
     Indices,
     MassProperties,
@@ -40,6 +41,7 @@ from factory.geometry.meshes import (
     mend_remark,
     usable,
 )
+from factory.geometry.overlapping import stood_in
 from factory.geometry.solids import Product, Solid, from_mesh, primitive
 from factory.problem.pag import PAG, SHAPES, Assembly
 from factory.support.cache import digest, load_arrays, packed, program, store_arrays, unpacked
@@ -60,7 +62,7 @@ class Work:
 FOLDER = "meshes"
 """The folder of measured meshes in the user's cache."""
 
-PACKAGES = ("trimesh", "numpy", "scipy", "coacd")
+PACKAGES = ("trimesh", "numpy", "scipy", "manifold3d", "coacd")
 """Packages that read, measure and decompose meshes."""
 
 LATTICE = 0.2
@@ -81,6 +83,11 @@ def product_geometry(pag: PAG, files: Mapping[str, bytes] = MappingProxyType({})
     reader.read([node for node in leaves if node.parameter("mesh") is not None])
     shaped = {n.label: reader.solid(n, i) for i, n in enumerate(leaves) if _has_shape(n)}
     solids = {label: solid for label, solid in shaped.items() if solid is not None}
+    if entered := stood_in([*solids.values()]):
+        bored = {_file(node) for node in leaves if node.label in entered}
+        again = [(n, i) for i, n in enumerate(leaves) if n.label in solids and _file(n) in bored]
+        reader.read([node for node, _ in again], entered=True)
+        solids |= {n.label: solid for n, i in again if (solid := reader.solid(n, i)) is not None}
     lift = max((float(solid.high[2]) for solid in solids.values()), default=0.0)
     cells = _cells(pag, {node.label for node in plain})
     lattice = _lattice(1 + max(cells.values(), default=-1))
@@ -145,20 +152,23 @@ class _Reader:
         self.errors: list[Diagnostic] = []
         self.warnings: dict[tuple[str, str], Diagnostic] = {}
         self._meshes: dict[tuple[str, float], MassProperties | Diagnostic] = {}
+        self._numbers: dict[tuple[str, float], int] = {}
 
-    def read(self, nodes: list[Assembly]) -> None:
-        """Read the meshes of these parts; repair, decompose and measure them in parallel."""
+    def read(self, nodes: list[Assembly], entered: bool = False) -> None:
+        """Read the meshes of these parts; repair, decompose and measure them in parallel.
+        `entered`: other parts stand in them."""
         first: dict[tuple[str, float], Assembly] = {}
         for node in nodes:
             first.setdefault(_file(node), node)
-        opened = {file: self._opened(node) for file, node in first.items()}
+        opened = {file: self._opened(node, entered) for file, node in first.items()}
         works = dict(opened.values())
         prepared: dict[str, MassProperties | Diagnostic] = {}
         for keys in _rounds(works):
             prepared.update(
                 zip(keys, side_by_side([works[key].to_do for key in keys]), strict=True)
             )
-        for number, (file, (key, _)) in enumerate(opened.items()):
+        for file, (key, _) in opened.items():
+            number = self._numbers.setdefault(file, len(self._numbers))
             self._meshes[file] = _named(prepared[key], f"m{number}")
 
     def solid(self, node: Assembly, number: int) -> Solid | None:
@@ -200,13 +210,14 @@ class _Reader:
         content = self.files.get(path)
         return read_bytes(self.folder / path, MESH) if content is None else content
 
-    def _opened(self, node: Assembly) -> tuple[str, Work]:
+    def _opened(self, node: Assembly, entered: bool) -> tuple[str, Work]:
         """The cache key of a part's mesh, and the work that is left after its file is read: files
         with equal content are measured once."""
         path, scale = _file(node)
         try:
             content, suffix = self._content(path), Path(path).suffix.lower()
-            key = digest(content, suffix, scale, program(Path(__file__).parent, *PACKAGES))
+            code = program(Path(__file__).parent, *PACKAGES)
+            key = digest(content, suffix, scale, entered, code)
             kept = _kept(key)
             if kept is not None:
                 return key, Work(lambda: kept)
@@ -219,7 +230,7 @@ class _Reader:
         vertices, faces = file.merged()
         if not np.abs(vertices).max() * scale <= FURTHEST:
             return f"{path} {scale}", Work(partial(too_far, node, "scale", "mesh"))
-        to_do = partial(_finished, key, vertices * scale, faces)
+        to_do = partial(_finished, key, vertices * scale, faces, entered)
         area = float(areas_of(vertices * scale, faces).sum())
         return key, Work(to_do, (len(vertices), len(faces), round(float(np.log(area)), 3)))
 
@@ -247,14 +258,16 @@ def _file(node: Assembly) -> tuple[str, float]:
 
 
 @np.errstate(all="ignore")
-def _finished(key: str, vertices: Array, faces: Indices) -> MassProperties:
-    """The mesh of a file, with vertices merged, as the engine can use it; it is cached under a key.
-    Its name is "" here: a product names its meshes itself."""
+def _finished(key: str, vertices: Array, faces: Indices, entered: bool) -> MassProperties:
+    """The mesh of a file, with vertices merged, as the engine can use it, in which other parts
+    stand if it is `entered`; it is cached under a key. Its name is "" here: a product names its
+    meshes itself."""
     mesh, remark = usable("", vertices, faces)
     if remark is None:
         vertices, faces, was = mended(mesh.vertices, mesh.faces)
         remark = mend_remark(was) if was else None
-        mesh = in_pieces(Mesh(mesh.name, vertices, faces))
+        mesh = in_pieces(Mesh(mesh.name, vertices, faces), entered)
+        remark = SHEETS if len(mesh.faces) < len(faces) else remark
     prepared = measured(mesh, remark)
     _keep(key, prepared)
     return prepared

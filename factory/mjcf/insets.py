@@ -66,7 +66,7 @@ def insets_of(layout: Layout, overlap: float) -> Insets:
         ):
             excluded.append(overlapping.parts)
             continue
-        for part, number, half in receding:
+        for part, number, half in (near for near in receding if near[2] > 0):
             mine = depths.setdefault(part, {})
             mine[number] = max(mine.get(number, 0.0), half)
     return Insets(depths, tuple(excluded))

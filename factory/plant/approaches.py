@@ -59,7 +59,8 @@ class Approach:
     `stroke` [m] above its place and is lowered when all others stand, "" where none is. `overlaps`:
     for each of `sides` the parts that cannot come so without overlapping or scraping. `clashes`:
     where it is blocked, the pairs that pass through each other as they are drawn if the last input
-    comes from the first of its sides, the deepest first.
+    comes from the first of its sides, the deepest first; otherwise the pairs that get no deeper
+    into each other than they are in the finished product, but cut more out of each other.
     """
 
     kind: Kind
@@ -88,6 +89,8 @@ class Approach:
     ) -> Diagnostic | None:
         """What is said of the operation that makes a label, where an input, the last, cannot come
         (Blocked); None where it can, or all that it passes through is allowed."""
+        if self.kind != "blocked":
+            return None
         allowed = [*allowed]
         clashes = [clash for clash in self.clashes if not clash.is_allowed(allowed)]
         if not clashes:

@@ -4,7 +4,8 @@ collide for one of them are more than it is.
 By booleans of surfaces (`geometry/overlap.py`), not in steps: what a part sweeps on its whole way
 out has something in common with what stands, or nothing, so no wall is too thin to be met. The
 depth of a way is the least by which one of the two, eroded, would let the other pass; that of the
-finished product is measured alike.
+finished product is measured alike. Depths are sampled, volumes are exact: a way that sweeps more of
+a part than the two share in the finished product *cuts*, whatever its depth.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from factory.compiler.mating.bodies import ConvexBodies
 from factory.compiler.mating.meetings import Ints
 from factory.compiler.mating.paths import CLEAR, LAST, SIGNS, TOLERANCE, Depths
 from factory.geometry.meshes import Array, Mesh, hull_of, is_closed, volume_of
-from factory.geometry.overlap import SAMPLES, Common, common, drawn, swept
+from factory.geometry.overlap import SAMPLES, Common, common, drawn, swept, united
 
 ALIKE = 1e-6
 """Convex bodies are all of a mesh if their volumes differ by no more than this share."""
@@ -34,7 +35,7 @@ class _Measurements:
 
     def __init__(self, *_: object) -> None:
         self.sweeps: dict[tuple[str, int, int], Any] = {}
-        self.finished: dict[tuple[str, str], float] = {}
+        self.finished: dict[tuple[str, str], Common] = {}
         self.pairs: dict[tuple[str, str, bool, int], tuple[Any, ...]] = {}
         self.kinds: dict[int, tuple[bool, bool]] = {}
 
@@ -90,9 +91,9 @@ class DrawnWays:
         `still` those in the finished product alone."""
         pairs = zip(moving.tolist(), standing.tolist(), still.tolist(), strict=True)
         rows = [self._kept(*pair, axis) for pair in pairs]
-        finished, *columns = (np.array([row[n] for row in rows], float) for n in range(4))
-        path, shift, graze = (column.reshape(-1, 2) for column in columns)
-        return Depths(finished, path, shift, graze)
+        finished, *columns = (np.array([row[n] for row in rows], float) for n in range(5))
+        path, shift, graze, cuts = (column.reshape(-1, 2) for column in columns)
+        return Depths(finished, path, shift, graze, cuts > 0)
 
     def room(self, moving: Ints, standing: Ints, axis: int, most: float) -> Array:
         """The least room (n, 2) [m] on the ways of pairs of parts from either side, but for the
@@ -119,24 +120,38 @@ class DrawnWays:
         return self._found.pairs[key]
 
     def _pair(self, moving: int, standing: int, still: bool, axis: int) -> tuple[Any, ...]:
-        finished = self.finished(moving, standing)
+        finished = self.finished(moving, standing).depth
         if still:
-            return finished, [finished] * 2, [0.0] * 2, [-np.inf] * 2
-        path, shift, graze = [], [], []
+            return finished, [finished] * 2, [0.0] * 2, [-np.inf] * 2, [False] * 2
+        path, shift, graze, cuts = [], [], [], []
         for sign in SIGNS:
             depth, at = self._path(moving, standing, axis, sign)
             free = depth <= TOLERANCE
             path.append(max(depth, finished))
             shift.append(at)
             graze.append(-self._gap(moving, standing, axis, sign, CLEAR) if free else depth)
-        return finished, path, shift, graze
+            is_deeper = depth > finished + TOLERANCE
+            cuts.append(not is_deeper and self._cuts(moving, standing, axis, sign))
+        return finished, path, shift, graze, cuts
 
-    def finished(self, one: int, other: int) -> float:
-        """Penetration depth of two parts in the finished product [m]."""
-        key, depths = (self._labels[one], self._labels[other]), self._found.finished
-        if key not in depths:
-            depths[key] = common(self._body(one), self._body(other)).depth
-        return depths[key]
+    def finished(self, one: int, other: int) -> Common:
+        """The overlap of two parts in the finished product."""
+        key, overlaps = (self._labels[one], self._labels[other]), self._found.finished
+        if key not in overlaps:
+            overlaps[key] = common(self._body(one), self._body(other))
+        return overlaps[key]
+
+    def _cuts(self, moving: int, standing: int, axis: int, sign: int) -> bool:
+        """Whether the smaller of two parts sweeps more of the larger on the way than the two share
+        in the finished product, and a layer as thick as the tolerance."""
+        if self._body(moving).volume() > self._body(standing).volume():
+            moving, standing, sign = standing, moving, -sign
+        sweep, body = self._swept(moving, axis, sign), self._body(standing)
+        cut, share = sweep ^ body, self.finished(moving, standing).volume
+        most = share + TOLERANCE * cut.surface_area()
+        # A sweep has places twice that it passes twice; its bodies united have them once.
+        is_more = bool(cut.volume() > most)
+        return is_more and united(part ^ body for part in sweep.decompose()) > most
 
     def _path(self, moving: int, standing: int, axis: int, sign: int) -> tuple[float, float]:
         """How deep the first part gets into the second on its way, and where [m]. The depth of a
@@ -144,7 +159,7 @@ class DrawnWays:
         cut = self._cut(moving, standing, axis, sign, QUICK)
         if cut is None:
             return 0.0, 0.0
-        finished = self.finished(moving, standing)
+        finished = self.finished(moving, standing).depth
         if cut.depth <= SURELY or finished > TOLERANCE:
             both = [
                 self._cut(moving, standing, axis, sign, SAMPLES),

@@ -1,8 +1,9 @@
 """Findings on how the inputs of a product's operations can come together.
 
 Three levels say how strictly. At a *strict* one no two parts ever overlap, nor scrape along each
-other; at one that goes *no deeper* they overlap on the way by no more than in the finished product;
-at the third, pairs that overlap in the finished product are *left out*. All of it up to TOLERANCE.
+other; at one that goes *no deeper* they overlap on the way by no more than in the finished product,
+neither in depth nor in volume; at the third, pairs that overlap in the finished product are *left
+out*. All of it up to TOLERANCE.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ class Mating:
 
     @property
     def clashes(self) -> tuple[Clash, ...]:
-        """If it is blocked, the pairs that pass through each other, the deepest first."""
+        """The pairs that pass through each other, the deepest first (`Approach`)."""
         return self.approach.clashes
 
     def clashes_as_json(self) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import ceil
 from types import MappingProxyType
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,8 +107,8 @@ class _Judge:
             approach = self._lowered(number, column)
         elif slide == lower == BLOCKED:
             column = clashing.index(min(clashing))
-            clashes = self._clashes(number, meeting.axis, column)
-            other = self._clashes(number, meeting.axis, 1 - column)
+            clashes = self._clashes(number, meeting.axis, column, "clashing")
+            other = self._clashes(number, meeting.axis, 1 - column, "clashing")
             same = {c.parts for c in clashes} == {c.parts for c in other}
             approach = self._along(number, "blocked", [0, 1] if same else [column])
             approach = replace(approach, clashes=clashes)
@@ -126,7 +127,8 @@ class _Judge:
         axis = self.meetings.all[number].axis
         sides = tuple(SIGNS[column] for column in columns)
         overlaps = tuple(self._overlaps(number, axis, column) for column in columns)
-        return Approach(kind, axis, sides, "", 0.0, overlaps)
+        clashes = self._clashes(number, axis, columns[0], "cutting")
+        return Approach(kind, axis, sides, "", 0.0, overlaps, clashes)
 
     def _lowered(self, number: int, column: int) -> Approach:
         """Lowering of the first input (0) or the last (1)."""
@@ -134,7 +136,9 @@ class _Judge:
         stroke = self._strokes(meeting)
         overlaps = self._overlaps(number, UPRIGHT, column)
         lowered = meeting.inputs[-1 if column else 0]
-        return Approach("lower", meeting.axis, SIGNS, lowered, stroke[column], (overlaps, overlaps))
+        clashes = self._clashes(number, UPRIGHT, column, "cutting")
+        both = overlaps, overlaps
+        return Approach("lower", meeting.axis, SIGNS, lowered, stroke[column], both, clashes)
 
     def _strokes(self, meeting: Meeting) -> tuple[float, float]:
         """How high the first, or the last input is raised above its place, so that it clears the
@@ -155,10 +159,12 @@ class _Judge:
         parts = self.meetings.parts
         return parts[meeting.first : meeting.split], parts[meeting.split : meeting.end]
 
-    def _clashes(self, number: int, axis: int, column: int) -> tuple[Clash, ...]:
-        """The pairs that clash from one side, the deepest first."""
+    def _clashes(
+        self, number: int, axis: int, column: int, how: Literal["clashing", "cutting"]
+    ) -> tuple[Clash, ...]:
+        """The pairs that are `clashing` or `cutting` from one side, the deepest first."""
         overlaps = self.overlaps[axis].of(number)
-        depths, rows = overlaps.depths, np.flatnonzero(overlaps.clashing[:, column])
+        depths, rows = overlaps.depths, np.flatnonzero(getattr(overlaps, how)[:, column])
         clashes = [
             Clash(
                 self._pair(overlaps, row),

@@ -8,7 +8,7 @@ two shapes are computed together, wherever they are.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import astuple, dataclass, field
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -36,7 +36,7 @@ from factory.support.cache import digest, load_arrays, program, store_arrays
 FOLDER = "overlaps"
 """Where overlaps are kept, in the user's cache."""
 
-KEYS = ("meeting", "moving", "standing", "finished", "path", "shift", "graze")
+KEYS = ("meeting", "moving", "standing", "finished", "path", "shift", "graze", "cuts")
 DRAWN, ROUGH = tuple(f"drawn_{key}" for key in KEYS), "rough"
 """The arrays of an entry: of bodies, of parts as they are drawn, and of all parts."""
 
@@ -91,15 +91,27 @@ class Overlaps:
     @cached_property
     def deeper(self) -> NDArray[np.bool_]:
         """Which pairs (n, 2) get deeper into each other on the way from either side than they are
-        in the finished product."""
-        return np.asarray(self.depths.path > self.depths.finished[:, None] + TOLERANCE)
+        in the finished product, or cut more out of each other."""
+        return np.asarray(self._passing | self.depths.cuts)
+
+    @property
+    def _passing(self) -> Flags:
+        """Which of them get deeper, or cut although they share nothing in the end."""
+        finished = self.depths.finished[:, None]
+        apart = finished <= TOLERANCE
+        return (self.depths.path > finished + TOLERANCE) | (self.depths.cuts & apart)
+
+    @cached_property
+    def cutting(self) -> Flags:
+        """Which of those (n, 2) do no more than cut: they get no deeper."""
+        return np.asarray(self.depths.cuts & ~self._passing)
 
     @cached_property
     def clashing(self) -> NDArray[np.bool_]:
-        """Which of those (n, 2) pass through each other: all but those of which a hull shows no
-        more than that they are drawn into each other."""
+        """Which of those (n, 2) pass through each other: all but those that do no more than cut,
+        and those of which a hull shows no more than that they are drawn into each other."""
         unknown = self.rough & (self.depths.finished > TOLERANCE)
-        return self.deeper & ~unknown[:, None]
+        return self._passing & ~unknown[:, None]
 
 
 Pairs = tuple[Ints, Ints, Ints, Depths]
@@ -122,7 +134,7 @@ class Finder:
         kept = load_arrays(FOLDER, name)
         if kept is None:
             bodies, parts, rough = self._search(axis, wanted)
-            arrays = [a for rows in (bodies, parts) for a in (*rows[:3], *astuple(rows[3]))]
+            arrays = [a for rows in (bodies, parts) for a in (*rows[:3], *rows[3].columns)]
             kept = dict(zip((*KEYS, *DRAWN, ROUGH), (*arrays, rough), strict=True))
             store_arrays(FOLDER, name, kept)
         return self._by_parts(_pairs(kept, KEYS), _pairs(kept, DRAWN), kept[ROUGH])
@@ -279,6 +291,7 @@ class Finder:
             path,
             np.minimum.reduceat(at, starts),
             np.maximum.reduceat(depths.graze, starts),
+            np.logical_or.reduceat(depths.cuts, starts),
         )
         meeting, one, other = meeting[starts], one[starts], other[starts]
         as_drawn = colliding.at(np.arange(len(starts)))
@@ -309,4 +322,4 @@ def _box_depths(bodies: ConvexBodies, moving: Ints, standing: Ints, axis: int) -
     path = most(ahead)
     shift = np.where(ahead > 0, np.maximum(ahead - (half - path), 0.0), 0.0)
     finished = np.minimum(across[:, 0], depth[:, axis])
-    return Depths(finished, path, shift, most(ahead - LAST))
+    return Depths(finished, path, shift, most(ahead - LAST), np.zeros(path.shape, bool))

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,17 +43,19 @@ class Depths:
     """How deep the two of each pair get into each other [m], less than 0 where apart: `finished`
     (n,) in the finished product; `path` (n, 2) the most if the last input comes from the lower or
     the upper side, and `shift` (n, 2) how far from its place that is; `graze` (n, 2) the most but
-    for the last bit of the way."""
+    for the last bit of the way; `cuts` (n, 2): whether the way sweeps more of the other than both
+    share in the finished product, however deep that is."""
 
     finished: Array
     path: Array
     shift: Array
     graze: Array
+    cuts: NDArray[np.bool_]
 
     @property
     def faulty(self) -> NDArray[np.bool_]:
         """Which pairs (n, 2) overlap or scrape on the way from either side."""
-        return np.asarray((self.path > TOLERANCE) | (self.graze > -CLEAR))
+        return np.asarray((self.path > TOLERANCE) | (self.graze > -CLEAR) | self.cuts)
 
     @property
     def room(self) -> Array:
@@ -67,14 +70,19 @@ class Depths:
         that they neither overlap nor scrape on the way from either side."""
         return np.asarray(np.maximum(self.path, self.graze + CLEAR))
 
+    @property
+    def columns(self) -> tuple[NDArray[Any], ...]:
+        """Its arrays."""
+        return self.finished, self.path, self.shift, self.graze, self.cuts
+
     def at(self, rows: Ints | slice) -> Depths:
         """Those of some of the pairs."""
-        return Depths(self.finished[rows], self.path[rows], self.shift[rows], self.graze[rows])
+        return Depths(*(column[rows] for column in self.columns))
 
     def put(self, rows: Ints | slice, depths: Depths) -> None:
         """Replaces those of some of the pairs."""
-        self.finished[rows], self.path[rows] = depths.finished, depths.path
-        self.shift[rows], self.graze[rows] = depths.shift, depths.graze
+        for column, values in zip(self.columns, depths.columns, strict=True):
+            column[rows] = values
 
 
 def depths_of(heights: Array, slopes: Array) -> tuple[Depths, Array]:
@@ -92,7 +100,8 @@ def depths_of(heights: Array, slopes: Array) -> tuple[Depths, Array]:
         most, at = summits(lines.reshape(-1, len(slopes)), rows)
         depth[:, start : start + step] = most.reshape(4, -1)
         shift[:, start : start + step] = at.reshape(4, -1)
-    depths = Depths(heights.min(axis=1), depth[:2].T, shift[:2].T, depth[2:].T)
+    cuts = np.zeros((len(heights), 2), bool)
+    depths = Depths(heights.min(axis=1), depth[:2].T, shift[:2].T, depth[2:].T, cuts)
     return depths, (begin[:, None] + shift) * ways[:, None]
 
 
