@@ -69,7 +69,7 @@ def coordinated(layout: Layout) -> Coordinated:
 def awaited_positions(layout: Layout) -> dict[int, float]:
     """For robots that return by themselves as soon as they have released their payload, by index,
     the arc lengths to which they go [m]."""
-    return dict(kept(layout).backs) if layout.hands else {}
+    return dict(kept(layout).backs)
 
 
 def goes_early(layout: Layout) -> list[tuple[int, int]]:
