@@ -21,6 +21,7 @@ from factory.layout.request import Ground
 from factory.pipeline import read
 from factory.record.state import Event, State
 from factory.simulation.mujoco.passing import Passing
+from factory.simulation.mujoco.sliders import NEVER
 from factory.simulation.ordering import Ordering
 from factory.simulation.recovery import Campaign, WorldFault, recover
 from factory.simulation.request import RunRequest
@@ -71,6 +72,7 @@ class CoordinatedGame:
             assert isinstance(event, Event)
             self.fire(self.number[event.transition])
         self.seen = len(state.events)
+        self.rise()
         self.pass_on(x)
         shown = world.parts.feeders.shown()
         if self.shown:
@@ -84,6 +86,18 @@ class CoordinatedGame:
         """The passes that are still to come."""
         places, passes = self.net.net.places, self.coordinated.passes.values()
         return [places[place].name for place, _ in passes if self.tokens[place]]
+
+    def rise(self) -> None:
+        """Fire what sliders do that have come up without a part."""
+        operations, feeders = self.layout.factory.operations, self.simulation.physical.parts.feeders
+        for served in self.coordinated.served.values():
+            number, event = (
+                feeders._number[operations[served.before].label],
+                self.net.right[served.up],
+            )
+            rests = feeders._sliders.ends[number] == NEVER and feeders._sliders.is_up(number)
+            if rests and self.is_enabled(event):
+                self.fire(event)
 
     def show(self, shown: Mapping[str, int]) -> None:
         """Sliders that have set out with the part for another unit have been up before."""

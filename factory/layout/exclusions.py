@@ -63,7 +63,7 @@ ROUNDS = 8
 def coordinated(layout: Layout) -> Coordinated:
     """The coordinated net of a layout, with everything that keeps its machines apart."""
     apart = kept(layout)
-    return with_machines(layout, apart.passes, [order for order in apart.orders if order.kept])
+    return with_machines(layout, apart.passes, apart.orders)
 
 
 def awaited_positions(layout: Layout) -> dict[int, float]:
