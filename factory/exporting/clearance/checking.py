@@ -12,9 +12,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import combinations
 
-from factory.exporting.clearance.documents import ClearanceProof, Excluded, Interval, Way
+from factory.exporting.clearance.documents import ClearanceProof, Excluded, Way
 from factory.exporting.clearance.machines import Machines
-from factory.exporting.clearance.moving import Machine, Step, Transfers, jumps
+from factory.exporting.clearance.moving import (
+    Machine,
+    Step,
+    Transfers,
+    hulls,
+    jumps,
+    starts_outside,
+)
 from factory.exporting.clearance.sweeping import Sweeping
 
 PLAY = 0.125
@@ -116,31 +123,26 @@ def _bodies(proof: ClearanceProof, machines: Machines) -> Iterator[str]:
 
 def _ranges(proof: ClearanceProof, machines: Machines) -> Iterator[str]:
     """The ways of each joint are within its range, and go up to its stops."""
-    m, spans = machines.m, dict[str, list[Interval]]()
-    for way in proof.ways:
-        for group in way.spans:
-            for joint, span in zip(way.joints, group, strict=True):
-                spans.setdefault(joint, []).append(span)
-    for joint, of_joint in spans.items():
+    m = machines.m
+    for joint, (begin, end) in hulls(proof.ways).items():
         number = machines.joints[joint]
         margin = float(m.jnt_margin[number])
         if not m.jnt_limited[number] or margin > proof.clearance:
             yield f"joint '{joint}' has no stops within the clearance of {proof.clearance:g} m"
             continue
         low, high = (float(end) for end in m.jnt_range[number])
-        begin, end = min(span[0] for span in of_joint), max(span[1] for span in of_joint)
         if begin < low - EXACT or end > high + EXACT:
-            yield f"joint '{joint}' goes from {low:g} to {high:g}; its ways are {begin:g} to {end:g}"
+            yield f"joint '{joint}' may go {low:g} to {high:g}; its ways are {begin:g} to {end:g}"
         elif max(begin - low, high - end) - margin > PLAY * margin + EXACT:
             yield (
-                f"joint '{joint}' may go from {low + margin:g} to {high - margin:g}, beyond its ways,"
+                f"joint '{joint}' may go {low + margin:g} to {high - margin:g}, beyond its ways:"
                 f" {begin:g} to {end:g}"
             )
 
 
 def _moves(proof: ClearanceProof, machines: Machines) -> Iterator[str]:
     """Each machine is always in one of its ways, and jumps nowhere; parts change hands."""
-    steps = list[Step]()
+    steps, level = list[Step](), machines.carriages()
     for of_machine in proof.by_machine.values():
         machine = Machine(of_machine, proof.net)
         at_start = [way for way in of_machine if _starts(machines, way)]
@@ -150,7 +152,7 @@ def _moves(proof: ClearanceProof, machines: Machines) -> Iterator[str]:
                 yield f"{machine.name} {step}"
                 continue
             steps.append(step)
-            faults |= dict.fromkeys(jumps(step, at_start))
+            faults |= dict.fromkeys([*jumps(step, at_start), *starts_outside(step, level)])
         yield from faults
     yield from Transfers.of(steps, machines).faults()
 
@@ -190,7 +192,8 @@ def _pairs(proof: ClearanceProof, machines: Machines) -> Iterator[str]:
         if geoms and apart.isdisjoint(both) and not alike(one, other):
             sides = zip(geoms, (one, other), strict=True)
             words = " and ".join(f"{geom} in {' and '.join(w.places)}" for geom, w in sides)
-            yield f"{one.machine} and {other.machine}: {words} come near, and no circuit excludes that"
+            names = f"{one.machine} and {other.machine}"
+            yield f"{names}: {words} come near, and no circuit excludes that"
 
 
 def _circuit(proof: ClearanceProof, pair: Excluded) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -101,10 +101,17 @@ def read_folder(folder: Path) -> ClearanceProof:
     """The certificate in a folder. Raises InputError (BadProof) where a file is missing or broken,
     and where it holds those of several builds."""
     paths = _paths(folder)
-    net = _net(paths["coordinated.pnml"])
+    net = net_of(read_text(paths["coordinated.pnml"], NET), paths["coordinated.pnml"])
     ways, clearance = (_json(paths[end]) for end in ENDINGS[2:])
+    return proof_of(_model(paths["xml"]), net, ways, clearance)
+
+
+def proof_of(
+    model: mujoco.MjModel, net: dict[str, Row], ways: Reader, clearance: Reader
+) -> ClearanceProof:
+    """The certificate of a model and three documents. Raises InputError (BadProof)."""
     excluded, metres = _excluded(clearance), clearance["clearance_m"].number
-    return ClearanceProof(_model(paths["xml"]), net, *_ways(ways), excluded, metres)
+    return ClearanceProof(model, net, *_ways(ways), excluded, metres)
 
 
 def _paths(folder: Path) -> dict[str, Path]:
@@ -142,8 +149,9 @@ def _model(path: Path) -> mujoco.MjModel:
         raise _bad(path, f"the engine refuses it: {words}") from None
 
 
-def _net(path: Path) -> dict[str, Row]:
-    net: MarkedNet = marked(read_pnml(read_text(path, NET), str(path)))
+def net_of(text: str, path: Path = Path()) -> dict[str, Row]:
+    """The places of a net in PNML, by name. Raises InputError."""
+    net: MarkedNet = marked(read_pnml(text, str(path)))
     rows, events = dict[str, Row](), net.net.transitions
     for place, tokens in zip(net.net.places, net.tokens, strict=True):
         if len(place.left) != 1 or len(place.right) != 1:

@@ -9,6 +9,12 @@ from functools import cached_property
 from factory.support.engine import mujoco
 
 FREE = int(mujoco.mjtJoint.mjJNT_FREE)
+LEVEL = 1e-6
+"""An axis is level that rises no more."""
+
+FED, TAKEN_AWAY = "feed/", "hold/"
+"""How welds are named by which a part comes into the factory, and by which it leaves it."""
+
 WELD = int(mujoco.mjtEq.mjEQ_WELD)
 
 
@@ -53,6 +59,17 @@ class Machines:
             if root in self.joints_of and self.is_part(part):
                 held[name] = root
         return held
+
+    def carriages(self) -> frozenset[str]:
+        """The joints that go over the floor, but for those of the machine that takes products
+        away: it has come to its end before it is given the next."""
+        away = {root for weld, root in self.holders.items() if weld.startswith(TAKEN_AWAY)}
+        return frozenset(
+            joint
+            for root, joints in self.joints_of.items()
+            for joint in joints
+            if root not in away and abs(self.m.jnt_axis[self.joints[joint]][2]) < LEVEL
+        )
 
     def bodies_of(self, root: int) -> Iterator[str]:
         """The bodies of a tree that collide with something."""

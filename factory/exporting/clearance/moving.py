@@ -4,12 +4,12 @@ comes to the next without a jump, with what it holds."""
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from factory.exporting.clearance.documents import Row, Way
-from factory.exporting.clearance.machines import Machines
+from factory.exporting.clearance.documents import Interval, Row, Way
+from factory.exporting.clearance.machines import FED, TAKEN_AWAY, Machines
 
 MOST = 50_000
 """Most markings of one machine that are looked at."""
@@ -17,8 +17,8 @@ MOST = 50_000
 JOIN = 1e-4
 """Spans no further apart join [m or rad]."""
 
-FED, TAKEN_AWAY = "feed/", "hold/"
-"""How welds are named by which a part comes into the factory, and by which it leaves it."""
+STARTS = "_s"
+"""How the transitions are named at which operations start."""
 
 Marking = frozenset[str]
 
@@ -64,13 +64,9 @@ class Machine:
         is_whole = place == first and circuit == self.places == {*onward.values()}
         return is_whole and sum(self._net[p].tokens for p in circuit) == 1
 
-    def present(self, marking: Marking) -> Ways:
-        """The ways in which the machine may be in a marking: where there is none, those to which
-        passes alone lead."""
-        return self._present(marking)[0]
-
     def _present(self, marking: Marking) -> tuple[Ways, list[str]]:
-        """The same, and the places left by these passes."""
+        """The ways in which the machine may be in a marking: where there is none, those to which
+        passes alone lead, and the places that these leave."""
         left = list[str]()
         while not (ways := [way for places, way in self._sets if places <= marking]):
             passing = next((p for p in sorted(marking) if self._is_passed(p)), None)
@@ -84,27 +80,29 @@ class Machine:
         """Whether the transition after a place is a pass: nothing else is before it."""
         return self._inputs[self._net[place].after] == 1
 
-    def firsts(self) -> set[str]:
-        """The transitions that it can fire at the start."""
-        return {event for event, places in self._pre.items() if places <= self.start}
-
     def explore(self) -> Iterator[Step | str]:
         """All firings of the part of the net beside the machine; a text where one is not safe, or
         leads to a marking in which the machine is nowhere. Other places only allow less."""
         events = sorted(self._pre.keys() | self._post.keys())
         for event in events:
             if not self._pre.get(event):
-                yield f"'{event}' marks {_listed(self._post[event])} of it, and none before that"
+                yield f"is in no way before '{event}', but after it in {_listed(self._post[event])}"
                 return
+        if full := {place for place in self.places if self._net[place].tokens > 1}:
+            yield f"goes through {_listed(full)}, with more than one token"
+            return
         seen, left = {self.start}, [self.start]
-        if not self.present(self.start):
+        if not self._present(self.start)[0]:
             yield f"is in none of its ways at the start, with {_listed(self.start)} marked"
         while left:
             marking = left.pop()
             for event in (e for e in events if self._pre[e] <= marking):
                 kept, gained = marking - self._pre[event], self._post.get(event, set())
-                if kept & gained or len(seen) > MOST:
-                    yield f"'{event}' puts a second token into {_listed(kept & gained)}"
+                if kept & gained:
+                    yield f"is where '{event}' puts a second token: {_listed(kept & gained)}"
+                    return
+                if len(seen) > MOST:
+                    yield f"has more than {MOST} markings"
                     return
                 after = kept | gained
                 ways, passed = self._present(after)
@@ -112,7 +110,7 @@ class Machine:
                     yield f"is in none of its ways after '{event}', with {_listed(after)} marked"
                     return
                 if not passed or self._inputs[event] > 1 or gained & {*passed}:
-                    yield Step(event, self.present(marking), ways)
+                    yield Step(event, self._present(marking)[0], ways)
                 if after not in seen:
                     seen.add(after)
                     left.append(after)
@@ -126,6 +124,30 @@ def jumps(step: Step, start: Sequence[Way]) -> Iterator[str]:
             if word == "from" or way not in start:
                 listed = " or ".join(dict.fromkeys(map(str, others)))
                 yield f"{way}: it cannot come {word} there at '{step.event}'; {listed} is elsewhere"
+
+
+def hulls(ways: Ways) -> dict[str, Interval]:
+    """From where to where each joint goes on some ways."""
+    of = dict[str, list[Interval]]()
+    for way in ways:
+        for group in way.spans:
+            for joint, span in zip(way.joints, group, strict=True):
+                of.setdefault(joint, []).append(span)
+    return {j: (min(a for a, _ in each), max(b for _, b in each)) for j, each in of.items()}
+
+
+def starts_outside(step: Step, joints: Container[str]) -> Iterator[str]:
+    """Where an operation would begin outside its ways: a machine starts it from wherever it is with
+    these of its joints."""
+    if not step.event.endswith(STARTS):
+        return
+    before, after = hulls(step.before), hulls(step.after)
+    for joint in (joint for joint in before if joint in joints and joint in after):
+        (low, high), (least, most) = before[joint], after[joint]
+        if low < least - JOIN or high > most + JOIN:
+            names = " or ".join(dict.fromkeys(map(str, step.after)))
+            begins, goes = f"{low:g} to {high:g}", f"{least:g} to {most:g}"
+            yield f"{names}: joint '{joint}' begins at {begins}, and is elsewhere, {goes}"
 
 
 def _cut_off(ways: Ways, others: Ways) -> Ways:
@@ -177,15 +199,14 @@ class Transfers:
     def faults(self) -> Iterator[str]:
         """Parts that come from nowhere, or are gone."""
         sides = (
-            (self.lost, self.gained, TAKEN_AWAY, "lets go of"),
-            (self.gained, self.lost, FED, "gets"),
+            (self.lost, self.gained, TAKEN_AWAY, ("lets go of", "gets")),
+            (self.gained, self.lost, FED, ("gets", "lets go of")),
         )
-        for mine, its, kind, verb in sides:
-            for key, welds in mine.items():
+        for mine, its, kind, (one, other) in sides:
+            for (event, part), welds in mine.items():
                 odd = sorted(weld for weld in welds if not weld.startswith(kind))
-                if odd and key not in its:
-                    other = "gets" if verb == "lets go of" else "lets go of"
-                    yield f"the machine of weld '{odd[0]}' {verb} its part at '{key[0]}', and no other {other} it"
+                if odd and (event, part) not in its:
+                    yield f"'{odd[0]}' {one} its part at '{event}', and no machine {other} it"
 
 
 def _listed(places: Iterable[str]) -> str:
