@@ -10,7 +10,7 @@ import re
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -98,16 +98,33 @@ def cut(ways: list[Json], machine: str, share: float = 0.0) -> None:
             way["spans"] = [[[a, a + share * (b - a)] for a, b in group] for group in way["spans"]]
 
 
+def without(ways: list[Json], machine: str) -> None:
+    """Leave out the ways of machines whose names begin so."""
+    ways[:] = [way for way in ways if not way["machine"].startswith(machine)]
+
+
+def cut_all(ways: list[Json]) -> None:
+    for machine in {way["machine"] for way in ways}:
+        cut(ways, machine)
+
+
+def headless(ways: list[Json]) -> None:
+    """The head of a lift is left out."""
+    for way in ways:
+        if way["machine"] == "r3":
+            way["bodies"].remove("r3/head")
+
+
 def leave_out(forgery: Forgery, machine: str) -> None:
     """Leave out a machine, and its pairs."""
-    forgery.ways(lambda ways: [ways.remove(w) for w in [*ways] if w["machine"] == machine])
+    forgery.ways(lambda ways: without(ways, machine))
 
-    def without(document: Json) -> None:
+    def unpaired(document: Json) -> None:
         pairs = [p for p in document["excluded"] if machine not in p["machines"]]
         assert len(pairs) < len(document["excluded"])
         document["excluded"] = pairs
 
-    forgery.edit("clearance.json", without)
+    forgery.edit("clearance.json", unpaired)
 
 
 def rename(ways: list[Json], machine: str, name: str) -> None:
@@ -162,7 +179,7 @@ def one_way(ways: list[Json], machine: str, number: int) -> None:
 
 FORGERIES: dict[str, tuple[Callable[[Forgery], object], tuple[str, ...]]] = {
     "spans cut to points": (
-        lambda f: f.ways(lambda w: [cut(w, each["machine"]) for each in w]),
+        lambda f: f.ways(cut_all),
         ("joint 'r1/slide'", "beyond its ways"),
     ),
     "the spans of one machine": (lambda f: f.ways(lambda w: cut(w, "r4", 0.5)), ("r4",)),
@@ -172,7 +189,7 @@ FORGERIES: dict[str, tuple[Callable[[Forgery], object], tuple[str, ...]]] = {
     ),
     "a machine left out": (lambda f: leave_out(f, "r4"), ("'r4/carriage'", "no ways")),
     "a magazine left out": (
-        lambda f: f.ways(lambda w: [w.remove(x) for x in [*w] if "feeder" in x["machine"]]),
+        lambda f: f.ways(lambda w: without(w, "feeder/")),
         ("feeder/", "no ways"),
     ),
     "a way left out": (lambda f: f.ways(lambda w: one_way(w, "r1", 2)), ("r1 is in",)),
@@ -196,9 +213,7 @@ FORGERIES: dict[str, tuple[Callable[[Forgery], object], tuple[str, ...]]] = {
         ("'grip/r", "no machine gets it"),
     ),
     "a body left out": (
-        lambda f: f.ways(
-            lambda w: [x["bodies"].remove("r3/head") for x in w if x["machine"] == "r3"]
-        ),
+        lambda f: f.ways(headless),
         ("r3 in", "'r3/head' is left out"),
     ),
     "a joint that goes further": (
@@ -266,19 +281,25 @@ def test_the_command_says_whether_it_holds(forgery: Forgery, run: Terminal) -> N
 
 # --- broken files ---------------------------------------------------------------------------------
 
+
+def halved(forgery: Forgery, end: str) -> None:
+    content = forgery.path(end).read_bytes()
+    forgery.path(end).write_bytes(content[: len(content) // 2])
+
+
+def folder_for_a_file(forgery: Forgery) -> None:
+    forgery.path("ways.json").unlink()
+    forgery.path("ways.json").mkdir()
+
+
 BROKEN: dict[str, Callable[[Forgery], object]] = {
-    **{f"no {end}": lambda f, end=end: f.path(end).unlink() for end in ENDINGS},  # type: ignore[misc]
+    **{f"no {end}": partial(lambda end, f: f.path(end).unlink(), end) for end in ENDINGS},
+    **{f"half of {end}": partial(lambda end, f: halved(f, end), end) for end in ENDINGS},
     **{
-        f"half of {end}": lambda f, end=end: f.path(end).write_bytes(  # type: ignore[misc]
-            f.path(end).read_bytes()[: f.path(end).stat().st_size // 2]
-        )
+        f"bytes in {end}": partial(lambda end, f: f.path(end).write_bytes(b"\xff\x00" * 50), end)
         for end in ENDINGS
     },
-    **{
-        f"bytes in {end}": lambda f, end=end: f.path(end).write_bytes(b"\xff\x00" * 50)
-        for end in ENDINGS
-    },  # type: ignore[misc]
-    "a folder for a file": lambda f: (f.path("ways.json").unlink(), f.path("ways.json").mkdir()),
+    "a folder for a file": folder_for_a_file,
     "two builds": lambda f: shutil.copy(f.path("clearance.json"), f.folder / "b.clearance.json"),
     "a list": lambda f: f.path("ways.json").write_text("[]"),
     "deep": lambda f: f.path("ways.json").write_text("[" * 100_000),

@@ -224,8 +224,7 @@ def test_variants_make_their_passes(name: str, tmp_path: Path) -> None:
 
 def test_passes_are_made_when_demand_is_over() -> None:
     """Robots that skip units are not where the net of a fixed sequence has them."""
-    asked = {"demand": test_demand.ordered("bba")}
-    faults = played(test_demand.little().layout, 1, **asked)
+    faults = played(test_demand.little().layout, 1, demand=test_demand.ordered("bba"))
     assert not [fault for fault in faults if fault.endswith("is not made")]
 
 

@@ -97,8 +97,8 @@ class _Writer:
                 ((_, high),) = self.way(one)["spans"][0]
                 tops[slider] = max(high, tops.get(slider, high))
         for magazine in turns.values():
-            for slider, places in magazine.items():
-                others = set[str]().union(*magazine.values()) - places
+            for slider, mine in magazine.items():
+                others = set[str]().union(*magazine.values()) - mine
                 yield from (_joint(slider, [p], [tops[slider]] * 2) for p in sorted(others))
 
 

@@ -240,7 +240,10 @@ def _ways(document: Reader) -> tuple[tuple[tuple[str, Row], ...], tuple[Way, ...
     ways = tuple(
         Way(
             way["machine"].text,
-            *(way[key].texts for key in ("places", "bodies", "joints", "welds")),
+            way["places"].texts,
+            way["bodies"].texts,
+            way["joints"].texts,
+            way["welds"].texts,
             tuple(tuple(span.interval for span in group) for group in way["spans"]),
         )
         for way in document["ways"]
