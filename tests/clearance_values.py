@@ -8,7 +8,7 @@ from typing import Any
 import mujoco
 
 from factory.exporting.clearance.checking import faults_of
-from factory.exporting.clearance.documents import Reader, Row, proof_of
+from factory.exporting.clearance.documents import DocumentReader, Row, proof_of
 
 Json = dict[str, Any]
 
@@ -16,5 +16,8 @@ Json = dict[str, Any]
 def check(m: mujoco.MjModel, ways: Json, clearance: Json) -> list[str]:
     """What is wrong, [] where no two machines ever meet; with the net that the ways refer to."""
     net = {row["place"]: Row(row["before"], row["after"], row["tokens"]) for row in ways["places"]}
-    documents = Reader(Path("ways.json"), ways), Reader(Path("clearance.json"), clearance)
+    documents = (
+        DocumentReader(Path("ways.json"), ways),
+        DocumentReader(Path("clearance.json"), clearance),
+    )
     return faults_of(proof_of(m, net, *documents))

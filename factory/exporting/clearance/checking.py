@@ -12,12 +12,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import combinations
 
-from factory.exporting.clearance.documents import ClearanceProof, Excluded, Way
+from factory.exporting.clearance.documents import ClearanceProof, ExcludedPair, MachineWay
 from factory.exporting.clearance.machines import Machines
 from factory.exporting.clearance.moving import (
     Machine,
-    Step,
-    Transfers,
+    MachineStep,
+    PartTransfers,
     hulls,
     jumps,
     starts_outside,
@@ -142,7 +142,7 @@ def _ranges(proof: ClearanceProof, machines: Machines) -> Iterator[str]:
 
 def _moves(proof: ClearanceProof, machines: Machines) -> Iterator[str]:
     """Each machine is always in one of its ways, and jumps nowhere; parts change hands."""
-    steps, level = list[Step](), machines.carriages()
+    steps, level = list[MachineStep](), machines.carriages()
     for of_machine in proof.by_machine.values():
         machine = Machine(of_machine, proof.net)
         at_start = [way for way in of_machine if _starts(machines, way)]
@@ -154,10 +154,10 @@ def _moves(proof: ClearanceProof, machines: Machines) -> Iterator[str]:
             steps.append(step)
             faults |= dict.fromkeys([*jumps(step, at_start), *starts_outside(step, level)])
         yield from faults
-    yield from Transfers.of(steps, machines).faults()
+    yield from PartTransfers.of(steps, machines).faults()
 
 
-def _starts(machines: Machines, way: Way) -> bool:
+def _starts(machines: Machines, way: MachineWay) -> bool:
     """Whether the model starts on a way."""
     m = machines.m
     at = [float(m.qpos0[m.jnt_qposadr[machines.joints[joint]]]) for joint in way.joints]
@@ -177,7 +177,7 @@ def _pairs(proof: ClearanceProof, machines: Machines) -> Iterator[str]:
             apart.update([pair.places, pair.places[::-1]])
     gears = {name: Machine(ways, proof.net) for name, ways in proof.by_machine.items()}
 
-    def alike(one: Way, other: Way) -> bool:
+    def alike(one: MachineWay, other: MachineWay) -> bool:
         """Whether the machines go through the same places, one after the other."""
         mine, its = gears[one.machine], gears[other.machine]
         return mine.places == its.places and mine.is_gear
@@ -196,7 +196,7 @@ def _pairs(proof: ClearanceProof, machines: Machines) -> Iterator[str]:
             yield f"{names}: {words} come near, and no circuit excludes that"
 
 
-def _circuit(proof: ClearanceProof, pair: Excluded) -> str:
+def _circuit(proof: ClearanceProof, pair: ExcludedPair) -> str:
     """Why a circuit does not exclude a pair, "" if it does."""
     net, listed = proof.net, ", ".join(pair.circuit)
     if not all(name in net for name in (*pair.circuit, *pair.places)):

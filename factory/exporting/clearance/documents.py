@@ -27,7 +27,7 @@ Interval = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
+class MachineWay:
     """A machine while places of the net are marked.
 
     Attributes:
@@ -51,7 +51,7 @@ class Way:
 
 
 @dataclass(frozen=True, slots=True)
-class Excluded:
+class ExcludedPair:
     """Two machines that come near in two places, and a circuit of the net through both."""
 
     machines: tuple[str, ...]
@@ -84,14 +84,14 @@ class ClearanceProof:
     model: mujoco.MjModel
     net: dict[str, Row]
     places: tuple[tuple[str, Row], ...]
-    ways: tuple[Way, ...]
-    excluded: tuple[Excluded, ...]
+    ways: tuple[MachineWay, ...]
+    excluded: tuple[ExcludedPair, ...]
     clearance: float
 
     @property
-    def by_machine(self) -> dict[str, list[Way]]:
+    def by_machine(self) -> dict[str, list[MachineWay]]:
         """The ways of each machine, by its name."""
-        ways = dict[str, list[Way]]()
+        ways = dict[str, list[MachineWay]]()
         for way in self.ways:
             ways.setdefault(way.machine, []).append(way)
         return ways
@@ -107,7 +107,7 @@ def read_folder(folder: Path) -> ClearanceProof:
 
 
 def proof_of(
-    model: mujoco.MjModel, net: dict[str, Row], ways: Reader, clearance: Reader
+    model: mujoco.MjModel, net: dict[str, Row], ways: DocumentReader, clearance: DocumentReader
 ) -> ClearanceProof:
     """The certificate of a model and three documents. Raises InputError (BadProof)."""
     excluded, metres = _excluded(clearance), clearance["clearance_m"].number
@@ -162,33 +162,33 @@ def net_of(text: str, path: Path = Path()) -> dict[str, Row]:
     return rows
 
 
-def _json(path: Path) -> Reader:
+def _json(path: Path) -> DocumentReader:
     try:
         document = json.loads(read_bytes(path, NET).decode("utf-8-sig"))
     except OSError as error:
         raise _bad(path, f"it cannot be read: {error.strerror}") from error
     except (ValueError, RecursionError):
         raise _bad(path, "its content is no JSON in UTF-8") from None
-    return Reader(path, document)
+    return DocumentReader(path, document)
 
 
 @dataclass(frozen=True, slots=True)
-class Reader:
+class DocumentReader:
     """A value in a document, and where it is there."""
 
     path: Path
     value: Any
     at: str = ""
 
-    def __getitem__(self, key: str) -> Reader:
+    def __getitem__(self, key: str) -> DocumentReader:
         where = f"{self.at}.{key}".strip(".")
         if not isinstance(self.value, dict) or key not in self.value:
             raise _bad(self.path, f"it lacks '{where}'")
-        return Reader(self.path, self.value[key], where)
+        return DocumentReader(self.path, self.value[key], where)
 
-    def __iter__(self) -> Iterator[Reader]:
+    def __iter__(self) -> Iterator[DocumentReader]:
         for number, value in enumerate(self._of(list, "a list")):
-            yield Reader(self.path, value, f"{self.at}[{number}]")
+            yield DocumentReader(self.path, value, f"{self.at}[{number}]")
 
     def _of(self, kind: type, words: str) -> Any:
         if type(self.value) is not kind:
@@ -227,18 +227,18 @@ class Reader:
         ends = self._of(list, "a list of two numbers")
         numbers = [end for end in ends if type(end) in (int, float) and abs(end) < FINITE]
         if len(ends) != 2 or len(numbers) != 2 or numbers[0] > numbers[1]:
-            found = json.dumps(self.value)[:40]
-            raise _bad(self.path, f"'{self.at}' has to be [low, high]; found {found}")
+            shown = json.dumps(self.value)[:40]
+            raise _bad(self.path, f"'{self.at}' has to be [low, high]; found {shown}")
         return float(numbers[0]), float(numbers[1])
 
 
-def _ways(document: Reader) -> tuple[tuple[tuple[str, Row], ...], tuple[Way, ...]]:
+def _ways(document: DocumentReader) -> tuple[tuple[tuple[str, Row], ...], tuple[MachineWay, ...]]:
     places = tuple(
         (row["place"].text, Row(row["before"].text, row["after"].text, row["tokens"].count))
         for row in document["places"]
     )
     ways = tuple(
-        Way(
+        MachineWay(
             way["machine"].text,
             way["places"].texts,
             way["bodies"].texts,
@@ -251,8 +251,8 @@ def _ways(document: Reader) -> tuple[tuple[tuple[str, Row], ...], tuple[Way, ...
     return places, ways
 
 
-def _excluded(document: Reader) -> tuple[Excluded, ...]:
+def _excluded(document: DocumentReader) -> tuple[ExcludedPair, ...]:
     return tuple(
-        Excluded(*(pair[key].texts for key in ("machines", "places", "circuit")))
+        ExcludedPair(*(pair[key].texts for key in ("machines", "places", "circuit")))
         for pair in document["excluded"]
     )

@@ -8,7 +8,7 @@ from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from factory.exporting.clearance.documents import Interval, Row, Way
+from factory.exporting.clearance.documents import Interval, MachineWay, Row
 from factory.exporting.clearance.machines import FED, TAKEN_AWAY, Machines
 
 MOST = 50_000
@@ -22,11 +22,11 @@ STARTS = "_s"
 
 Marking = frozenset[str]
 
-Ways = Sequence[Way]
+Ways = Sequence[MachineWay]
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class MachineStep:
     """A machine fires a transition: its ways before and after."""
 
     event: str
@@ -80,7 +80,7 @@ class Machine:
         """Whether the transition after a place is a pass: nothing else is before it."""
         return self._inputs[self._net[place].after] == 1
 
-    def explore(self) -> Iterator[Step | str]:
+    def explore(self) -> Iterator[MachineStep | str]:
         """All firings of the part of the net beside the machine; a text where one is not safe, or
         leads to a marking in which the machine is nowhere. Other places only allow less."""
         events = sorted(self._pre.keys() | self._post.keys())
@@ -110,13 +110,13 @@ class Machine:
                     yield f"is in none of its ways after '{event}', with {_listed(after)} marked"
                     return
                 if not passed or self._inputs[event] > 1 or gained & {*passed}:
-                    yield Step(event, self._present(marking)[0], ways)
+                    yield MachineStep(event, self._present(marking)[0], ways)
                 if after not in seen:
                     seen.add(after)
                     left.append(after)
 
 
-def jumps(step: Step, start: Sequence[Way]) -> Iterator[str]:
+def jumps(step: MachineStep, start: Sequence[MachineWay]) -> Iterator[str]:
     """Where a machine would jump in a step: out of a way, or into one that is not of the `start`
     alone."""
     for word, ways, others in (("from", step.before, step.after), ("to", step.after, step.before)):
@@ -136,7 +136,7 @@ def hulls(ways: Ways) -> dict[str, Interval]:
     return {j: (min(a for a, _ in each), max(b for _, b in each)) for j, each in of.items()}
 
 
-def starts_outside(step: Step, joints: Container[str]) -> Iterator[str]:
+def starts_outside(step: MachineStep, joints: Container[str]) -> Iterator[str]:
     """Where an operation would begin outside its ways: a machine starts it from wherever it is with
     these of its joints."""
     if not step.event.endswith(STARTS):
@@ -160,7 +160,7 @@ def _cut_off(ways: Ways, others: Ways) -> Ways:
     return left
 
 
-def _joins(one: Way, other: Way) -> bool:
+def _joins(one: MachineWay, other: MachineWay) -> bool:
     """Whether some position is in both ways."""
     spans = [
         dict(zip(way.joints, group, strict=True)) for way in (one, other) for group in way.spans
@@ -177,14 +177,14 @@ def _joins(one: Way, other: Way) -> bool:
 
 
 @dataclass(slots=True)
-class Transfers:
+class PartTransfers:
     """Which parts (body) machines get and give away at each transition: the welds."""
 
     gained: dict[tuple[str, int], set[str]]
     lost: dict[tuple[str, int], set[str]]
 
     @classmethod
-    def of(cls, steps: Iterable[Step], machines: Machines) -> Transfers:
+    def of(cls, steps: Iterable[MachineStep], machines: Machines) -> PartTransfers:
         """Those of all steps of all machines."""
         gained, lost = dict[tuple[str, int], set[str]](), dict[tuple[str, int], set[str]]()
         for step in steps:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.exporting.clearance.documents import Way
+from factory.exporting.clearance.documents import MachineWay
 from factory.exporting.clearance.machines import Machines
 from factory.support.engine import mujoco
 
@@ -24,13 +24,13 @@ STEPS = 90
 
 
 @dataclass(frozen=True, slots=True)
-class Swept:
+class SweptBoxes:
     """The boxes (n, 2, 3) that a machine and what it holds sweep [m], and whose they are."""
 
     geoms: tuple[str, ...]
     boxes: Boxes
 
-    def near(self, other: Swept) -> tuple[str, str] | None:
+    def near(self, other: SweptBoxes) -> tuple[str, str] | None:
         """The geoms of two machines that come nearest, where they are near."""
         a, b = self.boxes, other.boxes
         apart = np.maximum(a[:, None, 0] - b[None, :, 1], b[None, :, 0] - a[:, None, 1]).max(axis=2)
@@ -48,7 +48,7 @@ class Sweeping:
         self._d = mujoco.MjData(self._m)
         mujoco.mj_kinematics(self._m, self._d)
 
-    def swept(self, way: Way) -> Swept:
+    def swept(self, way: MachineWay) -> SweptBoxes:
         """What a machine sweeps on a way."""
         m, d, names, boxes = self._m, self._d, list[str](), list[Boxes]()
         for body in (self._machines.bodies[name] for name in way.bodies):
@@ -67,9 +67,9 @@ class Sweeping:
                 box = self._box(geom, at, here @ turn @ _turn(m.geom_quat[geom]))
                 boxes += self._sweep(holder, way, box)
                 names += [m.geom(geom).name or m.body(part).name] * len(way.spans)
-        return Swept(tuple(names), np.array(boxes).reshape(-1, 2, 3))
+        return SweptBoxes(tuple(names), np.array(boxes).reshape(-1, 2, 3))
 
-    def _sweep(self, body: int, way: Way, box: Boxes, standing: bool = False) -> list[Boxes]:
+    def _sweep(self, body: int, way: MachineWay, box: Boxes, standing: bool = False) -> list[Boxes]:
         """What a box of a body sweeps as joints go over spans, one group after the other. A joint
         that turns about the vertical comes first: it is the body's own. What is in the box may be a
         `standing` cylinder."""
