@@ -36,7 +36,7 @@ from tests.random_products import random_product
 
 Json = dict[str, Any]
 
-ORDER = "order:past:r8:s1/5:2:s1/4"
+ORDER = "order:past:r8:2:s1/5:s1/4"
 """What a carrier waits for with its next unit: a hand that has gone from its station."""
 
 SEEDS = (39014, 39018)

@@ -124,12 +124,11 @@ def _axis(layout: Layout, past: Past) -> str:
 def _named(layout: Layout, passes: Iterable[Past]) -> dict[Past, str]:
     """The names of passes: those of one axis and operation are numbered as they are found, so that
     further ones change no name."""
-    names, count = dict[Past, str](), Counter[str]()
+    names, count = dict[Past, str](), Counter[tuple[str, str]]()
     for past in passes:
-        operation = layout.factory.operations[past.after // 2]
-        name = f"{_axis(layout, past)}:{operation.label}"
-        count[name] += 1
-        names[past] = f"past:{name}:{count[name]}"
+        axis, label = _axis(layout, past), layout.factory.operations[past.after // 2].label
+        count[axis, label] += 1
+        names[past] = f"past:{axis}:{count[axis, label]}:{label}"
     return names
 
 
