@@ -29,10 +29,10 @@ from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
 from factory.support.settings import Settings
+from tests.clearance_values import check
 from tests.command_line import ROOT, Terminal
 from tests.good_runs import assert_good
 from tests.test_refinement import played
-from tests.ways_checker import check
 
 PEG = ROOT / "examples" / "peg.pag"
 

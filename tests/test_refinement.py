@@ -1,35 +1,44 @@
-"""What runs is what is proved: every run over the engine is a run of the coordinated net, and each
-robot is, in every tick, where its presences say for what is marked."""
+"""What runs is what is proved: every run over the engine is a run of the coordinated net, which
+makes all its passes, and each robot is, in every tick, where its presences say for what is marked.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from benches.speed.factories import cube
 from factory.layout.exclusions import awaited_positions, coordinated
 from factory.layout.hands.leaving import SPARE
 from factory.layout.layout import Layout
 from factory.layout.machines import presences
 from factory.layout.presence import Presence
+from factory.layout.request import Ground
 from factory.pipeline import read
 from factory.record.state import Event, State
 from factory.simulation.mujoco.passing import Passing
+from factory.simulation.mujoco.sliders import NEVER
 from factory.simulation.ordering import Ordering
+from factory.simulation.recovery import Campaign, WorldFault, recover
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.simulation.watched import watched
 from factory.study.allocation.aim import Aim
 from factory.study.allocation.search import allocated
 from factory.support.settings import LEAST
+from tests import test_demand, test_tees
 from tests.random_products import random_blocks, random_product
 
 OFF = SPARE
 """A robot is no further outside its presences: lifts that are to be up, and robots that are to be
 at home, count as there a millimetre before [m]."""
+
+AFTERWARDS = 6.0
+"""So long after its last unit robots may still be on their ways home [s]."""
 
 DAY = int(os.environ.get("TEST_DAY", "261126"))
 
@@ -63,6 +72,7 @@ class CoordinatedGame:
             assert isinstance(event, Event)
             self.fire(self.number[event.transition])
         self.seen = len(state.events)
+        self.rise()
         self.pass_on(x)
         shown = world.parts.feeders.shown()
         if self.shown:
@@ -70,6 +80,24 @@ class CoordinatedGame:
         self.shown |= shown
         self.pass_on(x)
         self.locate(x)
+
+    @property
+    def unmade(self) -> list[str]:
+        """The passes that are still to come."""
+        places, passes = self.net.net.places, self.coordinated.passes.values()
+        return [places[place].name for place, _ in passes if self.tokens[place]]
+
+    def rise(self) -> None:
+        """Fire what sliders do that have come up without a part."""
+        operations, feeders = self.layout.factory.operations, self.simulation.physical.parts.feeders
+        for served in self.coordinated.served.values():
+            number, event = (
+                feeders._number[operations[served.before].label],
+                self.net.right[served.up],
+            )
+            rests = feeders._sliders.ends[number] == NEVER and feeders._sliders.is_up(number)
+            if rests and self.is_enabled(event):
+                self.fire(event)
 
     def show(self, shown: Mapping[str, int]) -> None:
         """Sliders that have set out with the part for another unit have been up before."""
@@ -120,21 +148,32 @@ def _within(x: float, span: tuple[float, float]) -> bool:
     return min(span) - OFF <= x <= max(span) + OFF
 
 
-def played(layout: Layout, seed: int, distributed: bool = False, ordered: bool = True) -> list[str]:
-    """What is wrong in a run of three units, each robot with a speed of its own."""
-    request = RunRequest(units=3, seed=seed, jitter=0.3, distributed=distributed)
-    simulation = Simulation(layout, request)
+Change = Callable[[Simulation], object]
+"""What is done to a run before it begins."""
+
+
+def played(
+    layout: Layout, seed: int, change: Change = lambda run: None, **asked: object
+) -> list[str]:
+    """What is wrong in a run of three units, each robot with a speed of its own, and until the
+    passes after the last unit are made."""
+    values = {"units": 3, "seed": seed, "jitter": 0.3, **asked}
+    simulation = Simulation(layout, RunRequest(**values))  # type: ignore[arg-type]
     game = CoordinatedGame(simulation)
-    if not ordered:
-        simulation.supervisor.ordering = Ordering()
-    watched(simulation, [game.look], 600.0)
+    change(simulation)
+    run = watched(simulation, [game.look], 600.0)
+    assert run.trouble is None or game.faults, run.trouble
     assert game.faults or game.seen > 2 * len(layout.factory.operations)
-    return game.faults
+    over = simulation.world.time + AFTERWARDS
+    while game.unmade and simulation.world.time < over:
+        simulation.supervisor.step()
+        game.look(simulation.state())
+    return game.faults + [f"{name} is not made" for name in game.unmade]
 
 
 @pytest.mark.parametrize(("name", "distributed"), [("paper", True), ("stool", False)])
 def test_examples(name: str, distributed: bool) -> None:
-    assert not played(read(f"examples/{name}.pag").layout, 1, distributed)
+    assert not played(read(f"examples/{name}.pag").layout, 1, distributed=distributed)
 
 
 @pytest.mark.parametrize("seed", [1000 * DAY + 500 + number for number in (1, 3, 4)])
@@ -148,8 +187,59 @@ def test_random_products(seed: int, tmp_path: Path) -> None:
     assert not played(project.layout, seed)
 
 
+def tee() -> Layout:
+    """Two branches that come to one place over a stem: each waits for passes of the other."""
+    return test_tees.project(2).layout
+
+
+def relayed(folder: Path) -> Layout:
+    """A product whose longest way is divided among robots."""
+    file = folder / "cube.pag"
+    file.write_text(cube(8, side=0.15))
+    return read(file, ground=Ground(relay=True)).layout
+
+
+def starved(run: Simulation) -> None:
+    """A feeder is empty for some time before the last unit."""
+    recover(run, Campaign((WorldFault("no_part", label="part3", unit=3, seconds=2.0),)))
+
+
+Variant = tuple[Callable[[Path], Layout], Change, dict[str, object]]
+
+VARIANTS: dict[str, Variant] = {
+    "tee": (lambda folder: tee(), lambda run: None, {"distributed": True}),
+    "bounded": (lambda folder: tee(), lambda run: None, {"wip": 1}),
+    "starved": (lambda folder: tee(), starved, {"recovers": True}),
+    "relay": (relayed, lambda run: None, {}),
+    "mix": (lambda folder: test_demand.little().layout, lambda run: None, {"units": 4}),
+}
+"""Layouts with passes, what is done to a run, and what is asked of it."""
+
+
+@pytest.mark.parametrize("name", VARIANTS)
+def test_variants_make_their_passes(name: str, tmp_path: Path) -> None:
+    layout, change, asked = VARIANTS[name]
+    assert not played(layout(tmp_path), 1, change, **asked)
+
+
+def test_passes_are_made_when_demand_is_over() -> None:
+    """Robots that skip units are not where the net of a fixed sequence has them."""
+    faults = played(test_demand.little().layout, 1, demand=test_demand.ordered("bba"))
+    assert not [fault for fault in faults if fault.endswith("is not made")]
+
+
+def test_a_pass_that_nobody_makes_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Robots that are awaited wait where they have delivered."""
+    layout = tee()
+    monkeypatch.setattr("factory.modes.staging.awaited_positions", lambda layout: {})
+    monkeypatch.setattr(Ordering, "hold_up", lambda *_: False)
+    faults = played(layout, 1, units=2)
+    assert any(fault.endswith("is not made") for fault in faults), faults
+
+
 def test_a_run_that_keeps_no_orders_is_none_of_the_net() -> None:
-    faults = played(read("examples/gearbox.pag").layout, 1, ordered=False)
+    layout = read("examples/gearbox.pag").layout
+    faults = played(layout, 1, lambda run: setattr(run.supervisor, "ordering", Ordering()))
     assert any("without ['order:" in fault for fault in faults), faults
 
 

@@ -31,12 +31,12 @@ from factory.problem.robot_types import load_catalogue
 from factory.simulation.ordering import Ordering
 from factory.support.errors import RunError
 from factory.support.settings import Settings
+from tests.clearance_values import check
 from tests.random_products import random_product
-from tests.ways_checker import check
 
 Json = dict[str, Any]
 
-ORDER = "order:past:r8:0.134:s1/5:s1/4"
+ORDER = "order:past:r8:2:s1/5:s1/4"
 """What a carrier waits for with its next unit: a hand that has gone from its station."""
 
 SEEDS = (39014, 39018)
@@ -121,7 +121,7 @@ def test_a_magazine_that_is_10_mm_lower_is_refused() -> None:
 def test_a_clear_point_that_is_5_mm_short_is_refused() -> None:
     m, machines, clearance = written(39014)
     beyond = [
-        w for w in machines["ways"] if any("r9:0.233" in p and " on" in p for p in w["places"])
+        w for w in machines["ways"] if any("past:r9:" in p and " on" in p for p in w["places"])
     ]
     assert beyond
     for way in beyond:

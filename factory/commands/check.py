@@ -11,12 +11,23 @@ import click
 
 from factory.commands.allowing import ALLOW
 from factory.commands.grouped import Grouped
-from factory.commands.options import HANDS, OUTPUT, PATH, RELAY, SOURCE, WIP
-from factory.commands.outputs import for_a_pag, writable, writable_folder
+from factory.commands.options import (
+    HANDS,
+    OUTPUT,
+    PATH,
+    PROJECT,
+    RELAY,
+    TEMPLATES,
+    WIP,
+    options,
+    pag_files,
+)
+from factory.commands.outputs import for_a_pag, without_others, writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced, say_allowed
 from factory.support.collector import collector_paused
 from factory.support.console import emit, say, table
+from factory.support.errors import Diagnostic, RunError, usage_error
 from factory.support.files import is_net
 from factory.support.progress import Waiting
 
@@ -34,6 +45,15 @@ SHOWN = 24
 PICTURES = "Folder for pictures of blocked operations and of parts that no hand can hold."
 """The help of `--clashes`."""
 
+PROOF = "Check the clearance certificate in a folder that build -o wrote, without FILE."
+"""The help of `--clearance`."""
+
+SOURCE = options(
+    click.argument("file", type=PATH, required=False, default=Path(), shell_complete=pag_files),
+    TEMPLATES,
+    PROJECT,
+)
+
 AGAINST = 3
 """The most that is printed against one property, unless `-v` asks for all."""
 
@@ -45,6 +65,7 @@ POOLED = 8
 @SOURCE
 @click.option("--certificate", type=PATH, help="Write the proof to this file.")
 @click.option("--against", type=PATH, help="Check a proof written by --certificate.")
+@click.option("--clearance", "folder", type=PATH, help=PROOF)
 @WIP
 @ALLOW
 @click.option("--clashes", type=PATH, help=PICTURES)
@@ -57,10 +78,16 @@ def check(
     out: OutputOptions,
     certificate: Path | None,
     against: Path | None,
+    folder: Path | None,
     wip: int | None,
     clashes: Path | None,
 ) -> int:
     """Parse, compile and prove FILE.pag (or a net in FILE.pnml), or check its certificate."""
+    if folder is not None:
+        without_others("folder", f"--clearance '{folder}'")
+        return _check_clearance(folder, out)
+    if options.file == Path():
+        raise usage_error("Missing argument 'FILE'.", "see factory check --help")
     from factory.study.checking import check_net, check_project
     from factory.support.files import own_names, write_all, write_text
 
@@ -98,6 +125,30 @@ def check(
         if proved:
             say(f"{against} is a certificate of this net: {_claims(proved)}")
     return 0 if checked.verdict.holds else 1
+
+
+def _check_clearance(folder: Path, out: OutputOptions) -> int:
+    """Check the clearance certificate in a folder. Raises InputError, or RunError (BadProof) with
+    everything that is wrong with it."""
+    from factory.exporting.clearance.checking import faults_of
+    from factory.exporting.clearance.documents import read_folder
+
+    with Waiting("checking that machines never meet", out.silent):
+        proof = read_folder(folder)
+        faults = faults_of(proof)
+    counts = {"machines": len(proof.by_machine), "ways": len(proof.ways)}
+    counts |= {"pairs": len(proof.excluded), "places": len(proof.net)}
+    if out.as_json:
+        emit({"clearance": str(folder), "holds": not faults, **counts, "faults": faults})
+        return 1 if faults else 0
+    if faults:
+        hint = "build it again: `factory build FILE.pag -o DIR`"
+        raise RunError(
+            Diagnostic("BadProof", fault, None, "" if n else hint) for n, fault in enumerate(faults)
+        )
+    listed = ", ".join(f"{count} {name}" for name, count in counts.items())
+    say(f"{folder}: no two machines ever meet: {listed}")
+    return 0
 
 
 def _proved(certificate: Path, checked: Checked) -> dict[str, bool | None]:

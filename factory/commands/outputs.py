@@ -73,6 +73,13 @@ def for_a_pag(file: Path, kind: str, *but: str) -> None:
     _refuse_given(lambda name: name not in but, words, hint)
 
 
+def without_others(name: str, words: str) -> None:
+    """Check that nothing was given beside one option (`name`), in `words`, but those of OUTPUT.
+    Raises InputError (Usage) with every other."""
+    but = (name, "as_json", "quiet", "verbose")
+    _refuse_given(lambda each: each not in but, f"does not go with {words}", "leave it out")
+
+
 def for_a_film() -> None:
     """Check that no option of PICTURE was given, where nothing is filmed. Raises InputError (Usage)
     with every one."""

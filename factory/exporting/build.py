@@ -13,6 +13,7 @@ from factory.exporting.pnml import write_pnml
 from factory.exporting.ways import ways
 from factory.layout.certificate import Certificate
 from factory.layout.clearance import certify
+from factory.layout.exclusions import coordinated
 from factory.mjcf.binary import beside, kept, key_of, packed, seal_of, sealed
 from factory.mjcf.model import Model, model_files
 from factory.mjcf.stock import written
@@ -113,6 +114,7 @@ def _documents(project: Project, clearance: Certificate, verdict: Verdict) -> di
         "clearance.json": _json(clearance.as_json()),
         "dot": write_dot(factory.net),
         "pnml": write_pnml(factory.net),
+        "coordinated.pnml": write_pnml(coordinated(layout).net),
     }
 
 

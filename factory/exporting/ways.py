@@ -3,12 +3,14 @@ collide.
 
 For each machine and each place of the coordinated net in which it is: its bodies in the MJCF that
 is written, the spans of its joints there, and the welds by which it holds parts. The pairs that
-come near, and their circuits, are in the clearance certificate. Stationary machines have none.
+come near, and their circuits, are in the clearance certificate. A slider of a magazine is a machine
+of its own. Stationary machines have none.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 from factory.layout.exclusions import awaited_positions, coordinated
 from factory.layout.feeding import outlets_of
@@ -19,7 +21,7 @@ from factory.mjcf import names
 from factory.mjcf.model import Model
 from factory.mjcf.stock import Scale, scales_of
 
-Json = dict[str, object]
+Json = dict[str, Any]
 
 
 def ways(model: Model) -> Json:
@@ -29,15 +31,19 @@ def ways(model: Model) -> Json:
     coordination = coordinated(layout)
     net, written = coordination.net, _Writer(model)
     events = net.net.transitions
+    moving = [
+        (one, [net.net.places[p].name for p in one.places])
+        for one in presences(layout, coordination, awaited_positions(layout))
+        if one.places
+    ]
     return {
         "places": [
             {"place": place.name, "before": events[a].name, "after": events[b].name, "tokens": n}
             for place, a, b, n in zip(net.net.places, net.left, net.right, net.tokens, strict=True)
         ],
         "ways": [
-            {"places": [net.net.places[p].name for p in one.places], **written.way(one)}
-            for one in presences(layout, coordination, awaited_positions(layout))
-            if one.places
+            *({"places": places, **written.way(one)} for one, places in moving),
+            *written.standing(moving),
         ],
     }
 
@@ -67,10 +73,39 @@ class _Writer:
             bodies, joints = [names.OUTFEED_TRAY], [names.OUTFEED_SLIDE]
             return _way(one, bodies, joints, [names.hold(label) for label in held], [Scale()])
         outlet = self._outlets[one.label, one.robot]
-        slider = names.slider(self._hanging.slider[outlet])
+        slider = self._slider(one)
         hangs = [names.feed(outlet)] * (len(one.bodies.names) > 1)
         raised = Scale(zero=-self._hanging.raised[outlet])
-        return _way(one, [slider], [slider], hangs, [raised])
+        return _way(one, [slider], [slider], hangs, [raised]) | {"machine": slider}
+
+    def _slider(self, one: Presence) -> str:
+        """The slider of a magazine's presence."""
+        return names.slider(self._hanging.slider[self._outlets[one.label, one.robot]])
+
+    def standing(self, moving: Sequence[tuple[Presence, list[str]]]) -> Iterator[Json]:
+        """The ways of machines that come near nothing: the sliders of a magazine that stand up,
+        empty, while another of it has its turn; and the shutter of the shed, which goes down and up
+        while the tray is away."""
+        turns, tops = dict[int, dict[str, set[str]]](), dict[str, float]()
+        for one, places in moving:
+            if one.machine == "tray":
+                down = -self._model.layout.shutter_stroke * bool(one.label)
+                yield _joint(names.SHUTTER, places, [down, 0.0])
+            elif one.bears:
+                slider = self._slider(one)
+                turns.setdefault(one.robot, {}).setdefault(slider, set()).update(places)
+                ((_, high),) = self.way(one)["spans"][0]
+                tops[slider] = max(high, tops.get(slider, high))
+        for magazine in turns.values():
+            for slider, mine in magazine.items():
+                others = set[str]().union(*magazine.values()) - mine
+                yield from (_joint(slider, [p], [tops[slider]] * 2) for p in sorted(others))
+
+
+def _joint(name: str, places: list[str], span: list[float]) -> Json:
+    """The way of an empty machine of one body, which has the name of its joint."""
+    way: Json = {"places": places, "machine": name, "bodies": [name], "joints": [name]}
+    return way | {"welds": [], "spans": [[[round(end, 6) for end in span]]]}
 
 
 def _way(

@@ -7,6 +7,7 @@ once stays possible, and no circuit is free of tokens.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
@@ -67,8 +68,10 @@ def with_machines(
     every = dict.fromkeys(feeding.past for feeding in feedings if feeding.past is not None)
     every |= dict.fromkeys([*(past for past, _ in lifted), *passes])
     by_way = sorted(every, key=lambda past: _way_of(layout, past))
+    names = _named(layout, every)
     for (after, robot, _), along in groupby(by_way, key=lambda past: _way_of(layout, past)[:3]):
-        _chain(layout, build, (factory.operations[after // 2], robot), [*along], orders)
+        passes = {past: names[past] for past in along}
+        _chain(layout, build, (factory.operations[after // 2], robot), passes, orders)
     for past, number in lifted:
         before, operation = factory.operations[past.after // 2], factory.operations[number]
         robot = layout.factory.robot_of(past.axis)
@@ -118,18 +121,28 @@ def _axis(layout: Layout, past: Past) -> str:
     return robot.name if past.axis == robot.index else f"{robot.name} up"
 
 
+def _named(layout: Layout, passes: Iterable[Past]) -> dict[Past, str]:
+    """The names of passes: those of one axis and operation are numbered as they are found, so that
+    further ones change no name."""
+    names, count = dict[Past, str](), Counter[tuple[str, str]]()
+    for past in passes:
+        axis, label = _axis(layout, past), layout.factory.operations[past.after // 2].label
+        count[axis, label] += 1
+        names[past] = f"past:{axis}:{count[axis, label]}:{label}"
+    return names
+
+
 def _chain(
     layout: Layout,
     build: Coordination,
     who: tuple[Operation, int],
-    passes: list[Past],
+    names: Mapping[Past, str],
     orders: Sequence[Precedence],
 ) -> None:
     """The passes of a robot that follow one transition of an operation: in that, or after its end
     until the start of the robot's next, or its end where that leads beyond them all and waits for
     none of them."""
-    factory, (operation, robot) = layout.factory, who
-    names = {p: f"past:{_axis(layout, p)}:{p.at:.3f}:{operation.label}" for p in passes}
+    factory, (operation, robot), passes = layout.factory, who, [*names]
     name = factory.robots[robot].name
     if passes[0].after == operation.start:
         kind = "way", f"of {name} from its feeder"

@@ -63,13 +63,13 @@ ROUNDS = 8
 def coordinated(layout: Layout) -> Coordinated:
     """The coordinated net of a layout, with everything that keeps its machines apart."""
     apart = kept(layout)
-    return with_machines(layout, apart.passes, [order for order in apart.orders if order.kept])
+    return with_machines(layout, apart.passes, apart.orders)
 
 
 def awaited_positions(layout: Layout) -> dict[int, float]:
     """For robots that return by themselves as soon as they have released their payload, by index,
     the arc lengths to which they go [m]."""
-    return dict(kept(layout).backs) if layout.hands else {}
+    return dict(kept(layout).backs)
 
 
 def goes_early(layout: Layout) -> list[tuple[int, int]]:
