@@ -84,8 +84,8 @@ def _value(name: str, written: Any, kind: Any, asked: str) -> Any:
     if variant is None or variant.Value is None:
         raise Unfit(f"{name} is null: not {asked}")
     if variant.VariantType != kind:
-        given = getattr(variant.VariantType, "name", "unknown")
-        raise Unfit(f"{name} is of type {given}: not {asked}")
+        other = getattr(variant.VariantType, "name", "unknown")
+        raise Unfit(f"{name} is of type {other}: not {asked}")
     return variant.Value
 
 

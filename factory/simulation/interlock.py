@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from factory.control.mode import REST, Mode
+from factory.layout.coordinating import Coordinated
 from factory.layout.layout import Layout
 from factory.nets.threaded import Threads
 from factory.plant.factory import Operation
@@ -25,23 +26,23 @@ REACH = 1e-3
 
 class PlantInterlock:
     """Carries out commands in a `world`. It fires X_s when the carrier of X takes the job up, and
-    X_e when it gives it up. `corridors`: where axes may go; `fired`: firing counts of the transitions; `held_back`: robots that
-    stand because their last command is refused; `refusals`: all refused commands."""
+    X_e when it gives it up. `net`: the coordinated net of the layout; `corridors`: where axes may
+    go; `fired`: firing counts of the transitions; `held_back`: robots that stand because their last
+    command is refused; `refusals`: all refused commands."""
 
     def __init__(
         self,
         layout: Layout,
         modes: Sequence[Mode],
         world: World,
-        ordering: Ordering,
-        corridors: Corridors,
+        net: Coordinated,
     ) -> None:
-        self.factory, self.world, self.ordering = layout.factory, world, ordering
-        self.corridors = corridors
+        self.factory, self.world = layout.factory, world
+        self.ordering, self.corridors = Ordering(net.orders), Corridors(layout, net, modes)
         self._goals = [mode.goals for mode in modes]
-        net, starts = layout.factory.net, [o.start for o in layout.factory.operations]
-        self.threads = Threads(net.threaded, net.threads_of(net.initial_marking), starts)
-        self.fired = [0] * len(net.threaded.transitions)
+        gears, starts = layout.factory.net, [o.start for o in layout.factory.operations]
+        self.threads = Threads(gears.threaded, gears.threads_of(gears.initial_marking), starts)
+        self.fired = [0] * len(gears.threaded.transitions)
         self.events: list[Event] = []
         self.refusals: list[Refusal] = []
         robots = len(layout.factory.robots)

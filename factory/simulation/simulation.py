@@ -21,7 +21,6 @@ from factory.nets.replay import replay
 from factory.plant.demand import Word
 from factory.record.figures import PhysicsFigures
 from factory.record.state import Observer, State
-from factory.simulation.corridors import Corridors
 from factory.simulation.distributed import DistributedSupervisor
 from factory.simulation.driven import DrivenSupervisor
 from factory.simulation.ideal import IdealWorld
@@ -173,9 +172,8 @@ class Simulation:
 
     def drive(self, controller: Controller, scan: float) -> DrivenSupervisor:
         """Let a controller drive the plant from the start, asked every `scan` [s]."""
-        ordering, settings = self.supervisor.ordering, self.request.settings
-        corridors = Corridors(self.layout, self.timing.coordinated, self.modes)
-        interlock = PlantInterlock(self.layout, self.modes, self.world, ordering, corridors)
+        net, settings = self.timing.coordinated, self.request.settings
+        interlock = PlantInterlock(self.layout, self.modes, self.world, net)
         self.supervisor = DrivenSupervisor(interlock, self.limits, settings, controller, scan)
         return self.supervisor
 
