@@ -70,7 +70,9 @@ class _Format(click.ParamType[str]):
     type=PATH,
     help="Folder of additional exporters, *.py (repeatable).",
 )
-@click.option("-o", "--output", type=PATH, help="Output file, - for stdout (default for text formats).")
+@click.option(
+    "-o", "--output", type=PATH, help="Output file, - for stdout (default for text formats)."
+)
 @click.option("--of", default="", help="What to export, where a format offers a choice.")
 @FLOOR
 @RELAY
