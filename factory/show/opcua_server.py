@@ -4,6 +4,7 @@ plant keeps its pace."""
 
 from __future__ import annotations
 
+import asyncio
 from typing import Any
 
 MOST_CLIENTS = 16
@@ -85,5 +86,9 @@ class OpcuaServer:
                 await self._subscriptions.delete_subscriptions([number])
 
     async def stop(self) -> None:
-        """Disconnect all clients."""
+        """Disconnect all clients, and end what sessions have left behind."""
         await self.server.stop()
+        left = asyncio.all_tasks() - {asyncio.current_task()}
+        for task in left:
+            task.cancel()
+        await asyncio.gather(*left, return_exceptions=True)

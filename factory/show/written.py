@@ -50,20 +50,20 @@ class WrittenCommands:
     def _read(self, written: Callable[[str], Any]) -> Commands:
         """What is written, as commands. Raises Unfit."""
         kinds, axes, robots = self._kinds, len(self.kept.target), len(self.kept.grip)
-        target = list_of("Target", written("Target"), kinds.Double, axes)
-        grip = list_of("Grip", written("Grip"), kinds.Boolean, robots)
-        job = list_of("Job", written("Job"), kinds.UInt16, robots)
+        target = list_of("Target", written("Target"), kinds.Double, float, axes)
+        grip = list_of("Grip", written("Grip"), kinds.Boolean, bool, robots)
+        job = list_of("Job", written("Job"), kinds.UInt16, int, robots)
         return Commands(np.array(target), tuple(grip), tuple(job))
 
 
-def list_of(name: str, written: Any, kind: Any, count: int) -> list[Any]:
+def list_of(name: str, written: Any, kind: Any, of: type, count: int) -> list[Any]:
     """The values of an array variable, by its `name`, in what was `written`, an
     `asyncua.ua.DataValue`. Raises Unfit for anything but `count` finite values of a `kind`, an
-    `asyncua.ua.VariantType`."""
+    `asyncua.ua.VariantType`, which is the type `of` in Python."""
     asked = f"a list of {count} finite values of type {kind.name}"
     values = _value(name, written, kind, asked)
     flat = isinstance(values, list) and len(values) == count
-    if not flat or not all(_is_finite(value) for value in values):
+    if not flat or not all(type(value) is of and isfinite(value) for value in values):
         raise Unfit(f"{name} is {_shown(values)}: not {asked}")
     return list(values)
 
@@ -72,7 +72,7 @@ def number_of(name: str, written: Any, kind: Any) -> int:
     """The same for a variable that holds one whole number."""
     asked = f"a number of type {kind.name}"
     value = _value(name, written, kind, asked)
-    if not isinstance(value, int):
+    if type(value) is not int:
         raise Unfit(f"{name} is {_shown(value)}: not {asked}")
     return value
 
@@ -87,10 +87,6 @@ def _value(name: str, written: Any, kind: Any, asked: str) -> Any:
         other = getattr(variant.VariantType, "name", "unknown")
         raise Unfit(f"{name} is of type {other}: not {asked}")
     return variant.Value
-
-
-def _is_finite(value: Any) -> bool:
-    return isinstance(value, bool | int | float) and isfinite(value)
 
 
 def _shown(value: Any) -> str:
