@@ -115,10 +115,10 @@ def _chosen(columns: Sequence[str]) -> dict[str, str]:
     from factory.importing.bill_header import TITLES
 
     chosen = dict[str, str]()
-    for given in columns:
-        name, equals, title = (part.strip() for part in given.partition("="))
+    for said in columns:
+        name, equals, title = (part.strip() for part in said.partition("="))
         if not equals or not title or name not in TITLES or name in chosen:
-            message = f"--columns '{given}' does not say the title of a column, or not the only one"
+            message = f"--columns '{said}' does not say the title of a column, or not the only one"
             raise usage_error(message, f"name=TITLE, where the name is one of {', '.join(TITLES)}")
         chosen[name] = title
     return chosen

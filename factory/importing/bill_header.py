@@ -158,8 +158,8 @@ def _divided(title: str, units: Mapping[str, float]) -> tuple[str, str]:
 def _reading(title: str) -> dict[str, int]:
     """The columns that a title may be, with its rank among the titles of each."""
     names = dict[str, int]()
-    for name, known in NAMES.items():
+    for name, titles in NAMES.items():
         bare, _ = _divided(title, MEASURES.get(name, {}))
-        if bare in known:
-            names[name] = known.index(bare)
+        if bare in titles:
+            names[name] = titles.index(bare)
     return names

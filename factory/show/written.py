@@ -56,7 +56,7 @@ class WrittenCommands:
         return Commands(np.array(target), tuple(grip), tuple(job))
 
 
-def list_of(name: str, written: Any, kind: Any, of: type, count: int) -> list[Any]:
+def list_of(name: str, written: Any, kind: Any, of: type[float], count: int) -> list[Any]:
     """The values of an array variable, by its `name`, in what was `written`, an
     `asyncua.ua.DataValue`. Raises Unfit for anything but `count` finite values of a `kind`, an
     `asyncua.ua.VariantType`, which is the type `of` in Python."""
