@@ -18,6 +18,7 @@ from factory.layout.feeding import cleared
 from factory.layout.layout import Layout
 from factory.layout.way import Bend, Ways, rounding_for, way_of
 from factory.mjcf.loading import load
+from factory.mjcf.stock import written as stock
 from factory.record.monitor import beside
 from factory.simulation.modelling import physical_model
 from factory.simulation.request import RunRequest
@@ -156,10 +157,10 @@ def test_a_monitor_sees_where_a_robot_on_a_bend_is(layout: Layout) -> None:
 
 
 def test_a_urdf_has_both_slides_of_a_robot_on_a_bend(layout: Layout, tmp_path: Path) -> None:
-    """MuJoCo reads it, and puts all bodies where they are in the model."""
+    """MuJoCo reads it, and puts all bodies where they are in the written model."""
     file = tmp_path / "lamp.urdf"
     factory.export(layout, "urdf", file)
-    one = load(physical_model(layout, 1, Settings(hands=0)))
+    one = load(stock(physical_model(layout, 1, Settings(hands=0))))
     other = mujoco.MjModel.from_xml_path(str(file))
     here, there = mujoco.MjData(one), mujoco.MjData(other)
     for name, value in (("r9/slide", 0.3), ("r9/slide_across", -0.07)):

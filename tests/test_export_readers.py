@@ -16,6 +16,7 @@ from factory.exporting import exporters
 from factory.geometry.solids import rotation
 from factory.mjcf.loading import load
 from factory.mjcf.names import COMPASS
+from factory.mjcf.stock import written as stock
 from factory.nets.marked import MarkedNet, marked
 from factory.record.log import read_log
 from factory.record.log.model import model_of
@@ -422,24 +423,32 @@ def factory_by_pygltflib(log: Path) -> None:
 
 @reads("urdf", "MuJoCo", "Apache-2.0")
 def urdf_by_mujoco(folder: Path) -> None:
-    """the same bodies, joints and masses; for random joint values the same poses, to a nanometre"""
+    """the bodies, joints, ranges and masses of the MJCF; the same poses at home, where all joints
+    are 0, and for random joint values, to a nanometre"""
     import mujoco
 
     for file in (MESHES, LAMP):
         path = written(made("urdf", file, "", "x.urdf"), folder / file.stem / "x.urdf")
-        one = load(physical_model(project(file).layout, 1, project(file).settings))
+        one = load(stock(physical_model(project(file).layout, 1, project(file).settings)))
         other = mujoco.MjModel.from_xml_path(str(path))
         bodies = {one.body(n).name for n in range(one.nbody)} - {COMPASS}
         assert bodies == {other.body(n).name for n in range(other.nbody)}
         assert one.njnt == other.njnt
-        here, there = mujoco.MjData(one), mujoco.MjData(other)
-        for joint, value in _random_joints(one).items():
-            here.joint(joint).qpos[0] = there.joint(joint).qpos[0] = value
-        for m, d in ((one, here), (other, there)):
-            mujoco.mj_kinematics(m, d)
+        values = _random_joints(one)
+        for name in values:
+            low, high = other.joint(name).range
+            assert low < 0.0 < high
+            assert [low, high] == pytest.approx(one.joint(name).range)
+        for share in (0.0, 1.0):
+            here, there = mujoco.MjData(one), mujoco.MjData(other)
+            for joint, value in values.items():
+                here.joint(joint).qpos[0] = there.joint(joint).qpos[0] = share * value
+            for m, d in ((one, here), (other, there)):
+                mujoco.mj_kinematics(m, d)
+            for name in bodies:
+                assert np.allclose(here.body(name).xpos, there.body(name).xpos, atol=1e-9), name
+                assert np.allclose(here.body(name).xquat, there.body(name).xquat, atol=1e-9), name
         for name in bodies:
-            assert np.allclose(here.body(name).xpos, there.body(name).xpos, atol=1e-9), name
-            assert np.allclose(here.body(name).xquat, there.body(name).xquat, atol=1e-9), name
             if one.body_jntnum[one.body(name).id]:
                 assert one.body(name).mass == pytest.approx(other.body(name).mass)
                 assert np.allclose(_inertia(one, name), _inertia(other, name), rtol=1e-6)
@@ -454,8 +463,8 @@ def _inertia(m: Any, name: str) -> Any:
 
 def _random_joints(m: Any) -> dict[str, float]:
     rng = np.random.default_rng(1)
-    slides = (m.joint(j).name for j in range(m.njnt) if m.jnt_type[j] == 2)
-    return {name: float(rng.uniform(0.05, 0.2)) for name in slides}
+    slides = (m.joint(j) for j in range(m.njnt) if m.jnt_type[j] in (2, 3))
+    return {joint.name: float(rng.uniform(*joint.range)) for joint in slides}
 
 
 @reads("urdf", "yourdfpy", "MIT, a process of its own")
@@ -464,7 +473,7 @@ def urdf_by_yourdfpy(folder: Path) -> None:
     import mujoco
 
     path = written(made("urdf", MESHES, "", "x.urdf"), folder / "x.urdf")
-    m = load(physical_model(project(MESHES).layout, 1, project(MESHES).settings))
+    m = load(stock(physical_model(project(MESHES).layout, 1, project(MESHES).settings)))
     values, d = _random_joints(m), mujoco.MjData(m)
     for joint, value in values.items():
         d.joint(joint).qpos[0] = value
@@ -562,6 +571,9 @@ def usd_by_usd_core(log: Path) -> None:
     from pxr import Usd, UsdGeom
 
     stage = Usd.Stage.Open(str(written(made("usd", log, "", "x.usd"), log.with_name("x.usd"))))
+    as_text = written(made("usd", log, "", "x.usda"), log.with_name("x.usda"))
+    assert as_text.read_bytes().startswith(b"#usda 1.0")
+    assert Usd.Stage.Open(str(as_text)).GetEndTimeCode() == stage.GetEndTimeCode()
     assert (UsdGeom.GetStageMetersPerUnit(stage), UsdGeom.GetStageUpAxis(stage)) == (1.0, "Z")
     kept = subject(log).log
     seconds = (stage.GetEndTimeCode() - 1) / stage.GetTimeCodesPerSecond()

@@ -61,6 +61,13 @@ MISTAKES = [
     ("subject):\n", "subject):\n    exit(7)\n", 6, "SystemExit: 7"),
     ('return "', 'return b"" or 7 or "', 5, "the exporter labels gave int, not a text or files"),
     ('return "', 'return b"x" or "', 5, "the exporter labels gave bytes, not a text or files"),
+    ('return "', 'return "\\ud800" or "', 5, "the exporter labels gave a text with a lone"),
+    ('return "', 'return {} if 1 else "', 5, "the exporter labels gave no file"),
+    ('return "', 'return {"": "x"} or "', 5, "the exporter labels gave str for the file '', not"),
+    ('return "', 'return {"": None} or "', 5, "the exporter labels gave NoneType for the file ''"),
+    ('return "', 'return {7: b"x"} or "', 5, "the exporter labels gave a file whose name is 7,"),
+    ('return "', 'return {"a\\0": b""} or "', 5, "the exporter labels gave a file whose name 'a"),
+    ('return "', 'return {"\\ud8f0": b""} or "', 5, "the exporter labels gave a file whose name"),
 ]
 
 
@@ -78,6 +85,53 @@ def test_a_mistake_names_file_line_and_reason(
     assert first.startswith(f"{file}:{line}:"), done.err
     assert f"BadExtension {why}" in first or f": {why}" in first, done.err
     assert shown.strip() in file.read_text().splitlines()[line - 1]
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("../outside.txt", "a file that is not in the folder"),
+        ("/tmp/outside.txt", "a file that is not in the folder"),
+        ("link/outside.txt", "a file that is not in the folder"),
+        (".", "a file that is not in the folder"),
+        ("x/../own.pag", "a file that is the source"),
+        ("own.pag", "a file that is the source"),
+    ],
+)
+def test_a_file_beside_the_requested_one_stays_in_its_folder(
+    run: Terminal, folder: Path, name: str, why: str
+) -> None:
+    file, out = folder / "labels.py", folder / "out"
+    out.mkdir()
+    (out / "link").symlink_to(folder)
+    source = out / "own.pag"
+    source.write_bytes(PAPER.read_bytes())
+    file.write_text(GOOD.replace('return "', f'return {{"": b"x", {name!r}: b"y"}} or "', 1))
+    before = sorted(folder.rglob("*"))
+    done = run("export", source, "--format", "labels", "--exporters", folder, "-o", out / "a.txt")
+    assert done.status == 2 and done.out == ""
+    assert done.err.startswith(f"{file}:5:") and why in done.err, done.err
+    after = [path for path in sorted(folder.rglob("*")) if "__pycache__" not in path.parts]
+    assert after == [path for path in before if "__pycache__" not in path.parts]
+    assert source.read_bytes() == PAPER.read_bytes()
+
+
+def test_the_line_of_success_names_what_was_written(run: Terminal, folder: Path) -> None:
+    file, out = folder / "labels.py", folder / "a.txt"
+    file.write_text(GOOD.replace('return "', 'return {"d/b.txt": b"y"} or "', 1))
+    done = run("export", PAPER, "--format", "labels", "--exporters", folder, "-o", out)
+    assert done.status == 0 and not out.exists()
+    assert done.out == f"labels: {folder / 'd' / 'b.txt'}\n"
+    assert (folder / "d" / "b.txt").read_bytes() == b"y"
+
+
+def test_a_dash_is_standard_output(
+    run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = "export", PAPER, "--format", "dot"
+    assert run(*words, "-o", "-").out == run(*words).out != ""
+    assert not Path("-").exists()
 
 
 def test_a_folder_that_is_not_there(run: Terminal, tmp_path: Path) -> None:

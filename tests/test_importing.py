@@ -362,6 +362,71 @@ def test_a_bill_with_numbers(bring: Importer) -> None:
     }
 
 
+HEADERS = {
+    "English": "Level,Part Name,Qty.,Mass [g],X (cm)",
+    "German": "Ebene;Bezeichnung;Stückzahl;Gewicht (g);x [cm]",
+    "French": "Niveau;Désignation;Quantité;Poids / g;X cm",
+    "Spanish": "Nivel;Denominación;Cantidad;Masa [G];x_[cm]",
+    "two that are one word": "Niveau;Désignation;Nombre;Masse in g;x in cm",
+    "and the other way": "Nivel;Nombre;Cant.;Peso [g];x[cm]",
+}
+
+
+@pytest.mark.parametrize("language", HEADERS)
+def test_headers_of_four_languages_with_units(bring: Importer, language: str) -> None:
+    text = f"{HEADERS[language]}\n0;table;;;\n1;leg;2;12,5;3\n1;top;;100;\n"
+    comma = text.replace("12,5", "12.5").replace(";", ",")
+    pag = bring.pag("bill.csv", "\ufeff" + (comma if "," in HEADERS[language] else text))
+    assert shape_of(pag) == {"table": ("leg-1", "leg-2", "top")}
+    assert [pag[n].parameter("mass") for n in ("leg-1", "leg-2", "top")] == [0.0125, 0.0125, 0.1]
+    assert bring.product("bill.csv", comma if "," in HEADERS[language] else text).unused == ()
+
+
+def test_densities_have_units_too(bring: Importer) -> None:
+    pag = bring.pag("bill.csv", "level,name,Dichte [g/cm³]\n0,table,\n1,leg,2.7\n1,top,1\n")
+    assert pag["leg"].parameter("density") == 2700.0
+
+
+def test_columns_that_are_not_used_are_listed_and_titles_can_be_said(
+    bring: Importer, run: Terminal, out: Path
+) -> None:
+    bill = bring.folder / "b.csv"
+    bill.write_text("level,Zeichnung,Lieferant,Farbe\n0,table,us,\n1,leg,us,\n1,top,,red\n")
+    done = run("import", bill, "-o", out, "--columns", "name=Zeichnung")
+    assert done.status == 0, done.err
+    assert "columns that are not used: Lieferant, Farbe" in done.out
+    found = run("import", bill, "-o", out, "--columns", "name=Zeichnung", "--json").json
+    assert found["unused"] == ["Lieferant", "Farbe"]
+
+
+@pytest.mark.parametrize(
+    ("columns", "code", "told"),
+    [
+        ("name=Zeichnugn", "BadValue", "did you mean 'Zeichnung'?"),
+        ("nam=Zeichnung", "Usage", "the name is one of level, item, name"),
+        ("name", "Usage", "name=TITLE"),
+        ("name=", "Usage", "name=TITLE"),
+        ("quantity=Lieferant", "MissingPart", "--columns name=TITLE"),
+    ],
+)
+def test_titles_that_are_not_there(
+    bring: Importer, run: Terminal, columns: str, code: str, told: str
+) -> None:
+    bill = bring.folder / "b.csv"
+    bill.write_text("level,Zeichnung,Lieferant\n0,table,us\n1,leg,us\n")
+    done = run("import", bill, "--columns", columns, "--json")
+    assert done.status == 2 and code in done.codes
+    assert any(told in str(error) for error in done.json["errors"])
+
+
+def test_an_unknown_unit_is_named(bring: Importer, run: Terminal) -> None:
+    bill = bring.folder / "b.csv"
+    bill.write_text("level,name,Mass [stone]\n0,table,\n1,leg,1\n")
+    done = run("import", bill, "--json")
+    assert done.status == 2 and done.codes == ["BadValue"]
+    assert "units are kg, g, mg, t, lb, oz" in str(done.json["errors"])
+
+
 def test_import_warns_of_what_build_will(bring: Importer, run: Terminal, out: Path) -> None:
     """The unit in the header is that of the places, not of the meshes: parts are far apart. What
     hands can hold is not looked at yet."""

@@ -5,14 +5,12 @@ from __future__ import annotations
 
 import asyncio
 import json
-import math
 import re
 import shlex
 import signal
 import socket
 import sys
 from subprocess import PIPE
-from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -105,34 +103,6 @@ def test_what_may_not_be_is_refused_by_name() -> None:
     assert re.search(r"r\d is \d+\.\d mm from where it has to be, and a grip reaches 1 mm", message)
     assert count == len(served.refusals) >= 1
     assert products == 0
-
-
-def test_arrays_that_do_not_fit_are_refused() -> None:
-    simulation, served = plant(units=1, pace=10.0)
-    served_values: list[Any] = []
-
-    async def write() -> None:
-        from asyncua import Client, ua
-
-        async with Client(served.address) as client:
-            space = await client.get_namespace_index(SPACE)
-            target = client.get_node(f"ns={space};s=Outputs.Target")
-            beat = client.get_node(f"ns={space};s=Outputs.Heartbeat")
-            for count, values in enumerate(([0.1], [math.nan] * 6), start=1):
-                await target.write_value(values, ua.VariantType.Double)
-                await beat.write_value(count, ua.VariantType.UInt32)
-                await asyncio.sleep(0.3)
-                last = client.get_node(f"ns={space};s=Plant.LastRefusal")
-                served_values.append(await last.read_value())
-
-    before = simulation.world.sense()[0].copy()
-    with served:
-        client = Thread(target=lambda: asyncio.run(write()))
-        client.start()
-        ran(simulation, 12.0)
-        client.join()
-    assert served_values == ["Target is no list of 6 finite values"] * 2
-    assert np.allclose(simulation.world.sense()[0], before, atol=1e-5)
 
 
 def test_axes_have_the_names_of_the_companion_specification() -> None:

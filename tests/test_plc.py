@@ -156,7 +156,7 @@ FAULTS = {
         "chest",
         r"(Target := (\d\.\d+);\n\s+ELSE\n\s+Axes\[\d+\]\.Target := )\d\.\d+",
         r"\1\2",
-        "Dropped: r12 drops 'inside/2'",
+        " m: it may go between ",
     ),
 }
 

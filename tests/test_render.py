@@ -33,7 +33,7 @@ from factory.rendering.caption import Caption
 from factory.rendering.painter import Painter, Renderer
 from factory.rendering.picture import from_above, overview
 from factory.rendering.reel import HOLD
-from factory.rendering.video import VideoFile
+from factory.rendering.video import ENCODERS, VideoFile
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support import gl
@@ -225,6 +225,34 @@ def test_every_frame_is_in_the_file_in_order(
     frames = film_of(path)
     assert frames.shape == (count, 62, 130, 3)
     assert np.allclose(frames.mean(axis=(1, 2, 3)), 40 + 4 * np.arange(count), atol=3)
+
+
+@pytest.mark.parametrize("ending", [".mp4", ".mkv"])
+def test_films_need_no_encoder_under_the_gpl(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str
+) -> None:
+    """Where FFmpeg has no libx264 they are VP9: all frames, in order; and no encoder is named."""
+    import av
+
+    whole = av.codec.Codec
+
+    def without(name: str, mode: str = "r") -> Any:
+        if name in hidden:
+            raise av.codec.codec.UnknownCodecError(name)
+        return whole(name, mode)
+
+    hidden, path = {"libx264"}, tmp_path / f"grey{ending}"
+    monkeypatch.setattr(av.codec, "Codec", without)
+    with VideoFile(path, (64, 48), 25) as video:
+        for k in range(30):
+            video.write(np.full((48, 64, 3), 40 + 4 * k, np.uint8))
+    with av.open(str(path)) as film:
+        assert film.streams.video[0].codec_context.name == "vp9"
+    frames = film_of(path)
+    assert np.allclose(frames.mean(axis=(1, 2, 3)), 40 + 4 * np.arange(30), atol=3)
+    hidden = {*ENCODERS}
+    with pytest.raises(MissingError, match="need an encoder of FFmpeg: libx264, libvpx-vp9"):
+        VideoFile(tmp_path / "none.mp4", (64, 48), 25)
 
 
 def test_a_film_is_encoded_by_one_thread(tmp_path: Path) -> None:

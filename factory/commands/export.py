@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,6 +20,10 @@ from factory.support.errors import usage_error
 
 if TYPE_CHECKING:
     from factory.exporting.subject import Source
+
+
+STDOUT = Path("-")
+"""The output that is standard output."""
 
 
 class _Listing(Grouped):
@@ -64,7 +70,9 @@ class _Format(click.ParamType[str]):
     type=PATH,
     help="Folder of additional exporters, *.py (repeatable).",
 )
-@click.option("-o", "--output", type=PATH, help="Output file (default: stdout, for text formats).")
+@click.option(
+    "-o", "--output", type=PATH, help="Output file, - for stdout (default for text formats)."
+)
 @click.option("--of", default="", help="What to export, where a format offers a choice.")
 @FLOOR
 @RELAY
@@ -86,7 +94,8 @@ def export(
     from factory.support.files import write_all
 
     chosen = exporter(form, of, exporting)
-    if output is None and chosen.binary:
+    piped, output = output == STDOUT, None if output == STDOUT else output
+    if output is None and chosen.binary and (out.as_json or not piped or sys.stdout.isatty()):
         message = f"{chosen.format} is binary and is not written to a terminal"
         raise usage_error(message, f"give -o OUT.{chosen.ending or chosen.format}")
     if takes_folder(chosen, output):
@@ -99,7 +108,7 @@ def export(
         warn([source.cut_off.diagnostic(options.file)], out.silent)
     source = options.project(out.silent) if source is None else source
     made, files = exported(chosen, options.file, source, output, of)
-    if output is None and not isinstance(made, str):
+    if output is None and isinstance(made, Mapping):
         raise usage_error(
             f"this format writes {len(made)} files", "give -o OUT for the first of them"
         )
@@ -114,8 +123,11 @@ def export(
         made_of = {"format": form, "output": shown, "files": listed, "warnings": warnings}
         log = cut_off(source if isinstance(source, Log) else None)
         emit({**made_of, **log, **text})
+    elif isinstance(made, bytes) and piped:
+        sys.stdout.buffer.write(made)
     elif output is None and isinstance(made, str):
         say(made.rstrip("\n"))
     elif output is not None:
-        say(f"{form}: {output}" + (f", {len(files)} files" if len(files) > 1 else ""))
+        first = output if output in files or output.is_dir() else next(iter(files))
+        say(f"{form}: {first}" + (f", {len(files)} files" if len(files) > 1 else ""))
     return 0

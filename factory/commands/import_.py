@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -13,7 +13,7 @@ from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions
 from factory.commands.warnings import announced
 from factory.support.console import emit, say
-from factory.support.errors import Diagnostic, InputError
+from factory.support.errors import Diagnostic, InputError, usage_error
 from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
@@ -40,6 +40,13 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
     default="many",
     help="Mate all inputs in one operation, or two at a time.",
 )
+@click.option(
+    "--columns",
+    "columns",
+    multiple=True,
+    metavar="NAME=TITLE",
+    help="Title of a bill's column, as in name=Bezeichnung (repeatable).",
+)
 @TEMPLATES
 @OUTPUT
 def import_(
@@ -51,6 +58,7 @@ def import_(
     meshes: Path | None,
     unit: str,
     mates: str,
+    columns: tuple[str, ...],
     folders: tuple[Path, ...],
 ) -> int:
     """Convert SOURCE to a PAG: an LDraw model (.ldr, .mpd), a tree of meshes (.json, .yaml), a bill
@@ -62,7 +70,8 @@ def import_(
 
     for folder, option in ((library, "--library"), (meshes, "--meshes")):
         _require_folder(folder, option)
-    options = Options(library, boxes, meshes, UNITS[unit], cast("Mates", mates))
+    chosen = _chosen(columns)
+    options = Options(library, boxes, meshes, UNITS[unit], cast("Mates", mates), chosen)
     templates = all_templates(folders)
     with Waiting(f"reading {source.name}", out.silent):
         product = import_product(source, templates, options)
@@ -85,6 +94,7 @@ def import_(
                 "parts": parts,
                 "meshes": meshes_made,
                 "files": [str(path) for path in files],
+                "unused": list(product.unused),
                 "warnings": warnings,
             }
         )
@@ -93,9 +103,25 @@ def import_(
         say(f"{pag}: parts {parts}, operations {operations}, meshes {meshes_made}")
         for allowed in product.pag.allowed:
             say(f"the source has no fits: overlaps up to {1e3 * allowed.depth:g} mm are allowed")
+        if product.unused:
+            say(f"columns that are not used: {', '.join(product.unused)}")
         for path in files if out.verbose else ():
             say(f"  {path}")
     return 0
+
+
+def _chosen(columns: Sequence[str]) -> dict[str, str]:
+    """The titles of columns by their names. Raises InputError (Usage)."""
+    from factory.importing.bill_header import TITLES
+
+    chosen = dict[str, str]()
+    for said in columns:
+        name, equals, title = (part.strip() for part in said.partition("="))
+        if not equals or not title or name not in TITLES or name in chosen:
+            message = f"--columns '{said}' does not say the title of a column, or not the only one"
+            raise usage_error(message, f"name=TITLE, where the name is one of {', '.join(TITLES)}")
+        chosen[name] = title
+    return chosen
 
 
 def _shape_warnings(pag: Path, templates: Mapping[str, Template]) -> tuple[Diagnostic, ...]:

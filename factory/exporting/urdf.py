@@ -1,8 +1,9 @@
-"""URDF of the engine's model of the factory: a prismatic joint for each robot, each lift and the
-outfeed (its position is the arc length or height in a run's log), a revolute one for a tool that
-turns, a floating joint for each part; meshes are in a folder beside the file.
+"""URDF of the machine that `build` writes as MJCF: a prismatic joint for each robot, each lift,
+each slider and the outfeed, a revolute one for a tool that turns, a floating joint for each part;
+meshes are in a folder beside the file.
 
-Links have the names of the bodies in the MJCF, the log and the MCAP.
+Joints have the coordinates of that MJCF, which are 0 at the start of a run, and its ranges; links
+have the names of the bodies there, in the log and in the MCAP.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from factory.layout.guidepath import LEVER
 from factory.mjcf import names
 from factory.mjcf.elements import add, exact, numbers
 from factory.mjcf.mesh_files import stl
+from factory.mjcf.stock import written
 from factory.simulation.modelling import physical_model
 
 if TYPE_CHECKING:
@@ -39,7 +41,7 @@ def export(subject: Subject) -> str | Mapping[str, bytes]:
     from factory.mjcf.loading import load
 
     project = subject.project
-    model = physical_model(project.layout, 1, project.settings, project.catalogue)
+    model = written(physical_model(project.layout, 1, project.settings, project.catalogue))
     folder = f"{subject.name.rpartition('.')[0] or subject.name or subject.stem}_meshes"
     writer = _Writer(load(model), project.settings.speed, folder)
     text = writer.text(subject.stem)

@@ -1,4 +1,5 @@
-"""USD (binary, z upwards, metres) of a log's motion, frame by frame, by MuJoCo's own exporter."""
+"""USD (z upwards, metres; binary, or text in a file *.usda) of a log's motion, frame by frame, by
+MuJoCo's own exporter."""
 
 from __future__ import annotations
 
@@ -12,6 +13,7 @@ import numpy as np
 from factory.exporting.motion import BodyMotion, motion_of
 from factory.exporting.subject import Subject
 from factory.record.log import Log
+from factory.support.errors import usage_error
 from factory.support.version import optional
 
 FORMAT, TAKES, BINARY = "usd", "log", True
@@ -21,12 +23,16 @@ NAME = "usd"
 
 
 def export(subject: Subject) -> Mapping[str, bytes]:
-    """The stage and its textures. Raises MissingError where there is no usd-core."""
+    """The stage and its textures. Raises MissingError where there is no usd-core, InputError
+    (Usage) for a package."""
+    ending = Path(subject.name).suffix.lower()
+    if ending == ".usdz":
+        raise usage_error(f"'{subject.name}' would be a package", "give *.usd, *.usdc or *.usda")
     usd = optional("pxr.Usd", "usd-core", "USD", "usd")
     motion = motion_of(subject.log)
     textures = f"{Path(subject.name or subject.stem).stem}_textures"
     with tempfile.TemporaryDirectory() as folder:
-        _record(motion, subject.log, folder)
+        _record(motion, subject.log, folder, "usda" if ending == ".usda" else "usdc")
         (written,) = Path(folder, NAME, "frames").iterdir()
         _finish(usd, written, motion, subject.log, textures)
         files = {"": written.read_bytes()}
@@ -35,8 +41,8 @@ def export(subject: Subject) -> Mapping[str, bytes]:
     return files
 
 
-def _record(motion: BodyMotion, log: Log, folder: str) -> None:
-    """Write every frame with MuJoCo's exporter."""
+def _record(motion: BodyMotion, log: Log, folder: str, encoding: str) -> None:
+    """Write every frame with MuJoCo's exporter, in text (usda) or binary (usdc)."""
     from factory.mjcf.replica import SHOWN, Replica
     from factory.support.engine import mujoco
 
@@ -53,7 +59,7 @@ def _record(motion: BodyMotion, log: Log, folder: str) -> None:
         mujoco.mj_comPos(m, d)
         mujoco.mj_camlight(m, d)
         scene.update_scene(d)
-    scene.save_scene("usdc")
+    scene.save_scene(encoding)
 
 
 def _finish(usd: Any, path: Path, motion: BodyMotion, log: Log, textures: str) -> None:

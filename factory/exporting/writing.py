@@ -73,7 +73,25 @@ def export(
     if not isinstance(made, Mapping):
         return made, {output: made.encode() if isinstance(made, str) else made}
     folder = output if whole else output.parent
-    return made, {folder / name if name else output: content for name, content in made.items()}
+    files = {folder / name if name else output: content for name, content in made.items()}
+    _keep_inside(chosen, folder, file, [path for path in files if path != output])
+    return made, files
+
+
+def _keep_inside(chosen: Exporter, folder: Path, source: Path, files: Sequence[Path]) -> None:
+    """Check that files beside the requested one stay in its folder, through links too, and that
+    none is the source. Raises InputError (BadExtension)."""
+    top = folder.resolve()
+    for path in files:
+        inside = path.resolve()
+        if not inside.is_relative_to(top) or inside == top:
+            fault = f"a file that is not in the folder '{folder}'"
+        elif inside == source.resolve():
+            fault = "a file that is the source"
+        else:
+            continue
+        message = f"the exporter {chosen.format} gave '{path}', {fault}"
+        raise bad_extension(message, position_of(chosen.export))
 
 
 def _made(chosen: Exporter, subject: Subject) -> Made:
@@ -87,4 +105,29 @@ def _made(chosen: Exporter, subject: Subject) -> Made:
         wanted = f"{'bytes' if chosen.binary else 'a text'} or files by their names"
         message = f"the exporter {chosen.format} gave {type(made).__name__}, not {wanted}"
         raise bad_extension(message, position_of(chosen.export))
+    if fault := _fault_of(made):
+        message = f"the exporter {chosen.format} gave {fault}"
+        raise bad_extension(message, position_of(chosen.export))
     return made
+
+
+def _fault_of(made: Made) -> str:
+    """What of an exporter's text or files cannot be written; "" for nothing."""
+    if isinstance(made, str):
+        return "" if _is_unicode(made) else "a text with a lone surrogate, which is no character"
+    if isinstance(made, bytes):
+        return ""
+    if not made:
+        return "no file"
+    for name, content in made.items():
+        if not isinstance(name, str):
+            return f"a file whose name is {name!r}, not a text"
+        if "\0" in name or not _is_unicode(name):
+            return f"a file whose name {name!a} no folder can hold"
+        if not isinstance(content, bytes):
+            return f"{type(content).__name__} for the file {name!r}, not bytes"
+    return ""
+
+
+def _is_unicode(text: str) -> bool:
+    return not any("\ud800" <= c <= "\udfff" for c in text)

@@ -4,36 +4,23 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from math import isfinite
+from types import MappingProxyType
 
+from factory.importing.bill_header import Header, HeaderReader
 from factory.importing.draft import MATE, MOST_NODES, PART, DraftNode, ImportFaults, too_many
 from factory.importing.part_maker import PartMaker, Placement
 from factory.importing.tree_file import mesh_name
 from factory.lang.source import Source, quoted
 from factory.lang.values import GEOMETRY
-from factory.lang.words import UNITS, number
+from factory.lang.words import number
 from factory.problem.pag import Value
 from factory.support.errors import Diagnostic, InputError, Position
 
 MOST_COPIES = 10_000
 """The greatest quantity of a row."""
-
-COLUMNS = {
-    "level": ("level", "lvl", "indent"),
-    "item": ("item", "item no.", "item number", "no.", "pos.", "wbs"),
-    "name": ("name", "part", "part name", "part number", "part no.", "description", "component"),
-    "quantity": ("quantity", "qty", "qty.", "count", "amount"),
-    "mesh": ("mesh", "mesh file", "file", "cad file"),
-    "x": ("x",),
-    "y": ("y",),
-    "z": ("z",),
-    "mass": ("mass", "mass [kg]", "weight"),
-    "density": ("density",),
-}
-"""The columns that are read, each with its possible headers, the likeliest first."""
-
-EXAMPLE = "level,name,quantity,mesh,x,y,z"
 
 
 @dataclass(slots=True)
@@ -52,21 +39,13 @@ class BillRow:
         return self.places.get(column, self.position)
 
 
-@dataclass(frozen=True, slots=True)
-class Header:
-    """The index of each column that is read, and the units in headers [m]."""
-
-    columns: dict[str, int]
-    units: dict[str, float]
-
-
 class BillTable:
-    """Reads a bill row by row; errors go to the faults."""
+    """Reads a bill row by row, the first by a reader of headers."""
 
-    def __init__(self, source: Source, faults: ImportFaults) -> None:
-        self.source, self.faults = source, faults
-        header = next((line for line in source.lines if line.strip()), "")
-        self.delimiter = max(",;\t", key=header.count)
+    def __init__(self, source: Source, header: HeaderReader) -> None:
+        self.source, self._reader = source, header
+        first = next((line for line in source.lines if line.strip()), "")
+        self.delimiter = max(",;\t", key=first.count)
         self.header = Header({}, {})
 
     def rows(self) -> list[BillRow]:
@@ -76,7 +55,8 @@ class BillTable:
         for cells, at in self._lines():
             starts = self._starts(at.text)
             if not self.header.columns:
-                self.header = self._read_header(cells, at, starts)
+                places = [_place(at, starts, index) for index in range(len(cells))]
+                self.header = self._reader.read(cells, at, places)
                 continue
             columns = self.header.columns.items()
             row = {name: cells[i].strip() for name, i in columns if i < len(cells)}
@@ -112,42 +92,6 @@ class BillTable:
                 starts.append(index + 1)
         return starts
 
-    def _read_header(self, cells: list[str], at: Position, starts: list[int]) -> Header:
-        column_of = {header: name for name, headers in COLUMNS.items() for header in headers}
-        titles: list[str] = []
-        columns: dict[str, int] = {}
-        units: dict[str, float] = {}
-        for index, cell in enumerate(cells):
-            title = cell.strip().lower()
-            unit = re.fullmatch(r"([xyz])\s*[\[(]?(m|cm|mm|in)[\])]?", title)
-            name = unit[1] if unit else column_of.get(title)
-            if unit:
-                units[unit[1]] = UNITS[unit[2]]
-            if name in columns and title in titles:
-                message = f"there are two columns {quoted(cell.strip())}"
-                hint = "rename one of them"
-                self.faults.add("BadValue", message, _place(at, starts, index), hint)
-            elif name and (name not in columns or _rank(title) < _rank(titles[columns[name]])):
-                columns[name] = index
-            titles.append(title)
-        self._check(columns, at)
-        return Header(columns, units)
-
-    def _check(self, columns: dict[str, int], at: Position) -> None:
-        hint = f"the first line names the columns, for example {EXAMPLE}"
-        if not {"level", "item"} & set(columns):
-            message = "there is no column 'level' (0, 1, 2) or 'item' (1, 1.1, 1.2)"
-            self.faults.add("BadLevel", message, at, hint)
-        if not {"name", "mesh"} & set(columns):
-            message = "there is no column 'name' or 'mesh'"
-            self.faults.add("MissingPart", message, at, hint)
-        self.faults.raise_if_any()
-
-
-def _rank(title: str) -> int:
-    """The rank of a title among the headers of its column; 0 is the likeliest."""
-    return next((headers.index(title) for headers in COLUMNS.values() if title in headers), 0)
-
 
 def _place(at: Position, starts: list[int], index: int) -> Position:
     start = starts[index] if index < len(starts) else len(at.text)
@@ -155,11 +99,18 @@ def _place(at: Position, starts: list[int], index: int) -> Position:
 
 
 class BillReader:
-    """Makes drafts of rows; errors go to the faults."""
+    """Makes drafts of rows; errors go to the faults. `chosen`: titles of columns by their names,
+    where the user says them."""
 
-    def __init__(self, source: Source, parts: PartMaker, faults: ImportFaults) -> None:
+    def __init__(
+        self,
+        source: Source,
+        parts: PartMaker,
+        faults: ImportFaults,
+        chosen: Mapping[str, str] = MappingProxyType({}),
+    ) -> None:
         self.source, self.parts, self.faults = source, parts, faults
-        self.table = BillTable(source, faults)
+        self.table = BillTable(source, HeaderReader(faults, chosen))
 
     def read(self, name: str) -> list[DraftNode]:
         """The drafts of a bill; the product of several rows at the top is called `name`. Raises
@@ -274,7 +225,8 @@ class BillReader:
         for column in ("mass", "density"):
             value = self._value(row, column)
             if value is not None:
-                values[column] = value
+                unit = self.table.header.units.get(column)
+                values[column] = value if unit is None else float(f"{value * unit:.12g}")
         parameters = self.parts.parameters(values, Placement(), row.at("mesh"))
         return DraftNode(name, row.at("name"), PART, [], parameters)
 
@@ -288,7 +240,12 @@ class BillReader:
         text = row.cells.get(column, "")
         value = _number(text)
         kind = GEOMETRY.get(column)
-        if text and (value is None or (kind is not None and not kind.fits((value,)))):
+        unit = self.table.header.units.get(column, 1.0)
+        if text and (
+            value is None
+            or not isfinite(value * unit)
+            or (kind is not None and not kind.fits((value,)))
+        ):
             message = f"'{column}' takes {kind.wanted if kind else 'a number'}, not {quoted(text)}"
             self.faults.add("BadValue", message, row.at(column), "for example 0.25")
         return value

@@ -31,13 +31,15 @@ KINDS = (*LDRAW[:2], *JSON, *YAML, *BILL)
 class Options:
     """`library`: an LDraw parts library; `boxes`: whether parts without a known shape become boxes;
     `meshes`: the folder of a tree's meshes, None for the tree's own folder; `unit`: the unit of
-    length of a tree or a bill and its meshes [m]; `mates`: how three or more inputs are mated."""
+    length of a tree or a bill and its meshes [m]; `mates`: how three or more inputs are mated;
+    `columns`: titles of a bill's columns, by their names."""
 
     library: Path | None = None
     boxes: bool = False
     meshes: Path | None = None
     unit: float = 1.0
     mates: Mates = "many"
+    columns: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ class Imported:
     """A product as a PAG. `name`: that of the PAG's file, without `.pag`; `meshes`: the contents of
     mesh files, by path in the output folder; `source`: the name of the file it was read from;
     `notes`: what was read, in words; `has_tree`: whether the tree of the PAG says more than that
-    all parts belong to the product."""
+    all parts belong to the product; `unused`: the titles of a bill's columns that are not used."""
 
     name: str
     pag: PAG
@@ -54,6 +56,7 @@ class Imported:
     notes: tuple[str, ...] = ()
     warnings: tuple[Diagnostic, ...] = ()
     has_tree: bool = True
+    unused: tuple[str, ...] = ()
 
     @cached_property
     def files(self) -> Mapping[str, bytes]:
@@ -72,12 +75,14 @@ def import_product(
     file = _file(path)
     faults = ImportFaults()
     store = MeshStore("bricks" if file.suffix.lower() in LDRAW else "meshes")
-    drafts = _drafts(file, templates, options, store, faults)
+    unused = list[str]()
+    drafts = _drafts(file, templates, options, store, faults, unused)
     pag = assemble(drafts, faults, options.mates)
     if file.suffix.lower() in LDRAW:
         pag = _allowing(pag, store.files)
     name = file_stem(file.stem)
-    return Imported(name, pag, store.files, file.name, warnings=tuple(faults.warnings))
+    made = Imported(name, pag, store.files, file.name, warnings=tuple(faults.warnings))
+    return replace(made, unused=tuple(unused))
 
 
 def _allowing(pag: PAG, files: Mapping[str, bytes]) -> PAG:
@@ -97,6 +102,7 @@ def _drafts(
     options: Options,
     store: MeshStore,
     faults: ImportFaults,
+    unused: list[str],
 ) -> list[DraftNode]:
     kind = file.suffix.lower()
     if kind in LDRAW:
@@ -108,7 +114,10 @@ def _drafts(
     source = source_of(read_text(file), str(file))
     parts = PartMaker(options.meshes or file.parent, store, options.unit, faults)
     if kind in BILL:
-        return BillReader(source, parts, faults).read(file.stem)
+        bill = BillReader(source, parts, faults, options.columns)
+        made = bill.read(file.stem)
+        unused.extend(bill.table.header.unused)
+        return made
     operations = {name: signature(template) for name, template in templates.items()}
     root = read_json(source) if kind in JSON else read_yaml(source)
     return TreeReader(operations, parts, faults).read(root, file.stem)

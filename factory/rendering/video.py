@@ -11,12 +11,13 @@ less (docs/decisions/films.md)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from fractions import Fraction
 from math import isfinite
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from factory.rendering.ink import Pixels
@@ -35,6 +36,15 @@ FRAGMENTS = {
     ".mkv": ("matroska", {"cluster_time_limit": "250"}),
 }
 """For each ending how it is written so that it can be cut off anywhere."""
+
+ENCODERS: Mapping[str, Mapping[str, str]] = MappingProxyType(
+    {
+        "libx264": {"crf": "19", "preset": "fast", "bf": "0"},
+        "libvpx-vp9": {"crf": "30", "deadline": "good", "cpu-used": "4", "lag-in-frames": "0"},
+    }
+)
+"""The encoders of films, the best first, with their options: H.264 and, where FFmpeg was built
+without what is under the GPL, VP9. Neither reorders frames."""
 
 LARGEST, SMALLEST = 7680, 16
 
@@ -70,15 +80,16 @@ def _bad(message: str, hint: str) -> InputError:
 
 
 class VideoFile(Closing):
-    """An H.264 video (yuv420p) of exact size and rate, which no other process writes meanwhile.
-    Raises InputError where it cannot be written."""
+    """A video (yuv420p) of exact size and rate, by the first of the ENCODERS that is there, which
+    no other process writes meanwhile. Raises InputError where it cannot be written, MissingError
+    where there is no encoder."""
 
     def __init__(self, path: Path, size: tuple[int, int], fps: float) -> None:
         check_output(path, size, fps)
         self.path, self.frames, self.encoded = path, 0, 0
         self.coder = ThreadPoolExecutor(1, "video")
         self.pending: Future[None] | None = None
-        av = _av()
+        av, encoder = _av(), _encoder()
         self.rate = rate = Fraction(fps).limit_denominator(1001)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -90,7 +101,7 @@ class VideoFile(Closing):
             raise _bad(
                 f"'{path}' cannot be written: {error.strerror}", "choose another file"
             ) from error
-        self.stream: Any = self.container.add_stream("libx264", rate=rate)
+        self.stream: Any = self.container.add_stream(encoder, rate=rate)
         self.stream.width, self.stream.height = size
         self.stream.pix_fmt = "yuv420p"
         codec = self.stream.codec_context
@@ -98,9 +109,9 @@ class VideoFile(Closing):
         codec.gop_size = max(1, round(fps))
         codec.color_range, codec.colorspace = 1, 1
         codec.color_primaries, codec.color_trc = 1, 1
-        ahead = min(8, int(fps / 8))
         codec.thread_count = 1
-        codec.options = {"crf": "19", "preset": "fast", "rc-lookahead": str(ahead), "bf": "0"}
+        ahead = {"rc-lookahead": str(min(8, int(fps / 8)))} if encoder == "libx264" else {}
+        codec.options = {**ENCODERS[encoder], **ahead}
 
     def write(self, pixels: Pixels) -> None:
         """Add a frame (height, width, 3). It is encoded on a thread of its own while the next is
@@ -185,3 +196,16 @@ def _av() -> Any:
         message = f"films need PyAV: {error}"
         raise MissingError(Diagnostic("NoVideo", message, None, "pip install av")) from error
     return av
+
+
+def _encoder() -> str:
+    """The name of the first encoder that FFmpeg has. Raises MissingError."""
+    codec = _av().codec
+    for name in ENCODERS:
+        try:
+            codec.Codec(name, "w")
+        except codec.codec.UnknownCodecError:
+            continue
+        return name
+    message = f"films need an encoder of FFmpeg: {', '.join(ENCODERS)}"
+    raise MissingError(Diagnostic("NoVideo", message, None, "pip install av"))

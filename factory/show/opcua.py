@@ -3,7 +3,8 @@
 
 The server has a thread of its own, with which the simulation exchanges signals once in a scan, at
 the pace of the clock. A controller shows that it is there by a heartbeat: without one all axes
-stand, and grips and jobs stay as they are.
+stand, and grips and jobs stay as they are. So they do while something is written that fits no
+command.
 """
 
 from __future__ import annotations
@@ -16,10 +17,10 @@ from time import monotonic, sleep
 from types import TracebackType
 from typing import Any
 
-import numpy as np
-
 from factory.plant.factory import Factory
 from factory.show.live.server import check_host
+from factory.show.opcua_server import OpcuaServer
+from factory.show.written import WrittenCommands
 from factory.simulation.driven import DrivenSupervisor
 from factory.simulation.signals import Commands, Refusal, Sensed
 from factory.simulation.simulation import Simulation
@@ -28,9 +29,6 @@ from factory.support.version import optional
 
 SPACE = "urn:klavins-factory:plant"
 """The namespace of its nodes."""
-
-WATCHDOG = 0.5
-"""All axes stand when the heartbeat has not changed for so long [s]."""
 
 LOOK = 0.1
 """The axes by their names of OPC 40010 are written so often [s]."""
@@ -66,10 +64,10 @@ class OpcuaPlant:
         self._ua, self._where, self._pace = check_plant(host, exposed), (host, port), pace
         self._plant: DrivenSupervisor = simulation.drive(self, scan)
         simulation.world.hooks.busy = float("inf")
-        self._commands = self._plant.interlock.commands
+        self._written = WrittenCommands(self._ua, self._plant.interlock.commands)
         self._nodes = dict[str, Any]()
-        self._beat, self._alive, self._begun = 0, -WATCHDOG, float("-inf")
-        self._looked, self._told = float("-inf"), [0, 0]
+        self._begun, self._looked, self._told = float("-inf"), float("-inf"), [0, 0]
+        self._stood = True
         self._loop = asyncio.new_event_loop()
 
     @property
@@ -99,7 +97,7 @@ class OpcuaPlant:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._call(self._nodes["server"].stop())
+        self._call(self._server.stop())
         self._loop.call_soon_threadsafe(self._loop.stop)
 
     def _serve(self) -> None:
@@ -122,24 +120,21 @@ class OpcuaPlant:
     # in the thread of the server
 
     async def _start(self) -> None:
-        ua, nodes = self._ua, self._nodes
-        server = nodes["server"] = ua.Server()
+        self._server = OpcuaServer(self._ua, self.address)
+        server = self._nodes["server"] = self._server.server
         await server.init()
-        server.set_endpoint(self.address)
-        server.set_server_name("factory")
-        server.set_security_policy([ua.ua.SecurityPolicyType.NoSecurity])
         space = await server.register_namespace(SPACE)
         await self._add_signals(space)
         await self._add_axes(space)
-        nodes["event"] = await server.get_event_generator()
-        await server.start()
-        self._where = self._where[0], server.bserver._server.sockets[0].getsockname()[1]
+        self._nodes["event"] = await server.get_event_generator()
+        await self._server.start()
+        self._where = self._where[0], self._server.port
 
     async def _add_signals(self, space: int) -> None:
         """Inputs and outputs of the exported program, by their names there."""
-        kinds, factory = self._ua.ua.VariantType, self._plant.factory
+        kinds, factory = self._kinds, self._plant.factory
         objects, sensed = self._nodes["server"].nodes.objects, self._plant.sensed()
-        position, commands = sensed.position.tolist(), self._commands
+        position, commands = sensed.position.tolist(), self._written.kept
         grips, jobs = [*commands.grip], [*commands.job]
         signals = {
             "Inputs": {
@@ -180,7 +175,7 @@ class OpcuaPlant:
             await (await devices.add_object(space, robot.name)).add_object(space, "Axes")
             for robot in factory.robots
         ]
-        for axis in range(len(self._commands.target)):
+        for axis in range(len(self._written.kept.target)):
             robot = factory.robot_of(axis)
             name = f"Axis_{1 if axis == robot else 2}"
             made = await places[robot].add_object(space, name)
@@ -190,34 +185,26 @@ class OpcuaPlant:
                 self._nodes[f"{name} {axis}"] = await values.add_variable(space, name, 0.0)
 
     async def _exchange(self, sensed: Sensed) -> Commands:
-        nodes, now = self._nodes, monotonic()
         await self._write("Position", sensed.position.tolist())
         await self._write("Speed", sensed.speed.tolist())
         await self._write("Held", [*sensed.held])
         await self._write("Ready", [*sensed.ready])
         await self._write("Time", float(sensed.time))
-        beat = await nodes["Heartbeat"].read_value()
-        if beat != self._beat:
-            self._beat, self._alive = beat, now
-        stop = now - self._alive > WATCHDOG
-        if not stop:
-            await self._take_over()
-        await self._tell(sensed, stop)
-        return Commands(self._commands.target, self._commands.grip, self._commands.job, stop)
+        before, written = self._written.unfit, self._written
+        commands = written.take(self._value, monotonic())
+        if written.unfit not in ("", before):
+            self._plant.refuse(written.unfit)
+        await self._tell(sensed, commands.stop or self._plant.tripped)
+        return commands
 
-    async def _take_over(self) -> None:
-        """Take what the client has written; of what does not fit it is told, and the last commands
-        hold."""
-        kept, values = self._commands, list[Any]()
-        for name, last in (("Target", kept.target), ("Grip", kept.grip), ("Job", kept.job)):
-            value = await self._nodes[name].read_value()
-            fits = isinstance(value, list) and len(value) == len(last)
-            if not fits or not np.isfinite(value).all():
-                await self._write("LastRefusal", f"{name} is no list of {len(last)} finite values")
-                return
-            values.append(value)
-        target, grip, job = values
-        self._commands = Commands(np.array(target), tuple(grip), tuple(job))
+    def _value(self, name: str) -> Any:
+        """What a variable holds."""
+        return self._server.server.read_attribute_value(self._nodes[name].nodeid)
+
+    @property
+    def _kinds(self) -> Any:
+        """The types of values."""
+        return self._ua.ua.VariantType
 
     async def _tell(self, sensed: Sensed, stop: bool) -> None:
         """Events, refusals, and from time to time the axes."""
@@ -225,16 +212,19 @@ class OpcuaPlant:
         events, refusals = plant.events[sent[0] :], plant.refusals[sent[1] :]
         self._told = [sent[0] + len(events), sent[1] + len(refusals)]
         for message in (*(e.transition for e in events), *(r.message for r in refusals)):
-            await self._nodes["event"].trigger(message=message)
+            await self._server.tell(self._nodes["event"], message)
         if refusals:
-            await self._write("Refusals", self._told[1], self._ua.ua.VariantType.UInt32)
+            await self._write("Refusals", self._told[1], self._kinds.UInt32)
             await self._write("LastRefusal", refusals[-1].message)
+        if stop != self._stood:
+            self._stood = stop
+            await self._write("ProtectiveStop", stop)
         if sensed.time < self._looked + LOOK:
             return
         self._looked = sensed.time
+        await self._server.tidy()
         made = plant.interlock.world.delivered()
-        await self._write("Products", made, self._ua.ua.VariantType.UInt32)
-        await self._write("ProtectiveStop", stop)
+        await self._write("Products", made, self._kinds.UInt32)
         for axis, (x, v) in enumerate(zip(sensed.position, sensed.speed, strict=True)):
             await self._write(f"ActualPosition {axis}", float(x))
             await self._write(f"ActualSpeed {axis}", float(v))

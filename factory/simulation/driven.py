@@ -4,19 +4,23 @@ refuses forbidden commands."""
 
 from __future__ import annotations
 
-from factory.control.mode import Limits
+import numpy as np
+
+from factory.control.mode import Array, Limits
 from factory.plant.factory import Factory, Operation
 from factory.record.state import Event
+from factory.simulation.corridors import SLACK
 from factory.simulation.interlock import PlantInterlock
 from factory.simulation.ordering import Ordering
-from factory.simulation.signals import AxisDrives, Controller, Refusal, Sensed
+from factory.simulation.signals import NOBODY, AxisDrives, Commands, Controller, Refusal, Sensed
 from factory.simulation.supervisor import Active
 from factory.support.settings import Settings
 
 
 class DrivenSupervisor:
     """Lets a `controller` drive a plant through its `interlock`, asking it every `scan` [s],
-    rounded to whole timesteps."""
+    rounded to whole timesteps. No axis leaves its corridor; after a contact that is not meant, or a
+    dropped part, all axes stand for good: `tripped`."""
 
     def __init__(
         self,
@@ -27,6 +31,7 @@ class DrivenSupervisor:
         scan: float,
     ) -> None:
         self.interlock, self._controller = interlock, controller
+        self.tripped, self._astray = False, set[int]()
         self._steps, self._period = settings.steps, max(1, round(scan / settings.step))
         self.drives = AxisDrives(interlock.commands.target, limits, self._period * settings.step)
         self._count = 0
@@ -94,13 +99,47 @@ class DrivenSupervisor:
         outfeed = any(map(interlock.ready, factory.dropoffs))
         return Sensed(interlock.world.time, *interlock.world.sense(), held, (*leaves, outfeed))
 
+    def refuse(self, message: str) -> None:
+        """Refuse what concerns no single robot."""
+        self.refusals.append(Refusal(self.interlock.world.time, NOBODY, message))
+
     def _scan(self) -> None:
         """Scan the controller, carry out its permitted commands, and move the drives; robots that
         the interlock holds stand."""
         commands = self._controller.scan(self.sensed())
+        self._trip()
         self.interlock.carry_out(commands)
         drives, back, stops = self.drives, self.interlock.held_back, self.drives.stops
-        for axis, target in enumerate(commands.target.tolist()):
-            stands = commands.stop or self.factory.robot_of(axis) in back
-            drives.target[axis] = stops[axis] if stands else target
+        target = self._confined(commands, stops)
+        for axis, where in enumerate(target.tolist()):
+            stands = commands.stop or self.tripped or self.factory.robot_of(axis) in back
+            drives.target[axis] = stops[axis] if stands else where
         drives.go(self.interlock.world)
+
+    def _trip(self) -> None:
+        """Stop for good where bodies touch that are not meant to, or one was dropped."""
+        world = self.interlock.world
+        why = f"{touch} touch" if (touch := world.collision) else ""
+        if world.dropped is not None:
+            why = world.dropped.diagnostic.message
+        if why and not self.tripped:
+            self.tripped = True
+            self.refuse(f"{why}: all axes stand until the plant is started anew")
+
+    def _confined(self, commands: Commands, stops: Array) -> Array:
+        """The targets in their corridors; those that are not are refused once."""
+        interlock = self.interlock
+        low, high = interlock.corridors.bounds(
+            interlock.marked, interlock.fired, interlock.world.sense()[0], stops
+        )
+        high = np.maximum(low, high)
+        confined = np.clip(commands.target, low, high)
+        astray = {*np.flatnonzero(np.abs(confined - commands.target) > SLACK).tolist()}
+        for axis in sorted(astray - self._astray):
+            robot = self.factory.robot_of(axis)
+            name = self.factory.robots[robot].name + (" lift" if axis != robot else "")
+            ends = f"between {low[axis]:.3f} m and {high[axis]:.3f} m now"
+            message = f"{name} is sent to {commands.target[axis]:.6g} m: it may go {ends}"
+            self.refusals.append(Refusal(interlock.world.time, robot, message))
+        self._astray = astray
+        return confined

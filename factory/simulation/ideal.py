@@ -24,6 +24,7 @@ class IdealWorld:
     touch."""
 
     lacking: Container[str] = ()
+    collision = ""
     _nothing = np.empty(0), np.empty((0, 3), np.intp)
 
     def __init__(

@@ -8,11 +8,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from factory.control.mode import Mode
+from factory.control.mode import REST, Mode
+from factory.layout.coordinating import Coordinated
+from factory.layout.layout import Layout
 from factory.nets.threaded import Threads
-from factory.plant.factory import Factory, Operation
+from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
 from factory.record.state import Event
+from factory.simulation.corridors import Corridors
 from factory.simulation.ordering import Ordering
 from factory.simulation.signals import Commands, GripStates, Refusal
 from factory.simulation.world import World
@@ -23,24 +26,26 @@ REACH = 1e-3
 
 class PlantInterlock:
     """Carries out commands in a `world`. It fires X_s when the carrier of X takes the job up, and
-    X_e when it gives it up. `fired`: firing counts of the transitions; `held_back`: robots that
-    stand because their last command is refused; `refusals`: all refused commands."""
+    X_e when it gives it up. `net`: the coordinated net of the layout; `corridors`: where axes may
+    go; `fired`: firing counts of the transitions; `held_back`: robots that stand because their last
+    command is refused; `refusals`: all refused commands."""
 
     def __init__(
         self,
-        factory: Factory,
+        layout: Layout,
         modes: Sequence[Mode],
         world: World,
-        ordering: Ordering,
+        net: Coordinated,
     ) -> None:
-        self.factory, self.world, self.ordering = factory, world, ordering
+        self.factory, self.world = layout.factory, world
+        self.ordering, self.corridors = Ordering(net.orders), Corridors(layout, net, modes)
         self._goals = [mode.goals for mode in modes]
-        net, starts = factory.net, [operation.start for operation in factory.operations]
-        self.threads = Threads(net.threaded, net.threads_of(net.initial_marking), starts)
-        self.fired = [0] * len(net.threaded.transitions)
+        gears, starts = layout.factory.net, [o.start for o in layout.factory.operations]
+        self.threads = Threads(gears.threaded, gears.threads_of(gears.initial_marking), starts)
+        self.fired = [0] * len(gears.threaded.transitions)
         self.events: list[Event] = []
         self.refusals: list[Refusal] = []
-        robots = len(factory.robots)
+        robots = len(layout.factory.robots)
         self.grips, self.held_back = GripStates(robots), set[int]()
         self.commands = Commands(world.sense()[0].copy(), (False,) * robots, (0,) * robots)
 
@@ -149,7 +154,7 @@ class PlantInterlock:
         if held != (after != NOPART):
             state = "is closed" if held else "is open"
             self._refuse(robot, f"{name} ends {_name(operation)}, but its grip {state}")
-        elif far := self._far(operation):
+        elif far := self._far(operation) or self._moving(operation):
             self._refuse(robot, f"{name} ends {_name(operation)}, but {far}")
         else:
             self._fire(operation, operation.end)
@@ -209,6 +214,16 @@ class PlantInterlock:
         robot = self.factory.robots[self.factory.robot_of(axes[worst])].name
         far, reach = 1000 * float(away[worst]), 1000 * REACH
         return f"{robot} is {far:.1f} mm from where it has to be, and a grip reaches {reach:g} mm"
+
+    def _moving(self, operation: Operation) -> str:
+        """The axis that is too fast for parts to change hands; "" for none."""
+        axes = self.factory.axes[operation.index]
+        speeds = np.abs(self.world.sense()[1][list(axes)])
+        worst = int(speeds.argmax())
+        if speeds[worst] <= REST:
+            return ""
+        robot = self.factory.robots[self.factory.robot_of(axes[worst])].name
+        return f"{robot} still moves at {1000 * float(speeds[worst]):.0f} mm/s"
 
     def _refuse(self, robot: int, message: str) -> None:
         """Refuse a command: the robot stands until its job or grip command changes."""

@@ -14,6 +14,9 @@ from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
 from factory.simulation.world import World
 
+NOBODY = -1
+"""The robot of a refusal that concerns no single one."""
+
 
 @dataclass(frozen=True, slots=True)
 class Sensed:
@@ -48,7 +51,7 @@ class Controller(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """A refused command: time [s], robot (index) and reason."""
+    """A refused command, or a stop: time [s], robot (index; NOBODY: all of them) and reason."""
 
     time: float
     robot: int

@@ -172,8 +172,8 @@ class Simulation:
 
     def drive(self, controller: Controller, scan: float) -> DrivenSupervisor:
         """Let a controller drive the plant from the start, asked every `scan` [s]."""
-        ordering, settings = self.supervisor.ordering, self.request.settings
-        interlock = PlantInterlock(self.layout.factory, self.modes, self.world, ordering)
+        net, settings = self.timing.coordinated, self.request.settings
+        interlock = PlantInterlock(self.layout, self.modes, self.world, net)
         self.supervisor = DrivenSupervisor(interlock, self.limits, settings, controller, scan)
         return self.supervisor
 

@@ -158,5 +158,9 @@ class World(Protocol):
     def dropped(self) -> Drop | None:
         """The first dropped payload, if any; nothing may fire after it."""
 
+    @property
+    def collision(self) -> str:
+        """The two geoms that were first to touch without being meant to; "" for none."""
+
     def figures(self) -> PhysicsFigures | None:
         """Measurements of bodies; None if there are none."""

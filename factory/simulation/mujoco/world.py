@@ -257,6 +257,11 @@ class MujocoWorld:
         """The first overload of a hand, if any."""
         return self.parts.strength.dropped
 
+    @property
+    def collision(self) -> str:
+        """The two geoms that were first to touch without being meant to; "" for none."""
+        return " and ".join(self.inspection.unintended[0]) if self.inspection.unintended else ""
+
     def delivered(self) -> int:
         """Number of products that have left the outfeed, including those before the run."""
         return self._before + len(self.dropoffs)
