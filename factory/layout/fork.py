@@ -16,12 +16,13 @@ from types import MappingProxyType
 from factory.layout.bending import Detour, bent
 from factory.layout.certificate import ALWAYS, ARM_BODY, CARRIAGE_BODY, LOADS, MAST_BODY
 from factory.layout.clearance import TOLERANCE, ClearanceSearch, searched, separation
-from factory.layout.dimensions import ARMS, CARRIAGE, CARRIAGES, MAST, up
+from factory.layout.dimensions import ARMS, CARRIAGES, up
 from factory.layout.guidepath import Extent
 from factory.layout.layout import Layout, branch_of, carriers
 from factory.layout.sweeps import piles, regions
 from factory.layout.way import Bend
 from factory.plant.factory import Factory
+from factory.problem.robot_bodies import MAST
 from factory.support.errors import Diagnostic, RunError
 
 OUT = 0.02
@@ -160,8 +161,8 @@ def _beside(layout: Layout, robot: int) -> Iterator[tuple[int, Extent]]:
     path, branch = layout.guidepaths[robot], branch_of(carriers(layout.factory), robot)
     x, y = path.middle(path.length)
     lane = path.offset
-    half = CARRIAGE / 2
-    yield CARRIAGES, (half - path.reach - CARRIAGE, half - path.reach, lane - half, lane + half)
+    half = layout.factory.carriage / 2
+    yield CARRIAGES, (-path.reach - half, half - path.reach, lane - half, lane + half)
     yield ARMS, (-path.reach - MAST / 2, -path.arm, lane - MAST / 2, lane + MAST / 2)
     for region in regions(layout, piles(layout.factory, layout.product)):
         is_robots = region.robot == robot and region.kind in (CARRIAGE_BODY, MAST_BODY, ARM_BODY)
@@ -179,4 +180,4 @@ def _behind(layout: Layout, robot: int) -> tuple[float, ...]:
     path, grip = layout.guidepaths[robot], layout.grip(robot)
     brought = [path.frame(layout.payloads[label])[0] for label in layout.factory.deliveries(robot)]
     loads = min([*brought, *(grip[:1] if grip else ())])
-    return -path.reach - CARRIAGE / 2, -path.reach - MAST / 2, loads
+    return -path.reach - layout.factory.carriage / 2, -path.reach - MAST / 2, loads

@@ -17,7 +17,7 @@ from factory.control.laws import Setting, hold, law_of
 from factory.control.mode import Array, Limits, Mode
 from factory.control.navigation import Bundle
 from factory.geometry.solids import Product
-from factory.layout.dimensions import CARRIAGE, Clearance
+from factory.layout.dimensions import Clearance
 from factory.layout.layout import Layout
 from factory.layout.optimising import first_feasible
 from factory.plant.factory import Factory, Operation
@@ -66,7 +66,7 @@ def check_modes(factory: Factory, users: Iterable[Template], product: Product) -
             )
             raise InputError(Diagnostic("NotPrepared", message, template.law_position, EXAMPLE))
     settings = Settings()
-    layout = first_feasible(factory, product, Clearance(settings.clearance))
+    layout = first_feasible(factory, product, Clearance(settings.clearance, factory.carriage))
     operation_modes(layout, settings.eps)
 
 
@@ -128,7 +128,7 @@ def operation_mode(layout: Layout, operation: Operation, eps: float) -> Mode:
         r=r,
         eps=eps,
         station=np.array(stations),
-        width=np.minimum(r, CARRIAGE),
+        width=np.minimum(r, layout.factory.carriage),
         dwell=operation.dwell,
         gate=gate,
         standoff=standoff,
