@@ -21,9 +21,10 @@ from factory.geometry.product import product_geometry
 from factory.layout.layout import Layout
 from factory.layout.request import Ground
 from factory.mjcf import timestep
-from factory.mjcf.driving import ALLOWED, FRICTION, STEPS
+from factory.mjcf.driving import ALLOWED, STEPS
 from factory.mjcf.timestep import USUAL, timed
 from factory.problem.pag import PAG, Parameter
+from factory.problem.robot_bodies import FRICTION
 from factory.record.state import State
 from factory.simulation.modelling import physical_model
 from factory.simulation.request import RunRequest

@@ -15,7 +15,7 @@ from factory.layout.layout import Layout
 from factory.mjcf.robots import Drive
 from factory.mjcf.stops import OVERLOAD
 from factory.mjcf.tools import GYRATION, gyration
-from factory.problem.robot_bodies import LIFT_JOINT, RobotAxis
+from factory.problem.robot_bodies import FRICTION, LIFT_JOINT, RobotAxis
 from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import AUTO, TICK, Settings
 
@@ -48,9 +48,6 @@ GRAVITY = 9.81
 ROLLING = 0.003
 """Friction of a carriage's and the tray's guide, as a share of the weight that it bears: that of a
 profile rail with balls (docs/decisions/guides.md)."""
-
-FRICTION = 0.2
-"""Dry friction of the tray, and of the axes of the shipped robots, without a load [N]."""
 
 SLACK = 0.3
 """Share of a lift's weight that its drive must hold without having been told: drives that are a
@@ -128,9 +125,14 @@ class DrivenAxis:
         """How far off its reference it may be held for ever [m]."""
         return self.held / (self.gain * self.drive(settings).kp)
 
+    @property
+    def usual(self) -> bool:
+        """Whether its drive is sized for its load, against no more friction than usual."""
+        return self.motor is None or self.motor.usual
+
     def follows(self, settings: Settings, lever: float = 1.0) -> bool:
-        """Whether gains of its own are stable, do not swing, and keep it on its reference; `lever`:
-        how far it goes along for each unit [m]."""
+        """Whether its gains are stable, do not swing, and keep it on its reference; `lever`: how
+        far it goes along for each unit [m]. The shorter the timestep, the sooner."""
         drive, h = self.drive(settings), settings.step
         empty, mass = self.own + drive.inertia, self.own + drive.inertia + self.load
         stable = drive.kp <= PUSHED * empty / h**2 and drive.kv <= DAMPED * empty / h
@@ -235,8 +237,8 @@ def weights_of(layout: Layout) -> dict[str, float]:
 def check_drives(layout: Layout, settings: Settings) -> None:
     """Raises InputError (BadRobot) where the motor of a robot type is too weak for what a robot
     carries, or gains that the type has of its own do not keep a robot on its reference."""
-    robots = layout.whole.factory.robots
-    if all(_is_usual(axis) for robot in robots for axis in robot.body.axes):
+    motors = {axis for robot in layout.whole.factory.robots for axis in robot.body.axes}
+    if all(motor.usual and motor.force == inf for motor in motors):
         return
     axes = _axes(layout, settings)
     faults = [fault for each in axes for fault in _faults(*each, settings)]
@@ -244,17 +246,10 @@ def check_drives(layout: Layout, settings: Settings) -> None:
         raise InputError(faults)
 
 
-def _is_usual(axis: RobotAxis) -> bool:
-    """Whether a drive is sized for what it carries, against no more friction than usual."""
-    return axis.kp is None and axis.force == inf and axis.friction <= FRICTION
-
-
 def _axes(layout: Layout, settings: Settings) -> Iterator[tuple[str, DrivenAxis, float]]:
     """The axes of all robots, with the robot's name and how far each goes along for a unit."""
     robots, masses = layout.whole.factory.robots, weights_of(layout)
     for robot, load in zip(robots, heaviest(layout, masses), strict=True):
-        if _is_usual(robot.body.first):
-            continue
         lever = layout.guidepaths[robot.index].lever
         yield robot.name, first_axis(layout, robot.index, load, settings), lever
     for number, load in lifted(layout, masses).items():
@@ -265,9 +260,12 @@ def _faults(name: str, axis: DrivenAxis, lever: float, settings: Settings) -> It
     """What is wrong with the drive of one axis."""
     motor = axis.motor
     assert motor is not None, "it is a robot's"
+    each = [settings]
+    if settings.timestep == AUTO:
+        each = [replace(settings, timestep=TICK / n, substeps=n) for n in STEPS]
     unit, of = ("N", "kg") if lever == 1.0 else ("N m", "kg m²")
     carries = f"{name}, with {axis.load:.3g} {of}"
-    moved = axis.drive(settings).inertia + axis.own + axis.load
+    moved = axis.drive(each[-1]).inertia + axis.own + axis.load
     needed = RESERVE * moved * axis.push + axis.held / 2
     if motor.force < needed:
         yield Diagnostic(
@@ -277,10 +275,7 @@ def _faults(name: str, axis: DrivenAxis, lever: float, settings: Settings) -> It
             motor.position,
             f"valid: a forcerange from {needed:.3g} {unit}, less --acceleration, lighter parts",
         )
-    each = [settings]
-    if settings.timestep == AUTO:
-        each = [replace(settings, timestep=TICK / n, substeps=n) for n in STEPS]
-    if _is_usual(replace(motor, force=inf)) or any(axis.follows(s, lever) for s in each):
+    if axis.usual or any(axis.follows(s, lever) for s in each):
         return
     drive, sized = (a.drive(each[-1]) for a in (axis, replace(axis, motor=None)))
     yield Diagnostic(

@@ -22,6 +22,9 @@ ARM_WIDTH = 0.016
 ARM_LOW, ARM_TOP = 0.066, 0.084
 """From where to where up arms reach [m]; masts end there too."""
 
+FRICTION = 0.2
+"""Dry friction of the axes of the shipped robots without a load [N]."""
+
 SLIDE, LIFT_JOINT, TURN_JOINT = "slide", "lift", "turn"
 """The joints of robots: along a guidepath, up, and about the vertical."""
 
@@ -51,6 +54,11 @@ class RobotAxis:
     kv: float | None = None
     force: float = inf
     position: Position | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def usual(self) -> bool:
+        """Whether its drive is sized for its payload, against no more friction than usual."""
+        return self.kp is None and self.friction <= FRICTION
 
 
 @dataclass(frozen=True, slots=True)

@@ -49,6 +49,12 @@ UNSET = {"type": "sphere", "contype": "1", "conaffinity": "1", "group": "0", "po
 SOLID, SHOWN = ("1", "1", "0"), ("0", "0", "1")
 """contype, conaffinity and group of what collides, and of what is only shown."""
 
+ABOVE = ("column", "pad", "wrist")
+"""Geoms of what a lift raises."""
+
+OUT = 5e-3
+"""What is only shown stands out from what is solid by no more [m]."""
+
 ROOM = 1e-9
 """Sizes are compared to this [m]."""
 
@@ -73,7 +79,7 @@ def read_body(name: str, path: Path) -> RobotBody:
 class _Reader:
     """Reads one file. What was met so far: `classes` of geoms, `materials`, the body of each of
     the `geoms`, `joints`, `nests`; `masses`: of each body with a joint [kg]; `wide`: width of the
-    carriage [m]."""
+    carriage, and `shown`: what is seen of it [m]."""
 
     def __init__(self, document: RobotDocument) -> None:
         self.document = document
@@ -84,6 +90,7 @@ class _Reader:
         self.joints = dict[str, Element]()
         self.nests = list[tuple[str, str]]()
         self.wide = 0.0
+        self.shown = list[tuple[Element, str, list[float], list[float]]]()
 
     def body(self, root: Element) -> RobotBody:
         """The body in a document."""
@@ -106,6 +113,9 @@ class _Reader:
         axes = self._axes(bodies[0], sections["actuator"])
         self.document.stop()
         wide = max(CARRIAGE, 0.002 * ceil(self.wide * 500 - 1e-6))
+        for shown in self.shown:
+            self._stands_out(*shown, wide / 2)
+        self.document.stop()
         return RobotBody(round(wide, 6), round(sum(self.masses.values()), 9), axes)
 
     def _wrong(self, element: Element, found: str, valid: str) -> None:
@@ -185,10 +195,16 @@ class _Reader:
         elif masks == SOLID and (body != "carriage" or name in HAND):
             valid = "contype 0, conaffinity 0, group 1: only the carriage, its mast and its arm are"
             self._wrong(geom, f"the geom '{name}' is solid", valid)
-        elif (half := self._half(geom, name, values)) and masks == SOLID:
-            self._extent(geom, name, numbers(values["pos"]), half)
-        elif name in ("carriage", "mast", "arm"):
-            self._wrong(geom, f"the geom '{name}' is only shown", "solid: it collides")
+        elif half := self._half(geom, name, values):
+            if masks == SOLID:
+                self._extent(geom, name, numbers(values["pos"]), half)
+            elif name in ("carriage", "mast", "arm"):
+                self._wrong(geom, f"the geom '{name}' is only shown", "solid: it collides")
+            elif body in MOVING[1:] and name not in ABOVE:
+                valid = f"only {', '.join(ABOVE)}, which are where the payload is"
+                self._wrong(geom, f"the geom '{name}' is in '{body}'", valid)
+            elif name not in ABOVE and name not in HAND:
+                self.shown.append((geom, name, numbers(values["pos"]), half))
 
     def _weigh(self, geom: Element, name: str, values: Values, body: str) -> None:
         if "mass" not in values:
@@ -242,6 +258,20 @@ class _Reader:
                 f" {MAST * 500:g} mm of the mast's axis: arms of others go over carriages"
             )
             self._wrong(geom, f"{found}, {max(x, y) * 1e3:g} mm from the mast's axis", valid)
+
+    def _stands_out(
+        self, geom: Element, name: str, at: list[float], half: list[float], carriage: float
+    ) -> None:
+        """Check that what is only shown is seen where nothing else goes."""
+        side, high = max(abs(at[n]) + half[n] for n in (0, 1)), at[2] + half[2]
+        room = carriage if high <= CARRIAGE_TOP + ROOM else MAST / 2
+        if side > room + OUT + ROOM or high > ARM_TOP + OUT + ROOM or at[2] - half[2] < -ROOM:
+            found = f"the geom '{name}' is seen {side * 1e3:g} mm from the mast's axis"
+            valid = (
+                f"{(carriage + OUT) * 1e3:g} mm, above {CARRIAGE_TOP * 1e3:g} mm up"
+                f" {(MAST / 2 + OUT) * 1e3:g} mm, and {(ARM_TOP + OUT) * 1e3:g} mm up at most"
+            )
+            self._wrong(geom, f"{found}, up to {high * 1e3:g} mm up", valid)
 
     def _fittings(self, root: Element) -> None:
         """Check that there is what hands are made of, and what is stretched."""
