@@ -22,6 +22,7 @@ from factory.layout.layout import Layout
 from factory.layout.optimising import first_feasible
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
+from factory.problem.robot_bodies import CARRIAGE
 from factory.problem.template import Point, Template
 from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import Settings
@@ -128,7 +129,7 @@ def operation_mode(layout: Layout, operation: Operation, eps: float) -> Mode:
         r=r,
         eps=eps,
         station=np.array(stations),
-        width=np.minimum(r, layout.factory.carriage),
+        width=np.minimum(r, CARRIAGE),
         dwell=operation.dwell,
         gate=gate,
         standoff=standoff,
