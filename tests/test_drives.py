@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from factory.layout.request import Ground
-from factory.mjcf import model
+from factory.mjcf import driving
 from factory.mjcf.driving import GRAVITY, HOIST_STIFFNESS, STIFFNESS, drive_for
 from factory.mjcf.robots import Drive
 from factory.simulation.mujoco.drives import Drives
@@ -85,8 +85,8 @@ def test_long_timesteps_do(name: str, timestep: float) -> None:
 def test_drives_that_are_too_stiff_for_the_timestep_are_noticed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(model, "PUSHED", 1e9)
-    monkeypatch.setattr(model, "DAMPED", 1e9)
+    monkeypatch.setattr(driving, "PUSHED", 1e9)
+    monkeypatch.setattr(driving, "DAMPED", 1e9)
     settings = Settings(timestep=0.02, substeps=1)
     run = Simulation(layout_of("paper"), RunRequest(units=2, settings=settings)).run()
     assert run.trouble is not None

@@ -250,7 +250,7 @@ def test_references_lead_to_their_node_in_a_step(monkeypatch: pytest.MonkeyPatch
     count = 300
     chain = "".join(f'<referencePlace id="r{i}" ref="r{i + 1}"/>' for i in range(count))
     net = NET_OF.format(f'{chain}<place id="r{count}"/>')
-    reader = pnml_reader._Reader(xml_tree.XmlDocument("<text>", net.split("\n")))
+    reader = pnml_reader._Reader(xml_tree.XmlDocument("<text>", net.split("\n"), "BadNet"))
     looked_up: list[str] = []
 
     class Nodes(dict[str, xml_tree.Element]):

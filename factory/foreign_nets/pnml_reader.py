@@ -47,7 +47,7 @@ def read_pnml(text: str, file: str = "<text>") -> GearNet | MarkedNet:
     it), else a marked net. Raises InputError: Syntax where it is no XML, BadNet where it is no
     place/transition net with arcs of weight 1.
     """
-    document = XmlDocument(file, text.split("\n"))
+    document = XmlDocument(file, text.split("\n"), "BadNet")
     return _Reader(document).net(document.read(text, DRAWN))
 
 

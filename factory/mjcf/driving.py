@@ -166,9 +166,9 @@ def moment_of(axis: RobotAxis) -> float:
 
 def along(axis: RobotAxis, load: float, settings: Settings) -> DrivenAxis:
     """A robot's axis along its guidepath, with a load [kg]."""
-    own, a = axis.mass + axis.armature, settings.acceleration
+    empty, a = axis.mass + axis.armature, settings.acceleration
     held = 2 * (axis.friction + ROLLING * load * GRAVITY)
-    return DrivenAxis(own, load, a, a, STIFFNESS, held=held, motor=axis)
+    return DrivenAxis(empty, load, a, a, STIFFNESS, held=held, motor=axis)
 
 
 def turning(axis: RobotAxis, moment: float, settings: Settings) -> DrivenAxis:
@@ -179,9 +179,9 @@ def turning(axis: RobotAxis, moment: float, settings: Settings) -> DrivenAxis:
 
 def up(axis: RobotAxis, load: float, settings: Settings) -> DrivenAxis:
     """The axis of a robot's lift, with a load [kg]."""
-    own, a = axis.mass + axis.armature, settings.acceleration
+    empty, a = axis.mass + axis.armature, settings.acceleration
     held = 2 * axis.friction + SLACK * (axis.mass + load) * GRAVITY
-    return DrivenAxis(own, load, a, a + GRAVITY, HOIST_STIFFNESS, held=held, motor=axis)
+    return DrivenAxis(empty, load, a, a + GRAVITY, HOIST_STIFFNESS, held=held, motor=axis)
 
 
 def first_axis(

@@ -64,8 +64,8 @@ def timed(
     fastest = max(settings.speed * (1 + jitter), settings.outfeed)
     candidates = [s for s in candidates if fastest * s.step < layout.clearance] or candidates[-1:]
     axes, heaviest_fed = tuple(dict.fromkeys(_axes(settings, layout, jitter))), 0.0
-    own = [axis for axis in axes if not axis.usual]
-    candidates = [s for s in candidates if all(a.follows(s) for a in own)] or candidates[-1:]
+    unusual = [axis for axis in axes if not axis.usual]
+    candidates = [s for s in candidates if all(a.follows(s) for a in unusual)] or candidates[-1:]
     if settings.hands:
         heaviest_fed = max(layout.product.solids[o.label].mass for o in layout.factory.leaves)
     good = (s for s in candidates if _good(s, axes) and _dip(s, heaviest_fed) < DEEPEST)

@@ -26,13 +26,13 @@ from factory.problem.robot_bodies import (
 )
 from factory.problem.robot_schema import (
     FITTED,
-    FORMS,
     HAND,
     JOINTS,
     KINDS,
     LIMBS,
     MATERIALS,
     MOVING,
+    SIZES,
     RobotDocument,
     numbers,
 )
@@ -118,20 +118,20 @@ class _Reader:
         self.document.stop()
         return RobotBody(round(wide, 6), round(sum(self.masses.values()), 9), axes)
 
-    def _wrong(self, element: Element, found: str, valid: str) -> None:
-        self.document.wrong(element, found, valid)
+    def _wrong(self, element: Element, what: str, valid: str) -> None:
+        self.document.wrong(element, what, valid)
 
     def _defaults(self, element: Element, above: Values) -> None:
         """The classes of an element, which take over what is `above` them."""
         name = element.attributes.get("class", "")
         if element.name != "default" or not name or name in self.classes:
-            found = f"<{element.name} class='{name}'> inside <default>"
-            self._wrong(element, found, '<default class="..."> of a new name')
+            what = f"<{element.name} class='{name}'> inside <default>"
+            self._wrong(element, what, '<default class="..."> of a new name')
             return
-        own = [geom.attributes for geom in element.all("geom")]
-        if any({"name", "class"} & each.keys() for each in own):
+        values = [geom.attributes for geom in element.all("geom")]
+        if any({"name", "class"} & each.keys() for each in values):
             self._wrong(element, f"the class '{name}' has a geom with a name", "no name, no class")
-        self.classes[name] = {k: v for each in (above, *own) for k, v in each.items()}
+        self.classes[name] = {k: v for each in (above, *values) for k, v in each.items()}
         for child in element.all("default"):
             self._defaults(child, self.classes[name])
 
@@ -148,8 +148,8 @@ class _Reader:
             called = self.document.name(child, self.bodies)
             self.bodies.add(called)
             if called in MOVING and called not in below:
-                found = f"the body '{called}' is inside '{name}'"
-                self._wrong(child, found, "'head' inside 'carriage', 'tool' inside 'head'")
+                what = f"the body '{called}' is inside '{name}'"
+                self._wrong(child, what, "'head' inside 'carriage', 'tool' inside 'head'")
             else:
                 self._inside(child, called, inherited)
 
@@ -161,9 +161,9 @@ class _Reader:
             valid = ", ".join(f"'{j}' in '{b}'" for j, (b, *_) in JOINTS.items())
             self._wrong(joint, f"the joint '{name}' is in the body '{body}'", valid)
             return
-        found = joint.attributes.get("type", "hinge")
-        if found != kind:
-            self._wrong(joint, f"the joint '{name}' is of the type {found}", kind)
+        motion = joint.attributes.get("type", "hinge")
+        if motion != kind:
+            self._wrong(joint, f"the joint '{name}' is of the type {motion}", kind)
         at = joint.attributes.get("axis", "0 0 1")
         if numbers(at) != [*axis]:
             valid = " ".join(f"{value:g}" for value in axis)
@@ -189,9 +189,9 @@ class _Reader:
         self._weigh(geom, name, values, body)
         masks = values["contype"], values["conaffinity"], values["group"]
         if masks not in (SOLID, SHOWN):
-            found = "contype {}, conaffinity {}, group {}".format(*masks)
+            what = "contype {}, conaffinity {}, group {}".format(*masks)
             valid = "1, 1 and 0 for what collides; 0, 0 and 1 for what is only shown"
-            self._wrong(geom, f"the geom '{name}' has {found}", valid)
+            self._wrong(geom, f"the geom '{name}' has {what}", valid)
         elif masks == SOLID and (body != "carriage" or name in HAND):
             valid = "contype 0, conaffinity 0, group 1: only the carriage, its mast and its arm are"
             self._wrong(geom, f"the geom '{name}' is solid", valid)
@@ -221,15 +221,15 @@ class _Reader:
     def _half(self, geom: Element, name: str, values: Values) -> list[float]:
         """Half the box of a geom [m]; nothing where it has none."""
         kind, wanted = values["type"], FITTED.get(name)
-        if kind not in FORMS or (wanted and kind != wanted):
+        if kind not in SIZES or (wanted and kind != wanted):
             self._wrong(
-                geom, f"the geom '{name}' is of the type {kind}", wanted or ", ".join(FORMS)
+                geom, f"the geom '{name}' is of the type {kind}", wanted or ", ".join(SIZES)
             )
             return []
-        size = numbers(values.get("size", ""))[: FORMS[kind]]
-        if len(size) < FORMS[kind] or min(size) <= 0:
-            found = f"the geom '{name}' has the size '{values.get('size', '')}'"
-            self._wrong(geom, found, f"{FORMS[kind]} lengths above 0 [m]")
+        size = numbers(values.get("size", ""))[: SIZES[kind]]
+        if len(size) < SIZES[kind] or min(size) <= 0:
+            what = f"the geom '{name}' has the size '{values.get('size', '')}'"
+            self._wrong(geom, what, f"{SIZES[kind]} lengths above 0 [m]")
             return []
         if len(size) == 2:
             size = [size[0], size[0], size[1] + size[0] * (kind == "capsule")]
@@ -239,25 +239,25 @@ class _Reader:
         """Keep a solid geom within the room that it has, and note how wide the carriage is."""
         x, y = (abs(at[n]) + half[n] for n in (0, 1))
         low, high = at[2] - half[2], at[2] + half[2]
-        found = f"the geom '{name}' reaches from {low * 1e3:g} to {high * 1e3:g} mm up"
+        what = f"the geom '{name}' reaches from {low * 1e3:g} to {high * 1e3:g} mm up"
         if name == "arm":
             if y > ARM_WIDTH / 2 + ROOM or low < ARM_LOW - ROOM or high > ARM_TOP + ROOM:
                 heights = f"{ARM_LOW * 1e3:g} to {ARM_TOP * 1e3:g} mm up"
                 valid = f"{heights}, {ARM_WIDTH * 500:g} mm: others go under it and over it"
-                self._wrong(geom, f"{found}, and {y * 1e3:g} mm to a side", valid)
+                self._wrong(geom, f"{what}, and {y * 1e3:g} mm to a side", valid)
         elif low < -ROOM:
-            self._wrong(geom, found, "0 mm up: the floor")
+            self._wrong(geom, what, "0 mm up: the floor")
         elif high <= CARRIAGE_TOP + ROOM and name != "mast":
             self.wide = max(self.wide, 2 * x, 2 * y)
             if max(x, y) > WIDEST / 2:
-                found = f"the geom '{name}' reaches {max(x, y) * 1e3:g} mm from the mast's axis"
-                self._wrong(geom, found, f"{WIDEST * 500:g} mm")
+                what = f"the geom '{name}' reaches {max(x, y) * 1e3:g} mm from the mast's axis"
+                self._wrong(geom, what, f"{WIDEST * 500:g} mm")
         elif max(x, y) > MAST / 2 + ROOM or high > ARM_TOP + ROOM:
             valid = (
                 f"up to {CARRIAGE_TOP * 1e3:g} mm up; or up to {ARM_TOP * 1e3:g} mm, within"
                 f" {MAST * 500:g} mm of the mast's axis: arms of others go over carriages"
             )
-            self._wrong(geom, f"{found}, {max(x, y) * 1e3:g} mm from the mast's axis", valid)
+            self._wrong(geom, f"{what}, {max(x, y) * 1e3:g} mm from the mast's axis", valid)
 
     def _stands_out(
         self, geom: Element, name: str, at: list[float], half: list[float], carriage: float
@@ -266,12 +266,12 @@ class _Reader:
         side, high = max(abs(at[n]) + half[n] for n in (0, 1)), at[2] + half[2]
         room = carriage if high <= CARRIAGE_TOP + ROOM else MAST / 2
         if side > room + OUT + ROOM or high > ARM_TOP + OUT + ROOM or at[2] - half[2] < -ROOM:
-            found = f"the geom '{name}' is seen {side * 1e3:g} mm from the mast's axis"
+            what = f"the geom '{name}' is seen {side * 1e3:g} mm from the mast's axis"
             valid = (
                 f"{(carriage + OUT) * 1e3:g} mm, above {CARRIAGE_TOP * 1e3:g} mm up"
                 f" {(MAST / 2 + OUT) * 1e3:g} mm, and {(ARM_TOP + OUT) * 1e3:g} mm up at most"
             )
-            self._wrong(geom, f"{found}, up to {high * 1e3:g} mm up", valid)
+            self._wrong(geom, f"{what}, up to {high * 1e3:g} mm up", valid)
 
     def _fittings(self, root: Element) -> None:
         """Check that there is what hands are made of, and what is stretched."""
@@ -283,27 +283,27 @@ class _Reader:
             self._wrong(root, "it has no class 'solid' of geoms that collide", valid)
         for name in ("carriage", "mast", "arm")[: 2 + (SLIDE in self.joints)]:
             if self.geoms.get(name) != "carriage":
-                self._wrong(root, f"the body 'carriage' has no geom '{name}'", "one box")
+                self._wrong(root, f"the body 'carriage' has no geom '{name}'", "one of this name")
 
     def _axes(self, carriage: Element, drives: list[Element]) -> tuple[RobotAxis, ...]:
         """The axes, with their drives."""
-        found = tuple(joint for joint in JOINTS if joint in self.joints)
-        if found not in KINDS:
+        joints = tuple(joint for joint in JOINTS if joint in self.joints)
+        if joints not in KINDS:
             valid = "; ".join(" and ".join(kind) for kind in KINDS)
-            self._wrong(carriage, f"its joints are {', '.join(found) or 'none'}", valid)
+            self._wrong(carriage, f"its joints are {', '.join(joints) or 'none'}", valid)
             return ()
-        holder = JOINTS[found[-1]][0]
+        holder = JOINTS[joints[-1]][0]
         if self.nests != [(holder, "nest")]:
             sites = ", ".join(f"'{name}' in '{body}'" for body, name in self.nests) or "none"
             self._wrong(carriage, f"its sites are {sites}", f"one, 'nest' in '{holder}'")
         names = {SLIDE: "drive", LIFT_JOINT: "hoist", TURN_JOINT: "drive"}
         driven = {(d.attributes.get("name"), d.attributes.get("joint")): d for d in drives}
-        if len(drives) != len(found) or driven.keys() != {(names[j], j) for j in found}:
+        if len(drives) != len(joints) or driven.keys() != {(names[j], j) for j in joints}:
             words = ", ".join(f"'{name}' of '{joint}'" for name, joint in driven) or "none"
-            valid = ", ".join(f"'{names[joint]}' of '{joint}'" for joint in found)
+            valid = ", ".join(f"'{names[joint]}' of '{joint}'" for joint in joints)
             self._wrong(carriage, f"its actuators are {words}", valid)
             return ()
-        return tuple(self._axis(joint, driven[names[joint], joint]) for joint in found)
+        return tuple(self._axis(joint, driven[names[joint], joint]) for joint in joints)
 
     def _axis(self, name: str, drive: Element) -> RobotAxis:
         """The axis of a joint."""
@@ -319,6 +319,6 @@ class _Reader:
         if "forcerange" in drive.attributes:
             low, force = numbers(drive.attributes["forcerange"])
             if not force > 0 or low != -force:
-                found = f"the forcerange of '{name}' is {drive.attributes['forcerange']}"
-                self._wrong(drive, found, "-F F with F above 0")
+                what = f"the forcerange of '{name}' is {drive.attributes['forcerange']}"
+                self._wrong(drive, what, "-F F with F above 0")
         return RobotAxis(name, mass, armature, rub, kp, kv, force, self.document.at(drive))

@@ -22,11 +22,11 @@ KINDS = (SLIDE,), (SLIDE, LIFT_JOINT), (LIFT_JOINT, TURN_JOINT)
 MOVING = tuple(body for body, *_ in JOINTS.values())
 """The bodies with joints, each inside the one before; that of a robot that stands has none."""
 
-FORMS = {"box": 3, "sphere": 1, "cylinder": 2, "capsule": 2, "ellipsoid": 3}
+SIZES = {"box": 3, "sphere": 1, "cylinder": 2, "capsule": 2, "ellipsoid": 3}
 """How many sizes each type of geom has."""
 
-BOXES, RODS = ("carriage", "mast", "arm", "finger"), ("pin", "column", "pad")
-"""Geoms that are stretched, replaced or written on: boxes and cylinders."""
+BOXES, RODS = ("arm", "finger"), ("pin", "column", "pad")
+"""Geoms that are stretched, or replaced by those of a hand: boxes and cylinders."""
 
 FITTED = dict.fromkeys(BOXES, "box") | dict.fromkeys(RODS, "cylinder")
 """The type that each of these has."""
@@ -95,17 +95,17 @@ class RobotDocument(XmlDocument):
         super().__init__(file, text.split("\n"), "BadRobot")
         self.robot = robot
 
-    def wrong(self, element: Element, found: str, valid: str) -> None:
+    def wrong(self, element: Element, what: str, valid: str) -> None:
         """Note what was found at an element, and what would have been valid."""
-        self.fault(element, f"robot type '{self.robot}': {found}", f"valid: {valid}")
+        self.fault(element, f"robot type '{self.robot}': {what}", f"valid: {valid}")
 
     def schema(self, root: Element) -> None:
         """Raises InputError where there is what is not read, or numbers that are none."""
         if root.name != "mujoco":
             self.wrong(root, f"the root is <{root.name}>", "<mujoco>")
             self.stop()
-        for element, found, valid in _unread(root):
-            self.wrong(element, found, valid)
+        for element, what, valid in _unread(root):
+            self.wrong(element, what, valid)
         self.stop()
 
     def name(self, element: Element, taken: Container[str]) -> str:

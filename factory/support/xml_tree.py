@@ -45,7 +45,7 @@ class XmlDocument:
 
     file: str
     lines: list[str]
-    code: str = "BadNet"
+    code: str
     faults: list[Diagnostic] = field(default_factory=list)
 
     def position(self, line: int, column: int) -> Position:
