@@ -278,7 +278,7 @@ def test_random_products_with_random_settings_keep_their_limits(seeds: range) ->
 
 def test_a_prediction_that_promises_too_much_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(driving, "SURE", 0.2)
-    monkeypatch.setattr(timestep, "OVERLOAD", -1.0)  # nor do end stops ask for a shorter one
+    monkeypatch.setattr(driving, "OVERLOAD", -1.0)  # nor do end stops ask for a shorter one
     monkeypatch.setattr(timestep, "DEEPEST", inf)  # nor what hangs from feeders
     found = outcomes(touching=True)  # a shutter that overshoots so far meets the belt
     assert sum(most > error for _, error, most in found) > len(found) / 3
