@@ -294,11 +294,18 @@ class Project:
     def layout(self) -> Layout:
         """The factory laid out: as it was, where it is kept (`laid`), or with relays where its
         ground asks for them. Raises InputError, as BadPlan where what is kept is of another
-        factory; RunError (Layout) where there is no room."""
+        factory, and as BadRobot where a drive is too weak; RunError (Layout) where there is no
+        room."""
+        from factory.mjcf.driving import check_drives
+
         if self.laid is not None:
-            return self._laid_out(self.laid)
-        inputs = self.plain, self.product, self.settings, self._hands, self.catalogue
-        return self.ground.lay_out(*inputs, *([self.draft] if "draft" in self.__dict__ else ()))
+            laid = self._laid_out(self.laid)
+        else:
+            inputs = self.plain, self.product, self.settings, self._hands, self.catalogue
+            draft = [self.draft] if "draft" in self.__dict__ else []
+            laid = self.ground.lay_out(*inputs, *draft)
+        check_drives(laid, self.settings)
+        return laid
 
     @cached_property
     def draft(self) -> Layout:

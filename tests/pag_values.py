@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import random
 from functools import cache
-from pathlib import Path
 
 from hypothesis import strategies as st
 
 from factory.compiler.compiler import compile_pag
 from factory.plant.factory import Factory
 from factory.problem.pag import PAG, Assembly
-from factory.problem.robot_types import Catalogue, RobotType
+from factory.problem.robot_types import Catalogue, load_catalogue
 from factory.problem.template import Law, Point, Template
 from factory.support.errors import Position
 
@@ -65,8 +64,9 @@ TEMPLATES = {t.name: t for t in (_DOT, _MATE, _INSERT, _WELD, _CLAMP, _DROPOFF)}
 
 @cache
 def catalogue() -> Catalogue:
-    """Robots of types dot and tool, from no file."""
-    return Catalogue({name: RobotType(name, Path(f"{name}.xml")) for name in ("dot", "tool")})
+    """Robots of types dot and tool."""
+    types = load_catalogue().types
+    return Catalogue({name: types[name] for name in ("dot", "tool")})
 
 
 def factory_of(pag: PAG) -> Factory:

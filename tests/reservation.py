@@ -5,7 +5,7 @@ comes to rest, braking by a·dt a tick. Robots update one after another in a tic
 speed only if the reservation that it then needs is clear of those of all others, as they are, or
 comes no nearer to them than its present one; else it brakes by a·dt, and its reservation shrinks.
 
-Theorem 9: if all reservations are clear at first, no configuration is ever in Δ, whatever fields,
+Theorem 14: if all reservations are clear at first, no configuration is ever in Δ, whatever fields,
 markings, speeds and order of updates. Each case keeps reservations clear, and a robot stays in its
 own during a tick. That takes no mode, no net and no agreement between robots. It does not make
 progress by itself; on a tee `tests.ring` does.

@@ -11,7 +11,7 @@ Each crossing leads from one of two squares and a fin to another of these, so th
 round the removed configuration (V, V), the annulus of Ghrist and Koditschek (2002), and the fins
 are dead ends.
 
-Theorem 10: on edges that are long enough to stand by on, both robots reach all goals that are clear
+Theorem 15: on edges that are long enough to stand by on, both robots reach all goals that are clear
 of each other, from every clear state, if they make the first crossing of a shortest path of cells
 from that of the points where they would stop to that of their goals, again and again. The crossings
 left become fewer with each; the robot that stands by recedes, which a reservation always admits;

@@ -82,8 +82,7 @@ def test_robot_types_load(name: str) -> None:
         first, kind = "turn", mujoco.mjtJoint.mjJNT_HINGE
     assert m.joint(first).type == kind
     assert m.actuator("drive").trnid[0] == m.joint(first).id
-    assert m.njnt == len(robot.moves)
-    assert m.actuator_forcelimited[m.actuator("drive").id]
+    assert m.njnt == len(robot.body.axes)
     assert m.site("nest").id >= 0
     model = load_robot_model(robot)
     assert model.name == name

@@ -11,7 +11,7 @@ from factory.compiler.compiler import compile_pag
 from factory.compiler.expanding import expand
 from factory.lang import read_pag
 from factory.problem.pag import PAG
-from factory.problem.robot_types import Catalogue, RobotType, load_catalogue
+from factory.problem.robot_types import Catalogue, load_catalogue
 from factory.support.errors import InputError
 from tests.pag_texts import PAPER, TEMPLATES, compiled
 from tests.strategies import pags
@@ -97,7 +97,7 @@ HOIST = """hoist = (R, j, ~, <a; b>, F) where R = < lift, dot >; j = 1; ~ = { S1
 def catalogue() -> Catalogue:
     types = dict(load_catalogue().types)
     types["gantry"] = replace(types["tool"], name="gantry")
-    types["lift"] = RobotType("lift", types["dot"].mjcf, "dot")
+    types["lift"] = replace(types["dot"], name="lift", extends="dot")
     return Catalogue(types)
 
 

@@ -12,15 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from factory.layout.request import Ground
-from factory.mjcf import model
-from factory.mjcf.model import (
-    CARRIAGE_MASS,
-    GRAVITY,
-    HEAD_MASS,
-    HOIST_STIFFNESS,
-    STIFFNESS,
-    drive_for,
-)
+from factory.mjcf import driving
+from factory.mjcf.driving import GRAVITY, HOIST_STIFFNESS, STIFFNESS, drive_for
 from factory.mjcf.robots import Drive
 from factory.simulation.mujoco.drives import Drives
 from factory.simulation.request import RunRequest
@@ -28,6 +21,9 @@ from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from factory.support.settings import RANGES, TICK, Settings
 from tests.simulation_values import layout_of, read_by, ready
+
+CARRIAGE, HEAD = 1.9, 0.4
+"""What a carriage, and a lift's head, weigh without payload [kg]."""
 
 MOST = 1.9
 """Jitter draws no greater factor on a drive's gains."""
@@ -59,14 +55,13 @@ def test_drives_are_stable(
 
 
 def test_a_drive_that_knew_no_timestep_would_not_be() -> None:
-    loose = drive_for(CARRIAGE_MASS, 0.1, 2.0, Settings(timestep=1e-4))
-    assert growth(loose, CARRIAGE_MASS, 1e-4) < 1 < growth(loose, CARRIAGE_MASS, 0.02)
+    loose = drive_for(CARRIAGE, 0.1, 2.0, Settings(timestep=1e-4))
+    assert growth(loose, CARRIAGE, 1e-4) < 1 < growth(loose, CARRIAGE, 0.02)
 
 
 def test_with_short_timesteps_drives_are_as_stiff_as_ever() -> None:
     short, usual = (
-        drive_for(CARRIAGE_MASS, 0.5, 2.0, Settings(timestep=timestep))
-        for timestep in (1e-4, 0.002)
+        drive_for(CARRIAGE, 0.5, 2.0, Settings(timestep=timestep)) for timestep in (1e-4, 0.002)
     )
     assert (short.kp, short.kv) == (usual.kp, usual.kv)
 
@@ -90,8 +85,8 @@ def test_long_timesteps_do(name: str, timestep: float) -> None:
 def test_drives_that_are_too_stiff_for_the_timestep_are_noticed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(model, "PUSHED", 1e9)
-    monkeypatch.setattr(model, "DAMPED", 1e9)
+    monkeypatch.setattr(driving, "PUSHED", 1e9)
+    monkeypatch.setattr(driving, "DAMPED", 1e9)
     settings = Settings(timestep=0.02, substeps=1)
     run = Simulation(layout_of("paper"), RunRequest(units=2, settings=settings)).run()
     assert run.trouble is not None
@@ -233,7 +228,7 @@ def test_lifts_carry_their_loads() -> None:
     bare = next(r for r in range(9) if r not in motion.axes.lift)
     axes, drives = np.array([motion.axes.lift[robot] for robot in robots]), motion.drives
     motion.load([*robots, bare], [1.0, 2.0, 3.0])
-    assert drives.weight[axes] == pytest.approx([(HEAD_MASS + kg) * GRAVITY for kg in (1.0, 2.0)])
+    assert drives.weight[axes] == pytest.approx([(HEAD + kg) * GRAVITY for kg in (1.0, 2.0)])
     assert drives.mass[axes] - drives.own[axes] == pytest.approx([1.0, 2.0])
     assert drives.mass[[*robots, bare]] - drives.own[[*robots, bare]] == pytest.approx([1, 2, 3])
     assert (drives.weight[[*robots, bare]] == 0.0).all()

@@ -22,7 +22,7 @@ NOT_PROVOKED = {
     *("Dropped", "Early", "Exchanged", "Frame", "Order", "Start", "Stuck", "TwoHolders"),
     *("CutOff", "NotProved", "Stalled", "Unstable"),
     *("Contact", "EngineWarning", "GripGap", "HandOffGap", "Missed", "NotRefined"),
-    *("Record", "CannotAssemble", "Hulls", "NotInPlace", "Unit"),
+    *("BadRobot", "Record", "CannotAssemble", "Hulls", "NotInPlace", "Unit"),
     *("HandOffTurn", "Mass", "NotSolid", "Options", "ProductError", "ProductTurn", "Shape"),
 }
 """Codes that need a broken machine, run or factory, which other tests make."""

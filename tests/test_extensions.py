@@ -174,8 +174,14 @@ PACKAGE_MISTAKES = [
     ("robots/catalogue.toml", "[dabber]", "[dot]", 1, "there is a robot type 'dot' already"),
     ("robots/catalogue.toml", '"tool"', '"toool"', 1, "did you mean 'tool'?"),
     ("robots/catalogue.toml", 'mjcf = "', "mjcf = ", 2, "Syntax Invalid value"),
-    ("robots/catalogue.toml", "mjcf", "file", 1, "the robot catalogue is unusable: 'mjcf'"),
-    ("robots/dabber.xml", "</actuator>", "</actuators>", 37, "the file of robot type 'dabber'"),
+    ("robots/catalogue.toml", "mjcf", "file", 1, "'dabber' has the unknown key 'file'"),
+    (
+        "robots/dabber.xml",
+        "</actuator>",
+        "</actuators>",
+        37,
+        "Syntax not well-formed XML: mismatched",
+    ),
     ("templates/dab.op", "dot, dabber", "dot, daber", 3, "unknown"),
     ("count.py", "len(", "length(", 6, "NameError: name 'length'"),
 ]

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.mjcf.model import GRAVITY, ROLLING
-from factory.mjcf.timestep import FRICTION
+from factory.mjcf.driving import GRAVITY, ROLLING
+from factory.problem.robot_bodies import FRICTION
 from factory.record.state import State
 from factory.simulation.disturbance import Friction, disturb
 from factory.simulation.simulation import Simulation

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from factory.foreign_nets import pnml_reader, xml_tree
+from factory.foreign_nets import pnml_reader
 from factory.lang import load_templates, read_pag
-from factory.support import files
+from factory.support import files, xml_tree
 from factory.support.errors import SHOWN, InputError, did_you_mean
 from factory.support.files import MESH, MIB, NET, RECORD, TABLE, TEXT, read_bytes
 from tests.command_line import PAPER, ROOT, Terminal
@@ -175,7 +175,7 @@ def test_unknown_nodes_of_a_net_get_few_suggestions(monkeypatch: pytest.MonkeyPa
 
 def test_a_net_of_too_many_elements(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(xml_tree, "MOST", 10)
-    with pytest.raises(InputError, match="1:31: BadNet the net has more than 10 elements"):
+    with pytest.raises(InputError, match="1:31: BadNet it has more than 10 elements"):
         pnml_reader.read_pnml("<a>" * 11 + "</a>" * 11)
 
 
@@ -250,7 +250,7 @@ def test_references_lead_to_their_node_in_a_step(monkeypatch: pytest.MonkeyPatch
     count = 300
     chain = "".join(f'<referencePlace id="r{i}" ref="r{i + 1}"/>' for i in range(count))
     net = NET_OF.format(f'{chain}<place id="r{count}"/>')
-    reader = pnml_reader._Reader(xml_tree.XmlDocument("<text>", net.split("\n")))
+    reader = pnml_reader._Reader(xml_tree.XmlDocument("<text>", net.split("\n"), "BadNet"))
     looked_up: list[str] = []
 
     class Nodes(dict[str, xml_tree.Element]):

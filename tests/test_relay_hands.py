@@ -14,7 +14,7 @@ import pytest
 from benches.speed.factories import cube
 from factory.layout.certificate import ARM_BODY
 from factory.layout.clearance import certify
-from factory.layout.dimensions import ARM_WIDTH, Clearance
+from factory.layout.dimensions import Clearance
 from factory.layout.durations import Pace, gear_times
 from factory.layout.embedding import certified
 from factory.layout.hands.choosing import Hands
@@ -28,6 +28,7 @@ from factory.layout.relaying.ways import ways
 from factory.nets.verify import verify
 from factory.pipeline import read
 from factory.plant.factory import Operation
+from factory.problem.robot_bodies import ARM_WIDTH
 from factory.problem.robot_types import load_catalogue
 from factory.support.settings import Settings
 from factory.timing.timed import pace

@@ -1,4 +1,4 @@
-"""Reservations: braking is exact, and robots without any plan never collide (Theorem 9)."""
+"""Reservations: braking is exact, and robots without any plan never collide (Theorem 14)."""
 
 from __future__ import annotations
 

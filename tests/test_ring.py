@@ -1,4 +1,4 @@
-"""The ring plan: both robots of a tee reach all goals, without a collision (Theorem 10)."""
+"""The ring plan: both robots of a tee reach all goals, without a collision (Theorem 15)."""
 
 from __future__ import annotations
 

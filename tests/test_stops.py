@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from factory.control.mode import Array, Index
-from factory.layout.dimensions import CARRIAGE, CARRIAGE_TOP, Clearance
+from factory.layout.dimensions import Clearance
 from factory.mjcf import names
 from factory.mjcf.scene import SHOE
 from factory.mjcf.stops import OVERLOAD
 from factory.mjcf.timestep import timed
+from factory.problem.robot_bodies import CARRIAGE, CARRIAGE_TOP
 from factory.record.state import State
 from factory.simulation.modelling import physical_model
 from factory.simulation.request import RunRequest

@@ -20,9 +20,11 @@ import factory
 from factory.geometry.product import product_geometry
 from factory.layout.layout import Layout
 from factory.layout.request import Ground
-from factory.mjcf import timestep
-from factory.mjcf.timestep import ALLOWED, FRICTION, STEPS, USUAL, timed
+from factory.mjcf import driving, timestep
+from factory.mjcf.driving import ALLOWED, STEPS
+from factory.mjcf.timestep import USUAL, timed
 from factory.problem.pag import PAG, Parameter
+from factory.problem.robot_bodies import FRICTION
 from factory.record.state import State
 from factory.simulation.modelling import physical_model
 from factory.simulation.request import RunRequest
@@ -275,8 +277,8 @@ def test_random_products_with_random_settings_keep_their_limits(seeds: range) ->
 
 
 def test_a_prediction_that_promises_too_much_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(timestep, "SURE", 0.2)
-    monkeypatch.setattr(timestep, "OVERLOAD", -1.0)  # nor do end stops ask for a shorter one
+    monkeypatch.setattr(driving, "SURE", 0.2)
+    monkeypatch.setattr(driving, "OVERLOAD", -1.0)  # nor do end stops ask for a shorter one
     monkeypatch.setattr(timestep, "DEEPEST", inf)  # nor what hangs from feeders
     found = outcomes(touching=True)  # a shutter that overshoots so far meets the belt
     assert sum(most > error for _, error, most in found) > len(found) / 3

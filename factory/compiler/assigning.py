@@ -19,7 +19,8 @@ from itertools import accumulate
 from factory.nets.gears import Gear, GearNet
 from factory.nets.petri import PetriNet, Place, Transition
 from factory.nets.threaded import Redistribution, ThreadedNet
-from factory.plant.factory import Factory, Operation, Robot
+from factory.plant.factory import Factory, Operation
+from factory.plant.robot import Robot
 from factory.problem.pag import NOPART, PAG
 from factory.problem.plan import NOBODY, Plan, in_turn, out_of_turn
 from factory.problem.robot_types import LIFT, Catalogue
@@ -203,9 +204,10 @@ def with_crew(
         for n in dict.fromkeys(turn[tour] for turn in turns if turn[tour] != NOBODY):
             kind = crew[n].type if n in crew else robot.type
             kind = catalogue.meet(kind, robot.type) or kind
-            crew[n] = replace(crew.get(n, robot), index=n, name=f"r{n + 1}", type=kind)
+            of = crew.get(n, robot)
+            crew[n] = replace(of, index=n, name=f"r{n + 1}", kind=catalogue[kind])
     for n in lifts:
-        crew[n] = replace(crew[n], type=catalogue.meet(crew[n].type, LIFT) or LIFT)
+        crew[n] = replace(crew[n], kind=catalogue[catalogue.meet(crew[n].type, LIFT) or LIFT])
     return assigned(base, [crew[n] for n in sorted(crew)], turns)
 
 

@@ -16,7 +16,8 @@ from factory.compiler.domains import check_prepared
 from factory.compiler.expanding import Node, expand
 from factory.compiler.turning import check_turned
 from factory.plant.approaches import Approach
-from factory.plant.factory import Factory, Operation, Robot
+from factory.plant.factory import Factory, Operation
+from factory.plant.robot import Robot
 from factory.problem.pag import NOPART, PAG
 from factory.problem.plan import AS_WRITTEN, Plan
 from factory.problem.robot_types import LIFT, Catalogue
@@ -70,7 +71,7 @@ def compile_nodes(
     robots, operations = draft.robots(), tuple(draft.operations)
     troubles = draft.troubles or [
         *check_prepared(robots, operations),
-        *check_turned(pag, robots, operations, catalogue),
+        *check_turned(pag, robots, operations),
     ]
     if troubles:
         raise InputError(troubles)
@@ -145,10 +146,9 @@ class _Draft:
             Robot(
                 i,
                 f"r{i + 1}",
-                self.types[i],
+                self.catalogue[self.types[i]],
                 tuple(reversed(visits)),
                 self.births[i],
-                self.catalogue[self.types[i]].fixed,
             )
             for i, visits in enumerate(self.visits)
         )

@@ -5,7 +5,7 @@ the same way and from a side that both admit, as on a line of a fold (`folding`)
 fit for the tours, since a robot that is there keeps its type. What delivers to the dead robot would
 have to reach the deputy, so only a *leaf* has deputies, to which no robot delivers.
 
-The deputy does all its tours in the order in which its carrier asks for them (Theorem 2 of folds).
+The deputy does all its tours in the order in which its carrier asks for them (Theorem 2).
 Live (Theorem 1): the *postorder* of the operations, the pile first, depends on what is made, not on
 the robots that make it. So one order is the witness for every deputy: a net is live if each program
 ascends in it. Without a deputy a robot needs a spare.

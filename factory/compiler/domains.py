@@ -11,7 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 
-from factory.plant.factory import Operation, Robot
+from factory.plant.factory import Operation
+from factory.plant.robot import Robot
 from factory.problem.template import Point, Template
 from factory.support.errors import Diagnostic
 

@@ -10,17 +10,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from factory.compiler.expanding import Node
-from factory.plant.factory import Factory, Operation, Robot
+from factory.plant.factory import Factory, Operation
+from factory.plant.robot import Robot
 from factory.problem.pag import NOPART, PAG
 from factory.problem.robot_types import Catalogue
 from factory.support.errors import Diagnostic, InputError
 
-TURN = "turn"
-"""What an axis of a robot type does that turns what it holds about the vertical."""
-
 
 def check_turned(
-    pag: PAG, robots: Sequence[Robot], operations: Sequence[Operation], catalogue: Catalogue
+    pag: PAG, robots: Sequence[Robot], operations: Sequence[Operation]
 ) -> Iterator[Diagnostic]:
     """Every part that is presented turned and is joined, or worked on, as it is (NeedsTurn); and
     every operation to which a fixed robot brings what cannot be lowered (Blocked)."""
@@ -28,7 +26,7 @@ def check_turned(
     taking = {label: o for o in operations if fed for label in o.inputs}
     for part in fed:
         label, operation = part.label, taking[part.label]
-        while not (turns := _turns(robots, operation, catalogue)) and _hands_over(operation):
+        while not (turns := _turns(robots, operation)) and _hands_over(operation):
             label, operation = operation.label, taking[operation.label]
         if not turns:
             others = [x for x in operation.inputs if x != label] or ["base"]
@@ -42,9 +40,9 @@ def check_turned(
     yield from _not_lowered(robots, operations)
 
 
-def _turns(robots: Sequence[Robot], operation: Operation, catalogue: Catalogue) -> bool:
+def _turns(robots: Sequence[Robot], operation: Operation) -> bool:
     """Whether the carrier of an operation turns what it takes."""
-    return TURN in catalogue[robots[operation.carrier].type].moves
+    return robots[operation.carrier].kind.turns
 
 
 def _hands_over(operation: Operation) -> bool:

@@ -10,7 +10,10 @@ closed), and h(u) = sqrt(u² + s²) - s, a square near 0 and a length beyond s,
 
 gamma is a squared distance to the goal, sum z², in the coordinates z = ±sqrt(h(u) + tau'), tau' the
 sum over the robots that wait for this one. x -> z is the diffeomorphism that straightens the
-L-shaped W, and navigation functions are invariant under those. phi is 0 at the goal and 1 on Δ. On
+L-shaped W, and navigation functions are invariant under those; but z of a robot that waits itself
+jumps at u = 0 while its gate is closed. gamma is smooth there, with no critical point but the goal:
+along a robot that waits for none its derivative is 0 at u = 0 alone, where what waits for it is
+free, and so on down the chain (docs/theory/modes.md). phi is 0 at the goal and 1 on Δ. On
 the stops A and B it need not be 1: it falls away from them wherever no obstacle acts, and a robot
 pushed against a stop stands there.
 

@@ -10,7 +10,6 @@ from typing import Any
 
 from factory.exporting.floor_plan import Flat, flat_shapes, stations
 from factory.exporting.subject import Subject
-from factory.layout.dimensions import CARRIAGE
 from factory.layout.feeding import feeder_of
 from factory.layout.layout import Box, Layout, Point2
 from factory.support.version import optional
@@ -106,8 +105,8 @@ def _labels(layout: Layout) -> Iterator[tuple[str, Point2]]:
         xlo, _, _, yhi = feeder_of(layout, leaf.label).post
         yield leaf.label, (xlo, yhi + 0.005)
     for robot, path in zip(layout.factory.robots, layout.guidepaths, strict=True):
-        x, y = path.carriage(path.length)
-        yield robot.name, (x - CARRIAGE / 2 + 0.003, y + 0.15 * CARRIAGE)
+        (x, y), wide = path.carriage(path.length), layout.factory.carriage
+        yield robot.name, (x - wide / 2 + 0.003, y + 0.15 * wide)
     for (x, y), labels in stations(layout).items():
         yield ", ".join(labels), (x + 0.01, y + 0.01)
 

@@ -10,12 +10,12 @@ import numpy as np
 
 from factory.geometry.solids import Solid
 from factory.layout.certificate import ALWAYS, PAYLOAD_BODY
-from factory.layout.dimensions import ARM_WIDTH, CARRIAGE
 from factory.layout.feeding import feeder_of
 from factory.layout.hands.limbs import limbs
 from factory.layout.layout import Box, Extent, Layout, Point2
 from factory.layout.platen import tiles_of
 from factory.layout.sweeps import piles, regions
+from factory.problem.robot_bodies import ARM_WIDTH
 from factory.support.canvas import hexadecimal, hull
 
 JUNCTION = 0.008
@@ -109,7 +109,7 @@ def _sweeps(layout: Layout) -> Iterator[Flat]:
 
 def _robot(layout: Layout, robot: int, style: str) -> Iterator[Flat]:
     path = layout.guidepaths[robot]
-    half, rim, foot = CARRIAGE / 2, path.reach - path.arm, path.carriage(path.length)
+    half, rim, foot = layout.factory.carriage / 2, path.reach - path.arm, path.carriage(path.length)
     for limb in limbs(layout, robot):
         sides = sorted((limb.low[1] * path.left, limb.high[1] * path.left))
         box: Extent = (limb.low[0], limb.high[0], sides[0], sides[1])

@@ -8,7 +8,6 @@ from math import dist, floor, sqrt
 import numpy as np
 
 from factory.exporting.floor_plan import Flat, flat_shapes, stations
-from factory.layout.dimensions import CARRIAGE
 from factory.layout.feeding import feeder_of
 from factory.layout.layout import Layout
 from factory.support.canvas import LETTER, Box, Canvas, Point, millimetres, page_box
@@ -178,7 +177,7 @@ class _Sheet:
         """Robots on their carriages, operations at their junctions, parts at their feeders."""
         layout = self.layout
         for robot, path in zip(layout.factory.robots, layout.guidepaths, strict=True):
-            size = min(FONT + 3, 1e3 * CARRIAGE / (0.7 * len(robot.name)))
+            size = min(FONT + 3, 1e3 * layout.factory.carriage / (0.7 * len(robot.name)))
             self.canvas.label(millimetres(path.carriage(path.length)), robot.name, size, "r")
         for at, labels in stations(layout).items():
             for label in labels:

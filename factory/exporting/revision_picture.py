@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from factory.layout.dimensions import CARRIAGE
 from factory.layout.guidepath import Guidepath, Point2
 from factory.layout.layout import Layout
 from factory.layout.pins import StayingRobot
+from factory.problem.robot_bodies import CARRIAGE
 from factory.support.canvas import Canvas, millimetres, page_box
 
 STYLE = """

@@ -11,7 +11,6 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
-from factory.foreign_nets.xml_tree import Element, XmlDocument
 from factory.lang.source import read_text
 from factory.nets.composition import compose
 from factory.nets.gears import Gear, GearNet
@@ -21,6 +20,7 @@ from factory.nets.threaded import Redistribution, ThreadedNet
 from factory.support.collector import collector_paused
 from factory.support.errors import Position, did_you_mean
 from factory.support.files import NET
+from factory.support.xml_tree import Element, XmlDocument
 
 DRAWN = frozenset({"graphics"})
 """Elements that describe the drawing of a net, and are not read."""
@@ -47,7 +47,7 @@ def read_pnml(text: str, file: str = "<text>") -> GearNet | MarkedNet:
     it), else a marked net. Raises InputError: Syntax where it is no XML, BadNet where it is no
     place/transition net with arcs of weight 1.
     """
-    document = XmlDocument(file, text.split("\n"))
+    document = XmlDocument(file, text.split("\n"), "BadNet")
     return _Reader(document).net(document.read(text, DRAWN))
 
 

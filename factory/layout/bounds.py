@@ -20,7 +20,6 @@ from math import sqrt
 
 from factory.geometry.solids import Product
 from factory.layout.clearance import TOLERANCE
-from factory.layout.dimensions import CARRIAGE
 from factory.layout.durations import Pace
 from factory.layout.footprint import ahead_of
 from factory.layout.layout import BESIDE, carriers
@@ -126,7 +125,7 @@ class _Bound:
             return 0.0
         lanes = [self._lane(guest, self.axis[robot]) for guest in guests]
         apart = max(lanes) - min(lanes) + ROUNDED
-        return max(0.0, ((len(guests) + 1) // 2 - 1) * (CARRIAGE + self.c) - apart)
+        return max(0.0, ((len(guests) + 1) // 2 - 1) * (self.factory.carriage + self.c) - apart)
 
     def _lane(self, robot: int, axis: int) -> float:
         """Where a robot's lane is, along its carrier's path, about the meeting point."""

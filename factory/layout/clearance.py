@@ -37,16 +37,7 @@ from factory.layout.certificate import (
     fault,
 )
 from factory.layout.crossings import embedding_faults, near
-from factory.layout.dimensions import (
-    ARM_LOW,
-    ARM_TOP,
-    BELT_GAP,
-    CARRIAGE_TOP,
-    FINGER_LOW,
-    FINGER_TOP,
-    PAYLOAD,
-    PAYLOADS,
-)
+from factory.layout.dimensions import BELT_GAP, FINGER_LOW, FINGER_TOP, PAYLOAD, PAYLOADS
 from factory.layout.exclusions import exclusions
 from factory.layout.guidepath import Box
 from factory.layout.layout import Layout, delivery
@@ -55,6 +46,7 @@ from factory.layout.sweeps import Pile, piles, regions
 from factory.plant.approaches import MARGIN
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
+from factory.problem.robot_bodies import ARM_LOW, ARM_TOP, CARRIAGE_TOP
 
 TOLERANCE = 1e-6
 """Distances are compared to this [m]: a thousandth of what a layout is rounded to."""

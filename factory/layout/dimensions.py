@@ -10,23 +10,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import ceil
 
+from factory.problem.robot_bodies import CARRIAGE, MAST
+
 CARRIAGES, ARMS, PAYLOADS = LAYERS = range(3)
 """The layers in which things can meet, from the floor up. What stands on the floor is in all of
 them."""
 
-CARRIAGE = 0.06
-"""Width and length W of a carriage."""
-
-CARRIAGE_TOP = 0.05
-ARM_LOW, ARM_TOP = 0.066, 0.084
 FINGER_LOW, FINGER_TOP = 0.09, 0.096
 PAYLOAD = 0.1
 """z0: the lowest point of a product is carried at this height."""
-
-MAST = 0.02
-"""Width of a mast; arms and fingers are narrower."""
-
-ARM_WIDTH = 0.016
 
 FINGER = 0.01
 """Width of a finger, and of the bars and beams of tall hands."""
@@ -82,9 +74,11 @@ def up(length: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Clearance:
-    """c: least distance between things that are not meant to touch [m]."""
+    """c: least distance between things that are not meant to touch [m]; W: width and length of the
+    largest `carriage` [m]."""
 
     c: float = 0.02
+    carriage: float = CARRIAGE
 
     @property
     def rim(self) -> float:
@@ -107,12 +101,12 @@ class Clearance:
     def spread(self) -> float:
         """Distance of the lanes of relaying robots, to either side, from the line of a single
         robot."""
-        return up((CARRIAGE + self.c) / 2)
+        return up((self.carriage + self.c) / 2)
 
     def reach(self, arm: float, lane: float = 0.0) -> float:
         """Distance that a carriage stays behind the arm's end, and behind the other robot's
         carriage, whose line is `lane` nearer to the product's middle."""
-        return max(arm + STUB, CARRIAGE + self.c + lane)
+        return max(arm + STUB, self.carriage + self.c + lane)
 
     @property
     def room(self) -> float:
@@ -122,4 +116,4 @@ class Clearance:
     def post(self, reach: float, rear: float) -> float:
         """Distance of a feeder's post, behind the product's middle: behind the carriage's rear
         stop, and behind the part and the hand that holds it, whose rear end is at `rear`."""
-        return max(reach + CARRIAGE / 2, -rear) + self.c + POST / 2
+        return max(reach + self.carriage / 2, -rear) + self.c + POST / 2

@@ -47,7 +47,8 @@ def lay_out(
     that is known. Raises RunError (Layout) where it does not fit a floor of the given width and
     depth, saying by how much and where, or where an operation's template asks for what cannot be
     kept clear."""
-    lifted, c, pace = judged(factory, product), Clearance(clearance), pace or Pace()
+    lifted, c = judged(factory, product), Clearance(clearance, factory.carriage)
+    pace = pace or Pace()
     layout = draft or drafted(lifted, product, c, pace, floor, hands)
     place, certificate, arms = on_stems(lifted)[1], None, dict[int, float]()
     for _ in range(AGAIN if hands else 0):

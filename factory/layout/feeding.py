@@ -91,7 +91,8 @@ def feeder_of(layout: Layout, label: str) -> Feeder:
     housing = rear - SIDE, front + SIDE, near - SIDE, far + SIDE
     across, half = path.offset + path.aside, POST / 2
     hand, grip = layout.hand(robot), layout.grip(robot)
-    back = -Clearance(layout.clearance).post(path.reach, min(rear, grip[0]) if grip else rear)
+    c = Clearance(layout.clearance, layout.factory.carriage)
+    back = -c.post(path.reach, min(rear, grip[0]) if grip else rear)
     if hand is not None and hand.tall:
         top = max(hand.beam + BEAM, hand.places[0][2] + max(hand.radius, FINGER / 2))
         top += layout.visits[first, robot].height + rises - elevation

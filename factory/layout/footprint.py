@@ -13,11 +13,12 @@ from functools import cached_property
 from itertools import accumulate
 from math import inf
 
-from factory.layout.dimensions import CARRIAGE, MAST, PAYLOADS, POST, SIDE, Clearance, up
+from factory.layout.dimensions import PAYLOADS, POST, SIDE, Clearance, up
 from factory.layout.guidepath import Extent, hull
 from factory.layout.shapes import Shape
 from factory.layout.stops import Stop, stops_of
 from factory.plant.factory import Factory, Operation
+from factory.problem.robot_bodies import MAST
 
 Block = tuple[float, float, float, float]
 """(ulo, uhi, tlo, thi) [m]; on one side of a path (from, to, near, far), away from its line."""
@@ -90,7 +91,8 @@ class Footprint:
         ahead = extent_to(shape.last, side) + SIDE + half if self.corridor else -inf
         wide = max(extent_to(pile, side), extent_to(self.housing, side))
         load = -inf if shape.tool else max(wide + half, post)
-        return max(lane + CARRIAGE / 2, post, ahead), max(lane + MAST / 2, post, ahead), load
+        carriage, mast = (lane + width / 2 for width in (self.clearance.carriage, MAST))
+        return max(carriage, post, ahead), max(mast, post, ahead), load
 
     def strip_at(self, piles: Sequence[Placed]) -> Callable[[int, float], Strip]:
         """The strip on a side beside something that reaches a given distance ahead on this path.
@@ -108,7 +110,8 @@ class Footprint:
         """The interval along the path that each layer takes; (inf, -inf) for none. A post is behind
         the carriage's rear stop and behind the part."""
         shape, half = self.shape, self.half
-        taken = [(-shape.reach - width / 2 - half, half - shape.arm) for width in (CARRIAGE, MAST)]
+        widths = self.clearance.carriage, MAST
+        taken = [(-shape.reach - width / 2 - half, half - shape.arm) for width in widths]
         starts = [at + pile[0] - half for at, pile in piles]
         ends = [at + pile[1] + half for at, pile in piles]
         taken.append((min(starts, default=inf), max(ends, default=-inf)))

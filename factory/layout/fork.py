@@ -11,21 +11,29 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import permutations
 from types import MappingProxyType
+
+import numpy as np
 
 from factory.layout.bending import Detour, bent
 from factory.layout.certificate import ALWAYS, ARM_BODY, CARRIAGE_BODY, LOADS, MAST_BODY
 from factory.layout.clearance import TOLERANCE, ClearanceSearch, searched, separation
-from factory.layout.dimensions import ARMS, CARRIAGE, CARRIAGES, MAST, up
+from factory.layout.dimensions import ARMS, CARRIAGES, up
 from factory.layout.guidepath import Extent
+from factory.layout.hands.leaving import SPARE
 from factory.layout.layout import Layout, branch_of, carriers
 from factory.layout.sweeps import piles, regions
 from factory.layout.way import Bend
 from factory.plant.factory import Factory
+from factory.problem.robot_bodies import ARM_WIDTH, MAST
 from factory.support.errors import Diagnostic, RunError
 
 OUT = 0.02
 """Step by which a fork is moved outwards where something is in its way [m]."""
+
+ALONG = 1e-3
+"""Step by which a robot is followed on its way [m]."""
 
 MOST = 40
 """Most such steps."""
@@ -77,7 +85,8 @@ def forked(
             search, faults = searched(made.layout({**forks, robot: fork}))
             shared = [fault for fault in search.crossing if {*fault.robots} in pairs]
             faults = [f for f in faults if names.isdisjoint(f.robots) and f not in shared]
-            faults += shared if _is_passed_near(search, pairs[-1]) else []
+            passed = _is_passed_near(search, pairs[-1]) or _stands_in_the_way(search, pairs[-1])
+            faults += shared if passed else []
             if faults:
                 continue
             forks[robot] = fork
@@ -137,6 +146,34 @@ def _is_passed_near(search: ClearanceSearch, pair: set[str]) -> bool:
     )
 
 
+def _stands_in_the_way(search: ClearanceSearch, pair: set[str]) -> bool:
+    """Whether a robot of a pair, at its home, stands in the other's way."""
+    layout, least = search.layout, search.layout.clearance - TOLERANCE
+    robots = [robot.index for robot in layout.factory.robots if robot.name in pair]
+    for one, other in permutations(robots, 2):
+        home, way = layout.guidepaths[one], layout.guidepaths[other]
+        passes = [way.carriage(x) for x in np.arange(0.0, way.length, ALONG).tolist()]
+        mine, others = _feet(layout, one), _feet(layout, other)
+        for foot, layer in mine:
+            box = home.world(foot, home.carriage(home.length - SPARE))
+            for each, its in others:
+                near = (separation(box, way.world(each, at)) < least for at in passes)
+                if its == layer and any(near):
+                    return True
+    return False
+
+
+def _feet(layout: Layout, robot: int) -> list[tuple[Extent, int]]:
+    """Carriage, mast and arm of a robot about its carriage, with their layers."""
+    path, half, mast = layout.guidepaths[robot], layout.factory.carriage / 2, MAST / 2
+    arm = (0.0, max(path.reach - path.arm, 0.0), -ARM_WIDTH / 2, ARM_WIDTH / 2)
+    return [
+        ((-half, half, -half, half), CARRIAGES),
+        ((-mast, mast, -mast, mast), ARMS),
+        (arm, ARMS),
+    ]
+
+
 def _forks(layout: Layout, robot: int, rounding: float, longer: float) -> Iterator[Fork]:
     """The forks of a robot on a stem, the nearest first, to either side; arms are `longer` than
     they need [m]."""
@@ -145,7 +182,8 @@ def _forks(layout: Layout, robot: int, rounding: float, longer: float) -> Iterat
     low, high = min(t for _, (_, _, t, _) in takes), max(t for _, (_, _, _, t) in takes)
     aside = max(up(high - low + c), 2 * rounding)
     rears = _behind(layout, robot)
-    ahead = max(front - rears[layer] for layer, (_, front, _, _) in takes)
+    spare = SPARE, SPARE, 0.0  # a robot has gone by a point short of its home
+    ahead = max(front - rears[layer] + spare[layer] for layer, (_, front, _, _) in takes)
     back, least = up(max(up(ahead + c), rounding) + longer), max(up(rounding - path.travel), 0.0)
     for step in range(MOST):
         out = round(least + step * OUT, 3)
@@ -160,8 +198,8 @@ def _beside(layout: Layout, robot: int) -> Iterator[tuple[int, Extent]]:
     path, branch = layout.guidepaths[robot], branch_of(carriers(layout.factory), robot)
     x, y = path.middle(path.length)
     lane = path.offset
-    half = CARRIAGE / 2
-    yield CARRIAGES, (half - path.reach - CARRIAGE, half - path.reach, lane - half, lane + half)
+    half = layout.factory.carriage / 2
+    yield CARRIAGES, (-path.reach - half, half - path.reach, lane - half, lane + half)
     yield ARMS, (-path.reach - MAST / 2, -path.arm, lane - MAST / 2, lane + MAST / 2)
     for region in regions(layout, piles(layout.factory, layout.product)):
         is_robots = region.robot == robot and region.kind in (CARRIAGE_BODY, MAST_BODY, ARM_BODY)
@@ -179,4 +217,4 @@ def _behind(layout: Layout, robot: int) -> tuple[float, ...]:
     path, grip = layout.guidepaths[robot], layout.grip(robot)
     brought = [path.frame(layout.payloads[label])[0] for label in layout.factory.deliveries(robot)]
     loads = min([*brought, *(grip[:1] if grip else ())])
-    return -path.reach - CARRIAGE / 2, -path.reach - MAST / 2, loads
+    return -path.reach - layout.factory.carriage / 2, -path.reach - MAST / 2, loads

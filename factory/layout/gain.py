@@ -68,7 +68,7 @@ def gain(layout: Layout, pace: Pace) -> LayoutGain:
     _, (bottleneck, *_) = slowest(layout, pace)
     return LayoutGain(
         _figures(layout, pace),
-        _figures(first_feasible(factory, product, Clearance(c)), pace),
+        _figures(first_feasible(factory, product, Clearance(c, factory.carriage)), pace),
         layout.factory.robots[bottleneck].name,
         cycle_time_bound(factory, product, c, pace),
         _figures(plain, pace) if layout.plain else None,

@@ -104,7 +104,7 @@ class Ground:
         from factory.plant.fused_bodies import repeated
 
         factory, product = judged(factory, product), repeated(product, factory)
-        c, pace = Clearance(settings.clearance), Pace.of(settings)
+        c, pace = Clearance(settings.clearance, factory.carriage), Pace.of(settings)
         return drafted(factory, product, c, pace, self.floor, hands)
 
     def _with_deputies(

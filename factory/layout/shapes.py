@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 from factory.geometry.solids import Product
-from factory.layout.dimensions import FINGER, MAST, PAYLOAD, Clearance, up
+from factory.layout.dimensions import FINGER, PAYLOAD, Clearance, up
 from factory.layout.guidepath import Box, Extent, Point2, hull, moved, project
 from factory.layout.hands.choosing import Hands
 from factory.layout.hands.hand import Hand, Point3
@@ -16,6 +16,7 @@ from factory.layout.layout import carriers
 from factory.layout.stops import carried
 from factory.layout.sweeps import piles
 from factory.plant.factory import Factory
+from factory.problem.robot_bodies import MAST
 
 Frame = tuple[Point2, Point2]
 """(u, t): how a robot lies on the floor."""

@@ -19,18 +19,7 @@ from factory.geometry.meshes import Array
 from factory.geometry.pieces import cylinder_piece
 from factory.geometry.turning import fed_of, turning_pieces
 from factory.layout.coordinating import HOME, Coordinated
-from factory.layout.dimensions import (
-    ARM_LOW,
-    ARM_TOP,
-    ARM_WIDTH,
-    ARMS,
-    CARRIAGE,
-    CARRIAGE_TOP,
-    CARRIAGES,
-    MAST,
-    PAYLOAD,
-    PAYLOADS,
-)
+from factory.layout.dimensions import ARMS, CARRIAGES, PAYLOAD, PAYLOADS
 from factory.layout.guidepath import Guidepath
 from factory.layout.hands.limbs import Limb, limbs, rises_first
 from factory.layout.layout import Layout
@@ -38,6 +27,7 @@ from factory.layout.presence import ROUNDING, MachineBodies, Presence, Span, cor
 from factory.nets.coordinated import Past
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
+from factory.problem.robot_bodies import ARM_LOW, ARM_TOP, ARM_WIDTH, CARRIAGE_TOP, MAST
 
 LATE = 0.005
 """So much further than a point an axis may be when its pass fires [m]: a tick at full speed."""
@@ -276,7 +266,8 @@ def comes_last(layout: Layout, robot: int, operation: int) -> bool:
 
 def _own(layout: Layout, robot: int) -> MachineBodies:
     """Carriage, mast, arm and hand of a robot, with its axes at 0."""
-    path, half, mast, arm = layout.guidepaths[robot], CARRIAGE / 2, MAST / 2, ARM_WIDTH / 2
+    path, half = layout.guidepaths[robot], layout.factory.carriage / 2
+    mast, arm = MAST / 2, ARM_WIDTH / 2
     rim = max(path.reach - path.arm, mast)
     bodies_of = [
         (Limb("carriage", (-half, -half, 0.0), (half, half, CARRIAGE_TOP)), CARRIAGES),

@@ -29,21 +29,7 @@ from factory.layout.certificate import (
     SHED,
     Region,
 )
-from factory.layout.dimensions import (
-    ARM_LOW,
-    ARM_TOP,
-    ARM_WIDTH,
-    ARMS,
-    BOOM_HEIGHT,
-    CARRIAGE,
-    CARRIAGE_TOP,
-    CARRIAGES,
-    LAYERS,
-    MAST,
-    PAYLOAD,
-    PAYLOADS,
-    SIDE,
-)
+from factory.layout.dimensions import ARMS, BOOM_HEIGHT, CARRIAGES, LAYERS, PAYLOAD, PAYLOADS, SIDE
 from factory.layout.feeding import feeder_of
 from factory.layout.guidepath import Box, Extent, Point2, hull, moved
 from factory.layout.hands.hand import ROOT
@@ -52,6 +38,7 @@ from factory.layout.layout import Layout
 from factory.layout.visits import Visit
 from factory.plant.factory import Factory
 from factory.problem.pag import NOPART
+from factory.problem.robot_bodies import ARM_LOW, ARM_TOP, ARM_WIDTH, CARRIAGE_TOP, MAST
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,9 +121,10 @@ def _outfeed(layout: Layout, by_label: Mapping[str, Pile]) -> Iterator[Region]:
 def _bodies(layout: Layout, robot: int) -> Iterator[Region]:
     """Carriage, mast and arm, anywhere on the guidepath."""
     path, ends = layout.guidepaths[robot], layout.ends(robot)
+    carriage = layout.factory.carriage / 2
     mast, width = (CARRIAGE_TOP, ARM_TOP), MAST / 2
     for kind, layer, half, ahead, side, z in (
-        (CARRIAGE_BODY, CARRIAGES, CARRIAGE / 2, CARRIAGE / 2, CARRIAGE / 2, (0.0, CARRIAGE_TOP)),
+        (CARRIAGE_BODY, CARRIAGES, carriage, carriage, carriage, (0.0, CARRIAGE_TOP)),
         (MAST_BODY, ARMS, width, width, width, mast),
         (ARM_BODY, ARMS, 0.0, path.reach - path.arm, ARM_WIDTH / 2, (ARM_LOW, ARM_TOP)),
     ):

@@ -21,29 +21,33 @@ from xml.sax.saxutils import quoteattr
 from factory.control.profile import SpeedProfile
 from factory.layout.bins import Bin
 from factory.layout.feeding import outlets_of
-from factory.layout.guidepath import LEVER
 from factory.layout.hanging import Hanging
 from factory.layout.layout import Layout
 from factory.mjcf.bins import add_bins
+from factory.mjcf.driving import (
+    GRAVITY,
+    HOIST_STIFFNESS,
+    drive_for,
+    first_axis,
+    heaviest,
+    lifted,
+    up,
+)
 from factory.mjcf.elements import fill
-from factory.mjcf.feeders import add_feeders
+from factory.mjcf.feeders import SLIDER_MASS, add_feeders
 from factory.mjcf.insets import Insets, insets_of
-from factory.mjcf.outfeed import TRAY_MASS, add_outfeed
+from factory.mjcf.outfeed import SHUTTER_MASS, TRAY_MASS, add_outfeed
 from factory.mjcf.parts import add_meshes, add_parts, add_wholes
 from factory.mjcf.robot_bodies import add_robots
-from factory.mjcf.robots import (
-    Drive,
-    Hoist,
-    add_paints,
-)
+from factory.mjcf.robots import MOTOR, Drive, Hoist, add_paints
 from factory.mjcf.scene import add_scene
 from factory.mjcf.stops import stops_of
-from factory.mjcf.tools import gyration
 from factory.mjcf.unseen import leave_out_what_is_shown
 from factory.mjcf.welds import add_exclusions, add_welds
 from factory.plant.approaches import Pair
 from factory.plant.factory import Factory
 from factory.plant.fused_bodies import FusedBodies, Inside, bodies_of
+from factory.problem.robot_bodies import LIFT_JOINT
 from factory.problem.robot_types import Catalogue
 from factory.support.errors import Diagnostic
 from factory.support.settings import Settings
@@ -51,48 +55,12 @@ from factory.support.settings import Settings
 SKELETON = Path(__file__).with_name("skeleton.xml")
 """What every model has, whatever the factory."""
 
-CARRIAGE_MASS = 1.9
-"""What a `dot` weighs without payload [kg]."""
-
-HEAD_MASS = 0.4
-"""What the head of a `lift` weighs without payload [kg]."""
-
-TOOL_INERTIA = 0.00202
-"""What the drive of a fixed robot's tool turns without payload: that, and its motor's [kg m²]."""
-
-HOIST_MASS = 2.0
-"""What a `lift`'s hoist accelerates without payload: its head, and its motor's inertia [kg]."""
-
-STIFFNESS = 70.0
-"""Natural frequency of a robot's position loop at full payload [rad/s]."""
-
-HOIST_STIFFNESS = 200.0
-"""The same of a lift's, which holds a weight: half a payload unaccounted for lets it sag by 0.1
-mm [rad/s]."""
-
-PUSHED, DAMPED = 0.4, 0.8
-"""In a timestep a drive that carries nothing takes at most such shares of an offset and of a speed
-away: it is explicit, overshoots at 1, and is unstable where the first and twice the second are 4.
-With a long timestep it is less stiff for that."""
-
-LEAST = 0.5
-"""What moves a payload weighs at least this share of it: a weld is as stiff as the lighter of its
-bodies is heavy, and a heavy payload would swing on it. A motor's inertia makes up for what is
-missing."""
-
 MOST_BODIES = 8000
 """A pool of parts has at most so many bodies, unless told how many units may be inside: the engine
 takes minutes to compile more."""
 
 ARENA = 64
 """The engine's memory for contacts and constraints [MiB], without that for pairs of bodies."""
-
-GRAVITY = 9.81
-"""[m/s²]; the engine's own."""
-
-ROLLING = 0.003
-"""Friction of a carriage's and the tray's guide, as a share of the weight that it bears: that of a
-profile rail with balls (docs/decisions/guides.md)."""
 
 
 @dataclass(frozen=True)
@@ -191,7 +159,8 @@ def build_model(
         label: sum(bodies.mass[body] for body in inner) for label, inner in bodies.carried.items()
     }
     drives = tuple(
-        _drive(layout, robot, load, settings) for robot, load in enumerate(heaviest(layout, masses))
+        first_axis(layout, robot, load, settings).drive(settings)
+        for robot, load in enumerate(heaviest(layout, masses))
     )
     root = ElementTree.parse(SKELETON).getroot()
     root.set("model", product_name(factory))
@@ -209,7 +178,7 @@ def build_model(
     fast = settings.outfeed_acceleration
     tray = drive_for(TRAY_MASS, load, fast, settings)
     shutter = drive_for(
-        HOIST_MASS, 0.0, settings.shutter_limits[1] + GRAVITY, settings, HOIST_STIFFNESS
+        SHUTTER_MASS + MOTOR, 0.0, settings.shutter_limits[1] + GRAVITY, settings, HOIST_STIFFNESS
     )
     add_outfeed(world, actuator, layout, tray, shutter)
     hanging = Hanging.of(layout)
@@ -253,63 +222,11 @@ def model_files(model: Model, path: Path) -> dict[Path, bytes]:
     return {path: xml.encode(errors="surrogateescape"), **meshes}
 
 
-def heaviest(layout: Layout, masses: Mapping[str, float]) -> list[float]:
-    """The heaviest load that each robot carries [kg], by what labels weigh."""
-    factory = layout.whole.factory
-    names = {o.label: layout.named(o.label) for o in factory.making}
-    weights = {label: masses[name] for label, name in names.items() if name in masses}
-    operations, robots = factory.operations, factory.robots
-    return [
-        max(
-            weights.get(o.after[o.robots.index(robot.index)], 0.0)
-            for o in (operations[number] for number in robot.operations)
-        )
-        for robot in robots
-    ]
-
-
-def lifted(layout: Layout, masses: Mapping[str, float]) -> dict[int, float]:
-    """The heaviest load that each robot with a lift delivers [kg], by what labels weigh."""
-    factory = layout.whole.factory
-    return {
-        robot: max(masses[layout.named(label)] for label in factory.deliveries(robot))
-        for robot in factory.strokes
-    }
-
-
-def drive_for(
-    empty_mass: float,
-    load: float,
-    acceleration: float,
-    settings: Settings,
-    stiffness: float = STIFFNESS,
-) -> Drive:
-    """Critically damped gains for what moves a load, and the load [kg]; the force that their
-    acceleration [m/s²] takes; the inertia that the motor adds."""
-    inertia = max(0.0, LEAST * load - empty_mass)
-    empty, rate = empty_mass + inertia, 1 / settings.step
-    mass = empty + load
-    kp = min(mass * stiffness**2, PUSHED * empty * rate**2)
-    kv = min(2 * mass * stiffness, DAMPED * empty * rate)
-    force = settings.force * mass * acceleration + 5
-    return Drive(round(kp, 3), round(kv, 3), round(force, 3), settings.samples, round(inertia, 3))
-
-
-def _drive(layout: Layout, robot: int, load: float, settings: Settings) -> Drive:
-    """The drive of a robot's first axis, for the heaviest load [kg] of it; of one that turns for
-    its moment of inertia."""
-    if not layout.guidepaths[robot].fixed:
-        return drive_for(CARRIAGE_MASS, load, settings.acceleration, settings)
-    moment = load * gyration(layout, robot) ** 2
-    return drive_for(TOOL_INERTIA, moment, settings.acceleration / LEVER, settings, HOIST_STIFFNESS)
-
-
 def _hoists(layout: Layout, masses: Mapping[str, float], settings: Settings) -> dict[int, Hoist]:
     """The lifts, for the heaviest load of each: what it delivers."""
-    loads, hoists = lifted(layout, masses), {}
+    robots, loads, hoists = layout.whole.factory.robots, lifted(layout, masses), {}
     for robot, stroke in layout.whole.strokes.items():
-        most = settings.acceleration + GRAVITY
-        drive = drive_for(HOIST_MASS, loads[robot], most, settings, HOIST_STIFFNESS)
+        drive = up(robots[robot].body.axis(LIFT_JOINT), loads[robot], settings).drive(settings)
         hoists[robot] = Hoist(stroke, drive, stops_of(0.0, stroke, layout.clearance))
     return hoists
 
@@ -328,7 +245,7 @@ def _sliders(
         loads[slider] = max(loads.get(slider, 0.0), masses[outlet.label])
     return {
         slider: replace(
-            drive_for(HOIST_MASS, load, most, settings, HOIST_STIFFNESS), samples=samples
+            drive_for(SLIDER_MASS + MOTOR, load, most, settings, HOIST_STIFFNESS), samples=samples
         )
         for slider, load in loads.items()
     }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from factory.plant.factory import Robot
+from factory.plant.robot import Robot
 
 
 def carriage(robot: str) -> str:

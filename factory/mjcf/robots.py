@@ -6,13 +6,12 @@ from collections.abc import Collection
 from copy import deepcopy
 from dataclasses import dataclass, field
 from math import atan2, cos, hypot, sin
-from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from factory.layout.dimensions import FINGER_TOP, MAST, PAYLOAD
+from factory.layout.dimensions import FINGER_TOP, PAYLOAD
 from factory.layout.hands.limbs import Limb
 from factory.layout.layout import Guidepath, Point2
 from factory.mjcf import names
@@ -20,9 +19,9 @@ from factory.mjcf.elements import add, number, numbers
 from factory.mjcf.hands import Styles, add_hand
 from factory.mjcf.names import carriage, drive_across, head, slide_across
 from factory.mjcf.stops import Stops
-from factory.mjcf.tools import LIFTED, TOOL, mount_tool
+from factory.mjcf.tools import TOOL, mount_tool
+from factory.problem.robot_bodies import LIFT_JOINT, MAST, RobotBody
 from factory.problem.robot_types import RobotType
-from factory.support.errors import Diagnostic, InputError, Position
 
 OWN_HAND = {"finger", "pin", "column", "pad"}
 """Geoms of a type's own file that stand for a hand, where none is chosen."""
@@ -45,9 +44,10 @@ class Held:
 @dataclass(frozen=True, slots=True)
 class RobotModel:
     """The MJCF file of a robot type, taken apart: body, actuators, and the shared defaults and
-    assets, whose names are prefixed by the type's."""
+    assets, whose names are prefixed by the type's; `made`: what was read of it."""
 
     name: str
+    made: RobotBody = field(repr=False)
     body: Element = field(repr=False)
     actuators: tuple[Element, ...] = field(repr=False)
     defaults: Element = field(repr=False)
@@ -97,26 +97,15 @@ def add_drive(
 
 
 def load_robot_model(robot: RobotType) -> RobotModel:
-    """Reads the file of a type. Raises InputError (BadTemplate) where it is no MJCF of one
-    robot."""
-    path = Path(robot.mjcf)
-    try:
-        root = ElementTree.parse(path).getroot()
-        body = root.findall("worldbody/body")[0]
-        actuators = tuple(root.findall("actuator/*"))
-        if not actuators:
-            raise ValueError("no actuator")
-    except (OSError, ElementTree.ParseError, IndexError, ValueError) as error:
-        message = f"the file of robot type '{robot.name}' is unusable: {error or 'it has no body'}"
-        hint = "it needs one body with a joint `slide` and an actuator `drive`, like dot.xml"
-        line, column = getattr(error, "position", (1, 0))
-        at = Position(str(path), line, column + 1)
-        raise InputError(Diagnostic("BadTemplate", message, at, hint)) from error
+    """The file of a type, whose body has been read."""
+    root = ElementTree.parse(robot.mjcf).getroot()
+    body = root.findall("worldbody/body")[0]
+    actuators = tuple(root.findall("actuator/*"))
     defaults = Element("default", {"class": robot.name})
     for child in root.findall("default/*"):
         defaults.append(_prefixed(child, robot.name, names=False))
     assets = tuple(_prefixed(a, robot.name, names=True) for a in root.findall("asset/*"))
-    return RobotModel(robot.name, body, actuators, defaults, assets)
+    return RobotModel(robot.name, robot.body, body, actuators, defaults, assets)
 
 
 def _prefixed(element: Element, prefix: str, names: bool) -> Element:
@@ -186,7 +175,7 @@ def instantiate(
         _stretch(body, path, held.top, hoist)
     else:
         towers = any(limb.name == "tower" for limb in held.limbs)
-        _fit_arm(body, path, OWN_HAND | {CAP} if towers else OWN_HAND)
+        _fit_arm(body, path, OWN_HAND | {CAP} if towers else OWN_HAND, model.made)
         lifted = next((b for b in body.iter("body") if b.get("name") == head(robot)), None)
         turning = [limb for limb in held.limbs if path.fixed and limb.name in TOOL]
         others = [limb for limb in held.limbs if limb not in turning]
@@ -198,15 +187,15 @@ def instantiate(
     slide.set("ref", number(path.length))
     stops.limit(slide)
     if path.turn is not None:
-        mount_tool(body, slide, path.turn, held.limbs)
+        mount_tool(body, slide, path.turn, held.limbs, model.made)
+    if hoist is None:
+        _lock(body, names.lift(robot))
     actuators: list[Element] = []
     for actuator in model.actuators:
         kind = actuator.get("name") or ""
         named = {"name": f"{robot}/{kind}", "joint": f"{robot}/{actuator.get('joint')}"}
-        gains = {"drive": drive, "hoist": hoist.drive if hoist else None}.get(kind)
-        if gains is None:
-            actuators.append(_prefixed(actuator, model.name, names=False))
-            actuators[-1].attrib.update(named)
+        gains = drive if kind == "drive" else hoist.drive if hoist else None
+        if gains is None:  # a lift that nothing uses
             continue
         actuators.append(Element("pid", {**named, **gains.attributes()}))
         moved = next(j for j in body.iter("joint") if j.get("name") == named["joint"])
@@ -216,6 +205,14 @@ def instantiate(
         if gains is drive and path.bends:
             actuators.append(_bend(body, moved, actuators[-1], robot, path, stops))
     return body, actuators
+
+
+def _lock(body: Element, joint: str) -> None:
+    """Take a joint out of a body."""
+    for inner in body.iter("body"):
+        for each in inner.findall("joint"):
+            if each.get("name") == joint:
+                inner.remove(each)
 
 
 def _bend(
@@ -247,7 +244,7 @@ def heading_quaternion(path: Guidepath) -> tuple[float, float, float, float]:
     return (w, 0.0, 0.0, z)
 
 
-def _fit_arm(body: Element, path: Guidepath, without: Collection[str]) -> None:
+def _fit_arm(body: Element, path: Guidepath, without: Collection[str], made: RobotBody) -> None:
     """The arm from the mast to the rim, of a robot whose hand goes on from there, `without` some
     geoms; a tool's head reaches a little further."""
     rim = max(path.reach - path.arm, MAST / 2 + 0.002)
@@ -260,7 +257,8 @@ def _fit_arm(body: Element, path: Guidepath, without: Collection[str]) -> None:
             parents[geom].remove(geom)
     for lifted in body.iter("body"):
         if (lifted.get("name") or "").endswith("/head"):
-            inertia = {"pos": "0 0 0.1", "mass": number(LIFTED), "diaginertia": "2e-4 2e-4 2e-4"}
+            mass = number(made.axis(LIFT_JOINT).mass)
+            inertia = {"pos": "0 0 0.1", "mass": mass, "diaginertia": "2e-4 2e-4 2e-4"}
             lifted.insert(1, Element("inertial", inertia))
     for site in body.iter("site"):
         if (site.get("name") or "").endswith("/nest"):
@@ -281,10 +279,10 @@ def _stretch(body: Element, path: Guidepath, top: float, hoist: Hoist | None) ->
     for geom in body.iter("geom"):
         name = (geom.get("name") or "").rpartition("/")[2]
         for kind, ends in lines.items():
-            if name.startswith(kind):
+            if name == kind:
                 _span(geom, *ends)
         for kind, heights in uprights.items():
-            if name.startswith(kind):
+            if name == kind:
                 _stand(geom, nest, *heights)
     for site in body.iter("site"):
         if (site.get("name") or "").endswith("/nest"):

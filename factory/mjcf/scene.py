@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from factory.geometry.sight import Array, Framing, View, fit, towards
-from factory.layout.dimensions import CARRIAGE, PAYLOAD, Clearance
+from factory.layout.dimensions import PAYLOAD, Clearance
 from factory.layout.guidepath import Guidepath
 from factory.layout.layout import Layout
 from factory.layout.platen import tiles_of
@@ -86,7 +86,7 @@ def _rail(world: Element, layout: Layout, robot: int) -> None:
     begins (`stops.py`), its carriage passes over it."""
     name, path = layout.factory.robots[robot].name, layout.guidepaths[robot]
     room = Clearance(layout.clearance)
-    (low, high), over = layout.ends(robot), CARRIAGE / 2 + room.stop
+    (low, high), over = layout.ends(robot), layout.factory.carriage / 2 + room.stop
     face = SHOE + room.play
     if path.bends:
         _bent_rail(world, name, path, (low - over, high + over))

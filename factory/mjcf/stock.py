@@ -18,10 +18,12 @@ from factory.layout.feeding import outlets_of
 from factory.layout.layout import Layout
 from factory.layout.starting import start_positions
 from factory.mjcf import names
+from factory.mjcf.driving import GRAVITY
 from factory.mjcf.elements import add, number, numbers
 from factory.mjcf.feeders import SLIDER_MASS
-from factory.mjcf.model import GRAVITY, HEAD_MASS, Model
+from factory.mjcf.model import Model
 from factory.mjcf.outfeed import SHUTTER_MASS
+from factory.problem.robot_bodies import LIFT_JOINT
 
 LAW = ("kp", "kv", "forcerange")
 """What an actuator of a run and the written one have in common."""
@@ -83,7 +85,8 @@ def scales_of(layout: Layout) -> dict[str, Scale]:
 def _weights(model: Model) -> dict[str, float]:
     """What lifts, sliders and the shutter carry at the start [N], by the names of joints."""
     robots = model.factory.robots
-    masses = {names.lift(robots[robot].name): HEAD_MASS for robot in model.factory.strokes}
+    lifts = [robots[number] for number in model.factory.strokes]
+    masses = {names.lift(r.name): r.body.axis(LIFT_JOINT).mass for r in lifts}
     for outlet in outlets_of(model.layout):
         masses[names.slider(outlet.name)] = SLIDER_MASS + model.masses[outlet.label]
     masses[names.SHUTTER] = SHUTTER_MASS

@@ -14,16 +14,11 @@ import numpy as np
 from factory.layout.hands.limbs import Limb
 from factory.layout.layout import Layout
 from factory.mjcf.elements import number, numbers
+from factory.problem.robot_bodies import LIFT_JOINT, TURN_JOINT, RobotBody
 from factory.support.errors import Diagnostic, InputError
 
-LIFTED = 0.4
-"""Mass of a lift's head without what stands for a hand, and of the tool in it [kg]."""
-
-TURNS = 0.1
-"""Mass of a tool [kg]."""
-
-MOMENT = 2e-5
-"""Moment of inertia of a tool about each axis [kg m²]."""
+GYRATION = 2e-4
+"""Square of the radius of gyration of a tool about each axis [m²]."""
 
 WRIST = 0.004
 """How far below the beam the middle of what shows a tool's turn is [m]."""
@@ -32,10 +27,13 @@ TOOL = ("stem", "pad")
 """The limbs of a hand that are the tool of a fixed robot."""
 
 
-def mount_tool(body: Element, joint: Element, turn: float, limbs: Iterable[Limb]) -> None:
+def mount_tool(
+    body: Element, joint: Element, turn: float, limbs: Iterable[Limb], made: RobotBody
+) -> None:
     """Put a fixed robot's tool, and the origin of its body, where the middle of its pad is. Its
     `joint` turns what it holds by an angle [rad] from the highest coordinate to the lowest. Head
     and tool get their masses; what moves of the robot may sleep, since the rest never does."""
+    mass = made.axis(TURN_JOINT).mass
     tool = [limb for limb in limbs if limb.name in TOOL]
     pad = next(limb for limb in tool if limb.name == "pad")
     x, y = ((low + high) / 2 for low, high in zip(pad.low[:2], pad.high[:2], strict=True))
@@ -44,7 +42,7 @@ def mount_tool(body: Element, joint: Element, turn: float, limbs: Iterable[Limb]
         kind = (part.get("name") or "").rpartition("/")[2]
         if kind == "head":
             for inertial in part.findall("inertial"):
-                inertial.set("mass", number(LIFTED - TURNS))
+                inertial.set("mass", number(made.axis(LIFT_JOINT).mass - mass))
             part.set("sleep", body.attrib.pop("sleep", "allowed"))
         elif kind == "tool":
             part.set("pos", numbers((x, y, 0.0)))
@@ -53,7 +51,8 @@ def mount_tool(body: Element, joint: Element, turn: float, limbs: Iterable[Limb]
                 if (child.get("name") or "").endswith("/wrist"):
                     u, v, z = x, y, max(limb.high[2] for limb in tool) - WRIST
                 child.set("pos", numbers((round(u - x, 9), round(v - y, 9), z)))
-            inertia = {"mass": number(TURNS), "diaginertia": numbers((MOMENT, MOMENT, MOMENT))}
+            moments = numbers([round(GYRATION * mass, 12)] * 3)
+            inertia = {"mass": number(mass), "diaginertia": moments}
             part.insert(1, Element("inertial", {"pos": "0 0 0.1", **inertia}))
 
 

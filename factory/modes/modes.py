@@ -17,11 +17,12 @@ from factory.control.laws import Setting, hold, law_of
 from factory.control.mode import Array, Limits, Mode
 from factory.control.navigation import Bundle
 from factory.geometry.solids import Product
-from factory.layout.dimensions import CARRIAGE, Clearance
+from factory.layout.dimensions import Clearance
 from factory.layout.layout import Layout
 from factory.layout.optimising import first_feasible
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
+from factory.problem.robot_bodies import CARRIAGE
 from factory.problem.template import Point, Template
 from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import Settings
@@ -66,7 +67,7 @@ def check_modes(factory: Factory, users: Iterable[Template], product: Product) -
             )
             raise InputError(Diagnostic("NotPrepared", message, template.law_position, EXAMPLE))
     settings = Settings()
-    layout = first_feasible(factory, product, Clearance(settings.clearance))
+    layout = first_feasible(factory, product, Clearance(settings.clearance, factory.carriage))
     operation_modes(layout, settings.eps)
 
 

@@ -14,6 +14,7 @@ from types import MappingProxyType
 from factory.nets.gears import GearNet, ascending
 from factory.nets.undone import Joins
 from factory.plant.approaches import Approach
+from factory.plant.robot import Robot
 from factory.problem.pag import NOPART, PAG
 from factory.problem.plan import Plan, in_turn, out_of_turn
 from factory.problem.template import Template
@@ -100,23 +101,6 @@ class Operation:
         return self.index
 
 
-@dataclass(frozen=True, slots=True)
-class Robot:
-    """A robot identifier: name r1, r2, ..., its type, and its operations in the gear's order.
-
-    `position` is that of the operation that made it necessary (for diagnostics: the user's line).
-    `fixed`: it stands at the station of the robot that it delivers to, and its first axis turns
-    what it holds about the vertical.
-    """
-
-    index: int
-    name: str
-    type: str
-    operations: tuple[int, ...]
-    position: Position | None = field(default=None, compare=False)
-    fixed: bool = False
-
-
 @dataclass(frozen=True)
 class Factory(Pictured):
     """F = (R, ~, N) with the operations it is made of; the last operation is dropoff.
@@ -145,6 +129,11 @@ class Factory(Pictured):
     def by_label(self) -> Mapping[str, Operation]:
         """The operation that makes each label; dropoff under its own name."""
         return MappingProxyType({operation.label: operation for operation in self.operations})
+
+    @cached_property
+    def carriage(self) -> float:
+        """W, the width and length that each carriage has to itself: that of the largest [m]."""
+        return max(robot.body.carriage for robot in self.robots)
 
     @cached_property
     def present(self) -> tuple[int, ...]:

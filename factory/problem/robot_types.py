@@ -4,10 +4,12 @@ in that of a package that an entry point of `factory.robots` names."""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 
+from factory.problem.robot_bodies import RobotBody
+from factory.problem.robot_reader import read_body
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 from factory.support.extensions import extension_folders
 from factory.support.resources import mjcf_folder
@@ -21,17 +23,29 @@ LIFT = "lift"
 
 @dataclass(frozen=True, slots=True)
 class RobotType:
-    """T: its name, MJCF file, the type it extends ("" for none) and its purpose. `moves`: what
-    its axes do: go `along` a guidepath, `up`, or `turn` about the vertical. `fixed`: it stands at
-    its station, and turns what it holds; `lowers`: it lowers what it delivers."""
+    """T: its name, its MJCF file and the `body` that was read from it, the type it extends ("" for
+    none) and its purpose."""
 
     name: str
     mjcf: Path
+    body: RobotBody = field(repr=False)
     extends: str = ""
     summary: str = ""
-    moves: tuple[str, ...] = ("along",)
-    fixed: bool = False
-    lowers: bool = False
+
+    @property
+    def fixed(self) -> bool:
+        """Whether it stands at its station, and turns what it holds."""
+        return "along" not in self.body.moves
+
+    @property
+    def turns(self) -> bool:
+        """Whether it turns what it holds about the vertical."""
+        return "turn" in self.body.moves
+
+    @property
+    def lowers(self) -> bool:
+        """Whether it lowers what it delivers."""
+        return "up" in self.body.moves
 
 
 @dataclass(frozen=True)
@@ -63,11 +77,15 @@ class Catalogue:
         return other if self.fits(other, one) else None
 
 
+KEYS = ["mjcf", "extends", "summary"]
+"""What an entry of a catalogue may have; `mjcf` it must have."""
+
+
 def load_catalogue() -> Catalogue:
     """The shipped catalogue, with those of entry points.
 
     Raises InputError where a file is not readable TOML, or a type extends one that is not there,
-    or itself, or is there already.
+    or itself, or is there already; where its MJCF is not that of a robot (BadRobot).
     """
     types: dict[str, RobotType] = {}
     for path in (each / "catalogue.toml" for each in (mjcf_folder(), *extension_folders("robots"))):
@@ -82,21 +100,22 @@ def load_catalogue() -> Catalogue:
 
 def _types(path: Path) -> dict[str, RobotType]:
     _, table = read_toml(path, HINT)
-    try:
-        return {
-            name: RobotType(
-                name,
-                path.parent / str(entry["mjcf"]),
-                str(entry.get("extends", "")),
-                str(entry.get("summary", "")),
-                tuple(entry.get("moves", ("along",))),
-                bool(entry.get("fixed", False)),
-                bool(entry.get("lowers", False)),
-            )
-            for name, entry in table.items()
-        }
-    except (KeyError, TypeError, AttributeError) as error:
-        raise InputError(_trouble(path, f"the robot catalogue is unusable: {error}")) from error
+    types: dict[str, RobotType] = {}
+    for name, entry in table.items():
+        if not isinstance(entry, dict):
+            raise InputError(_trouble(path, f"'{name}' is no table of a robot type"))
+        for key, value in entry.items():
+            if key not in KEYS:
+                hint = did_you_mean(key, KEYS, "keys")
+                raise InputError(_trouble(path, f"'{name}' has the unknown key '{key}'", hint))
+            if not isinstance(value, str):
+                raise InputError(_trouble(path, f"{key} of '{name}' is {value!r}, not a text"))
+        if "mjcf" not in entry:
+            raise InputError(_trouble(path, f"'{name}' has no 'mjcf', the name of its file"))
+        file = path.parent / entry["mjcf"]
+        extends, summary = entry.get("extends", ""), entry.get("summary", "")
+        types[name] = RobotType(name, file, read_body(name, file), extends, summary)
+    return types
 
 
 def _check_ancestry(path: Path, robot: RobotType, types: Mapping[str, RobotType]) -> None:
@@ -111,6 +130,11 @@ def _check_ancestry(path: Path, robot: RobotType, types: Mapping[str, RobotType]
             raise InputError(_trouble(path, f"'{robot.name}' extends itself"))
         current = types[current.extends]
         seen.add(current.name)
+        lacking = [move for move in current.body.moves if move not in robot.body.moves]
+        if lacking or current.fixed != robot.fixed:
+            message = f"'{robot.name}' extends '{current.name}' and cannot do as that does"
+            hint = f"valid: an MJCF with all joints of {current.mjcf.name}"
+            raise InputError(Diagnostic("BadRobot", message, Position(str(robot.mjcf), 1, 1), hint))
 
 
 def _trouble(path: Path, message: str, hint: str = HINT) -> Diagnostic:

@@ -193,7 +193,7 @@ def _laid_out(new: Project, was: Layout, factory: Factory, pins: Pins, pin: Pin)
     hands = Hands(factory, product, settings.acceleration, pins.hands) if was.hands else None
     if pin == "hands":
         return new.ground.lay_out(factory, product, settings, hands)
-    size, speed = Clearance(settings.clearance), Pace.of(settings)
+    size, speed = Clearance(settings.clearance, factory.carriage), Pace.of(settings)
     pinning = Pinning(factory, product, size, speed, hands, pins)
     layout = pinning.layout()
     if layout is None:

@@ -8,13 +8,14 @@ import numpy as np
 
 from factory.control.mode import Truth
 from factory.geometry.meshes import Array
-from factory.layout.dimensions import FINGER, FINGER_TOP, MAST, PAYLOAD
+from factory.layout.dimensions import FINGER, FINGER_TOP, PAYLOAD
 from factory.layout.hands.hand import BEAM, Hand, Kind
 from factory.layout.hands.holding import Holding
 from factory.layout.hands.places import Places
 from factory.layout.hands.reach import back, halves, reach
 from factory.layout.hands.surfaces import Way, swept
 from factory.problem.pag import NOPART
+from factory.problem.robot_bodies import MAST
 
 Swept = tuple[Array, Array, Array]
 """Boxes that hands sweep, from `low` to `high` (n, 3), and boxes (m, 2, 3) that could be in the

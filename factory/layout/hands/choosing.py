@@ -25,7 +25,8 @@ from factory.layout.hands.one_hand import OneHand
 from factory.layout.hands.places import PUSH, centre_of
 from factory.layout.hands.surfaces import Way
 from factory.layout.stops import stops_of
-from factory.plant.factory import Factory, Robot
+from factory.plant.factory import Factory
+from factory.plant.robot import Robot
 
 
 @dataclass(frozen=True, slots=True)

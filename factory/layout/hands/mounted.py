@@ -6,17 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from factory.layout.dimensions import (
-    ARM_LOW,
-    ARM_TOP,
-    CARRIAGE_TOP,
-    FINGER,
-    FINGER_LOW,
-    FINGER_TOP,
-    MAST,
-)
+from factory.layout.dimensions import FINGER, FINGER_LOW, FINGER_TOP
 from factory.layout.guidepath import Extent, Point2
 from factory.layout.hands.hand import AIR, BEAM, PAD, ROOT, Hand, Point3
+from factory.problem.robot_bodies import ARM_LOW, ARM_TOP, CARRIAGE_TOP, MAST
 
 Round = Literal["", "x", "z"]
 

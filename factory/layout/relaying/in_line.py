@@ -12,7 +12,6 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from factory.layout.dimensions import ARM_WIDTH
 from factory.layout.hands.hand import Hand
 from factory.layout.hands.holding import held
 from factory.layout.hands.one_hand import OneHand
@@ -22,6 +21,7 @@ from factory.layout.hands.tips import STRONG
 from factory.layout.layout import Layout, carriers
 from factory.layout.relaying.lanes import HoldingInLanes, InTheWayInLanes, Lane
 from factory.plant.factory import Factory
+from factory.problem.robot_bodies import ARM_WIDTH
 
 InLine = tuple[tuple[Hand | None, ...], set[int]]
 """The hands of a factory with relays, and the robots (of the factory without) whose lanes are

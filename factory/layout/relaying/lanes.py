@@ -9,7 +9,7 @@ import numpy as np
 
 from factory.control.mode import Truth
 from factory.geometry.meshes import Array
-from factory.layout.dimensions import CARRIAGE, FINGER, Clearance
+from factory.layout.dimensions import FINGER, Clearance
 from factory.layout.hands.apart import BESIDE, HandsApart, Swept
 from factory.layout.hands.hand import Hand, Kind, widths
 from factory.layout.hands.holding import Holding, held
@@ -57,7 +57,7 @@ class HoldingInLanes(Holding):
         relays: Collection[int],
     ) -> None:
         super().__init__(factory, before.product)
-        self.relays, self.clearance = relays, Clearance(before.clearance)
+        self.relays, self.clearance = relays, Clearance(before.clearance, before.factory.carriage)
         self.origins, self.cut = origins, cut
         self.headings = [before.guidepaths[old].heading for old in origins]
         for robot in cut:
@@ -100,7 +100,7 @@ class HandsApartInLanes(HandsApart):
         wide = widths(places.radius) / 2
         away = (places.at[:, lane.across] - lane.line) * lane.side
         free = (away - wide >= c.c / 2) & (away - places.radius >= BESIDE)
-        free &= away + wide <= c.spread + CARRIAGE / 2
+        free &= away + wide <= c.spread + c.carriage / 2
         if self.holding.gives(robot):
             return free
         return free & super().own_side(robot, kind, places, u, t)

@@ -22,7 +22,7 @@ from factory.layout.optimising import optimised
 from factory.layout.outfeed import away
 from factory.layout.relaying.splitting import split
 from factory.layout.relaying.ways import Way, ways
-from factory.plant.factory import Robot
+from factory.plant.robot import Robot
 from factory.problem.pag import NOPART
 from factory.problem.robot_types import load_catalogue
 from factory.support.collector import collector_paused
@@ -77,7 +77,8 @@ class Room:
 
     def layout(self, wide: Collection[int]) -> Layout:
         """The layout with room for two lanes on the guidepaths of these robots."""
-        plain, c = self.plain, Clearance(self.plain.clearance)
+        plain = self.plain
+        c = Clearance(plain.clearance, plain.factory.carriage)
         return optimised(plain.factory, plain.product, c, self.pace, self.floor, wide, self.hands)
 
     def cuttable(self) -> set[int]:

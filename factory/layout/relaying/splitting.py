@@ -45,10 +45,11 @@ def split(
     factory = with_relays(before, numbers, templates, catalogue)
     cut = {r: list(_pieces(layout, r, ways, factory)) for r in range(len(before.robots))}
     hands, turned = _hands(layout, factory, cut)
+    c = Clearance(layout.clearance, factory.carriage)
     paths: dict[int, Guidepath] = {}
     starts: dict[int, float] = {}
     for robot, pieces in cut.items():
-        spread = Clearance(layout.clearance).spread * (-1 if robot in turned else 1)
+        spread = c.spread * (-1 if robot in turned else 1)
         for number, piece in enumerate(reversed(pieces)):
             lane = spread * (-1) ** number if len(pieces) > 1 else 0.0
             paths[piece.robot] = _path(layout.guidepaths[robot], piece, lane)

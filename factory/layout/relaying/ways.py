@@ -15,9 +15,10 @@ from dataclasses import dataclass
 from itertools import accumulate, pairwise
 from math import floor, inf
 
-from factory.layout.dimensions import CARRIAGE, MAST, up
+from factory.layout.dimensions import up
 from factory.layout.layout import Layout
 from factory.problem.pag import NOPART
+from factory.problem.robot_bodies import MAST
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +63,7 @@ def ways(layout: Layout) -> dict[str, Way]:
 
 def _ways(layout: Layout, robot: int) -> Iterator[Way]:
     path, c = layout.guidepaths[robot], layout.clearance
-    lanes = max(CARRIAGE, path.reach - path.arm + MAST / 2)
+    lanes = max(layout.factory.carriage, path.reach - path.arm + MAST / 2)
     at = [round(path.length - stop, 3) for stop in layout.stops(robot)]
     piles = _piles(layout, robot)
     fronts = [-inf, *(front for _, _, front in piles)]
@@ -103,4 +104,4 @@ def _beyond(layout: Layout, robot: int) -> float:
     if operation.index != factory.dropoff.index:
         return beside
     front = path.frame(layout.outgoing)[1]
-    return beside - c + min(0.0, front + path.arm, front + path.reach - CARRIAGE / 2)
+    return beside - c + min(0.0, front + path.arm, front + path.reach - layout.factory.carriage / 2)

@@ -12,6 +12,7 @@ from factory.layout.layout import Layout
 from factory.layout.way import Ways
 from factory.mjcf import names
 from factory.mjcf.tools import gyration
+from factory.problem.robot_bodies import LIFT_JOINT
 from factory.support.engine import mujoco
 
 
@@ -77,7 +78,8 @@ class Axes:
     Each (axes,): `qpos`, `dof`, `body`, `tree`, `actuator`: addresses in the engine's model.
     `lift`: the axis of a robot's lift, by the robot (index); `across`: the second slides of robots
     whose guidepaths have bends; `inertia` (axes,): what a load of 1 kg adds to what an axis moves:
-    1 kg, or the moment of inertia [kg m²] of one that turns about the vertical, an angle [rad].
+    1 kg, or the moment of inertia [kg m²] of one that turns about the vertical, an angle [rad];
+    `heads` (axes,): what lifts bear without payload, 0 of other axes [kg].
     """
 
     qpos: Index
@@ -88,6 +90,7 @@ class Axes:
     lift: Mapping[int, int]
     across: Across
     inertia: Array
+    heads: Array
 
     @classmethod
     def of(cls, m: mujoco.MjModel, layout: Layout) -> Axes:
@@ -108,7 +111,10 @@ class Axes:
         for robot in factory.robots:
             if robot.fixed:
                 inertia[robot.index] = gyration(layout, robot.index) ** 2
-        return cls(address, dof, body, m.body_treeid[body], actuator, lift, across, inertia)
+        heads = np.zeros(len(joint))
+        for number, axis in lift.items():
+            heads[axis] = factory.robots[number].body.axis(LIFT_JOINT).mass
+        return cls(address, dof, body, m.body_treeid[body], actuator, lift, across, inertia, heads)
 
     @property
     def turns(self) -> Truth:

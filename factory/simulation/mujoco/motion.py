@@ -9,7 +9,8 @@ import numpy as np
 
 from factory.control.mode import Array, Index
 from factory.control.navigation import Bundle
-from factory.mjcf.model import GRAVITY, HEAD_MASS, ROLLING, Model
+from factory.mjcf.driving import GRAVITY, ROLLING
+from factory.mjcf.model import Model
 from factory.simulation.mujoco.axes import Across, Axes
 from factory.simulation.mujoco.courses import AHEAD, Course, Follower, along, planned
 from factory.simulation.mujoco.drives import Drives
@@ -99,7 +100,7 @@ class Motion:
         lifts = [n for n, robot in enumerate(robots) if robot in lift]
         if lifts:
             axes = np.array([lift[robots[n]] for n in lifts])
-            self.drives.load(axes, mass[lifts], (HEAD_MASS + mass[lifts]) * GRAVITY)
+            self.drives.load(axes, mass[lifts], (self.axes.heads[axes] + mass[lifts]) * GRAVITY)
             stand = axes[self.robots.v[axes] == 0.0]
             if len(stand):
                 self.drives.stand(stand, self.robots.x[stand])

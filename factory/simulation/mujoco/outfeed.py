@@ -9,7 +9,8 @@ from factory.control.governor import towards
 from factory.control.mode import Array
 from factory.layout.dimensions import BEHIND, PLAY
 from factory.layout.outfeed import tray_profile
-from factory.mjcf.model import GRAVITY, Model
+from factory.mjcf.driving import GRAVITY
+from factory.mjcf.model import Model
 from factory.mjcf.outfeed import SHUTTER_MASS
 from factory.simulation.mujoco.axes import Axes
 from factory.simulation.mujoco.courses import AHEAD, Course, Follower, Move, planned

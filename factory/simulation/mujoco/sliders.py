@@ -14,8 +14,9 @@ from factory.control.governor import towards
 from factory.control.mode import Array, Index
 from factory.layout.feeding import outlets_of
 from factory.mjcf import names
+from factory.mjcf.driving import GRAVITY
 from factory.mjcf.feeders import SLIDER_MASS
-from factory.mjcf.model import GRAVITY, Model, stroke_ticks
+from factory.mjcf.model import Model, stroke_ticks
 from factory.simulation.mujoco.courses import Course, Move, planned
 from factory.simulation.mujoco.drives import Drives
 from factory.simulation.mujoco.sleep import Sleep

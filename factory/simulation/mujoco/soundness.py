@@ -15,9 +15,10 @@ from factory.control.mode import Array, Index
 from factory.layout.feeding import lines_of
 from factory.layout.hands.limbs import limbs
 from factory.mjcf import names
+from factory.mjcf.driving import GRAVITY
 from factory.mjcf.feeders import SLIDER_MASS
 from factory.mjcf.masks import masks_of
-from factory.mjcf.model import CARRIAGE_MASS, GRAVITY, Model
+from factory.mjcf.model import Model
 from factory.mjcf.outfeed import SHUTTER_MASS, TRAY_MASS
 from factory.simulation.mujoco.contacts import ContactMasks
 from factory.simulation.mujoco.fusing import angles, rotations
@@ -39,9 +40,8 @@ HOUSING = ("post", "lid", "end-1", "end1", "wall-1", "wall1")
 ROD = "/rod"
 """What the names of geoms end with that slide in lids, which have no holes for them."""
 
-WEIGHTS = {"carriage": CARRIAGE_MASS, "slider": SLIDER_MASS}
-WEIGHTS |= {"tray": TRAY_MASS, "shutter": SHUTTER_MASS}
-"""What weighs how much, by the last word of its name, with what is on it [kg]."""
+WEIGHTS = {"slider": SLIDER_MASS, "tray": TRAY_MASS, "shutter": SHUTTER_MASS}
+"""What weighs how much of stations, by the last word of its name, with what is on it [kg]."""
 
 HEAVIER = 1e-6
 """Masses are the same to this share."""
@@ -73,7 +73,9 @@ class Soundness:
         self.masks, self.gone, self.found = masks, set[int](), tuple[Diagnostic, ...]()
         self._name = [m.geom(geom).name for geom in range(m.ngeom)]
         called = [m.body(body).name for body in range(m.nbody)]
-        self.mass = np.array([WEIGHTS.get(name.rpartition("/")[2], np.nan) for name in called])
+        robots = {names.carriage(r.name): r.body.mass for r in model.layout.whole.factory.robots}
+        weights = (robots.get(n, WEIGHTS.get(n.rpartition("/")[2], np.nan)) for n in called)
+        self.mass = np.array([*weights])
         for label, ids in bodies.items():
             self.mass[ids] = model.carried.mass[label]
         self._shape: Array = np.empty(0)

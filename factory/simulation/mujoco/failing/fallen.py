@@ -10,8 +10,8 @@ import numpy as np
 
 from factory.layout.bins import TOP, Bin
 from factory.layout.sweeping import SweptFloor
+from factory.mjcf.driving import GRAVITY
 from factory.mjcf.masks import robot_code
-from factory.mjcf.model import GRAVITY
 from factory.simulation.mujoco.world import MujocoWorld
 
 SETTLES = 0.5

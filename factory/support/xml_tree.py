@@ -41,10 +41,11 @@ class Element:
 
 @dataclass
 class XmlDocument:
-    """A file of XML, and the faults found in it as a net."""
+    """A file of XML, and the faults found in what it describes, with their `code`."""
 
     file: str
     lines: list[str]
+    code: str
     faults: list[Diagnostic] = field(default_factory=list)
 
     def position(self, line: int, column: int) -> Position:
@@ -58,14 +59,14 @@ class XmlDocument:
 
     def fault(self, element: Element, message: str, hint: str) -> None:
         """Note a fault at an element."""
-        self.faults.append(Diagnostic("BadNet", message, self.at(element), hint))
+        self.faults.append(Diagnostic(self.code, message, self.at(element), hint))
 
     def stop(self) -> None:
-        """Raise InputError (BadNet) with the faults noted, if any."""
+        """Raise InputError with the faults noted, if any."""
         if self.faults:
             raise InputError(self.faults)
 
-    def read(self, text: str, ignored: frozenset[str]) -> Element:
+    def read(self, text: str, ignored: frozenset[str] = frozenset()) -> Element:
         """The root element of the text, without the elements that are `ignored`.
 
         Raises InputError (Syntax) where it is not well-formed or declares a document type.
@@ -110,7 +111,7 @@ class _Builder:
         element = Element(local, attributes, line, column)
         self.elements += 1
         if self.elements > MOST:
-            self.document.fault(element, f"the net has more than {MOST} elements", "take it apart")
+            self.document.fault(element, f"it has more than {MOST} elements", "take it apart")
             self.document.stop()
         self.stack[-1].children.append(element)
         self.stack.append(element)
@@ -135,6 +136,6 @@ class _Builder:
     def doctype(self, *_: object) -> None:
         line, column = self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber + 1
         at = self.document.position(line, column)
-        hint = "leave the <!DOCTYPE ...> out: nothing in a net needs entities"
+        hint = "leave the <!DOCTYPE ...> out: nothing here needs entities"
         message = "a document type declaration is not accepted"
         raise InputError(Diagnostic("Syntax", message, at, hint))
