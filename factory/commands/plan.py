@@ -116,7 +116,8 @@ def plan(
         with Waiting(f"reading {source.name}", out.silent):
             return read_source(source, templates, options)
 
-    options = SourceOptions(unit, keep, replan, library, boxes, in_place)
+    fast = None if no_screws else screws
+    options = SourceOptions(unit, keep, replan, library, boxes, in_place, fast)
     placed = asked(read_as, options, out.silent)
     meant, allow = overlaps_in(allow, {part.label for part in placed.parts})
     placed = replace(placed, allowed=(*placed.allowed, *meant))
@@ -127,7 +128,6 @@ def plan(
         for note in placed.notes:
             say(f"  {note}")
     side = UPS[up] if up else None
-    fast = None if no_screws else screws
     search = PlanOptions(aim, seconds, allow, hulls, side, base or "", fast, templates=templates)
     planned, stopped = _sought(placed, search, out)
     if isinstance(planned, CannotAssemble):

@@ -9,7 +9,7 @@ on the solids as drawn.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -149,19 +149,23 @@ def _gaps(low: Array, high: Array, lows: Array, highs: Array) -> Array:
     return np.asarray(np.linalg.norm(np.maximum(0.0, np.maximum(lows - high, low - highs)), axis=1))
 
 
-def check_in_place(parts: Sequence[PlacedPart]) -> list[Diagnostic]:
-    """The faults of parts that are not in place (NotInPlace); empty if they are."""
+def check_in_place(parts: Sequence[PlacedPart], screws: Collection[str] = ()) -> list[Diagnostic]:
+    """The faults of parts that are not in place (NotInPlace); empty if they are. What a screw, and
+    a part that is none, have in common is a thread, no fault."""
     solids = [part.solid for part in parts]
     bodies = [drawn(solid) for solid in solids]
-    faults = _inside(solids, bodies)
+    faults = _inside(solids, bodies, screws)
     return faults or _groups(solids, bodies)
 
 
-def _inside(solids: Sequence[Solid], bodies: Sequence[Any]) -> list[Diagnostic]:
+def _inside(
+    solids: Sequence[Solid], bodies: Sequence[Any], screws: Collection[str]
+) -> list[Diagnostic]:
     """Parts that are inside one another."""
     overlaps: list[tuple[float, str, str, Common]] = []
     for one, other in near_pairs(solids, -DEPTH).tolist():
-        if bodies[one] is None or bodies[other] is None:
+        threaded = (solids[one].label in screws) != (solids[other].label in screws)
+        if threaded or bodies[one] is None or bodies[other] is None:
             continue
         small, large = sorted((one, other), key=lambda n: float(bodies[n].volume()))
         shared = common(bodies[small], bodies[large])

@@ -28,7 +28,7 @@ def write_planned(
     first. `allow`: units, or pairs of them, that may pass through others. Raises InputError where a
     file would be written over the source or through a link."""
     tree = planned.tree, planned.orientation
-    made = planned_product(placed, *tree, source.name, allow, templates)
+    made = planned_product(placed, *tree, source.name, allow, templates, planned.screws)
     files = {folder / name: content for name, content in made.files.items()}
     own_names(folder, files, [source])
     write_all(files)
