@@ -104,6 +104,8 @@ class Project:
         InputError (BadLine)."""
         from factory.compiler.folding import fold, lines_of_labels
 
+        if not lines:
+            return self
         factory = self.planned
         return self.with_plan(fold(factory, lines_of_labels(factory, lines), self.catalogue))
 

@@ -133,7 +133,7 @@ def plan(
     if isinstance(planned, CannotAssemble):
         return refuse(placed, planned, folder, look, out)
     files = write_planned(placed, planned, folder, source, allow, templates)
-    project = read(files[0], folders)
+    project = read(files[0], folders).with_lines(planned.lines)
     if stopped and not out.silent:
         say("  stopped: the best tree so far, without pictures")
     announced_before = set(map(id, project.product.warnings))
@@ -147,7 +147,7 @@ def plan(
         emit(_document(placed, planned, project, [*files, *looked], warnings))
     else:
         _print_files([*files, *looked], out)
-    return 0
+    return 1 if project.matings and project.matings.faults(project.pag.allowed) else 0
 
 
 def _sought(

@@ -58,10 +58,11 @@ class Blocking:
 
     `levels` (3, n, n): how much j blocks i that leaves along +x, +y or +z; the opposite direction
     has the transpose. `locks` (3, n, n): whether j prevents i from leaving. `touch` (n, n): which
-    units touch; `near` (n, n): which are near each other. `low`, `high` (n, 3): their boxes [m]. `depths` (3, n, n): how deep i gets into j
-    [m]; empty if unknown. `hidden`: the parts of two units that overlap in the finished product
-    according to the hull of an open mesh, the deepest first. `feet`: what units stand on; None if
-    tipping does not matter. `base`: the unit onto which all others come, -1 for none.
+    units touch; `near` (n, n): which are near each other. `low`, `high` (n, 3): their boxes [m].
+    `depths` (3, n, n): how deep i gets into j [m]; empty if unknown. `hidden`: the parts of two
+    units that overlap in the finished product according to the hull of an open mesh, the deepest
+    first. `feet`: what units stand on; None if tipping does not matter. `base`: the unit onto which
+    all others come, -1 for none.
     """
 
     labels: tuple[str, ...]

@@ -31,20 +31,22 @@ def _numbers(text: str) -> frozenset[int]:
 
 
 DIN = _numbers(
-    "84 85 95 96 97 186 188 261 316 404 417 427 438 444 464 465 478 479 480 525 529 551 553 558 561"
-    " 564 571 580 601 603 604 605 607 608 609 610 653 787 797 835 906 908 909 910 912 913 914 915"
-    " 916 920 921 922 923 925 926 927 931 933 938 939 940 949 960 961 963 964 965 966 967 968 975"
-    " 976 2509 2510 6332 6367 6378 6379 6900 6901 6902 6912 6914 6921 6922 7380 7500 7504 7505 7513"
-    " 7516 7964 7968 7969 7970 7971 7972 7973 7976 7981 7982 7983 7984 7985 7990 7991 7992 7995 7996"
-    " 7997 7998 7999 34800 34801 34802 34803 34804 34805 34806 34821 34822 34823 34824 34827 82101"
+    "84 85 95 96 97 186 188 261 316 404 417 427 438 444 464 465 478 479 480 525 529 551 553 558"
+    " 561 564 571 580 601 603 604 605 607 608 609 610 653 787 797 835 906 908 909 910 912 913 914"
+    " 915 916 920 921 922 923 925 926 927 931 933 938 939 940 949 960 961 963 964 965 966 967 968"
+    " 975 976 2509 2510 6332 6367 6378 6379 6900 6901 6902 6912 6914 6921 6922 7380 7500 7504"
+    " 7505 7513 7516 7964 7968 7969 7970 7971 7972 7973 7976 7981 7982 7983 7984 7985 7990 7991"
+    " 7992 7995 7996 7997 7998 7999 34800 34801 34802 34803 34804 34805 34806 34821 34822 34823"
+    " 34824 34827 82101"
 )
 """Numbers of DIN standards of screws, bolts and studs."""
 
 ISO = _numbers(
-    "1207 1479 1481 1482 1483 1580 2009 2010 2342 2702 3266 3506 4014 4015 4016 4017 4018 4026 4027"
-    " 4028 4029 4162 4762 4766 7045 7046 7047 7048 7049 7050 7051 7053 7379 7380 7411 7412 7434 7435"
-    " 7436 7437 7438 8676 8677 8678 8765 10509 10510 10642 10644 12474 13918 14579 14580 14581 14582"
-    " 14583 14584 14585 14586 14587 15071 15072 15480 15481 15482 15483 21269 23429 1662 1665"
+    "1207 1479 1481 1482 1483 1580 2009 2010 2342 2702 3266 3506 4014 4015 4016 4017 4018 4026"
+    " 4027 4028 4029 4162 4762 4766 7045 7046 7047 7048 7049 7050 7051 7053 7379 7380 7411 7412"
+    " 7434 7435 7436 7437 7438 8676 8677 8678 8765 10509 10510 10642 10644 12474 13918 14579"
+    " 14580 14581 14582 14583 14584 14585 14586 14587 15071 15072 15480 15481 15482 15483 21269"
+    " 23429 1662 1665"
 )
 """Numbers of ISO and EN standards of screws, bolts and studs; EN 24014 is ISO 4014."""
 
@@ -56,8 +58,8 @@ SIZE = re.compile(r"\bm ?\d{1,2}(?:[., ]\d{1,2})? ?x ?\d+(?:[., ]\d+)?(?: ?x ?\d
 THREAD = re.compile(r"\bm ?\d{1,2}(?:[.,]\d+)?\b")
 
 PREPOSITIONS = _words(
-    "for with of to in on at from without fuer fur mit von zu zur zum an am auf ohne pour avec de du"
-    " des par para con del por per di da della voor met"
+    "for with of to in on at from without fuer fur mit von zu zur zum an am auf ohne pour avec"
+    " de du des par para con del por per di da della voor met"
 )
 
 SCREW = re.compile(
@@ -104,13 +106,13 @@ OTHERS = re.compile(
 MORE = _words(
     "left right top bottom upper lower front rear back inner outer middle mid center centre side"
     " corner north south east west links rechts oben unten vorne hinten mitte innen aussen first"
-    " second third last short long kurz lang small large big klein gross thin thick lh rh"
-    " copy kopie instance inst no nr num number part body solid component comp mesh object obj stl"
-    " steel stainless inox zinc brass messing stahl black schwarz silver nylon galvanized verzinkt"
-    " hex hexagon hexagonal torx allen inbus phillips pozi pozidriv slotted recessed tx pz ph sw"
-    " pan flat button cheese countersunk csk senkkopf zylinderkopf linsenkopf sechskant innensechskant"
-    " mm inch unc unf grade class type typ standard std din iso en bs jis gost uni ansi asme"
-    " a b c d e f g h i j k l m n o p q r s t u v w x y z"
+    " second third last short long kurz lang small large big klein gross thin thick lh rh copy"
+    " kopie instance inst no nr num number part body solid component comp mesh object obj stl"
+    " steel stainless inox zinc brass messing stahl black schwarz silver nylon galvanized"
+    " verzinkt hex hexagon hexagonal torx allen inbus phillips pozi pozidriv slotted recessed tx"
+    " pz ph sw pan flat button cheese countersunk csk senkkopf zylinderkopf linsenkopf sechskant"
+    " innensechskant mm inch unc unf grade class type typ standard std din iso en bs jis gost uni"
+    " ansi asme a b c d e f g h i j k l m n o p q r s t u v w x y z"
 )
 """Words that say more of what a noun names."""
 

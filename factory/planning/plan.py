@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from factory.planning.fastening import fastened, fasteners, renumbered
 from factory.planning.judging import Join, Judged
 from factory.planning.laying import LaidOut, Layouts
 from factory.planning.parts import InPlace, refuse_hidden
-from factory.planning.posing import Pose, along, loose, posed, said, screwing, toppling
+from factory.planning.posing import Pose, along, loose, posed, said, screwing, sharing, toppling
 from factory.planning.searching import Aim, Sought, Trees, budget_of, trees
 from factory.planning.standing import feet
 from factory.planning.subsets import BLOCKED, ROOT_AXIS, Stance, stances
@@ -115,7 +116,8 @@ class Planned:
     onto the floor, the operations and figures, and the laid-out `project` (None if estimates alone
     decided). `optimal`: whether it is proved that no tree is better in price and expected cycle;
     `hidden`: the pairs that overlap according to accepted hulls; `notes`: the orientation and other
-    remarks; `screws`: the units that are screws, driven in or not."""
+    remarks; `screws`: the units that are screws, driven in or not; `lines`: those that share a
+    robot, `alone`: why others do not."""
 
     tree: Tree = field(repr=False)
     orientation: Array
@@ -126,6 +128,8 @@ class Planned:
     hidden: tuple[Overlapping, ...] = field(default=(), repr=False)
     notes: tuple[str, ...] = ()
     screws: tuple[str, ...] = ()
+    lines: tuple[tuple[str, ...], ...] = ()
+    alone: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -164,6 +168,7 @@ def plan(source: InPlace, options: PlanOptions | None = None) -> Planned | Canno
     planned = _planned(pose, asked, budget)
     notes = (*said(pose, planned.orientation), *toppling(planned.figures.tips))
     notes += (*loose(planned.figures.apart), *screwing(screws_in(planned.tree), planned.screws))
+    notes += (*sharing(planned.lines), *planned.alone)
     return replace(planned, hidden=pairs if asked.hulls else (), notes=notes)
 
 
@@ -277,7 +282,8 @@ def _result(pose: Pose, laid: LaidOut, optimal: bool, layouts: int) -> Planned:
     joins = tuple(_join(join, pose, room[join.direction[0]]) for join in judged.joins)
     project = laid.project if layouts else None
     orientation = judged.stance.rotation @ pose.turn
-    return Planned(laid.tree, orientation, joins, figures, optimal, project)
+    shared: dict[str, Any] = {"lines": laid.lines, "alone": laid.apart}
+    return Planned(laid.tree, orientation, joins, figures, optimal, project, **shared)
 
 
 def _join(join: Join, pose: Pose, room: Array) -> PlannedJoin:

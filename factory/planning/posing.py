@@ -143,6 +143,12 @@ def screwing(driven: Sequence[str], screws: Sequence[str]) -> tuple[str, ...]:
     return tuple(notes)
 
 
+def sharing(lines: Sequence[Sequence[str]]) -> tuple[str, ...]:
+    """A note on each line of screws that share a robot and a driver."""
+    words = "share the robot that brings them, and a driver ([lines] in factory.toml)"
+    return tuple(f"{listing(line, 12)} {words}" for line in lines)
+
+
 def loose(count: int) -> tuple[str, ...]:
     """A note on sub-assemblies whose parts do not touch each other, if there are any."""
     some = f"{count} sub-assemblies have" if count > 1 else "a sub-assembly has"

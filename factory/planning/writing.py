@@ -52,6 +52,19 @@ def screws_in(tree: Tree) -> tuple[str, ...]:
     return (*(screw for below in inside for screw in screws_in(below)), *mine)
 
 
+def screw_lines(tree: Tree, kinds: Mapping[str, str]) -> tuple[tuple[str, ...], ...]:
+    """The equal screws of a tree that come to one sub-assembly one after the other: one robot
+    brings those of a line, and one driver turns them; `kinds`: those of parts."""
+    if isinstance(tree, str):
+        return ()
+    inside = (tree.tree,) if isinstance(tree, Screwed) else tree
+    lines = [line for below in inside for line in screw_lines(below, kinds)]
+    alike: dict[str, list[str]] = {}
+    for screw in tree.screws if isinstance(tree, Screwed) else ():
+        alike.setdefault(kinds.get(screw, screw), []).append(screw)
+    return (*lines, *(tuple(line) for line in alike.values() if len(line) > 1))
+
+
 @dataclass(frozen=True, slots=True)
 class PlannedProduct:
     """A product as `plan` writes it: its PAG, the contents of its files by path in the output
@@ -71,11 +84,11 @@ def planned_product(
     threaded: Collection[str] = (),
 ) -> PlannedProduct:
     """The product that a tree makes of a source's parts, turned by a rotation (3, 3) about the
-    origin. `by` is said in the first line of the PAG. Of units, or pairs `a:b`, that `allow` has,
-    what they pass through is allowed as deep as it is; so are the threads that `threaded` parts,
-    which are screws, have in common with parts that are none. Only those of the `templates` that the
-    package ships are used: `mate`, with its further inputs inserted, `screw` and `relay`, besides
-    what kept sub-trees name."""
+    origin. `by` is said in the first line of the PAG. Of units, or pairs `a:b`, that `allow`
+    has, what they pass through is allowed as deep as it is; so are the threads that `threaded`
+    parts, which are screws, have in common with parts that are none. Only those of the
+    `templates` that the package ships are used: `mate`, with its further inputs inserted,
+    `screw` and `relay`, besides what kept sub-trees name."""
     turn = np.eye(3) if orientation is None else orientation
     kept = {keep.label: keep.nodes for keep in source.kept}
     taken = {part.label for part in source.parts}
