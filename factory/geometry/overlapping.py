@@ -16,6 +16,9 @@ from factory.support.errors import Diagnostic
 SILENT = 2e-5
 """Smaller overlaps are rounding, or the accuracy of a drawing [m]."""
 
+INSIDE = 0.999
+"""A part lies inside another if they have more than this share of its volume in common."""
+
 EVERYWHERE = 5e-4
 """The depth of overlaps in a drawing without fits [m]."""
 
@@ -28,13 +31,18 @@ NAMED = 6
 
 @dataclass(frozen=True, slots=True)
 class Overlapping:
-    """Two parts, in the order of the product, and the depth of their overlap [m]."""
+    """Two parts, in the order of the product, and the depth of their overlap [m]; `inner`: the one
+    of them that lies inside the other, "" for neither."""
 
     one: str
     other: str
     depth: float
+    inner: str = ""
 
     def __str__(self) -> str:
+        if self.inner:
+            outer = self.one if self.inner == self.other else self.other
+            return f"{self.inner} lies inside {outer} when finished"
         return f"{self.one} and {self.other} overlap by {1e3 * self.depth:.2f} mm when finished"
 
     def fault(self, allowed: Sequence[AllowedOverlap]) -> Diagnostic | None:
@@ -45,6 +53,8 @@ class Overlapping:
         words = f"{self}, and {1e3 * most:.2f} mm is allowed" if most else str(self)
         option = f"--allow {self.one}:{self.other}"
         hint = f"correct the drawing or, if the overlap is intended, allow it: {option}"
+        if self.inner:
+            hint = f"move '{self.inner}' to its place, remove it, or give the other part its recess"
         return Diagnostic("Overlap", words, None, hint)
 
 
@@ -111,9 +121,12 @@ def _found(product: Product, insides: Insides) -> DrawnOverlaps:
         if insides and not any(both <= inside for inside in insides):
             continue
         if bodies[one] is not None and bodies[other] is not None:
-            depth = common(bodies[one], bodies[other]).depth
-            if depth > SILENT:
-                pairs.append(Overlapping(labels[one], labels[other], depth))
+            shared = common(bodies[one], bodies[other])
+            if shared.depth > SILENT:
+                small = min((one, other), key=lambda n: float(bodies[n].volume()))
+                whole = shared.volume > INSIDE * bodies[small].volume()
+                inner = labels[small] if whole else ""
+                pairs.append(Overlapping(labels[one], labels[other], shared.depth, inner))
     pairs.sort(key=lambda pair: -pair.depth)
     left = (label for label, body in zip(labels, bodies, strict=True) if body is None)
     return DrawnOverlaps(tuple(pairs), tuple(left))
