@@ -3,7 +3,7 @@ clamp, and their nuts put on."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -65,32 +65,40 @@ class Fastening:
             self.places.append(_Place(path, units, axis))
         return units
 
-    def drive(self, screw: int, clamped: Sequence[int]) -> bool:
-        """Drive a screw into the smallest sub-assembly that contains all parts that it clamps, if
-        it can get there and no later operation collides with it. Returns whether there is such a
-        place."""
-        return self._joined(screw, clamped, self.driven, (self.up.up,))
+    def drive(self, threads: Sequence[Thread]) -> bool:
+        """Drive screws, one after the other, into the smallest sub-assembly that contains all parts
+        that they clamp, if they can get there and no later operation collides with them. Returns
+        whether there is such a place."""
+        needed = {unit for thread in threads for unit in thread.clamps}
+        return self._joined([t.screw for t in threads], needed, self.driven, (self.up.up,))
 
     def put_on(self, ring: int, screw: int, near: Sequence[int]) -> bool:
         """Put a nut or a washer on a screw, from above or from below, in the smallest sub-assembly
         that has that screw and all that is `near` the ring. Returns whether there is such a
         place."""
-        return self._joined(ring, [screw, *near], self.put, (self.up.up, -self.up.up))
+        return self._joined([ring], {screw, *near}, self.put, (self.up.up, -self.up.up))
 
     def _joined(
         self,
-        unit: int,
-        needed: Sequence[int],
+        come: Sequence[int],
+        needed: Collection[int],
         at: dict[tuple[int, ...], list[Join]],
         upright: Sequence[int],
     ) -> bool:
         for place in self.places:
             there = self._with_screws(place.units, place.path)
-            if {*needed} <= {*there} and self._passes(unit, place):
+            if not {*needed} <= {*there}:
+                continue
+            joins = list[Join]()
+            for unit in come:
                 join = self._way(unit, there, place.axis, upright)
-                if join is not None:
-                    at.setdefault(place.path, []).append(join)
-                    return True
+                if join is None or not self._passes(unit, place):
+                    break
+                joins.append(join)
+                there = (*there, unit)
+            else:
+                at.setdefault(place.path, []).extend(joins)
+                return True
         return False
 
     def _with_screws(self, units: Units, path: tuple[int, ...]) -> Units:
@@ -190,8 +198,13 @@ def fastened(
 ) -> tuple[Judged, tuple[int, ...]]:
     """A tree of all other units with the screws in it, and their nuts, and those of both for which
     there is no place."""
-    work = Fastening(graphs, judged, judged.stance)
-    left = [one.screw for one in threads if not work.drive(one.screw, one.clamps)]
+    work, left = Fastening(graphs, judged, judged.stance), list[int]()
+    alike: dict[tuple[str, int], list[Thread]] = {}
+    for one in threads:
+        alike.setdefault((one.kind, one.into), []).append(one)
+    for several in alike.values():
+        if not work.drive(several):  # in one place, to share a driver
+            left += [one.screw for one in several if not work.drive([one])]
     screws, follow = {one.screw for one in threads}, {n for one in threads for n in one.follow}
     for one in threads:
         for ring in one.follow if one.screw not in left else ():

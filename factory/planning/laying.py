@@ -21,7 +21,7 @@ from factory.planning.judging import Judged
 from factory.planning.parts import InPlace
 from factory.planning.searching import Aim
 from factory.planning.subsets import Stance
-from factory.planning.writing import Screwed, planned_product, screw_lines
+from factory.planning.writing import Screwed, planned_product, screw_lines, screws_in
 from factory.planning.writing import Tree as LabelTree
 from factory.problem.plan import Plan
 from factory.problem.robot_types import load_catalogue
@@ -114,17 +114,23 @@ class Layouts:
             self._products[judged.stance] = product_geometry(pag, self.source.files)
         project.__dict__["product"] = self._products[judged.stance]
         laid = LaidOut(judged, tree, project, self.kinds(judged.tree))
-        lines, apart = list[tuple[str, ...]](), list[str]()
-        for line in screw_lines(tree, self._kinds):
-            try:
-                project.with_lines([line])
-                lines.append(line)
-            except InputError as error:
-                apart += [fault.message for fault in error.diagnostics]
-        if not lines:
-            return replace(laid, apart=tuple(apart))
-        shared = replace(laid, project=project.with_lines(lines), lines=tuple(lines))
-        return replace(shared, apart=tuple(apart))
+        lines = [one for line in screw_lines(tree, self._kinds) for one in _lines(project, line)]
+        why = self._spread(screws_in(tree), lines)
+        shared = project.with_lines(lines)
+        return replace(laid, project=shared, lines=tuple(lines), apart=why)
+
+    def _spread(self, screws: Sequence[str], lines: Sequence[Sequence[str]]) -> tuple[str, ...]:
+        """Why equal screws are not on one line."""
+        line = {screw: number for number, line in enumerate(lines) for screw in line}
+        alike: dict[str, list[str]] = {}
+        for screw in screws:
+            alike.setdefault(self._kinds.get(screw, screw), []).append(screw)
+        why = "they come to several sub-assemblies, or from several sides"
+        return tuple(
+            f"{listing(several, 12)} do not all share a driver: {why}"
+            for several in alike.values()
+            if len({line.get(screw, screw) for screw in several}) > 1
+        )
 
     def or_alone(self, laid: LaidOut) -> LaidOut:
         """A layout whose screws share robots or, where there is none of them, or hands cannot hold
@@ -194,3 +200,19 @@ class Layouts:
         if best is None:
             raise ValueError("there is no tree to lay out")
         return best
+
+
+def _lines(project: Project, screws: Sequence[str]) -> list[tuple[str, ...]]:
+    """The fewest lines found for some screws, those of one screw left out."""
+    lines: list[list[str]] = []
+    for screw in screws:
+        for line in lines:
+            try:
+                project.with_lines([[*line, screw]])
+            except InputError:
+                continue
+            line.append(screw)
+            break
+        else:
+            lines.append([screw])
+    return [tuple(line) for line in lines if len(line) > 1]

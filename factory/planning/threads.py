@@ -23,10 +23,12 @@ from factory.planning.shanks import Shank, shank_of
 
 @dataclass(frozen=True, slots=True)
 class Thread:
-    """A `screw`; the units that it `clamps`, which come before it; the rings that `follow` it, in
-    their order; and the unit `into` which it is driven before any other comes, -1 for none."""
+    """A `screw` of some `kind`; the units that it `clamps`, which come before it; the rings that
+    `follow` it, in their order; the unit `into` which it is driven before any other comes, -1 for
+    none, and the one that this would be (`first`)."""
 
     screw: int
+    kind: str
     clamps: Units
     follow: Units = ()
     into: int = -1
@@ -45,7 +47,7 @@ def threads(
     for screw in screws:
         near = np.flatnonzero(graphs.near[screw] & others).tolist()
         shank = shank_of(units[screw][0], bare=True) if len(units[screw]) == 1 else None
-        thread = Thread(screw, tuple(near))
+        thread = Thread(screw, units[screw][0].kind, tuple(near))
         if shank is not None:
             thread = _thread(graphs, units, near, thread, shank, taken)
         taken |= {*thread.follow}
@@ -92,7 +94,8 @@ def _thread(
     tail = shank.ends[0] if shank.headed else shank.ends[1 if sides == {-1} else 0]
     first = min(left, key=lambda n: _apart(graphs, n, axis, float(tail[axis])), default=-1)
     into = first if peeled and not shank.headed and len(sides) == 1 else -1
-    return Thread(screw, (into,) if into >= 0 else clamps, tuple(peeled[::-1]), into, first)
+    needed = (into,) if into >= 0 else clamps
+    return replace(thread, clamps=needed, follow=tuple(peeled[::-1]), into=into, first=first)
 
 
 def _apart(graphs: Blocking, unit: int, axis: int, at: float) -> float:
