@@ -167,8 +167,8 @@ def plan(source: InPlace, options: PlanOptions | None = None) -> Planned | Canno
         return CannotAssemble(pose.stuck, removal(graphs), pose.needs)
     planned = _planned(pose, asked, budget)
     notes = (*said(pose, planned.orientation), *toppling(planned.figures.tips))
-    notes += (*loose(planned.figures.apart), *screwing(screws_in(planned.tree), planned.screws))
-    notes += (*sharing(planned.lines), *planned.alone)
+    notes += (*loose(planned.figures.apart), *sharing(planned.lines), *planned.alone)
+    notes += screwing(screws_in(planned.tree), planned.screws)
     return replace(planned, hidden=pairs if asked.hulls else (), notes=notes)
 
 

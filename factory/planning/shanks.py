@@ -25,7 +25,7 @@ HOLE = 0.65, 1.5
 """A hole around a shank is at least and at most so many times as wide."""
 
 HEIGHTS = (0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95)
-"""Where along a shank it is tested for holes around it, as shares of its length."""
+"""Where along a shank it is tested for holes around it, as shares of what is beside a part."""
 
 AROUND, MOST = 8, 6
 """The number of directions in which walls are sought, and in how many there must be one."""
@@ -65,7 +65,12 @@ class Shank:
         body = drawn(part.solid)
         if body is None:
             return self.is_inside(part)
-        return any(self._walls(body, point) >= MOST for point in self.points)
+        (first, last), along = np.sort(self.ends[:, self.axis]), self.axis
+        first = max(first, float(part.solid.low[along]))
+        last = min(last, float(part.solid.high[along]))
+        points = np.array([self.ends[0]] * len(HEIGHTS))
+        points[:, along] = first + np.array(HEIGHTS) * (last - first)
+        return bool(first < last) and any(self._walls(body, p) >= MOST for p in points)
 
     def _walls(self, body: object, point: Array) -> int:
         """In how many directions across the axis a body has a wall, or is solid, beside a point."""
