@@ -200,21 +200,16 @@ class Project:
     def warnings(self) -> tuple[Diagnostic, ...]:
         """What is wrong with the geometry of its parts, which touch no others, what overlaps, what
         is blocked, and what no hand can hold, unless the product is of an unlikely size."""
+        from factory.geometry.touching_groups import apart_in
+
+        insides = self.pag.insides if self.pag.mix else ()
+        apart = apart_in(self.product, *insides) if self.pag.is_shaped else ()
         product = () if self.pag.is_plain else self.product.warnings
         blocked = self.matings.faults(self.pag.allowed) if self.matings else ()
         sized = any(warning.code == "Size" for warning in product)
         grips = () if sized else tuple(no_grip.warning() for no_grip in self.no_grips)
         overlaps = self.overlaps.faults(self.pag.allowed) if self.pag.is_shaped else ()
-        return (*product, *self._apart, *overlaps, *blocked, *grips)
-
-    @property
-    def _apart(self) -> tuple[Diagnostic, ...]:
-        """A warning of parts that touch none of the others; none for default boxes, which do."""
-        if not self.pag.is_shaped:
-            return ()
-        from factory.geometry.groups import apart_in
-
-        return apart_in(self.product, *(self.pag.insides if self.pag.mix else ()))
+        return (*product, *apart, *overlaps, *blocked, *grips)
 
     @cached_property
     def _hands(self) -> Hands | None:

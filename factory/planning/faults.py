@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from factory.geometry.groups import groups_of
 from factory.geometry.meshes import Array
 from factory.geometry.overlap import Common, common, drawn
 from factory.geometry.overlapping import near_pairs
 from factory.geometry.solids import Solid
 from factory.geometry.touching import connected
+from factory.geometry.touching_groups import groups_of
 from factory.nets.verdict import listing
 from factory.planning.parts import PlacedPart
 from factory.support.errors import Diagnostic, InputError

@@ -194,10 +194,10 @@ def _planned(pose: Pose, asked: PlanOptions, budget: Allowance) -> Planned:
         others = graphs.grouped(groups) if after else graphs
         prices = _kept_prices(only(source, others.labels), templates)
         task = Sought(others, expected, prices, asked.aim, budget, told, stances(pose.up))
-        found = trees(task)
+        candidates = trees(task)
         if not screws:
-            return found
-        joined = [fastened(graphs, renumbered(j, rest), made, DWELL) for j in found.all]
+            return candidates
+        joined = [fastened(graphs, renumbered(j, rest), made, DWELL) for j in candidates.all]
         if all(left for _, left in joined):
             lost = min((left for _, left in joined), key=len)
             return sought_for([n for n in screws if n not in lost], {*plain, *lost})

@@ -155,11 +155,11 @@ def screws_among(parts: Sequence[PlacedPart], named: Sequence[str] = ()) -> tupl
 
 def _among(parts: Sequence[PlacedPart], named: Sequence[str]) -> Iterator[str]:
     for part in parts:
-        told = called(part)
-        if part.label in named or told == Says.SCREW:
+        meaning = called(part)
+        if part.label in named or meaning == Says.SCREW:
             yield part.label
-        elif told != Says.OTHER:
-            shank = shank_of(part, bare=told == Says.PERHAPS)
+        elif meaning != Says.OTHER:
+            shank = shank_of(part, bare=meaning == Says.PERHAPS)
             others = (other for other in parts if other is not part)
             if shank and _is_massive(part, shank) and any(map(shank.is_in, others)):
                 yield part.label
@@ -167,9 +167,9 @@ def _among(parts: Sequence[PlacedPart], named: Sequence[str]) -> Iterator[str]:
 
 def called(part: PlacedPart) -> Says:
     """What the label of a part says of it or, if that says nothing, the name of its mesh."""
-    told = says(part.label)
+    meaning = says(part.label)
     mesh = str(part.node.parameter("mesh", "")).rpartition("/")[2].rpartition(".")[0]
-    return says(mesh) if told == Says.NOTHING else told
+    return says(mesh) if meaning == Says.NOTHING else meaning
 
 
 def _is_massive(part: PlacedPart, shank: Shank) -> bool:

@@ -1,4 +1,4 @@
-"""Groups of parts of a finished product that touch each other."""
+"""TouchingGroups of parts of a finished product that touch each other."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ NAMED = 6
 
 
 @dataclass(frozen=True, slots=True)
-class Groups:
+class TouchingGroups:
     """The groups of parts that touch each other, the largest first, each by the label of its first
     part and the number of its parts; no two are nearer to each other than `reach` [m]."""
 
@@ -43,7 +43,7 @@ class Groups:
         )
 
 
-def groups_of(solids: Sequence[Solid]) -> Groups:
+def groups_of(solids: Sequence[Solid]) -> TouchingGroups:
     """The groups of some solids in place."""
     low = np.min([solid.low for solid in solids], axis=0)
     high = np.max([solid.high for solid in solids], axis=0)
@@ -55,7 +55,7 @@ def groups_of(solids: Sequence[Solid]) -> Groups:
             group[group == group[other]] = group[one]
     counts = Counter(group.tolist())
     firsts = {number: solids[int(np.argmax(group == number))].label for number in counts}
-    return Groups(tuple((firsts[n], count) for n, count in counts.most_common()), reach)
+    return TouchingGroups(tuple((firsts[n], count) for n, count in counts.most_common()), reach)
 
 
 def _gap(one: Solid, other: Solid, reach: float) -> float:
