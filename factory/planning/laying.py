@@ -140,9 +140,10 @@ class Layouts:
         project = laid.project.with_plan(Plan())
         project.__dict__["product"] = laid.project.product
         alone = replace(laid, project=project, lines=())
-        if (isfinite(laid.seconds), -laid.held) >= (isfinite(alone.seconds), -alone.held):
+        fits = isfinite(laid.seconds)
+        if (fits and laid.held <= alone.held) or not isfinite(alone.seconds):
             return laid
-        why = "no hand holds them all" if isfinite(laid.seconds) else "no layout is found"
+        why = "no hand holds them all" if fits else "no layout is found"
         apart = [f"{listing(line, 12)} have a driver each: {why}" for line in laid.lines]
         return replace(alone, apart=(*laid.apart, *apart))
 

@@ -50,7 +50,10 @@ ISO = _numbers(
 )
 """Numbers of ISO and EN standards of screws, bolts and studs; EN 24014 is ISO 4014."""
 
-STANDARD = re.compile(r"\b(?:(din)|(en|iso|din en|en iso|din iso|din en iso)) ?(\d{1,6})(?: \d)?\b")
+STANDARD = re.compile(
+    r"\b(?:(din) ?(\d{1,6})|(en|iso|din en|en iso|din iso|din en iso) ?(\d{3,6}))(?: \d)?\b"
+)
+"""DIN 912, DIN EN ISO 4762, ISO 7380-1."""
 
 SIZE = re.compile(r"\bm ?\d{1,2}(?:[., ]\d{1,2})? ?x ?\d+(?:[., ]\d+)?(?: ?x ?\d+(?:[.,]\d+)?)?\b")
 """A thread and a length: M3x10, M8x1.25x30."""
@@ -153,9 +156,7 @@ def _before_prepositions(words: list[str]) -> list[str]:
     return words[:end]
 
 
-def _is_screw(din: str, iso: str, number: str) -> bool:
+def _is_screw(din: str, number: str, iso: str, other: str) -> bool:
     """Whether a standard is one of screws."""
-    n = int(number)
-    if din:
-        return n in DIN
-    return n in ISO or (20000 < n < 40000 and n - 20000 in ISO) or (iso == "din en" and n in DIN)
+    n = int(number or other)
+    return n in DIN if din else n in ISO or n - 20000 in ISO
