@@ -97,7 +97,7 @@ PLACES = re.compile(
 OTHERS = re.compile(
     PLACES.pattern + r"|\w*(?:nuts?|washers?|muttern?|scheiben?|zahnrad|bushing|bearing|buchse|"
     r"huelse|hulse|drivers?|dreher|zieher|stopfen|nieten?|rivets?|federring|sicherungsring|"
-    r"sprengring)|\w*(?<!gewinde)stifte?|rings?|pins?|dowels?|inserts?|standoffs?|spacers?|"
+    r"sprengring|einsatz|einsaetze)|\w*(?<!gewinde)stifte?|rings?|pins?|dowels?|inserts?|standoffs?|spacers?|"
     r"sleeves?|circlips?|clips?|keys?|holes?|loch|circles?|patterns?|terminals?|wrench|knobs?|"
     r"handles?|wheels?|gears?|pinions?|shafts?|axles?|plugs?|valves?|pistons?|rollers?|pulleys?|"
     r"springs?|magnets?|welle|achse|griff|knopf|ventil|kolben|rolle|feder|lager|ecrous?|rondelles?|"
@@ -114,8 +114,8 @@ MORE = _words(
     " steel stainless inox zinc brass messing stahl black schwarz silver nylon galvanized"
     " verzinkt hex hexagon hexagonal torx allen inbus phillips pozi pozidriv slotted recessed tx"
     " pz ph sw pan flat button cheese countersunk csk senkkopf zylinderkopf linsenkopf sechskant"
-    " innensechskant mm inch unc unf grade class type typ standard std din iso en bs jis gost uni"
-    " ansi asme a b c d e f g h i j k l m n o p q r s t u v w x y z"
+    " innensechskant mm inch unc unf grade class type typ standard std din iso en bs chc fhc thc"
+    " jis gost uni ansi asme a b c d e f g h i j k l m n o p q r s t u v w x y z"
 )
 """Words that say more of what a noun names."""
 
