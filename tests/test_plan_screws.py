@@ -110,6 +110,7 @@ def test_the_last_noun_and_the_number_of_a_standard_say_what_a_part_is() -> None
 def test_where_a_name_is_in_doubt_a_shank_in_a_hole_decides(tmp_path: Path) -> None:
     """A plate with a hole is no screw on the knob in it, a bar in a pot none in the pot."""
     hole, shank = rod(3.1, 40), rod(3, 30)
+    peg = box(3, 3, 18, (0, 0, -9)) + box(6, 6, 3, (0, 0, 1.5))
     plates = {"bolt_flange": box(40, 40, 6) - hole, "knob": rod(3, 40)}
     assert fasteners(model_source(tmp_path, plates), ()) == ()
     block = box(40, 40, 40, (0, 0, -20))
@@ -118,6 +119,8 @@ def test_where_a_name_is_in_doubt_a_shank_in_a_hole_decides(tmp_path: Path) -> N
         ("bar in a body", {"stud": shank, "block": block}, ("stud",)),
         ("bar in a pot", {"stud": shank, "block": block - rod(12, 60)}, ()),
         ("no name", {"bar": shank, "block": block - hole}, ()),
+        ("round, with a head", {"part": bolt((0, 0, 0)), "block": block - rod(1.6, 90)}, ("part",)),
+        ("square, with a head", {"part": peg, "block": block - box(3, 3, 90)}, ()),
     ):
         assert fasteners(model_source(tmp_path, parts), ()) == found, name
 

@@ -124,7 +124,7 @@ def _bolt(vertices: Array, axis: int, low: Array, high: Array) -> Shank | None:
     ends = along[head].min(), length - along[head].max()
     tip = along > along[head].max() + 1e-6 if ends[0] < ends[1] else along < ends[0] - 1e-6
     outer = min(ends) < SHORT * length / 4 and bool(tip.any())
-    slim = outer and radius[tip].max() <= SHANK * radius.max()
+    slim = outer and radius[tip].max() <= SHANK * radius.max() and _is_round(across[tip])
     if not (slim and radius.max() < max(ends)):  # a brick has a stud that is shorter
         return None
     line = np.array([(low + high) / 2] * 2)
@@ -137,13 +137,18 @@ def _bolt(vertices: Array, axis: int, low: Array, high: Array) -> Shank | None:
 def _bar(part: PlacedPart, axis: int, low: Array, high: Array) -> Shank | None:
     """A round bar along an axis as a shank."""
     across = np.delete(part.vertices - (low + high) / 2, axis, axis=1)
-    wide, radius = np.ptp(across, axis=0), float(np.linalg.norm(across, axis=1).max())
-    is_round = np.ptp(wide) <= ROUND * wide.max() and 2 * radius <= CORNERS * wide.max()
-    if not is_round or high[axis] - low[axis] < radius:
+    radius = float(np.linalg.norm(across, axis=1).max())
+    if not _is_round(across) or high[axis] - low[axis] < radius:
         return None
     line = np.array([(low + high) / 2] * 2)
     line[:, axis] = low[axis], high[axis]
     return Shank(axis, line, radius, False)
+
+
+def _is_round(across: Array) -> bool:
+    """Whether points (n, 2) about an axis are those of a circle, or of a hexagon."""
+    wide, radius = np.ptp(across, axis=0), np.linalg.norm(across, axis=1).max()
+    return bool(np.ptp(wide) <= ROUND * wide.max() and 2 * radius <= CORNERS * wide.max())
 
 
 def screws_among(parts: Sequence[PlacedPart], named: Sequence[str] = ()) -> tuple[str, ...]:
