@@ -104,6 +104,8 @@ class Project:
         InputError (BadLine)."""
         from factory.compiler.folding import fold, lines_of_labels
 
+        if not lines:
+            return self
         factory = self.planned
         return self.with_plan(fold(factory, lines_of_labels(factory, lines), self.catalogue))
 
@@ -196,14 +198,18 @@ class Project:
 
     @property
     def warnings(self) -> tuple[Diagnostic, ...]:
-        """What is wrong with the geometry of its parts, what overlaps, what is blocked, and what no
-        hand can hold, unless the product is of an unlikely size."""
+        """What is wrong with the geometry of its parts, which touch no others, what overlaps, what
+        is blocked, and what no hand can hold, unless the product is of an unlikely size."""
+        from factory.geometry.touching_groups import apart_in
+
+        insides = self.pag.insides if self.pag.mix else ()
+        apart = apart_in(self.product, *insides) if self.pag.is_shaped else ()
         product = () if self.pag.is_plain else self.product.warnings
         blocked = self.matings.faults(self.pag.allowed) if self.matings else ()
         sized = any(warning.code == "Size" for warning in product)
         grips = () if sized else tuple(no_grip.warning() for no_grip in self.no_grips)
         overlaps = self.overlaps.faults(self.pag.allowed) if self.pag.is_shaped else ()
-        return (*product, *overlaps, *blocked, *grips)
+        return (*product, *apart, *overlaps, *blocked, *grips)
 
     @cached_property
     def _hands(self) -> Hands | None:

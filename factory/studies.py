@@ -243,11 +243,11 @@ def plan(
         if value is not None:
             check_choice(name, value, valid)
     operations, file = all_templates(templates), path_of(source)
-    options = SourceOptions(unit, tuple(keep), replan, maybe(library), boxes, in_place)
+    fast = None if screws is None else tuple(screws)
+    options = SourceOptions(unit, tuple(keep), replan, maybe(library), boxes, in_place, fast)
     placed = read_source(file, operations, options)
     meant, passing = overlaps_in(allow, {part.label for part in placed.parts})
     placed = replace(placed, allowed=(*placed.allowed, *meant))
-    fast = None if screws is None else tuple(screws)
     search = PlanOptions(aim, seconds, passing, hulls, UPS[up] if up else None, base, fast)
     planned = planned_for(placed, replace(search, templates=operations))
     if isinstance(planned, CannotAssemble):

@@ -182,3 +182,32 @@ def test_a_peg_too_thick_for_its_hole(run: Terminal, tmp_path: Path) -> None:
     assert pair.depth == pytest.approx(4e-4, abs=1e-8)
     assert run("run", file).status == 1
     assert run("run", file, "--allow", "peg:frame").status == 0
+
+
+PLACED = """root = product; product = mate ( a, b, c );
+a = atomic ( box = ( 0.06, 0.06, 0.01 ) );
+b = atomic ( box = ( 0.06, 0.06, 0.01 ), pos = ( 0, 0, %s ) );
+c = atomic ( box = ( 0.02, 0.02, 0.004 ), pos = ( 0, 0, %s ) );
+"""
+
+
+def test_parts_that_touch_nowhere_or_lie_inside_another_are_named(
+    run: Terminal, tmp_path: Path
+) -> None:
+    """Half a millimetre is play, and a part that reaches out of another is not inside it."""
+    for number, (b, c, found) in enumerate(
+        (
+            (0.01, 0.017, ""),
+            (0.01, 0.0175, ""),
+            (0.406, 0.413, "Apart warning: the parts are 2 groups that do not touch each other"),
+            (0.01, 0.04, "'a' and 1 more, 'c'"),
+            (0.01, 0.01, "Overlap warning: c lies inside b when finished"),
+            (0.01, 0.015, "Overlap warning: b and c overlap by 2.00 mm when finished"),
+        )
+    ):
+        file = tmp_path / f"product{number}.pag"
+        file.write_text(PLACED % (b, c))
+        done = run("check", file, "--no-hands")
+        assert done.status == 0
+        assert found in done.err if found else "warning" not in done.err
+        assert ("approach: 2 of 2 operations clear; " in done.out) == (found[:1] != "O")

@@ -264,9 +264,12 @@ def _describe_approaches(matings: Matings, allowed: Sequence[AllowedOverlap]) ->
     strict, no_deeper, left_out = (matings.count(level) for level in (3, 2, 1))
     lowered, blocked = len(matings.of_kind("lower")), len(matings.faults(allowed))
     passing = len(matings.of_kind("blocked")) - blocked
+    every = len(matings.all)
+    clear = f"{left_out} of {every} operations clear"
+    if not strict == no_deeper == left_out == every:
+        clear += f" but for overlaps when finished, {no_deeper} never deeper, {strict} strictly"
     say(
-        f"approach: {left_out} of {len(matings.all)} operations clear but for overlaps"
-        f" when finished, {no_deeper} never deeper, {strict} strictly; {lowered} lowered"
+        f"approach: {clear}; {lowered} lowered"
         f"{f', {passing} allowed to pass through each other' if passing else ''},"
         f" {blocked} blocked{' (--clashes DIR draws each)' if blocked else ''}"
     )

@@ -116,7 +116,8 @@ def plan(
         with Waiting(f"reading {source.name}", out.silent):
             return read_source(source, templates, options)
 
-    options = SourceOptions(unit, keep, replan, library, boxes, in_place)
+    fast = None if no_screws else screws
+    options = SourceOptions(unit, keep, replan, library, boxes, in_place, fast)
     placed = asked(read_as, options, out.silent)
     meant, allow = overlaps_in(allow, {part.label for part in placed.parts})
     placed = replace(placed, allowed=(*placed.allowed, *meant))
@@ -127,13 +128,12 @@ def plan(
         for note in placed.notes:
             say(f"  {note}")
     side = UPS[up] if up else None
-    fast = None if no_screws else screws
     search = PlanOptions(aim, seconds, allow, hulls, side, base or "", fast, templates=templates)
     planned, stopped = _sought(placed, search, out)
     if isinstance(planned, CannotAssemble):
         return refuse(placed, planned, folder, look, out)
     files = write_planned(placed, planned, folder, source, allow, templates)
-    project = read(files[0], folders)
+    project = read(files[0], folders).with_lines(planned.lines)
     if stopped and not out.silent:
         say("  stopped: the best tree so far, without pictures")
     announced_before = set(map(id, project.product.warnings))
@@ -147,7 +147,7 @@ def plan(
         emit(_document(placed, planned, project, [*files, *looked], warnings))
     else:
         _print_files([*files, *looked], out)
-    return 0
+    return 1 if project.matings and project.matings.faults(project.pag.allowed) else 0
 
 
 def _sought(

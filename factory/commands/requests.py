@@ -91,7 +91,6 @@ class ProjectOptions:
                 "--robots": self.robots is not None,
                 "--deputies": self.deputies,
                 "--platen": self.platen or self.tile is not None,
-                "[lines]": bool(defaults_for(self.file).lines()),
                 "[tees]": bool(defaults_for(self.file).tees()),
             }
         )

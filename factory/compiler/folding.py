@@ -59,13 +59,17 @@ def _turn(factory: Factory, lines: Iterable[Line]) -> list[int]:
 
 
 def _tool_lines(factory: Factory, lines: Sequence[Line]) -> list[Line]:
-    """The tools that share a robot: those of one kind that come to one line."""
+    """The tools that share a robot: those of one kind that come to one line, opposite to robots
+    that come from the same sides."""
     on = line_of(len(factory.robots), lines)
-    groups: dict[tuple[int, object], list[int]] = {}
+    groups: dict[tuple[object, ...], list[int]] = {}
     for robot in factory.robots[1:]:
         kind = kind_of(factory, robot.index)
         if kind[0] == "tool":
-            groups.setdefault((on[factory.last(robot.index).carrier], kind), []).append(robot.index)
+            last = factory.last(robot.index)
+            sides = [frozenset(sides_at(last, r)) for r in last.robots if r != last.carrier]
+            key = on[last.carrier], kind, *sides
+            groups.setdefault(key, []).append(robot.index)
     return [tuple(tools) for tools in groups.values() if len(tools) > 1]
 
 

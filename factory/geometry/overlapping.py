@@ -19,6 +19,9 @@ from factory.support.errors import Diagnostic
 SILENT = 2e-5
 """Smaller overlaps are rounding, or the accuracy of a drawing [m]."""
 
+INSIDE = 0.999
+"""A part lies inside another if they have more than this share of its volume in common."""
+
 EVERYWHERE = 5e-4
 """The depth of overlaps in a drawing without fits [m]."""
 
@@ -31,16 +34,21 @@ NAMED = 6
 
 @dataclass(frozen=True, slots=True)
 class Overlapping:
-    """Two parts, in the order of the product, the depth of their overlap, and the `sagitta` of the
+    """Two parts, in the order of the product, the depth of their overlap, the `sagitta` of the
     facets by which round surfaces are drawn where they overlap [m]: an overlap that is not deeper
-    may be these facets alone."""
+    may be these facets alone; `inner`: the one of them that lies inside the other, "" for
+    neither."""
 
     one: str
     other: str
     depth: float
     sagitta: float = 0.0
+    inner: str = ""
 
     def __str__(self) -> str:
+        if self.inner:
+            outer = self.one if self.inner == self.other else self.other
+            return f"{self.inner} lies inside {outer} when finished"
         words = f"{self.one} and {self.other} overlap by {1e3 * self.depth:.2f} mm when finished"
         if self.depth <= self.sagitta:
             return f"{words}, which may be their facets (sagitta {1e3 * self.sagitta:.3f} mm)"
@@ -54,7 +62,9 @@ class Overlapping:
         words = f"{self}, and {1e3 * most:.2f} mm is allowed" if most else str(self)
         option = f"--allow {self.one}:{self.other}"
         hint = f"correct the drawing or, if the overlap is intended, allow it: {option}"
-        if self.depth <= self.sagitta:
+        if self.inner:
+            hint = f"move '{self.inner}' to its place, remove it, or give the other part its recess"
+        elif self.depth <= self.sagitta:
             option = f"{option}:{ceil(1e5 * self.sagitta) / 100:g}mm"
             hint = f"export round surfaces with more facets, or allow these: {option}"
         return Diagnostic("Overlap", words, None, hint)
@@ -126,7 +136,10 @@ def _found(product: Product, insides: Insides) -> DrawnOverlaps:
             shared = common(bodies[one], bodies[other])
             if shared.depth > SILENT:
                 off = max(sagitta(bodies[n], *shared.box) for n in (one, other))
-                pairs.append(Overlapping(labels[one], labels[other], shared.depth, off))
+                small = min((one, other), key=lambda n: float(bodies[n].volume()))
+                whole = shared.volume > INSIDE * bodies[small].volume()
+                inner = labels[small] if whole else ""
+                pairs.append(Overlapping(labels[one], labels[other], shared.depth, off, inner))
     pairs.sort(key=lambda pair: -pair.depth)
     left = (label for label, body in zip(labels, bodies, strict=True) if body is None)
     return DrawnOverlaps(tuple(pairs), tuple(left))

@@ -16,6 +16,7 @@ from factory.layout.layout import carriers
 from factory.layout.stops import carried
 from factory.layout.sweeps import piles
 from factory.plant.factory import Factory
+from factory.problem.pag import NOPART
 from factory.problem.robot_bodies import MAST
 
 Frame = tuple[Point2, Point2]
@@ -119,20 +120,28 @@ def oriented_shape(
         return project(payloads[factory.operations[number].label], *frame)
 
     boxes = {number: lies(number) for number in carried(factory, robot)}
-    shifts = _fronts(factory, robot, boxes)
+    tool = is_tool(factory, robot)
+    if tool:
+        shifts = _fronts_of_guests(factory, payloads, robot, frame)
+    else:
+        shifts = _fronts(factory, robot, boxes)
     boxes = {number: moved(box, shifts.get(number, NONE)[:2]) for number, box in boxes.items()}
-    last, tool = _last(factory, robot, boxes), is_tool(factory, robot)
+    last = _last(factory, robot, boxes)
     lane, belt = 0.0, c.c - last[0]
     if carrier >= 0:
         delivered = (payloads[label] for label in factory.deliveries(carrier))
         along = hull([project(box, *frame) for box in delivered])
         lane, belt = -round((along[0] + along[1]) / 2, 3), 0.0
         lane += c.spread if carrier in wide else 0.0
-    held = hull([lies(number) for number in factory.robots[robot].operations]) if tool else last
-    arm = up(max(c.rim, c.rim + lane, belt))
+    held = last
+    if tool:
+        under = factory.robots[robot].operations
+        held = hull([moved(lies(n), shifts.get(n, NONE)[:2]) for n in under])
+    back = up(max(0.0, *(-ahead for ahead, _, _ in shifts.values()), 0.0))
+    arm = up(max(c.rim, c.rim + lane, belt) + back)
     offset, nest = round((held[2] + held[3]) / 2, 3), round((held[0] + held[1]) / 2, 3)
     spread = c.spread if robot in wide else 0.0
-    reach = up(c.reach(arm, lane))
+    reach = up(c.reach(arm, lane + back))
     return Shape(boxes, last, offset, arm, reach, nest, tool, spread, post=offset, shifts=shifts)
 
 
@@ -142,16 +151,40 @@ def _fronts(factory: Factory, robot: int, boxes: Mapping[int, Extent]) -> dict[i
     to; nothing for others, nor for the output robot of a mix: the outfeed is in one place."""
     tours = factory.tours[robot]
     output = robot == 0 and factory.pag.mix is not None
-    if (
-        output
-        or len(tours) == 1
-        or any(len(tour) != 2 for tour in tours)
-        or is_tool(factory, robot)
-    ):
+    if output or len(tours) == 1 or any(len(tour) != 2 for tour in tours):
         return {}
     front = max(boxes[tour[0]][1] for tour in tours)
     ahead = {tour: round(front - boxes[tour[0]][1], 6) for tour in tours}
     return {number: (ahead[tour], 0.0, 0.0) for tour in tours for number in tour}
+
+
+def _fronts_of_guests(
+    factory: Factory, payloads: Mapping[str, Box], tool: int, frame: Frame
+) -> dict[int, Point3]:
+    """By operation how far ahead of a tool that has no hand the product is, since the robot that
+    brings what the tool works on, from the other side, holds it there."""
+    (x, y), t = frame
+    shifts: dict[int, Point3] = {}
+    for number, guest in guests_at(factory, tool).items():
+        boxes = {
+            n: project(payloads[factory.operations[n].label], (-x, -y), t)
+            for n in carried(factory, guest)
+        }
+        ahead = _fronts(factory, guest, boxes).get(number, NONE)[0]
+        if ahead:
+            shifts[number] = (-ahead, 0.0, 0.0)
+    return shifts
+
+
+def guests_at(factory: Factory, tool: int) -> dict[int, int]:
+    """By the operations of a tool the robot that brings what it works on, if there is one."""
+    made: dict[int, int] = {}
+    for number in factory.robots[tool].operations:
+        operation = factory.operations[number]
+        for robot, label in zip(operation.robots, operation.before, strict=True):
+            if label != NOPART and robot != operation.carrier:
+                made[number] = robot
+    return made
 
 
 def held_shape(
@@ -190,7 +223,7 @@ def held_shape(
     if hand is None:
         held = hull([lies(operations[n].label, n) for n in factory.robots[robot].operations])
         offset, nest = round((held[2] + held[3]) / 2, 3), round((held[0] + held[1]) / 2, 3)
-        return Shape(boxes, last, offset, arm, reach, nest, True, spread)
+        return Shape(boxes, last, offset, arm, reach, nest, True, spread, shifts=shifts)
     x, y = (hands.holding.product.middle[:2]).tolist()
     pads = [(px - x, py - y) for px, py, _ in hand.places]
     ahead = [px * u[0] + py * u[1] for px, py in pads]
@@ -219,7 +252,10 @@ def _moves(hands: Hands, robot: int, carrier: int, frame: Frame) -> tuple[dict[i
     has it; and how much further behind it has to stay, since it delivers further ahead than that
     where its carrier's line is [m]."""
     (u, t), factory = frame, hands.factory
-    of_robot = hands.shifts(robot, u, t)
+    if is_tool(factory, robot):
+        of_robot = _shifts_of_guests(hands, robot, frame)
+    else:
+        of_robot = hands.shifts(robot, u, t)
     carriers = hands.shifts(carrier, t) if carrier >= 0 else ()
     if not any(map(any, (*of_robot, *carriers))):
         return {}, 0.0
@@ -233,6 +269,20 @@ def _moves(hands: Hands, robot: int, carrier: int, frame: Frame) -> tuple[dict[i
             ahead -= x * u[0] + y * u[1]
         back = max(back, -ahead)
     return moves, up(back)
+
+
+def _shifts_of_guests(hands: Hands, tool: int, frame: Frame) -> tuple[Point3, ...]:
+    """For each tour of a tool the displacement of the product by the robot that brings what it
+    works on, from the other side."""
+    (x, y), t = frame
+    factory, guests = hands.factory, guests_at(hands.factory, tool)
+    shifts = []
+    for number in (tour[-1] for tour in factory.tours[tool]):
+        guest = guests.get(number)
+        of_guest = () if guest is None else hands.shifts(guest, (-x, -y), t)
+        turn = factory.turns[number, guest] if of_guest and guest is not None else 0
+        shifts.append(of_guest[turn] if of_guest else NONE)
+    return tuple(shifts)
 
 
 def is_tool(factory: Factory, robot: int) -> bool:

@@ -39,6 +39,9 @@ TIMES, SLACK = 2.0, 3e-4
 on the way than so many times their depth when finished, plus SLACK [m]."""
 
 NEAR = 5e-4
+"""Parts no further apart than this [m] are near each other, as a bolt in a clearance hole."""
+
+CONTACT = 5e-5
 """Parts no further apart than this [m] touch. If the product is then not connected, the nearest
 parts of its components touch as well."""
 
@@ -55,10 +58,11 @@ class Blocking:
 
     `levels` (3, n, n): how much j blocks i that leaves along +x, +y or +z; the opposite direction
     has the transpose. `locks` (3, n, n): whether j prevents i from leaving. `touch` (n, n): which
-    units touch. `low`, `high` (n, 3): their boxes [m]. `depths` (3, n, n): how deep i gets into j
-    [m]; empty if unknown. `hidden`: the parts of two units that overlap in the finished product
-    according to the hull of an open mesh, the deepest first. `feet`: what units stand on; None if
-    tipping does not matter. `base`: the unit onto which all others come, -1 for none.
+    units touch; `near` (n, n): which are near each other. `low`, `high` (n, 3): their boxes [m].
+    `depths` (3, n, n): how deep i gets into j [m]; empty if unknown. `hidden`: the parts of two
+    units that overlap in the finished product according to the hull of an open mesh, the deepest
+    first. `feet`: what units stand on; None if tipping does not matter. `base`: the unit onto which
+    all others come, -1 for none.
     """
 
     labels: tuple[str, ...]
@@ -71,6 +75,7 @@ class Blocking:
     hidden: tuple[Overlapping, ...] = field(default=(), repr=False)
     feet: Feet | None = field(default=None, repr=False)
     base: int = -1
+    near: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), bool), repr=False)
 
     def __post_init__(self) -> None:
         for array in (self.levels, self.locks, self.touch, self.low, self.high, self.depths):
@@ -145,8 +150,10 @@ def blocking(source: InPlace) -> Blocking:
     np.maximum.at(bounds[1], unit[convex.part], convex.high)
     labels = tuple(label for label, _ in units)
     touch = _touching(finder, convex, unit, count)
+    near = touch | _within(finder, unit, count, NEAR)
     hidden = _hidden(overlaps, unit, [part.label for _, members in units for part in members])
-    return Blocking(labels, levels, levels >= LOCKED, touch, *bounds, depths, hidden)
+    locks = levels >= LOCKED
+    return Blocking(labels, levels, locks, touch, *bounds, depths, hidden, near=near)
 
 
 def rooms(source: InPlace, axis: int) -> Array:
@@ -206,18 +213,24 @@ def _enter(overlaps: Overlaps, unit: Ints, levels: NDArray[np.int8], deep: Array
 
 
 def _touching(finder: Finder, convex: ConvexBodies, unit: Ints, count: int) -> NDArray[np.bool_]:
-    """Which units touch: those that are near each other, then those that connect components."""
+    """Which units touch: those in contact, then those that connect components."""
     touch = np.eye(count, dtype=bool)
-    gap, furthest = NEAR, float((convex.high.max(axis=0) - convex.low.min(axis=0)).max())
+    gap, furthest = CONTACT, float((convex.high.max(axis=0) - convex.low.min(axis=0)).max())
     while count > 1 and gap < 2 * furthest:
-        one, other = finder.near(gap)
-        near = np.zeros((count, count), bool)
-        near[unit[one], unit[other]] = True
+        near = _within(finder, unit, count, gap)
         pieces, piece = connected_components(touch, directed=False)
-        if gap > NEAR:
+        if gap > CONTACT:
             near &= piece[:, None] != piece[None, :]
-        touch |= near | near.T
+        touch |= near
         if pieces > 1 and connected_components(touch, directed=False)[0] == 1:
             break
         gap *= WIDER
     return touch
+
+
+def _within(finder: Finder, unit: Ints, count: int, gap: float) -> NDArray[np.bool_]:
+    """Which units (n, n) are at most so far from each other [m]."""
+    near = np.zeros((count, count), bool)
+    one, other = finder.near(gap)
+    near[unit[one], unit[other]] = True
+    return near | near.T

@@ -1,81 +1,30 @@
 """Screws: which parts are screws, and where in a tree they are driven in, after all that they
-clamp."""
+clamp, and their nuts put on."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from factory.geometry.meshes import Array
 from factory.planning.blocking import Blocking
 from factory.planning.cannot import Direction, Units
 from factory.planning.exact import Tree
 from factory.planning.judging import Join, Judged
-from factory.planning.parts import InPlace, PlacedPart
+from factory.planning.parts import InPlace
+from factory.planning.shanks import screws_among
 from factory.planning.subsets import ROOT_AXIS, Stance
+from factory.planning.threads import Thread
 from factory.planning.writing import Screwed
-
-WORDS = re.compile(
-    r"(?:^|[^a-z])(?:(?:cap|set|wood|grub)?screws?|bolts?|vis|schrauben?|tornillos?|viti?|"
-    r"(?:din|iso|en)[ _-]?\d{3,5}|m\d+(?:[.,]\d+)?x\d+)(?![a-z])"
-)
-"""Words in the names of screws, in lower case."""
-
-HEAD, SHANK, SHORT, ROUND = 0.85, 0.75, 0.5, 0.16
-"""Proportions of a bolt. Its head is farther from the axis than HEAD times the largest radius; its
-shank is no farther than SHANK times that radius, longer than the head, and longer than half its
-width. A round part has sides that differ by no more than ROUND."""
 
 
 def fasteners(source: InPlace, named: Sequence[str]) -> tuple[str, ...]:
-    """The units of a source that are screws: those that are `named`, those whose name says so, and
-    those with a head that is wider than their shank, which is inside another part."""
+    """The units of a source that are screws: those that are `named`, and parts that are recognised
+    (`shanks`)."""
     kept = {keep.label for keep in source.kept}
-
-    def is_screw(part: PlacedPart) -> bool:
-        return _is_called(part) or _is_in_another(_shank(part.vertices), part, source)
-
-    return tuple(
-        label
-        for label, parts in source.units()
-        if label in named or (label not in kept and is_screw(parts[0]))
-    )
-
-
-def _is_in_another(point: Array | None, part: PlacedPart, source: InPlace) -> bool:
-    """Whether a point is inside the box of another part (the shank of an antenna is not)."""
-    boxes = ((o.solid.low, o.solid.high) for o in source.parts if o is not part)
-    return point is not None and any((a < point).all() and (point < b).all() for a, b in boxes)
-
-
-def _is_called(part: PlacedPart) -> bool:
-    name = f"{part.label} {part.node.parameter('mesh', '')}".lower()
-    return bool(WORDS.search(re.sub(r"(?<=\D)\d{1,2}(?=$|\W|_)", "", name)))
-
-
-def _shank(vertices: Array) -> Array | None:
-    """The middle of the shank, if points (n, 3) are those of a bolt along an axis; None
-    otherwise."""
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
-    for axis in range(3):
-        across = np.delete(vertices - (low + high) / 2, axis, axis=1)
-        wide = np.ptp(across, axis=0)
-        radius, along = np.linalg.norm(across, axis=1), vertices[:, axis] - low[axis]
-        head, length = radius > HEAD * radius.max(), high[axis] - low[axis]
-        if np.ptp(wide) > ROUND * wide.max() or np.ptp(along[head]) > SHORT * length:
-            continue
-        ends = along[head].min(), length - along[head].max()
-        tip = along > along[head].max() + 1e-6 if ends[0] < ends[1] else along < ends[0] - 1e-6
-        outer = min(ends) < SHORT * length / 4 and bool(tip.any())
-        slim = outer and radius[tip].max() <= SHANK * radius.max()
-        if slim and radius.max() < max(ends):  # a brick has a stud that is shorter
-            middle = (low + high) / 2
-            middle[axis] = (vertices[tip, axis].min() + vertices[tip, axis].max()) / 2
-            return np.asarray(middle)
-    return None
+    screws = {*screws_among(source.parts, named), *named}
+    return tuple(label for label, _ in source.units() if label in named or label in screws - kept)
 
 
 @dataclass(frozen=True)
@@ -98,6 +47,7 @@ class Fastening:
     places: list[_Place] = field(default_factory=list)
     joins: list[tuple[tuple[int, ...], int, Join]] = field(default_factory=list)
     driven: dict[tuple[int, ...], list[Join]] = field(default_factory=dict)
+    put: dict[tuple[int, ...], list[Join]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._walk(self.judged.tree, (), ROOT_AXIS, iter(self.judged.joins))
@@ -115,38 +65,62 @@ class Fastening:
             self.places.append(_Place(path, units, axis))
         return units
 
-    def drive(self, screw: int, clamped: Sequence[int]) -> bool:
-        """Drive a screw into the smallest sub-assembly that contains all parts that it clamps, if
-        it can get there and no later operation collides with it. Returns whether there is such a
+    def drive(self, threads: Sequence[Thread]) -> bool:
+        """Drive screws, one after the other, into the smallest sub-assembly that contains all parts
+        that they clamp, if they can get there and no later operation collides with them. Returns
+        whether there is such a place."""
+        needed = {unit for thread in threads for unit in thread.clamps}
+        return self._joined([t.screw for t in threads], needed, self.driven, (self.up.up,))
+
+    def put_on(self, ring: int, screw: int, near: Sequence[int]) -> bool:
+        """Put a nut or a washer on a screw, from above or from below, in the smallest sub-assembly
+        that has that screw and all that is `near` the ring. Returns whether there is such a
         place."""
+        return self._joined([ring], {screw, *near}, self.put, (self.up.up, -self.up.up))
+
+    def _joined(
+        self,
+        come: Sequence[int],
+        needed: Collection[int],
+        at: dict[tuple[int, ...], list[Join]],
+        upright: Sequence[int],
+    ) -> bool:
         for place in self.places:
-            if set(clamped) <= set(place.units) and self._passes(screw, place):
-                join = self._way(screw, place)
-                if join is not None:
-                    self.driven.setdefault(place.path, []).append(join)
-                    return True
+            there = self._with_screws(place.units, place.path)
+            if not {*needed} <= {*there}:
+                continue
+            joins = list[Join]()
+            for unit in come:
+                join = self._way(unit, there, place.axis, upright)
+                if join is None or not self._passes(unit, place):
+                    break
+                joins.append(join)
+                there = (*there, unit)
+            else:
+                at.setdefault(place.path, []).extend(joins)
+                return True
         return False
 
     def _with_screws(self, units: Units, path: tuple[int, ...]) -> Units:
-        """Units, and the screws that are driven in at a path or below it."""
+        """Units, and the screws that are driven in at a path or below it, with their rings."""
         screws = [
             join.come[0]
-            for at, joins in self.driven.items()
+            for at, joins in (*self.driven.items(), *self.put.items())
             for join in joins
             if at[: len(path)] == path or set(join.pile) <= set(units)
         ]
         return (*units, *dict.fromkeys(screws))
 
-    def _way(self, screw: int, place: _Place) -> Join | None:
-        """The motion of a screw to a place: from above, or else along the axis of its carrier."""
-        units = self._with_screws(place.units, place.path)
-        ways: list[tuple[Direction, bool]] = [((self.up.axes[2], self.up.up), True)]
-        ways += [((self.up.axes[place.axis], side), False) for side in (+1, -1)]
+    def _way(self, unit: int, there: Units, across: int, upright: Sequence[int]) -> Join | None:
+        """The motion of a unit to others: along the vertical, or else along the axis of their
+        carrier."""
+        ways: list[tuple[Direction, bool]] = [((self.up.axes[2], side), True) for side in upright]
+        ways += [((self.up.axes[across], side), False) for side in (+1, -1)]
         for (axis, side), lowered in ways:
-            at = np.ix_([screw], units) if side > 0 else np.ix_(units, [screw])
+            at = np.ix_([unit], there) if side > 0 else np.ix_(there, [unit])
             if not self.graphs.locks[axis][at].any():
                 level = int(self.graphs.levels[axis][at].max())
-                return Join(tuple(sorted(units)), (screw,), (axis, side), level, lowered)
+                return Join(tuple(sorted(there)), (unit,), (axis, side), level, lowered)
         return None
 
     def _passes(self, screw: int, place: _Place) -> bool:
@@ -165,23 +139,45 @@ class Fastening:
         return True
 
     def result(self, dwell: float) -> Judged:
-        """The tree with its screws. Each takes a robot that brings it, and a driver for `dwell`
-        [s]; screws with equal labels are driven in one after the other."""
+        """The tree with its screws, and with their nuts. Each screw takes a robot that brings it,
+        and those of one sub-assembly a driver for `dwell` [s] one after the other."""
         screws = [join for joins in self.driven.values() for join in joins]
+        rings = [join for joins in self.put.values() for join in joins]
         most = max(map(len, self.driven.values()), default=0)
         return replace(
             self.judged,
             tree=self._rebuilt(self.judged.tree, ()),
-            joins=(*self.judged.joins, *screws),
-            robots=self.judged.robots + 2 * len(screws),
+            joins=(*self.judged.joins, *screws, *rings),
+            robots=self.judged.robots + len(screws) + len(self.driven) + 2 * len(rings),
             seconds=self.judged.seconds + dwell * most,
         )
 
     def _rebuilt(self, tree: Tree, path: tuple[int, ...]) -> Tree:
         if not isinstance(tree, int):
             tree = tuple(self._rebuilt(below, (*path, n)) for n, below in enumerate(tree))
-        joins = self.driven.get(path)
-        return Screwed(tree, tuple(join.come[0] for join in joins)) if joins else tree
+        if joins := self.driven.get(path):
+            tree = Screwed(tree, tuple(join.come[0] for join in joins))
+        return self._with_rings(tree, path)
+
+    def _with_rings(self, tree: Tree, path: tuple[int, ...]) -> Tree:
+        """A sub-assembly with its nuts and washers: those from above are inserted one after the
+        other, and it is lowered onto each of those from below. Each time its axis turns, so that
+        it may have to be handed over first."""
+        joins = self.put.get(path, [])
+        above = [join.come[0] for join in joins if join.direction[1] == self.up.up]
+        below = [join.come[0] for join in joins if join.direction[1] != self.up.up]
+        if self._slides_below(path) and (bool(above) + len(below)) % 2:
+            tree = (tree,)
+        tree = (tree, *above) if above else tree
+        for ring in below:
+            tree = (tree, ring)
+        return tree
+
+    def _slides_below(self, path: tuple[int, ...]) -> bool:
+        """Whether the way of some join below a path, or at it, is horizontal."""
+        every = [(at, join) for at, _, join in self.joins]
+        every += [(at, join) for at, joins in self.driven.items() for join in joins]
+        return any(at[: len(path)] == path and not join.lowered for at, join in every)
 
 
 def renumbered(judged: Judged, units: Sequence[int]) -> Judged:
@@ -198,16 +194,22 @@ def renumbered(judged: Judged, units: Sequence[int]) -> Judged:
 
 
 def fastened(
-    graphs: Blocking, judged: Judged, screws: Sequence[int], dwell: float
+    graphs: Blocking, judged: Judged, threads: Sequence[Thread], dwell: float
 ) -> tuple[Judged, tuple[int, ...]]:
-    """A tree of all other units with the screws in it, and the screws for which there is no
-    place."""
-    work = Fastening(graphs, judged, judged.stance)
-    others = np.ones(len(graphs), bool)
-    others[list(screws)] = False
-    left = tuple(
-        screw
-        for screw in screws
-        if not work.drive(screw, np.flatnonzero(graphs.touch[screw] & others).tolist())
-    )
-    return work.result(dwell), left
+    """A tree of all other units with the screws in it, and their nuts, and those of both for which
+    there is no place."""
+    work, left = Fastening(graphs, judged, judged.stance), list[int]()
+    alike: dict[tuple[str, int], list[Thread]] = {}
+    for one in threads:
+        alike.setdefault((one.kind, one.into), []).append(one)
+    for several in alike.values():
+        if not work.drive(several):  # in one place, to share a driver
+            left += [one.screw for one in several if not work.drive([one])]
+    screws, follow = {one.screw for one in threads}, {n for one in threads for n in one.follow}
+    for one in threads:
+        for ring in one.follow if one.screw not in left else ():
+            near = np.flatnonzero(graphs.touch[ring]).tolist()
+            needed = [n for n in near if n not in screws | follow]
+            if not work.put_on(ring, one.screw, needed):
+                left.append(ring)
+    return work.result(dwell), tuple(left)

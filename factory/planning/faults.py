@@ -8,8 +8,7 @@ on the solids as drawn.
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from factory.geometry.overlap import Common, common, drawn
 from factory.geometry.overlapping import near_pairs
 from factory.geometry.solids import Solid
 from factory.geometry.touching import connected
+from factory.geometry.touching_groups import groups_of
 from factory.nets.verdict import listing
 from factory.planning.parts import PlacedPart
 from factory.support.errors import Diagnostic, InputError
@@ -45,12 +45,8 @@ it exceeds SHARE and they overlap by more than DEPTH [m], which is more than a p
 THIN = 0.25
 """In a sheet, this share of its thickness is too deep, if that is less."""
 
-NEAR, NEARLY = 1e-3, (0.05, 0.005)
-"""The largest gap between parts that touch [m], at most the first and at least the second share of
-the product's diagonal."""
-
 NAMED = 6
-"""The most pairs, or groups, that a message names."""
+"""The most pairs that a message names."""
 
 HINT = "--in-place skips this check"
 
@@ -149,19 +145,23 @@ def _gaps(low: Array, high: Array, lows: Array, highs: Array) -> Array:
     return np.asarray(np.linalg.norm(np.maximum(0.0, np.maximum(lows - high, low - highs)), axis=1))
 
 
-def check_in_place(parts: Sequence[PlacedPart]) -> list[Diagnostic]:
-    """The faults of parts that are not in place (NotInPlace); empty if they are."""
+def check_in_place(parts: Sequence[PlacedPart], screws: Collection[str] = ()) -> list[Diagnostic]:
+    """The faults of parts that are not in place (NotInPlace); empty if they are. What a screw, and
+    a part that is none, have in common is a thread, no fault."""
     solids = [part.solid for part in parts]
     bodies = [drawn(solid) for solid in solids]
-    faults = _inside(solids, bodies)
-    return faults or _groups(solids, bodies)
+    faults = _inside(solids, bodies, screws)
+    return faults or _groups(solids)
 
 
-def _inside(solids: Sequence[Solid], bodies: Sequence[Any]) -> list[Diagnostic]:
+def _inside(
+    solids: Sequence[Solid], bodies: Sequence[Any], screws: Collection[str]
+) -> list[Diagnostic]:
     """Parts that are inside one another."""
     overlaps: list[tuple[float, str, str, Common]] = []
     for one, other in near_pairs(solids, -DEPTH).tolist():
-        if bodies[one] is None or bodies[other] is None:
+        threaded = (solids[one].label in screws) != (solids[other].label in screws)
+        if threaded or bodies[one] is None or bodies[other] is None:
             continue
         small, large = sorted((one, other), key=lambda n: float(bodies[n].volume()))
         shared = common(bodies[small], bodies[large])
@@ -186,40 +186,11 @@ def _inside(solids: Sequence[Solid], bodies: Sequence[Any]) -> list[Diagnostic]:
     return [Diagnostic("NotInPlace", message, None, hint)]
 
 
-def _groups(solids: Sequence[Solid], bodies: Sequence[Any]) -> list[Diagnostic]:
+def _groups(solids: Sequence[Solid]) -> list[Diagnostic]:
     """Groups of parts that do not touch each other."""
-    low = np.min([solid.low for solid in solids], axis=0)
-    high = np.max([solid.high for solid in solids], axis=0)
-    size = float(np.linalg.norm(high - low))
-    reach = max(min(NEAR, NEARLY[0] * size), NEARLY[1] * size)
-    group = list(range(len(solids)))
-    for one, other in near_pairs(solids, reach).tolist():
-        if group[one] != group[other] and _gap(solids, bodies, one, other, reach) < reach:
-            group = [group[one] if g == group[other] else g for g in group]
-    sizes = Counter(group).most_common()
-    if len(sizes) == 1:
+    groups = groups_of(solids)
+    if len(groups.firsts) == 1:
         return []
-    named = []
-    for first, count in sizes:
-        label = solids[group.index(first)].label
-        named.append(f"'{label}'" + (f" and {count - 1} more" if count > 1 else ""))
-    message = (
-        f"these parts are not in place: they are {len(sizes)} groups that do not touch each other "
-        f"({1e3 * reach:.1f} mm at least between them): {listing(named, NAMED)}"
-    )
+    message = f"these parts are not in place: they are {groups}"
     hint = f"a print bed, an exploded view, or a part that is missing? {HINT}"
     return [Diagnostic("NotInPlace", message, None, hint)]
-
-
-def _gap(
-    solids: Sequence[Solid], bodies: Sequence[Any], one: int, other: int, reach: float
-) -> float:
-    """The distance of two parts [m], at most `reach`; 0 if the hull of one overlaps that of the
-    other, as with links of a chain. An open mesh is represented by its hull."""
-    from manifold3d import Manifold
-
-    hulls = [Manifold.hull_points(solids[n].corners) for n in (one, other)]
-    if (hulls[0] ^ hulls[1]).volume() > 0:
-        return 0.0
-    pair = [bodies[n] or hull for n, hull in zip((one, other), hulls, strict=True)]
-    return float(pair[0].min_gap(pair[1], reach))

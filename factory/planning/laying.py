@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import inf
+from math import inf, isfinite
 from time import perf_counter
 
 import numpy as np
@@ -14,18 +14,20 @@ from factory.geometry.product import product_geometry
 from factory.geometry.solids import Product
 from factory.lang.pag_reader import read_pag
 from factory.layout.request import Ground
+from factory.nets.verdict import listing
 from factory.pipeline import Project
 from factory.planning.exact import Tree
 from factory.planning.judging import Judged
 from factory.planning.parts import InPlace
 from factory.planning.searching import Aim
 from factory.planning.subsets import Stance
-from factory.planning.writing import Screwed, planned_product
+from factory.planning.writing import Screwed, planned_product, screw_lines, screws_in
 from factory.planning.writing import Tree as LabelTree
+from factory.problem.plan import Plan
 from factory.problem.robot_types import load_catalogue
 from factory.problem.template import Template
 from factory.support.bounds import Allowance
-from factory.support.errors import FactoryError
+from factory.support.errors import FactoryError, InputError
 from factory.support.settings import Settings
 from factory.timing.timed import pace
 
@@ -39,12 +41,14 @@ ALIKE = 0.01
 @dataclass(frozen=True)
 class LaidOut:
     """A judged tree, as a `tree` of labels and as a `project`; `kinds`: the number of different
-    sub-assemblies."""
+    sub-assemblies; `lines`: the screws that share a robot, and `apart`: why others do not."""
 
     judged: Judged
     tree: LabelTree = field(repr=False)
     project: Project = field(repr=False)
     kinds: int
+    lines: tuple[tuple[str, ...], ...] = ()
+    apart: tuple[str, ...] = ()
 
     @cached_property
     def blocked(self) -> int:
@@ -109,7 +113,39 @@ class Layouts:
         if judged.stance not in self._products:
             self._products[judged.stance] = product_geometry(pag, self.source.files)
         project.__dict__["product"] = self._products[judged.stance]
-        return LaidOut(judged, tree, project, self.kinds(judged.tree))
+        laid = LaidOut(judged, tree, project, self.kinds(judged.tree))
+        lines = [one for line in screw_lines(tree, self._kinds) for one in _lines(project, line)]
+        why = self._spread(screws_in(tree), lines)
+        shared = project.with_lines(lines)
+        return replace(laid, project=shared, lines=tuple(lines), apart=why)
+
+    def _spread(self, screws: Sequence[str], lines: Sequence[Sequence[str]]) -> tuple[str, ...]:
+        """Why equal screws are not on one line."""
+        line = {screw: number for number, line in enumerate(lines) for screw in line}
+        alike: dict[str, list[str]] = {}
+        for screw in screws:
+            alike.setdefault(self._kinds.get(screw, screw), []).append(screw)
+        why = "they come to several sub-assemblies, or from several sides"
+        return tuple(
+            f"{listing(several, 12)} do not all share a driver: {why}"
+            for several in alike.values()
+            if len({line.get(screw, screw) for screw in several}) > 1
+        )
+
+    def or_alone(self, laid: LaidOut) -> LaidOut:
+        """A layout whose screws share robots or, where there is none of them, or hands cannot hold
+        what they could hold alone, the one in which they do not."""
+        if not laid.lines or (isfinite(laid.seconds) and not laid.held):
+            return laid
+        project = laid.project.with_plan(Plan())
+        project.__dict__["product"] = laid.project.product
+        alone = replace(laid, project=project, lines=())
+        fits = isfinite(laid.seconds)
+        if (fits and laid.held <= alone.held) or not isfinite(alone.seconds):
+            return laid
+        why = "no hand holds them all" if fits else "no layout is found"
+        apart = [f"{listing(line, 12)} have a driver each: {why}" for line in laid.lines]
+        return replace(alone, apart=(*laid.apart, *apart))
 
     def labelled(self, tree: Tree) -> LabelTree:
         """A tree with the labels of units in place of their numbers."""
@@ -154,7 +190,7 @@ class Layouts:
                 break
             begin = perf_counter()
             try:
-                laid = self.of(judged)
+                laid = self.or_alone(self.of(judged))
                 best = laid if best is None else min(best, laid, key=lambda one: one.rank(aim))
             except KeyboardInterrupt:
                 if best is None:
@@ -165,3 +201,19 @@ class Layouts:
         if best is None:
             raise ValueError("there is no tree to lay out")
         return best
+
+
+def _lines(project: Project, screws: Sequence[str]) -> list[tuple[str, ...]]:
+    """The fewest lines found for some screws, those of one screw left out."""
+    lines: list[list[str]] = []
+    for screw in screws:
+        for line in lines:
+            try:
+                project.with_lines([[*line, screw]])
+            except InputError:
+                continue
+            line.append(screw)
+            break
+        else:
+            lines.append([screw])
+    return [tuple(line) for line in lines if len(line) > 1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -12,8 +13,12 @@ from factory.planning.plan import CannotAssemble, Planned
 from factory.planning.posing import in_words
 from factory.planning.writing import planned_product
 from factory.problem.template import Template
-from factory.support.errors import Diagnostic
-from factory.support.files import own_names, write_all
+from factory.support.errors import Diagnostic, InputError
+from factory.support.files import head_of, own_names, write_all
+from factory.support.user_defaults import NAME
+
+HEAD = b"# written by `factory plan`: equal screws are brought by one robot, and driven in by one\n"
+"""The first line of the settings that are written with a plan."""
 
 
 def write_planned(
@@ -28,11 +33,31 @@ def write_planned(
     first. `allow`: units, or pairs of them, that may pass through others. Raises InputError where a
     file would be written over the source or through a link."""
     tree = planned.tree, planned.orientation
-    made = planned_product(placed, *tree, source.name, allow, templates)
+    made = planned_product(placed, *tree, source.name, allow, templates, planned.screws)
     files = {folder / name: content for name, content in made.files.items()}
+    files |= _settings(folder / NAME, planned.lines)
     own_names(folder, files, [source])
     write_all(files)
     return tuple(files)
+
+
+def _settings(file: Path, lines: Sequence[Sequence[str]]) -> dict[Path, bytes]:
+    """The settings beside the PAG, with the screws that share robots; none if there are none, and
+    nobody had written any. Raises InputError (BadFile) where the file is somebody else's."""
+    there = head_of(file, len(HEAD)) if file.exists() else HEAD
+    if not lines and (there != HEAD or not file.exists()):
+        return {}
+    if there != HEAD:
+        rows = ", ".join(f"screws{n} = {_row(line)}" for n, line in enumerate(lines, 1))
+        message = f"'{file}' is not of a plan, and would be written over"
+        hint = f"choose another folder, or move it and add [lines] {rows} to yours afterwards"
+        raise InputError(Diagnostic("BadFile", message, None, hint))
+    rows = "".join(f"screws{n} = {_row(line)}\n" for n, line in enumerate(lines, 1))
+    return {file: HEAD + (f"\n[lines]\n{rows}" if lines else "").encode()}
+
+
+def _row(line: Sequence[str]) -> str:
+    return json.dumps(list(line), ensure_ascii=False)
 
 
 def refusal(why: CannotAssemble, pictures: Sequence[Path] = ()) -> Diagnostic:

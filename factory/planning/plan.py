@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -22,10 +23,11 @@ from factory.planning.fastening import fastened, fasteners, renumbered
 from factory.planning.judging import Join, Judged
 from factory.planning.laying import LaidOut, Layouts
 from factory.planning.parts import InPlace, refuse_hidden
-from factory.planning.posing import Pose, along, posed, said, screwing, toppling
+from factory.planning.posing import Pose, along, loose, posed, said, screwing, sharing, toppling
 from factory.planning.searching import Aim, Sought, Trees, budget_of, trees
 from factory.planning.standing import feet
 from factory.planning.subsets import BLOCKED, ROOT_AXIS, Stance, stances
+from factory.planning.threads import threads
 from factory.planning.turning import only
 from factory.planning.writing import Tree, planned_product, screws_in
 from factory.problem.pag import PAG
@@ -114,7 +116,8 @@ class Planned:
     onto the floor, the operations and figures, and the laid-out `project` (None if estimates alone
     decided). `optimal`: whether it is proved that no tree is better in price and expected cycle;
     `hidden`: the pairs that overlap according to accepted hulls; `notes`: the orientation and other
-    remarks."""
+    remarks; `screws`: the units that are screws, driven in or not; `lines`: those that share a
+    robot, `alone`: why others do not."""
 
     tree: Tree = field(repr=False)
     orientation: Array
@@ -124,6 +127,9 @@ class Planned:
     project: Project | None = field(default=None, repr=False, compare=False)
     hidden: tuple[Overlapping, ...] = field(default=(), repr=False)
     notes: tuple[str, ...] = ()
+    screws: tuple[str, ...] = ()
+    lines: tuple[tuple[str, ...], ...] = ()
+    alone: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -161,7 +167,8 @@ def plan(source: InPlace, options: PlanOptions | None = None) -> Planned | Canno
         return CannotAssemble(pose.stuck, removal(graphs), pose.needs)
     planned = _planned(pose, asked, budget)
     notes = (*said(pose, planned.orientation), *toppling(planned.figures.tips))
-    notes += screwing(screws_in(planned.tree))
+    notes += (*loose(planned.figures.apart), *sharing(planned.lines), *planned.alone)
+    notes += screwing(screws_in(planned.tree), planned.screws)
     return replace(planned, hidden=pairs if asked.hulls else (), notes=notes)
 
 
@@ -179,27 +186,30 @@ def _planned(pose: Pose, asked: PlanOptions, budget: Allowance) -> Planned:
         words = f"{judged.robots} robots, about {judged.seconds:.1f} s"
         asked.told("searching for a tree", seen[0], None, words)
 
-    def sought_for(screws: tuple[int, ...]) -> Trees:
-        rest = [n for n in range(len(graphs)) if n not in screws]
-        others = graphs.grouped([[n] for n in rest]) if screws else graphs
+    def sought_for(screws: Sequence[int], plain: Collection[int] = ()) -> Trees:
+        made = threads(source, graphs, screws, plain)
+        after = {*screws, *(ring for one in made for ring in one.follow)}
+        rest = [n for n in range(len(graphs)) if n not in after]
+        groups = [[n, *(one.screw for one in made if one.into == n)] for n in rest]
+        others = graphs.grouped(groups) if after else graphs
         prices = _kept_prices(only(source, others.labels), templates)
         task = Sought(others, expected, prices, asked.aim, budget, told, stances(pose.up))
-        return driven(trees(task), rest)
-
-    def driven(sought: Trees, rest: list[int]) -> Trees:
-        screws = [n for n in range(len(graphs)) if n not in rest]
+        candidates = trees(task)
         if not screws:
-            return sought
-        made = [fastened(graphs, renumbered(j, rest), screws, DWELL) for j in sought.all]
-        if all(left for _, left in made):
-            lost = min((left for _, left in made), key=len)
-            return sought_for(tuple(n for n in screws if n not in lost))
-        return Trees(tuple(judged for judged, left in made if not left), optimal=False)
+            return candidates
+        joined = [fastened(graphs, renumbered(j, rest), made, DWELL) for j in candidates.all]
+        if all(left for _, left in joined):
+            lost = min((left for _, left in joined), key=len)
+            return sought_for([n for n in screws if n not in lost], {*plain, *lost})
+        return Trees(tuple(judged for judged, left in joined if not left), optimal=False)
 
-    sought = sought_for(_screws(source, graphs, asked))
+    screws = _screws(source, graphs, asked)
+    sought = sought_for(screws)
     layouts = Layouts(source, templates, asked.settings)
+    named = tuple(graphs.labels[n] for n in screws)
     if not asked.lay_out:
-        return _result(pose, layouts.of(sought.all[0]), sought.optimal, 0)
+        made = _result(pose, layouts.of(sought.all[0]), sought.optimal, 0)
+        return replace(made, screws=named)
     laid = [0]
 
     def said(best: LaidOut) -> None:
@@ -209,7 +219,7 @@ def _planned(pose: Pose, asked: PlanOptions, budget: Allowance) -> Planned:
 
     best = layouts.best(sought.all, asked.aim, budget, said)
     asked.told("measuring clearances", 1, None, "")
-    return _result(pose, best, sought.optimal, laid[0])
+    return replace(_result(pose, best, sought.optimal, laid[0]), screws=named)
 
 
 def _kept_prices(source: InPlace, templates: Mapping[str, Template]) -> Callable[[Stance], Array]:
@@ -272,7 +282,8 @@ def _result(pose: Pose, laid: LaidOut, optimal: bool, layouts: int) -> Planned:
     joins = tuple(_join(join, pose, room[join.direction[0]]) for join in judged.joins)
     project = laid.project if layouts else None
     orientation = judged.stance.rotation @ pose.turn
-    return Planned(laid.tree, orientation, joins, figures, optimal, project)
+    shared: dict[str, Any] = {"lines": laid.lines, "alone": laid.apart}
+    return Planned(laid.tree, orientation, joins, figures, optimal, project, **shared)
 
 
 def _join(join: Join, pose: Pose, room: Array) -> PlannedJoin:

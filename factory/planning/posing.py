@@ -127,14 +127,32 @@ def said(pose: Pose, turn: Array) -> tuple[str, ...]:
     return (stands + (tips if pose.tips > TIPS else ""),)
 
 
-def screwing(labels: Sequence[str]) -> tuple[str, ...]:
-    """A note on the parts that are driven in as screws, if there are any."""
-    some = f"{listing(labels, 12)} {'are driven in as screws' if len(labels) > 1 else 'is a screw'}"
-    return (
-        (f"{some}, after the parts that they clamp (--no-screws: ordinary parts)",)
-        if labels
-        else ()
-    )
+def screwing(driven: Sequence[str], screws: Sequence[str]) -> tuple[str, ...]:
+    """Notes on the screws of a product: those that are driven in, and those that are joined as
+    other parts."""
+    notes = []
+    if driven:
+        some = "are driven in as screws" if len(driven) > 1 else "is a screw"
+        after = "after the parts that they clamp (--no-screws: ordinary parts)"
+        notes.append(f"{listing(driven, 12)} {some}, {after}")
+    if others := [label for label in screws if label not in driven]:
+        some = "are screws and are" if len(others) > 1 else "is a screw and is"
+        why = "no sub-assembly lets a driver get there from above, or along its axis"
+        hint = "if the product stands on its side, --up turns it"
+        notes.append(f"{listing(others, 12)} {some} not driven in: {why} ({hint})")
+    return tuple(notes)
+
+
+def sharing(lines: Sequence[Sequence[str]]) -> tuple[str, ...]:
+    """A note on each line of screws that share a robot and a driver."""
+    words = "share the robot that brings them, and a driver ([lines] in factory.toml)"
+    return tuple(f"{listing(line, 12)} {words}" for line in lines)
+
+
+def loose(count: int) -> tuple[str, ...]:
+    """A note on sub-assemblies whose parts do not touch each other, if there are any."""
+    some = f"{count} sub-assemblies have" if count > 1 else "a sub-assembly has"
+    return (f"{some} parts that touch none of its others: no tree avoids this",) if count else ()
 
 
 def toppling(count: int) -> tuple[str, ...]:

@@ -26,6 +26,7 @@ from factory.lang.pag_reader import load_pag
 from factory.lang.source import quoted
 from factory.planning.faults import check_in_place, check_places, raise_if_any
 from factory.planning.parts import EXTRA, InPlace, Kept, PlacedPart, hull_stands
+from factory.planning.shanks import screws_among
 from factory.problem.pag import PAG, SHAPES, Assembly
 from factory.problem.template import Template
 from factory.support.collector import collector_paused
@@ -43,7 +44,8 @@ SHOWN = 12
 class SourceOptions:
     """`unit`: the unit of length, None to determine it; `keep`: labels of sub-trees to keep;
     `replan`: whether the tree of a PAG is discarded; `library` and `boxes` as for an LDraw import;
-    `in_place`: whether the check that parts are in place is skipped."""
+    `in_place`: whether the check that parts are in place is skipped; `screws`: parts that are
+    screws besides those that are recognised, None for no screws at all."""
 
     unit: str | None = None
     keep: tuple[str, ...] = ()
@@ -51,6 +53,7 @@ class SourceOptions:
     library: Path | None = None
     boxes: bool = False
     in_place: bool = False
+    screws: tuple[str, ...] | None = ()
 
 
 @collector_paused()
@@ -68,7 +71,8 @@ def read_source(
     named = tuple(replace(part, kind=parts[first].label) for part, first in firsts)
     doubtful = check_places(named, made.has_tree, asked.unit is not None)
     if not (made.has_tree or asked.in_place):
-        raise_if_any(check_in_place(named))
+        screws = () if asked.screws is None else screws_among(named, asked.screws)
+        raise_if_any(check_in_place(named, screws))
     twins = (
         f"'{parts[one].label}' and '{parts[other].label}' are mirror images: two kinds"
         for one, other in kinds.twins[:SHOWN]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, count
 from math import ceil
@@ -20,7 +20,7 @@ from factory.importing.draft import file_stem, label_of
 from factory.importing.part_maker import Placement
 from factory.lang.writer import write_pag
 from factory.planning.parts import InPlace
-from factory.problem.pag import PAG, AllowedOverlap, Assembly
+from factory.problem.pag import PAG, AllowedOverlap, Assembly, most_allowed
 from factory.problem.template import Template
 
 Unit = TypeVar("Unit", str, int)
@@ -52,6 +52,19 @@ def screws_in(tree: Tree) -> tuple[str, ...]:
     return (*(screw for below in inside for screw in screws_in(below)), *mine)
 
 
+def screw_lines(tree: Tree, kinds: Mapping[str, str]) -> tuple[tuple[str, ...], ...]:
+    """The equal screws of a tree that come to one sub-assembly one after the other: one robot
+    brings those of a line, and one driver turns them; `kinds`: those of parts."""
+    if isinstance(tree, str):
+        return ()
+    inside = (tree.tree,) if isinstance(tree, Screwed) else tree
+    lines = [line for below in inside for line in screw_lines(below, kinds)]
+    alike: dict[str, list[str]] = {}
+    for screw in tree.screws if isinstance(tree, Screwed) else ():
+        alike.setdefault(kinds.get(screw, screw), []).append(screw)
+    return (*lines, *(tuple(line) for line in alike.values() if len(line) > 1))
+
+
 @dataclass(frozen=True, slots=True)
 class PlannedProduct:
     """A product as `plan` writes it: its PAG, the contents of its files by path in the output
@@ -68,12 +81,14 @@ def planned_product(
     by: str = "",
     allow: Sequence[str] = (),
     templates: Mapping[str, Template] = MappingProxyType({}),
+    threaded: Collection[str] = (),
 ) -> PlannedProduct:
     """The product that a tree makes of a source's parts, turned by a rotation (3, 3) about the
-    origin. `by` is said in the first line of the PAG. Of units, or pairs `a:b`, that `allow` has,
-    what they pass through is allowed as deep as it is. Only those of the `templates` that the
-    package ships are used: `mate`, with its further inputs inserted, `screw` and `relay`, besides
-    what kept sub-trees name."""
+    origin. `by` is said in the first line of the PAG. Of units, or pairs `a:b`, that `allow`
+    has, what they pass through is allowed as deep as it is; so are the threads that `threaded`
+    parts, which are screws, have in common with parts that are none. Only those of the
+    `templates` that the package ships are used: `mate`, with its further inputs inserted,
+    `screw` and `relay`, besides what kept sub-trees name."""
     turn = np.eye(3) if orientation is None else orientation
     kept = {keep.label: keep.nodes for keep in source.kept}
     taken = {part.label for part in source.parts}
@@ -102,8 +117,8 @@ def planned_product(
     parts = [_turned(part.node, turn) for part in source.parts]
     nodes = (*made, *reversed(whole), *parts)
     pag = PAG(root, nodes, len(nodes), allowed=source.allowed)
-    if allow:
-        meant = _meant(source, pag, allow, templates)
+    if allow or threaded:
+        meant = _meant(source, pag, allow, templates, threaded)
         pag = replace(pag, allowed=(*source.allowed, *meant))
     name = file_stem(source.name)
     head = f"// {name}, planned{f' from {by}' if by else ''}\n"
@@ -112,19 +127,25 @@ def planned_product(
 
 
 def _meant(
-    source: InPlace, pag: PAG, allow: Sequence[str], templates: Mapping[str, Template]
+    source: InPlace,
+    pag: PAG,
+    allow: Sequence[str],
+    templates: Mapping[str, Template],
+    threaded: Collection[str],
 ) -> Iterator[AllowedOverlap]:
-    """How deep units that may pass through others do so on their ways, and pairs `a:b` also when
-    finished, up to a hundredth of a millimetre more."""
+    """How deep units that may pass through others do so on their ways, and pairs `a:b`, and
+    `threaded` parts with others, also when finished, up to a hundredth of a millimetre more."""
     product = product_geometry(pag, source.files)
     units = {part.label: label for label, parts in source.units() for part in parts}
     pairs = [{*name.split(":")} for name in allow]
     deep: dict[tuple[str, str], float] = {}
     for pair in overlaps_of(product).pairs:
-        if {units[pair.one], units[pair.other]} in pairs:
+        is_thread = (pair.one in threaded) != (pair.other in threaded)
+        needed = pair.depth > most_allowed(pag.allowed, pair.one, pair.other)
+        if {units[pair.one], units[pair.other]} in pairs or (is_thread and needed):
             deep[pair.one, pair.other] = pair.depth
-    judged = matings(expand(pag, templates), product)
-    for clash in (clash for mating in judged.all for clash in mating.clashes):
+    judged = matings(expand(pag, templates), product).all if allow else ()
+    for clash in (clash for mating in judged for clash in mating.clashes):
         both = {units[part] for part in clash.parts}
         if both in pairs or both & {*allow}:
             labels = next((p for p in deep if {*p} == {*clash.parts}), clash.parts)

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 APART = (
     ("--deputies", ("--relay", "--cycle"), "no robot can take over for one that relays"),
-    ("[lines]", ("--robots", "--cycle"), "the search chooses which labels share a robot"),
     ("[tees]", ("--robots", "--cycle", "--relay"), "they change the robots that share a stem"),
     (
         "--demand",
