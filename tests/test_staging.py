@@ -14,7 +14,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from factory.control.mode import Mode
-from factory.control.profile import mode_time
 from factory.layout.bounds import cycle_time_bound
 from factory.layout.clearance import certify
 from factory.layout.dimensions import Clearance
@@ -146,7 +145,7 @@ def test_a_carrier_that_is_waited_for_takes_as_long_as_all_of_its_operation() ->
     settings, world = simulation.request.settings, simulation.request.world
     timing, longer = simulation.timing, set[tuple[int, int]]()
     for stage in timing.stages:
-        way = mode_time(stage.mode, np.array([stage.start]), timing.limits.of((stage.axis,)), world)
+        way = timing.drive.way(abs(stage.start - stage.goal)).rests(stage.mode.eps) * timing.tick
         key = stage.robot, stage.operation
         longer |= {key} if timing.ways()[key] > way + 0.1 else set()
     run = simulation.run()
