@@ -182,9 +182,11 @@ def test_the_layout_is_made_for_that_pace(drawn: Drawn) -> None:
     still, staged = Pace.of(STILL), Pace.of(STAGED)
     timing = Timing(layout, STAGED)
     delays, ways = timing.delays, timing.ways()
-    assert operation_times(layout, staged) == pytest.approx(delays, abs=1e-6)
+    later, most = np.array(delays) - operation_times(layout, staged), 4 * timing.tick
+    assert -1e-6 < later.min() and later.max() < most
     cycle = max(gear_times(layout, staged))
-    assert cycle == pytest.approx(cycle_time(layout.factory, delays, ways).seconds, abs=1e-6)
+    rounded = cycle_time(layout.factory, delays, ways).seconds - cycle
+    assert -1e-6 < rounded < most * max(len(r.operations) for r in layout.factory.robots)
     assert net.pace < cycle <= max(gear_times(layout, still)) + 1e-9
     bound = cycle_time_bound(layout.factory, layout.product, layout.clearance, staged)
     made = optimised(layout.factory, layout.product, Clearance(layout.clearance), staged)
