@@ -160,12 +160,22 @@ p10 = atomic ( box = ( 0.07, 0.074, 0.0705 ), pos = ( 0.0836, 0.1033, 0.16225 ) 
 """The rear of p6 is 0.1 mm ahead of that of p4 under it."""
 
 SHEETS = """
-root = u4; u1 = mate ( a, b ); u2 = mate ( u1, c ); u3 = mate ( u2, d ); u4 = mate ( u3, e );
-a = atomic ( box = ( 0.01476566, 0.01423379, 0.0002 ), pos = ( 0, 0, 0.0001 ) );
-b = atomic ( box = ( 0.01614489, 0.01556334, 0.0001 ), pos = ( 0, 0, 0.00025 ) );
-c = atomic ( box = ( 0.01395501, 0.01345234, 0.0006 ), pos = ( 0, 0, 0.0006 ) );
-d = atomic ( box = ( 0.01705306, 0.0164388, 0.0003 ), pos = ( 0, 0, 0.00105 ) );
-e = atomic ( box = ( 0.01273689, 0.0122781, 0.00008 ), pos = ( 0, 0, 0.00124 ) );
+root = u7;
+u1 = mate ( p1, p2 );
+u2 = mate ( u1, p3 );
+u3 = mate ( u2, p4 );
+u4 = mate ( u3, p5 );
+u5 = mate ( u4, p6 );
+u6 = mate ( u5, p7 );
+u7 = mate ( u6, p8 );
+p1 = atomic ( box = ( 0.01476566, 0.01423379, 0.0002 ), pos = (0, 0, 0.0001 ), density = 700 );
+p2 = atomic ( box = ( 0.01614489, 0.01556334, 0.0001 ), pos = (0, 0, 0.00025 ), density = 700 );
+p3 = atomic ( box = ( 0.01395501, 0.01345234, 0.0006 ), pos = (0, 0, 0.0006 ), density = 700 );
+p4 = atomic ( box = ( 0.01705306, 0.0164388, 0.0003 ), pos = (0, 0, 0.00105 ), density = 700 );
+p5 = atomic ( box = ( 0.01716914, 0.0165507, 0.0002 ), pos = (0, 0, 0.0013 ), density = 700 );
+p6 = atomic ( box = ( 0.01580761, 0.01523821, 0.0001 ), pos = (0, 0, 0.00145 ), density = 700 );
+p7 = atomic ( box = ( 0.01273689, 0.0122781, 8e-05 ), pos = (0, 0, 0.00154 ), density = 700 );
+p8 = atomic ( box = ( 0.0138956, 0.01339508, 0.0002 ), pos = (0, 0, 0.00168 ), density = 700 )
 """
 """Of these sheets one has an edge of 80 µm."""
 
