@@ -133,7 +133,8 @@ class Run:
     def verdict(self) -> RunVerdict:
         """Whether the run made its units, is a run of the net, and its bodies agree."""
         figures = None if self.physics is None else kept_figures(self.physics)
-        return judged(self.trouble, self.replays, figures, self.monitor, self.lenient)
+        verdict = judged(self.trouble, self.replays, figures, self.monitor, self.lenient)
+        return verdict.caused_by(self.failures.unseen if self.failures else ())
 
     @property
     def succeeded(self) -> bool:

@@ -4,7 +4,7 @@ respond."""
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from factory.simulation.recovery.faults import Campaign, WorldFault
 from factory.simulation.recovery.plant import Plant
 from factory.simulation.recovery.responding import Responding
 from factory.simulation.recovery.standing import patience
-from factory.simulation.recovery.striking import Striking
+from factory.simulation.recovery.striking import Hit, Striking
 from factory.simulation.simulation import Simulation
 from factory.simulation.supervisor import Supervisor
 from factory.support.errors import Diagnostic, InputError
@@ -49,8 +49,9 @@ def summed(
     stood: Sequence[Stood],
     binned: int = 0,
     spilled: tuple[str, ...] = (),
+    hits: Sequence[Hit] = (),
 ) -> Failures:
-    """The failures of a run. A dead robot that was never asked to move does not count as missed. A
+    """The failures of a run; `hits`: the faults that struck a part. A dead robot that was never asked to move does not count as missed. A
     robot that is stuck in its operation does not count as a false alarm: it indicates an input that
     has slipped."""
     stuck = sum(one.test == "jammed" and not one.is_death for one in failures)
@@ -73,7 +74,22 @@ def summed(
         tuple(stood),
         binned,
         spilled,
+        tuple(_unseen(failures, hits, missed)),
     )
+
+
+def _unseen(
+    failures: Sequence[Failing], hits: Sequence[Hit], missed: Mapping[str, int]
+) -> Iterator[str]:
+    """The faults that no sensor found, in words: those that struck labels oftener than the failures
+    of their test concern."""
+    found = Counter((one.test, one.operation) for one in failures)
+    for kind, label, unit in hits:
+        test = CAUSES.get(kind, "")
+        if found[test, label] > 0:
+            found[test, label] -= 1
+        elif missed.get(test, 0) > 0:
+            yield f"{kind} '{label}' of unit {unit + 1}"
 
 
 class Recovery:
@@ -256,6 +272,7 @@ class Recovery:
             self.stood,
             self.plant.binned,
             tuple(dict.fromkeys(self.plant.spilled)),
+            self.striking.hits,
         )
 
 

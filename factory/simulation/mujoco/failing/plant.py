@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
+from math import radians
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from factory.mjcf.masks import robot_code
 from factory.mjcf.weld_frames import WeldFrames
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
+from factory.record.verdict import MOST
 from factory.simulation.mujoco.failing.fallen import Fallen
 from factory.simulation.mujoco.failing.mishaps import Mishaps
 from factory.simulation.mujoco.holdings import Holdings
@@ -27,8 +29,15 @@ SCRAP = 1 << 20
 LOST = 5e-3
 """A part further than this from its place in the hand is lost [m]."""
 
-TURNED = 0.05
-"""What a feeder shows is askew, too, when it is turned so far [rad]."""
+SHARE = 0.5
+"""A feeder's camera finds what is off by this share of what a hand-off may be (`verdict.LIMITS`):
+the rest is left to its noise and to the robot that takes the part."""
+
+SHIFTED = SHARE * MOST["handoff_gap_max_mm"] / 1e3
+"""Largest displacement that no camera finds [m]; a template may ask for less."""
+
+TURNED = SHARE * radians(MOST["handoff_angle_max_deg"])
+"""Largest angle that no camera finds [rad]."""
 
 
 class Senses:
@@ -89,7 +98,8 @@ class Senses:
         pose, upright = self._world.d.qpos[address], m.qpos0[address[3:]]
         off = np.linalg.norm(pose[:3] - place + self._noise * self._draw.normal(size=3))
         return bool(
-            off > test.limit or 2 * np.arccos(min(1.0, abs(float(pose[3:] @ upright)))) > TURNED
+            off > min(test.limit, SHIFTED)
+            or 2 * np.arccos(min(1.0, abs(float(pose[3:] @ upright)))) > TURNED
         )
 
     def _gaps(self, welds: Index, bodies: Index) -> Array:
