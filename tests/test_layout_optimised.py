@@ -68,7 +68,7 @@ def test_times_are_those_of_the_modes(drawn: Drawn) -> None:
     layout = random_layout(*drawn)
     predicted = Timing(layout, replace(Settings(), stage=False)).delays
     later = np.array(predicted) - operation_times(layout, PACE)
-    assert -1e-6 < later.min() and later.max() < 4 * Settings().tick
+    assert later.min() > -1e-6 and later.max() < 4 * Settings().tick
 
 
 @pytest.mark.parametrize(

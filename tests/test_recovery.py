@@ -200,7 +200,7 @@ OFFS = ({"metres": 3e-4}, {"metres": 1.5e-3}, {"degrees": 0.02, "metres": 0.0}, 
 
 @pytest.mark.parametrize("off", OFFS)
 def test_what_no_camera_finds_no_verdict_condemns(off: dict[str, Any]) -> None:
-    """Cameras and verdict have one set of limits: 1.5 mm or 2° were let pass, and failed the run."""
+    """Cameras and verdict have one set of limits: 1.5 mm or 2° passed, and failed the run."""
     run, failures = run_with(WorldFault("misplaced", label="part1", unit=1, **off), units=1)
     assert run.succeeded, run.verdict.failures
     assert failures.missed == len(failures.unseen) == 1 - len(failures.found)

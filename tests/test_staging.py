@@ -183,7 +183,7 @@ def test_the_layout_is_made_for_that_pace(drawn: Drawn) -> None:
     timing = Timing(layout, STAGED)
     delays, ways = timing.delays, timing.ways()
     later, most = np.array(delays) - operation_times(layout, staged), 4 * timing.tick
-    assert -1e-6 < later.min() and later.max() < most
+    assert later.min() > -1e-6 and later.max() < most
     cycle = max(gear_times(layout, staged))
     rounded = cycle_time(layout.factory, delays, ways).seconds - cycle
     assert -1e-6 < rounded < most * max(len(r.operations) for r in layout.factory.robots)

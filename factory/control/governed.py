@@ -1,6 +1,6 @@
-"""The governed references of a mode, tick by tick: the tick in which a run sees an axis pass a place,
-and that in which the mode is over. One axis at a time, in scalars; `governor.py` moves all axes of a
-run by the same rules."""
+"""The governed references of a mode, tick by tick: in which tick a run sees an axis pass a place,
+and in which the mode is over. One axis at a time, in scalars; `governor.py` moves all axes of a run
+by the same rules."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Braking profiles and the times that follow from them.
 
 A robot with speed limit v and acceleration limit a goes a distance d along a trapezoid of speed. In
-the ideal world it has its speed at once and only brakes. A run samples this in ticks: `governed.py`.
+the ideal world it has its speed at once and only brakes. A run goes by ticks (`governed.py`).
 """
 
 from __future__ import annotations
@@ -81,4 +81,3 @@ class SpeedProfile:
         """The greatest speed on the way."""
         v, a = self.speed, self.acceleration
         return max(min(v, sqrt(a * distance + start * start / 2)), start)
-

@@ -133,7 +133,9 @@ def _reason(layout: Layout, fault: Fault) -> Diagnostic:
         if robot.name in fault.robots and hand is not None and hand.kind == "none":
             label = held(factory, robot.index).partition("@")[0]
             message = f"no hand can hold '{label}', and robots without hands meet here"
-            hint = f"{', '.join(fault.robots)}: `factory check --clashes DIR` draws the nearest miss"
+            hint = (
+                f"{', '.join(fault.robots)}: `factory check --clashes DIR` draws the nearest miss"
+            )
             made = factory.by_label.get(label)
             return Diagnostic("NoGrip", message, made and made.position, hint)
     return fault.diagnostic()

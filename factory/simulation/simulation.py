@@ -129,7 +129,7 @@ class Simulation:
     @cached_property
     def cycle(self) -> CycleTime:
         """The predicted cycle time, and what bounds it."""
-        return cycle_of(self.timing, self.word, self.request.wip)
+        return cycle_of(self.timing, self.word, self.request.wip, self.supervisor.scans)
 
     @property
     def duration(self) -> float:

@@ -17,7 +17,6 @@ from factory.plant.family import family
 from factory.timing.on_demand import cycle_of
 from factory.timing.timing import Timing
 
-
 UNITS = 24
 """Number of units of one product from which its cycle time is taken."""
 

@@ -10,8 +10,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from factory.control.mode import ROUNDING, Array, Limits, Mode
 from factory.control.governed import Drive, Trajectory, mode_ticks, trajectories
+from factory.control.mode import ROUNDING, Array, Limits, Mode
 from factory.control.profile import SpeedProfile, World
 from factory.layout.coordinating import HOME, Coordinated, without_bodies
 from factory.layout.exclusions import coordinated
@@ -125,7 +125,7 @@ class Timing:
     def _past(self, past: Past, change: Change) -> int:
         """The ticks until an axis comes past a point, from rest."""
         layout, robot, number = self.layout, self.factory.robot_of(past.axis), past.after // 2
-        drive = self._drive(past.axis, change)
+        drive = self.axis_drive(past.axis, change)
         if past.axis != robot:
             stroke = layout.strokes[robot]
             return drive.way(stroke).passes(stroke - past.at)
@@ -136,7 +136,7 @@ class Timing:
             return way.passes(max(0.0, past.at - visit.at) * factor)
         rises, length = 0, layout.guidepaths[robot].length
         if rises_first(layout, robot):
-            lift = self._drive(self.factory.lift_axis[robot], change)
+            lift = self.axis_drive(self.factory.lift_axis[robot], change)
             rises = lift.way(layout.strokes[robot]).rests(self.settings.eps)
         home = drive.way((length - visit.at) * factor)
         if past.at < length - HOME:
@@ -150,7 +150,7 @@ class Timing:
         gear = self.factory.robots[robot].operations
         after = gear[(gear.index(number) + 1) % len(gear)]
         one, other = (self.layout.visits[n, robot].up for n in (number, after))
-        lift = self._drive(self.factory.lift_axis[robot], AS_IT_IS)
+        lift = self.axis_drive(self.factory.lift_axis[robot], AS_IT_IS)
         return lift.way(abs(one - other)).rests(self.settings.eps)
 
     @cached_property
@@ -181,7 +181,7 @@ class Timing:
             sooner = fastest.rest(max(0.0, layout.guidepaths[robot].length - at))
         return up * tick, max(0, ceil(down - sooner / tick - ROUNDING)) * tick
 
-    def _drive(self, axis: int, change: Change) -> Drive:
+    def axis_drive(self, axis: int, change: Change) -> Drive:
         """How an axis moves, with a change."""
         limits = self._limits((axis,), (self.factory.robot_of(axis),), change)
         return replace(
@@ -218,7 +218,7 @@ class Timing:
 
     def _way(self, stage: HeadStart, start: float, change: Change) -> float:
         way = abs(start - stage.goal) * change.way.get(stage.robot, 1.0)
-        ticks = self._drive(stage.axis, change).way(way).rests(stage.mode.eps)
+        ticks = self.axis_drive(stage.axis, change).way(way).rests(stage.mode.eps)
         return ticks * self.tick + self.rest - self.tick
 
     def _limits(self, axes: Sequence[int], robots: Sequence[int], change: Change) -> Limits:
@@ -272,7 +272,7 @@ class Timing:
         """How long one robot moves in an operation, without stops on its way [s]."""
         mode = self.modes[number]
         axis = self.factory.axes[number][slot]
-        drive = self._drive(axis, AS_IT_IS)
+        drive = self.axis_drive(axis, AS_IT_IS)
         profile = SpeedProfile(drive.speed, drive.acceleration)
         way = 0.0 if mode.is_still else abs(float(self.left[number][slot] - mode.goals[slot]))
         if self.world == "mujoco":

@@ -51,9 +51,9 @@ def summed(
     spilled: tuple[str, ...] = (),
     hits: Sequence[Hit] = (),
 ) -> Failures:
-    """The failures of a run; `hits`: the faults that struck a part. A dead robot that was never asked to move does not count as missed. A
-    robot that is stuck in its operation does not count as a false alarm: it indicates an input that
-    has slipped."""
+    """The failures of a run; `hits`: the faults that struck a part. A dead robot that was never
+    asked to move does not count as missed. A robot that is stuck in its operation does not count as
+    a false alarm: it indicates an input that has slipped."""
     stuck = sum(one.test == "jammed" and not one.is_death for one in failures)
     tests, wanted = Counter(one.test for one in failures), Counter[str]()
     tests["jammed"] -= stuck
