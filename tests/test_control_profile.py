@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.control.governed import Drive, mode_ticks, trajectories
+from factory.control.governed import GovernedAxis, mode_ticks, trajectories
 from factory.control.governor import follow
 from factory.control.mode import STILL, Array, Limits, Mode
 from factory.control.navigation import Bundle
@@ -32,7 +32,7 @@ def staged(lengths: Array, standoffs: Array) -> Mode:
     return Mode(np.zeros(k), np.zeros(k), lengths, EPS, gate=gate, standoff=standoffs, dwell=0.1)
 
 
-def measured(mode: Mode, x: Array, limits: Limits, drive: Drive) -> int:
+def measured(mode: Mode, x: Array, limits: Limits, drive: GovernedAxis) -> int:
     """The tick in which the field's flow, or the governed reference, ends the mode."""
     bundle, v, shown = Bundle.of([mode], [limits]), np.zeros_like(x), np.zeros_like(x)
     clock = 0.0
@@ -68,7 +68,10 @@ def test_a_mode_ends_in_the_tick_in_which_the_integrated_one_does(
             (staged(long, 0.9 * long * rng.uniform(0, 1, 3)), long),
             (staged(long[:2], np.array([0.0, 0.1])), np.array([1e-4, 1.0]) * long[:2]),
         ):
-            limits, drive = random_limits(rng, mode.size), Drive(1.0, 1.0, tick, tick / 2, instant)
+            limits, drive = (
+                random_limits(rng, mode.size),
+                GovernedAxis(1.0, 1.0, tick, tick / 2, instant),
+            )
             assert mode.clear_from(x0)
             found = mode_ticks(mode, trajectories(mode, x0, limits, drive), tick)
             off.append(found - measured(mode, x0, limits, drive))
@@ -116,14 +119,14 @@ def test_a_way_ends_at_the_distance_at_rest(d: float, v: float, a: float, part: 
 def test_a_way_in_ticks_is_the_continuous_one_rounded_up(
     d: float, v: float, a: float, part: float
 ) -> None:
-    profile, way = SpeedProfile(v, a), Drive(v, a, 0.01).way(d)
+    profile, way = SpeedProfile(v, a), GovernedAxis(v, a, 0.01).way(d)
     assert 0 <= way.rests(1e-6, 1e-6) - profile.rest(d) / 0.01 < 2.5
     tick = way.passes(part * d)
     assert way.left[tick] - 1e-9 <= part * d <= way.left[max(tick - 1, 0)]
 
 
 def test_waiting_takes_a_tick_or_its_dwell() -> None:
-    limits, drive = Limits(np.ones(2), np.ones(2)), Drive(1.0, 1.0, 0.01)
+    limits, drive = Limits(np.ones(2), np.ones(2)), GovernedAxis(1.0, 1.0, 0.01)
     ways = trajectories(Mode.still(2), np.zeros(2), limits, drive)
     assert mode_ticks(Mode.still(2), ways, 0.01) == 1
     assert mode_ticks(replace(Mode.still(2), dwell=0.25), ways, 0.01) == 25

@@ -72,7 +72,7 @@ def test_the_cycle_of_robots_that_run_their_own_programs_is_predicted(
     """They see what they wait for up to a control period late: they were 1.4 to 6.8 % slower."""
     run = factory.run(paper, units=12, seed=seed, distributed=True)
     assert run.succeeded and run.cycle_time_s > 1.01 * timed(Timing(paper)).pace
-    assert run.cycle_time_s == pytest.approx(run.predicted_cycle_time_s, rel=0.01)
+    assert run.cycle_time_s == pytest.approx(run.predicted_cycle_time_s, rel=0.015)
 
 
 def test_a_cycle_time_is_one_of_whole_periods() -> None:

@@ -17,7 +17,7 @@ from factory.control.obstacles import OPEN
 
 
 @dataclass(frozen=True, slots=True)
-class Drive:
+class GovernedAxis:
     """How an axis moves.
 
     Attributes:
@@ -92,7 +92,7 @@ def _first(values: Sequence[float], bound: float) -> int:
 
 
 @lru_cache(maxsize=4096)
-def _way(drive: Drive, distance: float, taus: tuple[float, ...]) -> Trajectory:
+def _way(drive: GovernedAxis, distance: float, taus: tuple[float, ...]) -> Trajectory:
     """`governor.follow` for one axis until it rests at its goal."""
     tick, step, most = drive.tick, drive.acceleration * drive.tick, drive.speed
     left, v = distance, 0.0
@@ -116,7 +116,7 @@ def _way(drive: Drive, distance: float, taus: tuple[float, ...]) -> Trajectory:
     return Trajectory(tuple(lefts), tuple(speeds), tuple(measured))
 
 
-def trajectories(mode: Mode, x0: Array, limits: Limits, drive: Drive) -> list[Trajectory]:
+def trajectories(mode: Mode, x0: Array, limits: Limits, drive: GovernedAxis) -> list[Trajectory]:
     """The references of the axes of a mode from rest at `x0`, each under its `limits`; the rest of
     `drive` is that of all. Exact where the mode is `clear_from` x0."""
     distance = np.abs(x0 - mode.goals).tolist()

@@ -8,7 +8,7 @@ from math import sqrt
 
 import numpy as np
 
-from factory.control.governed import Drive, Trajectory
+from factory.control.governed import GovernedAxis, Trajectory
 from factory.control.profile import SpeedProfile
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Solid
@@ -42,7 +42,7 @@ def tray_profile(layout: Layout, settings: Settings) -> SpeedProfile:
 
 
 def leaving(layout: Layout, settings: Settings) -> float:
-    """Time from a product's dropoff until it is out of sight [s]: the tray sets out a tick later, and
+    """Time from a dropoff until the product is out of sight [s]: the tray sets out a tick later, and
     the shutter comes down once the product is past it."""
     tray, shutter = _drives(layout, settings)
     way = tray.way(layout.outfeed_way)
@@ -59,11 +59,11 @@ def away(layout: Layout, settings: Settings) -> float:
     return leaving(layout, settings) + back * settings.tick
 
 
-def _drives(layout: Layout, settings: Settings) -> tuple[Drive, Drive]:
+def _drives(layout: Layout, settings: Settings) -> tuple[GovernedAxis, GovernedAxis]:
     """The drives of tray and shutter."""
     tray = tray_profile(layout, settings)
     limits = (tray.speed, tray.acceleration), settings.shutter_limits
-    one, other = (Drive(speed, most, settings.tick, settings.lag) for speed, most in limits)
+    one, other = (GovernedAxis(speed, most, settings.tick, settings.lag) for speed, most in limits)
     return one, other
 
 

@@ -4,8 +4,6 @@ refuses forbidden commands."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from factory.control.mode import Limits
 from factory.plant.factory import Factory, Operation
 from factory.record.state import Event
@@ -14,14 +12,11 @@ from factory.simulation.ordering import Ordering
 from factory.simulation.signals import AxisDrives, Controller, Refusal, Sensed
 from factory.simulation.supervisor import Active
 from factory.support.settings import Settings
-from factory.timing.distributed import Scan
 
 
 class DrivenSupervisor:
     """Lets a `controller` drive a plant through its `interlock`, asking it every `scan` [s],
-    rounded to whole timesteps. `scans`: none of robots."""
-
-    scans: Sequence[Scan] = ()
+    rounded to whole timesteps."""
 
     def __init__(
         self,

@@ -26,7 +26,6 @@ from factory.simulation.ahead import Ahead
 from factory.simulation.bundles import Bundles
 from factory.simulation.ordering import Ordering
 from factory.simulation.world import World
-from factory.timing.distributed import Scan
 
 
 @dataclass(slots=True)
@@ -48,10 +47,8 @@ class Supervisor:
     that the marking stays legal. `counts`: how often each transition has fired where the run
     starts. `stages`: what robots do while they wait, where that is not to stand; nothing of it is
     in the net. `ordering`: the order places of the coordinated net. `enabled`: some operation may
-    start that could not in the last tick. `scans`: none, since all robots tick together.
+    start that could not in the last tick.
     """
-
-    scans: Sequence[Scan] = ()
 
     def __init__(
         self,

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, inf, sqrt
+from random import Random
 
 import numpy as np
 
@@ -58,7 +59,7 @@ class ScannedTimes:
     def __init__(self, net: Timed, scans: Sequence[Scan]) -> None:
         self.timed, self.timing, self.scans = net, net.timing, scans
         self._step = self.timing.stepped.step
-        self._passes = self.timing.passes()
+        self._passes, self._order = self.timing.passes(), Random(0)
         self.acted = [-scan.period for scan in scans]
         self.shown = [0] * len(scans)
         self.entered = dict[tuple[int, int], int]()
@@ -138,13 +139,18 @@ class ScannedTimes:
     def _enters(self, operation: Operation, date: float) -> int:
         """The tick in which the carrier sees that it may begin."""
         carrier = operation.carrier
-        others = [self.shown[robot] for robot in operation.robots if robot != carrier]
+        others = [self._seen(self.shown[r]) for r in operation.robots if r != carrier]
         begun = self.scans[carrier].tick(max(self.acted[carrier] + 1, date, *others, 0))
         for robot in operation.robots:
             self.entered[operation.index, robot] = self.scans[robot].tick(
-                max(self.acted[robot] + 1, begun)
+                max(self.acted[robot] + 1, begun if robot == carrier else self._seen(begun))
             )
         return begun
+
+    def _seen(self, tick: int) -> float:
+        """When others see what a robot shows in a tick: those that tick in the same timestep do so
+        in any order."""
+        return tick + self._order.choice((0.0, 0.5))
 
     def _ends(self, operation: Operation) -> int:
         """The tick in which the carrier ends an operation; all others see it, and go on."""
@@ -155,7 +161,7 @@ class ScannedTimes:
         last = self.shown[carrier] = end
         for robot in operation.robots:
             if robot != carrier:
-                self.shown[robot] = self.acted[robot] = self.scans[robot].tick(end)
+                self.shown[robot] = self.acted[robot] = self.scans[robot].tick(self._seen(end))
                 last = max(last, self.acted[robot])
         self.acted[carrier] = scan.tick(max(end + 1, last))
         return end

@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from factory.control.governed import Drive, Trajectory, mode_ticks, trajectories
+from factory.control.governed import GovernedAxis, Trajectory, mode_ticks, trajectories
 from factory.control.mode import ROUNDING, Array, Limits, Mode
 from factory.control.profile import SpeedProfile, World
 from factory.layout.coordinating import HOME, Coordinated, without_bodies
@@ -165,7 +165,7 @@ class Timing:
         the next until its robot may set out [s]: a robot comes when the part is down, one whose
         hand holds from above sets out then, and one whose hand is there first is there."""
         layout, tick = self.layout, self.tick
-        slider = Drive(*self.settings.feeder_limits, tick)
+        slider = GovernedAxis(*self.settings.feeder_limits, tick)
         up, down = (
             slider.way(feeder_of(layout, self.factory.operations[n].label).stroke).passes(ROUNDING)
             + CALM
@@ -181,7 +181,7 @@ class Timing:
             sooner = fastest.rest(max(0.0, layout.guidepaths[robot].length - at))
         return up * tick, max(0, ceil(down - sooner / tick - ROUNDING)) * tick
 
-    def axis_drive(self, axis: int, change: Change) -> Drive:
+    def axis_drive(self, axis: int, change: Change) -> GovernedAxis:
         """How an axis moves, with a change."""
         limits = self._limits((axis,), (self.factory.robot_of(axis),), change)
         return replace(
@@ -189,11 +189,13 @@ class Timing:
         )
 
     @cached_property
-    def drive(self) -> Drive:
+    def drive(self) -> GovernedAxis:
         """How axes move in this world."""
         settings, engine = self.settings, self.world == "mujoco"
         lag = self.stepped.lag if engine else 0.0
-        return Drive(settings.speed, settings.acceleration, self.tick, lag, instant=not engine)
+        return GovernedAxis(
+            settings.speed, settings.acceleration, self.tick, lag, instant=not engine
+        )
 
     @cached_property
     def stepped(self) -> Settings:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -49,11 +50,10 @@ def summed(
     stood: Sequence[Stood],
     binned: int = 0,
     spilled: tuple[str, ...] = (),
-    hits: Sequence[Hit] = (),
 ) -> Failures:
-    """The failures of a run; `hits`: the faults that struck a part. A dead robot that was never
-    asked to move does not count as missed. A robot that is stuck in its operation does not count as
-    a false alarm: it indicates an input that has slipped."""
+    """The failures of a run. A dead robot that was never asked to move does not count as missed. A
+    robot that is stuck in its operation does not count as a false alarm: it indicates an input that
+    has slipped."""
     stuck = sum(one.test == "jammed" and not one.is_death for one in failures)
     tests, wanted = Counter(one.test for one in failures), Counter[str]()
     tests["jammed"] -= stuck
@@ -74,21 +74,18 @@ def summed(
         tuple(stood),
         binned,
         spilled,
-        tuple(_unseen(failures, hits, missed)),
     )
 
 
-def _unseen(
-    failures: Sequence[Failing], hits: Sequence[Hit], missed: Mapping[str, int]
-) -> Iterator[str]:
-    """The faults that no sensor found, in words: those that struck labels oftener than the failures
-    of their test concern."""
-    found = Counter((one.test, one.operation) for one in failures)
-    for kind, label, unit in hits:
+def _unseen(failures: Failures, hits: Sequence[Hit]) -> Iterator[str]:
+    """The missed faults among those that struck parts, in words: those that struck a label oftener
+    than failures of their test concern it."""
+    found = Counter((one.test, one.operation) for one in failures.found)
+    for kind, label, unit in hits if failures.missed else ():
         test = CAUSES.get(kind, "")
         if found[test, label] > 0:
             found[test, label] -= 1
-        elif missed.get(test, 0) > 0:
+        elif test:
             yield f"{kind} '{label}' of unit {unit + 1}"
 
 
@@ -263,7 +260,7 @@ class Recovery:
     def report(self) -> Failures:
         """Summary of faults and failures so far."""
         undone = (e for e in self.books.supervisor.events if isinstance(e, Undone))
-        return summed(
+        failures = summed(
             self.responding.found,
             self.striking.struck,
             sum(len(event.transitions) for event in undone),
@@ -272,8 +269,8 @@ class Recovery:
             self.stood,
             self.plant.binned,
             tuple(dict.fromkeys(self.plant.spilled)),
-            self.striking.hits,
         )
+        return replace(failures, unseen=tuple(_unseen(failures, self.striking.hits)))
 
 
 def recover(simulation: Simulation, campaign: Campaign = Campaign()) -> Recovery:  # noqa: B008

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
-from math import radians
 
 import numpy as np
 
@@ -14,12 +13,11 @@ from factory.mjcf.masks import robot_code
 from factory.mjcf.weld_frames import WeldFrames
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
-from factory.record.verdict import MOST
 from factory.simulation.mujoco.failing.fallen import Fallen
 from factory.simulation.mujoco.failing.mishaps import Mishaps
 from factory.simulation.mujoco.holdings import Holdings
 from factory.simulation.mujoco.world import MujocoWorld
-from factory.simulation.recovery.faults import Campaign, WorldFault
+from factory.simulation.recovery.faults import SHIFTED, TURNED, Campaign, WorldFault
 from factory.simulation.recovery.plant import Plant
 
 SCRAP = 1 << 20
@@ -28,16 +26,6 @@ SCRAP = 1 << 20
 
 LOST = 5e-3
 """A part further than this from its place in the hand is lost [m]."""
-
-SHARE = 0.5
-"""A feeder's camera finds what is off by this share of what a hand-off may be (`verdict.LIMITS`):
-the rest is left to its noise and to the robot that takes the part."""
-
-SHIFTED = SHARE * MOST["handoff_gap_max_mm"] / 1e3
-"""Largest displacement that no camera finds [m]; a template may ask for less."""
-
-TURNED = SHARE * radians(MOST["handoff_angle_max_deg"])
-"""Largest angle that no camera finds [rad]."""
 
 
 class Senses:
