@@ -121,16 +121,16 @@ def trajectories(mode: Mode, x0: Array, limits: Limits, drive: GovernedAxis) -> 
     `drive` is that of all. Exact where the mode is `clear_from` x0."""
     distance = np.abs(x0 - mode.goals).tolist()
     speed, acceleration = limits.speed.tolist(), limits.acceleration.tolist()
-    found: dict[int, Trajectory] = {}
+    ways: dict[int, Trajectory] = {}
     for i in mode.order:
-        own = replace(drive, speed=speed[i], acceleration=acceleration[i])
+        axis = replace(drive, speed=speed[i], acceleration=acceleration[i])
         gate, standoff = int(mode.gate[i]), float(mode.standoff[i])
         if gate >= 0 and standoff:
-            taus = found[gate].taus(mode.eps, standoff, drive.tick)
-            found[i] = own.gated(distance[i], taus)
+            taus = ways[gate].taus(mode.eps, standoff, drive.tick)
+            ways[i] = axis.gated(distance[i], taus)
         else:
-            found[i] = own.way(distance[i])
-    return [found[i] for i in range(mode.size)]
+            ways[i] = axis.way(distance[i])
+    return [ways[i] for i in range(mode.size)]
 
 
 def mode_ticks(mode: Mode, ways: Sequence[Trajectory], tick: float) -> int:

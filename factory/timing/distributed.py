@@ -170,7 +170,7 @@ class ScannedTimes:
         """When each axis of an operation rests at its goal."""
         timing, number = self.timing, operation.index
         mode, starts = timing.modes[number], timing.starts[number]
-        found, opens = dict[int, float](), dict[int, float]()
+        arrivals, opens = dict[int, float](), dict[int, float]()
         ways = dict[int, tuple[int, int, Trajectory]]()
         for slot in mode.order:
             axis = timing.factory.axes[number][slot]
@@ -191,8 +191,8 @@ class ScannedTimes:
             ways[slot] = robot, begun, way
             opens[slot] = begun + self._opens(way, mode.eps) * self.scans[robot].period
             at = begun + self._rests(way, mode.eps) * self.scans[robot].period
-            found[slot] = max(at, float(self.entered[number, robot]))
-        return [*found.values()]
+            arrivals[slot] = max(at, float(self.entered[number, robot]))
+        return [*arrivals.values()]
 
     def _tick(self, robot: int) -> float:
         return self.scans[robot].period * self._step
