@@ -42,8 +42,8 @@ def tray_profile(layout: Layout, settings: Settings) -> SpeedProfile:
 
 
 def leaving(layout: Layout, settings: Settings) -> float:
-    """Time from a dropoff until the product is out of sight [s]: the tray sets out a tick later, and
-    the shutter comes down once the product is past it."""
+    """Time from a dropoff until the product is out of sight [s]: the tray sets out a tick later,
+    and the shutter comes down once the product is past it."""
     tray, shutter = _drives(layout, settings)
     way = tray.way(layout.outfeed_way)
     past = way.passes(BEHIND - PLAY)

@@ -80,11 +80,11 @@ def summed(
 def _unseen(failures: Failures, hits: Sequence[Hit]) -> Iterator[str]:
     """The missed faults among those that struck parts, in words: those that struck a label oftener
     than failures of their test concern it."""
-    found = Counter((one.test, one.operation) for one in failures.found)
+    named = Counter((one.test, one.operation) for one in failures.found)
     for kind, label, unit in hits if failures.missed else ():
         test = CAUSES.get(kind, "")
-        if found[test, label] > 0:
-            found[test, label] -= 1
+        if named[test, label] > 0:
+            named[test, label] -= 1
         elif test:
             yield f"{kind} '{label}' of unit {unit + 1}"
 
