@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from factory.layout.certificate import fault
 from factory.layout.dimensions import TOOL_TRAVEL
+from factory.layout.embedding import certified
 from factory.layout.shapes import is_tool
 from factory.pipeline import Project, read
 from factory.problem.plan import Plan
@@ -17,6 +20,7 @@ from factory.simulation.watched import watched
 from factory.study.allocation.aim import Aim
 from factory.study.allocation.search import allocated
 from factory.study.fidelity.hidden import HiddenPenetrations
+from factory.support.errors import RunError
 from factory.support.settings import LEAST
 from tests.random_products import random_blocks, random_product
 
@@ -136,6 +140,65 @@ def test_the_default_path(seed: int, tmp_path: Path) -> None:
     request = RunRequest(units=5, seed=seed, jitter=0.3)
     run = watched(Simulation(project_of(text, tmp_path).layout, request))
     assert run.succeeded, run.verdict.failures
+
+
+BY_A_HAIR = """
+root = s8; s1 = mate ( p1, p2 ); s2 = mate ( s1, p3, p4 ); s3 = mate ( p5, p6 );
+s4 = weld ( s3, dwell = 0.3 ); s5 = mate ( p7, p8 ); s6 = mate ( p9, p10 ); s7 = mate ( s5, s6 );
+s8 = mate ( s2, s4, s7 );
+p1 = atomic ( box = ( 0.1186, 0.0574, 0.0388 ), pos = ( 0.0593, 0.0287, 0.0194 ) );
+p2 = atomic ( box = ( 0.1186, 0.0574, 0.0356 ), pos = ( 0.0593, 0.0287, 0.0566 ) );
+p3 = atomic ( box = ( 0.1186, 0.045, 0.0744 ), pos = ( 0.0593, 0.0799, 0.0372 ) );
+p4 = atomic ( box = ( 0.1186, 0.038, 0.0744 ), pos = ( 0.0593, 0.1214, 0.0372 ) );
+p5 = atomic ( box = ( 0.1186, 0.0738, 0.0526 ), pos = ( 0.0593, 0.0369, 0.1007 ) );
+p6 = atomic ( box = ( 0.1186, 0.0665, 0.0526 ), pos = ( 0.0593, 0.10705, 0.1007 ) );
+p7 = atomic ( box = ( 0.0719, 0.0663, 0.0705 ), pos = ( 0.03595, 0.03315, 0.16225 ) );
+p8 = atomic ( box = ( 0.0467, 0.0663, 0.0705 ), pos = ( 0.09525, 0.03315, 0.16225 ) );
+p9 = atomic ( box = ( 0.0486, 0.074, 0.0705 ), pos = ( 0.0243, 0.1033, 0.16225 ) );
+p10 = atomic ( box = ( 0.07, 0.074, 0.0705 ), pos = ( 0.0836, 0.1033, 0.16225 ) );
+"""
+"""The rear of p6 is 0.1 mm ahead of that of p4 under it."""
+
+SHEETS = """
+root = u7;
+u1 = mate ( p1, p2 );
+u2 = mate ( u1, p3 );
+u3 = mate ( u2, p4 );
+u4 = mate ( u3, p5 );
+u5 = mate ( u4, p6 );
+u6 = mate ( u5, p7 );
+u7 = mate ( u6, p8 );
+p1 = atomic ( box = ( 0.01476566, 0.01423379, 0.0002 ), pos = (0, 0, 0.0001 ), density = 700 );
+p2 = atomic ( box = ( 0.01614489, 0.01556334, 0.0001 ), pos = (0, 0, 0.00025 ), density = 700 );
+p3 = atomic ( box = ( 0.01395501, 0.01345234, 0.0006 ), pos = (0, 0, 0.0006 ), density = 700 );
+p4 = atomic ( box = ( 0.01705306, 0.0164388, 0.0003 ), pos = (0, 0, 0.00105 ), density = 700 );
+p5 = atomic ( box = ( 0.01716914, 0.0165507, 0.0002 ), pos = (0, 0, 0.0013 ), density = 700 );
+p6 = atomic ( box = ( 0.01580761, 0.01523821, 0.0001 ), pos = (0, 0, 0.00145 ), density = 700 );
+p7 = atomic ( box = ( 0.01273689, 0.0122781, 8e-05 ), pos = (0, 0, 0.00154 ), density = 700 );
+p8 = atomic ( box = ( 0.0138956, 0.01339508, 0.0002 ), pos = (0, 0, 0.00168 ), density = 700 )
+"""
+"""Of these sheets one has an edge of 80 µm."""
+
+
+@pytest.mark.parametrize("text", [BY_A_HAIR, SHEETS])
+def test_a_face_has_room_to_what_other_robots_hold(text: str, tmp_path: Path) -> None:
+    """Such layouts were refused by 0.05 mm, or ended without a place to choose from."""
+    layout = project_of(text, tmp_path).layout
+    assert layout.certificate is not None and layout.certificate.holds
+
+
+def test_a_missing_hand_is_the_reason_why_robots_meet(tmp_path: Path) -> None:
+    text = """
+    root = c; c = mate ( a, s ); a = atomic ( box = ( 0.05, 0.05, 0.05 ), pos = ( 0, 0, 0.025 ) );
+    s = atomic ( sphere = 0.0006, pos = ( 0.0256, 0, 0.025 ) );
+    """
+    layout = project_of(text, tmp_path).layout
+    (bare,) = (n for n, hand in enumerate(layout.hands) if hand and hand.kind == "none")
+    assert layout.certificate is not None
+    for robots, code in (((0, bare), "NoGrip"), ((0, 1), "Layout")):
+        met = fault(layout.factory, "they meet", *robots)
+        with pytest.raises(RunError, match=code):
+            certified(layout, None, replace(layout.certificate, faults=(met,)))
 
 
 @pytest.mark.slow

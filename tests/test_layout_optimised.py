@@ -7,6 +7,7 @@ from dataclasses import replace
 from math import inf
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 
@@ -63,10 +64,11 @@ def test_between_the_bound_and_the_first_layout(drawn: Drawn) -> None:
 @settings(max_examples=20)
 @given(drawn_layouts)
 def test_times_are_those_of_the_modes(drawn: Drawn) -> None:
-    """Scalar times against those predicted from the modes of the operations."""
+    """Scalar times against those predicted from the modes of the operations, in whole ticks."""
     layout = random_layout(*drawn)
     predicted = Timing(layout, replace(Settings(), stage=False)).delays
-    assert operation_times(layout, PACE) == pytest.approx(predicted, abs=1e-6)
+    later = np.array(predicted) - operation_times(layout, PACE)
+    assert later.min() > -1e-6 and later.max() < 4 * Settings().tick
 
 
 @pytest.mark.parametrize(

@@ -195,6 +195,27 @@ def test_no_robot_dies_of_what_lies_askew(name: str, label: str, off: dict[str, 
     assert not world.m.geom_margin.any() and not world.m.geom_gap.any()
 
 
+OFFS = ({"metres": 3e-4}, {"metres": 1.5e-3}, {"degrees": 0.02, "metres": 0.0}, {"degrees": 2.0})
+
+
+@pytest.mark.parametrize("off", OFFS)
+def test_what_no_camera_finds_no_verdict_condemns(off: dict[str, Any]) -> None:
+    """Cameras and verdict have one set of limits: 1.5 mm or 2° passed, and failed the run."""
+    run, failures = run_with(WorldFault("misplaced", label="part1", unit=1, **off), units=1)
+    assert run.succeeded, run.verdict.failures
+    assert failures.missed == len(failures.unseen) == 1 - len(failures.found)
+
+
+def test_a_fault_that_no_sensor_finds_is_named_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Senses, "is_askew", lambda *_: False)
+    fault = WorldFault("misplaced", label="part1", unit=1, degrees=2.0)
+    run, failures = run_with(fault, units=1)
+    run = replace(run, failures=failures)
+    first, *others = run.verdict.failures
+    assert first.code == "Unseen" and "misplaced 'part1' of unit 1" in first.message
+    assert others and not run.succeeded
+
+
 @pytest.mark.parametrize("fuse", [False, True])
 def test_a_folded_factory(fuse: bool) -> None:
     """Robots with several labels, whose magazines show again what was lost."""

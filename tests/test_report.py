@@ -385,3 +385,14 @@ def test_bodies_that_replace_others_are_no_hand_overs(tmp_path: Path) -> None:
     recounted = recording.monitor.figures or {}
     for key in ("handoff_gap_max_mm", "grip_gap_max_mm"):
         assert recounted[key] == pytest.approx(getattr(run.physics, key), abs=0.02)
+
+
+def test_a_fused_body_of_which_each_part_is_apart_is_drawn(run: Terminal, tmp_path: Path) -> None:
+    """Parts that overlap when finished are not tested against each other, so that each has a body
+    of its own in the fused one: this has no geoms then."""
+    box = "atomic ( box = ( 0.04, 0.04, 0.04 ), pos = ( {}, 0, 0.02 ) );"
+    file, log = tmp_path / "apart.pag", tmp_path / "apart.log"
+    parts = f"a = {box.format(0)} b = {box.format(0.036)} c = {box.format(-0.036)}"
+    file.write_text(f"root = t; allow ( 0.01 ); t = mate ( s, c ); s = mate ( a, b ); {parts}\n")
+    run("run", file, "--fuse", "--units", 1, "--log", log)
+    assert run("report", log, "-o", tmp_path / "apart.html").status == 0

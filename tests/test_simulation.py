@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,9 +17,11 @@ from factory.pipeline import all_templates
 from factory.record.state import Event, State
 from factory.simulation.distributed import DistributedSupervisor
 from factory.simulation.request import RunRequest
-from factory.simulation.run import busy_times
+from factory.simulation.run import busy_times, mean_interval, steady_from
 from factory.simulation.simulation import Simulation
 from factory.support.settings import Settings
+from factory.timing.timed import timed
+from factory.timing.timing import Timing
 from tests.good_runs import assert_good, random_marking
 from tests.pag_texts import LONE, PAPER, PRODUCTS, laid_out
 from tests.simulation_values import ready
@@ -34,6 +37,51 @@ def test_forty_units_of_the_papers_example(paper: Layout) -> None:
     assert run.products == 40
     assert_good(run)
     assert run.cycle_time_s == pytest.approx(run.predicted_cycle_time_s, rel=0.02)
+
+
+SHORT = {
+    "outfeed": """
+        root = s1; s1 = mate ( p0, p1 );
+        p0 = atomic ( box = ( 0.01, 0.01, 0.1 ), pos = ( 0, 0, 0.05 ) );
+        p1 = atomic ( sphere = 0.01, pos = ( 0.005, 0.0155, 0.01 ) );
+    """,
+    "r": """
+        root = s2; s1 = mate ( p1, p0 ); s2 = mate ( p2, s1 );
+        p0 = atomic ( box = ( 0.0869, 0.0306, 0.0242 ), pos = ( 0, 0, 0.0121 ) );
+        p1 = atomic ( box = ( 0.1171, 0.0185, 0.0535 ), pos = ( 0, 0, 0.05095 ) );
+        p2 = atomic ( box = ( 0.0161, 0.0349, 0.0566 ), pos = ( 0, 0, 0.106 ) );
+    """,
+}
+"""Products with short cycles, by what sets the pace."""
+
+
+@pytest.mark.parametrize(("pace", "jitter"), [("outfeed", 0.0), ("r", 0.0), ("r", 0.3)])
+def test_a_short_cycle_is_predicted_to_a_tick(pace: str, jitter: float, tmp_path: Path) -> None:
+    """They were off by up to 69 ms: a run goes by ticks, and the tray counts as home when near."""
+    file = tmp_path / "short.pag"
+    file.write_text(SHORT[pace])
+    run = factory.run(file, units=12, jitter=jitter)
+    assert run.succeeded and run.bottleneck.startswith(pace)
+    assert run.cycle_time_s == pytest.approx(run.predicted_cycle_time_s, abs=0.0101)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_cycle_of_robots_that_run_their_own_programs_is_predicted(
+    paper: Layout, seed: int
+) -> None:
+    """They see what they wait for up to a control period late: they were 1.4 to 6.8 % slower."""
+    run = factory.run(paper, units=12, seed=seed, distributed=True)
+    assert run.succeeded and run.cycle_time_s > 1.01 * timed(Timing(paper)).pace
+    assert run.cycle_time_s == pytest.approx(run.predicted_cycle_time_s, rel=0.015)
+
+
+def test_a_cycle_time_is_one_of_whole_periods() -> None:
+    """Of units that leave in groups of six, 1 s apart, a group every 9 s."""
+    left = [9.0 * (n // 6) + n % 6 for n in range(24)]
+    assert mean_interval(left, 6) == 1.5
+    assert mean_interval(left[:12], 6) == 1.5
+    assert mean_interval(left[:11], 6) is None and mean_interval(left[:8], 6) is None
+    assert (steady_from(1), steady_from(2), steady_from(6)) == (4, 4, 12)
 
 
 @pytest.mark.parametrize("seed", range(6))

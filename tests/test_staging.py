@@ -14,7 +14,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from factory.control.mode import Mode
-from factory.control.profile import mode_time
 from factory.layout.bounds import cycle_time_bound
 from factory.layout.clearance import certify
 from factory.layout.dimensions import Clearance
@@ -146,7 +145,7 @@ def test_a_carrier_that_is_waited_for_takes_as_long_as_all_of_its_operation() ->
     settings, world = simulation.request.settings, simulation.request.world
     timing, longer = simulation.timing, set[tuple[int, int]]()
     for stage in timing.stages:
-        way = mode_time(stage.mode, np.array([stage.start]), timing.limits.of((stage.axis,)), world)
+        way = timing.drive.way(abs(stage.start - stage.goal)).rests(stage.mode.eps) * timing.tick
         key = stage.robot, stage.operation
         longer |= {key} if timing.ways()[key] > way + 0.1 else set()
     run = simulation.run()
@@ -183,9 +182,11 @@ def test_the_layout_is_made_for_that_pace(drawn: Drawn) -> None:
     still, staged = Pace.of(STILL), Pace.of(STAGED)
     timing = Timing(layout, STAGED)
     delays, ways = timing.delays, timing.ways()
-    assert operation_times(layout, staged) == pytest.approx(delays, abs=1e-6)
+    later, most = np.array(delays) - operation_times(layout, staged), 4 * timing.tick
+    assert later.min() > -1e-6 and later.max() < most
     cycle = max(gear_times(layout, staged))
-    assert cycle == pytest.approx(cycle_time(layout.factory, delays, ways).seconds, abs=1e-6)
+    rounded = cycle_time(layout.factory, delays, ways).seconds - cycle
+    assert -1e-6 < rounded < most * max(len(r.operations) for r in layout.factory.robots)
     assert net.pace < cycle <= max(gear_times(layout, still)) + 1e-9
     bound = cycle_time_bound(layout.factory, layout.product, layout.clearance, staged)
     made = optimised(layout.factory, layout.product, Clearance(layout.clearance), staged)

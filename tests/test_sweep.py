@@ -493,7 +493,9 @@ def test_summaries_are_printed(tmp_path: Path, run: Terminal, here: None) -> Non
     quiet = run("sweep", PAPER, *words, "-o", database, "-q")
     assert quiet.err == "" and quiet.out.startswith("6 runs, 0 failed")
     told = run("sweep", database, "--summary")
-    assert "speed 0.3: 3 runs" in told.out and "cycle_time_s" in told.out
+    assert "speed 0.3: 3 runs, 0 failed" in told.out
+    rows = [line.split()[0] for line in told.out.splitlines() if line.split()]
+    assert rows[rows.index("figure") + 2] == "cycle_time_s" and "realtime_factor" not in rows
     summary = run("sweep", "--summary", "-o", database, "--json").json["summary"]
     assert [g["values"] for g in summary["groups"]] == [{"speed": 0.3}, {"speed": 0.5}]
     assert summary["groups"][0]["figures"]["cycle_time_s"]["n"] == 3

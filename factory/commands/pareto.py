@@ -151,9 +151,9 @@ def _print(front: ParetoFront, commands: Sequence[str | None]) -> None:
     """Print the front as a table."""
     heads = ["robots", "tools", "lines", "relays", "cycle [s]", "least [s]", "floor [m²]"]
     tried, built = bool(front.trials), any(commands)
-    heads += ["measured [s]", "error"] * tried + ["command"] * built
+    heads += ["measured [s]", "predicted for that run [s]", "error"] * tried + ["command"] * built
     rows = [
-        (*_row(point), *_measured(point)[: 2 * tried], *[command or ""] * built)
+        (*_row(point), *_measured(point)[: 3 * tried], *[command or ""] * built)
         for point, command in zip(front.points, commands, strict=True)
     ]
     title = f"{front.name}: {len(front.points)} points, {_looked_at(front)}"
@@ -184,11 +184,12 @@ def _row(point: FrontPoint) -> list[str]:
     ]
 
 
-def _measured(point: FrontPoint) -> tuple[str, str]:
-    """The measured cycle time of a point, and the error of its prediction."""
+def _measured(point: FrontPoint) -> tuple[str, str, str]:
+    """The measured cycle time of a point, that predicted for the speeds that were drawn, and the
+    error of this prediction."""
     trial = point.trial
     if trial is None:
-        return "not run", ""
+        return "not run", "", ""
     if trial.error is None or trial.failures:
-        return "failed", ""
-    return f"{trial.measured:.2f}", f"{100 * trial.error:+.1f} %"
+        return "failed", "", ""
+    return f"{trial.measured:.2f}", f"{trial.predicted:.2f}", f"{100 * trial.error:+.1f} %"

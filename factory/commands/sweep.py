@@ -156,18 +156,17 @@ def _summarise(database: Path | None, out: OutputOptions) -> dict[str, Any]:
 
 def _print_summary(result: Summary, verbose: bool) -> None:
     """A table for each group: figure, mean, spread, confidence interval."""
-    from factory.study.sweep.summary import CONFIDENCE
+    from factory.study.sweep.summary import CONFIDENCE, FIRST
 
     heads = ("figure", "mean", "deviation", f"{CONFIDENCE:.0%} from", "to", "least", "greatest")
     for group in result.groups:
         at = ", ".join(f"{key} {value}" for key, value in group.values) or result.product
-        failed = f", {group.failed} failed" if group.failed else ""
         rows = [
             (key, *map(_shown, astuple(s)[1:]))
             for key, s in group.figures.items()
-            if verbose or s.least != s.greatest or key == "cycle_time_s"
+            if verbose or s.least != s.greatest or key in FIRST
         ]
-        title = f"{at}: {group.done} runs{failed}"
+        title = f"{at}: {group.done + group.failed} runs, {group.failed} failed"
         table(title, heads, rows) if rows else say(title)
     for reason, count in list(result.reasons.items())[:SHOWN]:
         print(f"{count} failed: {reason}", file=sys.stderr)

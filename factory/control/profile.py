@@ -1,7 +1,7 @@
 """Braking profiles and the times that follow from them.
 
 A robot with speed limit v and acceleration limit a goes a distance d along a trapezoid of speed. In
-the ideal world it has its speed at once and only brakes.
+the ideal world it has its speed at once and only brakes. A run goes by ticks (`governed.py`).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from factory.control.mode import Array, Limits, Mode
+from factory.control.mode import Array
 
 World = Literal["ideal", "mujoco"]
 
@@ -57,62 +57,27 @@ class SpeedProfile:
         """The greatest speed [m/s] from which a robot comes to rest in `distance` [m]."""
         return min(self.speed, sqrt(2.0 * self.acceleration * distance))
 
-    def staged(
-        self, distance: float, standoff: float, opens: float, instant: bool = False
-    ) -> float:
+    def staged(self, distance: float, standoff: float, opens: float) -> float:
         """The time [s] at which a gated robot rests at its goal, `distance` [m] ahead, if its gate
         opens at `opens` [s]: it makes for its standoff, and goes on from where it then is, moving
-        or not. `instant`: it has any speed at once."""
-        stage = max(distance - standoff, 0.0)
-        way, speed = self.gone(stage, opens, self.braking(stage) if instant else 0.0)
-        left = max(distance - way, 0.0)
-        return opens + self.rest(left, self.braking(left) if instant else speed)
+        or not."""
+        way, speed = self.gone(max(distance - standoff, 0.0), opens)
+        return opens + self.rest(max(distance - way, 0.0), speed)
 
-    def gone(self, distance: float, time: float, start: float = 0.0) -> tuple[float, float]:
-        """How far [m] a robot has come after `time` [s] of its way over `distance`, and its
-        speed."""
-        a, peak = self.acceleration, self._peak(distance, start)
-        left, gaining = self.rest(distance, start) - time, (peak - start) / a
+    def gone(self, distance: float, time: float) -> tuple[float, float]:
+        """How far [m] a robot has come after `time` [s] of its way over `distance`, from rest, and
+        its speed."""
+        a, peak = self.acceleration, self._peak(distance, 0.0)
+        left, gaining = self.rest(distance) - time, peak / a
         if left <= 0:
             return distance, 0.0
         if time < gaining:
-            return start * time + a * time * time / 2, start + a * time
-        if left < peak / a:
+            return a * time * time / 2, a * time
+        if left < gaining:
             return distance - a * left * left / 2, a * left
-        return peak * (time - gaining / 2) + start * gaining / 2, peak
-
-    def passes(self, distance: float, way: float) -> float:
-        """The time [s] at which a robot passes `way` [m] on its way over `distance`, from rest to
-        rest."""
-        a, peak = self.acceleration, self._peak(distance, 0.0)
-        left, ramp = distance - way, peak * peak / (2 * a)
-        if way <= ramp:
-            return sqrt(2 * way / a)
-        if left <= ramp:
-            return self.rest(distance) - sqrt(2 * left / a)
-        return (way + ramp) / peak
+        return peak * (time - gaining / 2), peak
 
     def _peak(self, distance: float, start: float) -> float:
         """The greatest speed on the way."""
         v, a = self.speed, self.acceleration
         return max(min(v, sqrt(a * distance + start * start / 2)), start)
-
-
-def mode_time(mode: Mode, x0: Array, limits: Limits, world: World = "mujoco") -> float:
-    """The time [s] a mode takes from rest at `x0` until it is at its goal, dwell included.
-
-    In the ideal world that is when the last robot enters the goal ball, in mujoco when the last
-    reference comes to rest. Exact to two ticks where the mode is `clear_from` x0, and one more for
-    each further robot that waits for one that waits.
-    """
-    if mode.is_still:
-        return mode.dwell
-    distance, instant = np.abs(x0 - mode.goals).tolist(), world == "ideal"
-    rested, entered = [0.0] * mode.size, [0.0] * mode.size
-    for i in mode.order:
-        profile = SpeedProfile(float(limits.speed[i]), float(limits.acceleration[i]))
-        gate = mode.gate[i]
-        opens, standoff = (entered[gate], float(mode.standoff[i])) if gate >= 0 else (0.0, 0.0)
-        rested[i] = profile.staged(distance[i], standoff, opens, instant)
-        entered[i] = max(rested[i] - profile.landing(mode.eps), 0.0)
-    return max(entered if instant else rested) + mode.dwell

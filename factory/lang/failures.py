@@ -23,7 +23,7 @@ from factory.support.errors import did_you_mean
 TIMES = 1000
 """The most times on end that an operation may be done again."""
 
-LIMITS: Mapping[str, str] = MappingProxyType({"residual": "5e-4", "misplaced": "2e-3"})
+LIMITS: Mapping[str, str] = MappingProxyType({"residual": "5e-4", "misplaced": "5e-4"})
 """The tests that have a limit, with a usual one [m]."""
 
 TESTS: Mapping[str, Test] = MappingProxyType({test: test for test in get_args(Test)})

@@ -15,7 +15,7 @@ from math import ceil
 from factory.compiler.mating.mating import judged
 from factory.compiler.tees import on_stems
 from factory.geometry.solids import Product
-from factory.layout.certificate import ALWAYS, LOADS, Certificate, Region
+from factory.layout.certificate import ALWAYS, LOADS, Certificate, Fault, Region
 from factory.layout.clearance import certify
 from factory.layout.dimensions import Clearance, up
 from factory.layout.durations import Pace
@@ -23,6 +23,7 @@ from factory.layout.exclusions import crowded
 from factory.layout.fork import NO_ARMS, forked
 from factory.layout.guidepath import Point2, hull
 from factory.layout.hands.choosing import Hands
+from factory.layout.hands.holding import held
 from factory.layout.layout import Layout
 from factory.layout.optimising import bounds, optimised
 from factory.layout.way import rounding_for
@@ -116,12 +117,29 @@ def certified(
     (Layout) as `lay_out` does."""
     certificate = certificate or certify(layout)
     if not certificate.holds:
-        raise RunError(fault.diagnostic() for fault in certificate.faults)
+        raise RunError(dict.fromkeys(_reason(layout, fault) for fault in certificate.faults))
     around = bounds(certificate.regions, layout.clearance)
     layout = replace(layout, floor=around, certificate=certificate)
     if floor is not None:
         _check_floor(layout, certificate.regions, floor)
     return layout
+
+
+def _reason(layout: Layout, fault: Fault) -> Diagnostic:
+    """The error of a fault. Where a robot of it has no hand, that is the reason: what it brings is
+    attached, and nobody waits for its way home."""
+    factory = layout.factory
+    for robot in factory.robots:
+        hand = layout.hand(robot.index)
+        if robot.name in fault.robots and hand is not None and hand.kind == "none":
+            label = held(factory, robot.index).partition("@")[0]
+            message = f"no hand can hold '{label}', and robots without hands meet here"
+            hint = (
+                f"{', '.join(fault.robots)}: `factory check --clashes DIR` draws the nearest miss"
+            )
+            made = factory.by_label.get(label)
+            return Diagnostic("NoGrip", message, made and made.position, hint)
+    return fault.diagnostic()
 
 
 def _check_floor(layout: Layout, occupied: tuple[Region, ...], wanted: Point2) -> None:

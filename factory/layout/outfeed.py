@@ -8,6 +8,7 @@ from math import sqrt
 
 import numpy as np
 
+from factory.control.governed import GovernedAxis, Trajectory
 from factory.control.profile import SpeedProfile
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Solid
@@ -21,6 +22,9 @@ from factory.support.settings import Settings
 CRUISE = 1.2
 """The tray's way is at least so many times what it takes to reach its speed and to brake: a drive
 whose acceleration is reversed at once gets half as far again off its reference."""
+
+NEAR = 1e-3
+"""The tray is somewhere when it is within this [m]."""
 
 FLAT = 1e-5
 """What dips no deeper stands flat [m]."""
@@ -38,22 +42,34 @@ def tray_profile(layout: Layout, settings: Settings) -> SpeedProfile:
 
 
 def leaving(layout: Layout, settings: Settings) -> float:
-    """Time from a product's dropoff until it is out of sight [s]."""
-    profile = tray_profile(layout, settings)
-    tray = profile.rest(layout.outfeed_way)
-    shut = tray - profile.landing(BEHIND - PLAY) + _shutter(layout, settings)
-    return max(tray, shut) + settings.tick
+    """Time from a dropoff until the product is out of sight [s]: the tray sets out a tick later,
+    and the shutter comes down once the product is past it."""
+    tray, shutter = _drives(layout, settings)
+    way = tray.way(layout.outfeed_way)
+    past = way.passes(BEHIND - PLAY)
+    shut = past + _arrives(shutter.way(layout.shutter_stroke), settings)
+    return (1 + max(_arrives(way, settings), shut)) * settings.tick
 
 
 def away(layout: Layout, settings: Settings) -> float:
-    """Time from one product to the next [s]."""
-    tray = tray_profile(layout, settings).rest(layout.outfeed_way)
-    back = max(tray, _shutter(layout, settings)) + settings.tick
-    return leaving(layout, settings) + back
+    """Time from one dropoff until the next may begin [s]."""
+    tray, shutter = _drives(layout, settings)
+    ways = tray.way(layout.outfeed_way), shutter.way(layout.shutter_stroke)
+    back = max(_arrives(way, settings) for way in ways)
+    return leaving(layout, settings) + back * settings.tick
 
 
-def _shutter(layout: Layout, settings: Settings) -> float:
-    return SpeedProfile(*settings.shutter_limits).rest(layout.shutter_stroke)
+def _drives(layout: Layout, settings: Settings) -> tuple[GovernedAxis, GovernedAxis]:
+    """The drives of tray and shutter."""
+    tray = tray_profile(layout, settings)
+    limits = (tray.speed, tray.acceleration), settings.shutter_limits
+    one, other = (GovernedAxis(speed, most, settings.tick, settings.lag) for speed, most in limits)
+    return one, other
+
+
+def _arrives(way: Trajectory, settings: Settings) -> int:
+    """The tick in which the tray or its shutter is where it goes."""
+    return way.rests(NEAR, NEAR / settings.tick)
 
 
 def slot_of(layout: Layout) -> tuple[float, float, float] | None:

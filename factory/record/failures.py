@@ -131,7 +131,7 @@ class Failures:
     backwards; `spares`: of spares used; `contacts`: of contacts with fallen parts, which do not
     count as unintended; `stood`: the robots that stood still over time; `binned`: number of times
     that scrap fell into a bin; `spilled`: names of robots that dropped scrap elsewhere, where there
-    is no space for a bin."""
+    is no space for a bin; `unseen`: the missed faults, in words."""
 
     found: tuple[Failing, ...] = ()
     struck: Mapping[str, int] = field(default_factory=dict)
@@ -143,6 +143,7 @@ class Failures:
     stood: tuple[Stood, ...] = ()
     binned: int = 0
     spilled: tuple[str, ...] = ()
+    unseen: tuple[str, ...] = ()
 
     @property
     def scrapped(self) -> int:
@@ -155,6 +156,7 @@ class Failures:
             "struck": dict(self.struck),
             "found": len(self.found),
             "missed": self.missed,
+            "unseen": list(self.unseen),
             "false_alarms": self.false_alarms,
             "transitions_undone": self.undone,
             "scrapped": self.scrapped,

@@ -7,8 +7,8 @@ first is the cause."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import inf
 from typing import Any
 
@@ -102,6 +102,9 @@ BLOCKED = "Blocked"
 """The code of an operation in which parts passed through each other."""
 
 
+UNSEEN = "what follows may be its doing; a template says what is tested: failure = { ... }"
+
+
 @dataclass(frozen=True, slots=True)
 class RunVerdict:
     """The verdict on a run: the `trouble` that ended it early, whether its record refines the net,
@@ -115,6 +118,15 @@ class RunVerdict:
     lenient: bool = False
     before: int = 0
     blocked: tuple[Diagnostic, ...] = ()
+
+    def caused_by(self, unseen: Sequence[str]) -> RunVerdict:
+        """The verdict on a run with faults that no sensor found: where it has failures, they are
+        the cause."""
+        if not unseen or not (self.bodies or self.trouble):
+            return self
+        words = ", ".join(unseen[:SHOWN])
+        fault = Diagnostic("Unseen", f"no sensor found a fault: {words}", None, UNSEEN)
+        return replace(self, bodies=(fault, *self.bodies), before=self.before + 1)
 
     @property
     def follows(self) -> bool:

@@ -27,9 +27,7 @@ from factory.simulation.cells import Cells, Link
 from factory.simulation.ordering import Ordering
 from factory.simulation.supervisor import Active
 from factory.simulation.world import Job, World
-
-PERIODS = (0.006, 0.02)
-"""Control periods are drawn from so long to so long [s], in whole timesteps, one at least."""
+from factory.timing.distributed import Scan, drawn_scans
 
 
 @dataclass(slots=True)
@@ -134,21 +132,26 @@ class DistributedSupervisor:
         self.count = 0
 
     def _processes(self, programs: Sequence[Program]) -> list[Process]:
-        low, high = (max(1, round(period / self.timestep)) for period in PERIODS)
-        periods = self.random.integers(low, high + 1, size=len(programs))
+        scans = drawn_scans(self.random, len(programs), self.timestep)
         x = self.world.sense()[0]
         lifts = {robot: len(programs) + n for n, robot in enumerate(self.factory.strokes)}
         processes = []
-        for p, n in zip(programs, periods, strict=True):
+        for p, scan in zip(programs, scans, strict=True):
             axes = np.array([p.robot, *([lifts[p.robot]] if p.robot in lifts else [])])
-            phase = int(self.random.integers(n))
             link, still = (
                 Link(p.robot, self.cells, self.world, self.factory.axes),
                 np.zeros(len(axes)),
             )
             link.at(p.steps[0].operation, 0)
-            processes.append(Process(p, link, int(n), phase, axes, np.array(x[axes]), still))
+            processes.append(
+                Process(p, link, scan.period, scan.phase, axes, np.array(x[axes]), still)
+            )
         return processes
+
+    @property
+    def scans(self) -> list[Scan]:
+        """When each robot ticks."""
+        return [Scan(process.period, process.phase) for process in self.processes]
 
     @property
     def events(self) -> list[Event]:

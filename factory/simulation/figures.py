@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from factory.record.figures import PhysicsFigures
-from factory.simulation.run import Run
+from factory.simulation.run import STEADY, Run, steady_from
 from factory.support.console import POOL_BOUND
 
 
@@ -17,7 +17,11 @@ def not_tested(physics: PhysicsFigures) -> str:
 def figures(record: Run, verbose: bool = False) -> Iterator[str]:
     """The figures of a run line by line; `verbose`: with each pair of parts that was not tested for
     contact."""
-    cycle = f"{record.cycle_time_s:.3f} s" if record.cycle_time_s is not None else "not yet steady"
+    cycle = "not yet steady"
+    if record.cycle_time_s is not None:
+        cycle = f"{record.cycle_time_s:.3f} s"
+    elif (least := steady_from(record.period)) > STEADY:
+        cycle = f"measured from {least} units on (two periods of {record.period})"
     of_all = " with all robots" if record.exchanges else ""
     each = [f"{count} {product}" for product, count in record.by_product.items()]
     yield (

@@ -28,14 +28,20 @@ STEADY = 4
 """Number of products from which on a cycle time is measured: the last half has two intervals."""
 
 
+def steady_from(period: int = 1) -> int:
+    """The number of products from which on a cycle time is measured where `period` units come in a
+    cycle of the net: the last half has a whole period."""
+    return max(STEADY, 2 * period if period > 1 else 0)
+
+
 def mean_interval(left: Sequence[float], period: int = 1) -> float | None:
-    """Mean interval [s] between these times of departure over their last half, rounded to whole
-    periods of units if any; None for fewer than STEADY."""
-    if len(left) < STEADY:
+    """Mean interval [s] between these times of departure over the whole periods of units in their
+    last half; None for fewer than `steady_from`."""
+    if len(left) < steady_from(period):
         return None
     tail = left[len(left) // 2 - 1 :]
     count = len(tail) - 1
-    count -= count % period if count >= period else 0
+    count -= count % period
     return (tail[-1] - tail[-1 - count]) / count
 
 
@@ -127,7 +133,8 @@ class Run:
     def verdict(self) -> RunVerdict:
         """Whether the run made its units, is a run of the net, and its bodies agree."""
         figures = None if self.physics is None else kept_figures(self.physics)
-        return judged(self.trouble, self.replays, figures, self.monitor, self.lenient)
+        verdict = judged(self.trouble, self.replays, figures, self.monitor, self.lenient)
+        return verdict.caused_by(self.failures.unseen if self.failures else ())
 
     @property
     def succeeded(self) -> bool:
@@ -149,8 +156,18 @@ class Run:
 
     @property
     def cycle_time_s(self) -> float | None:
-        """Mean interval between dropoffs over the last half of the units; None below 4."""
+        """Mean interval between dropoffs over the whole periods in the last half of the units; None
+        for fewer than `steady_from`."""
         return mean_interval(self.dropoffs, self.period)
+
+    @property
+    def cycle_time_missing(self) -> str | None:
+        """Why no cycle time is measured; None where one is."""
+        if self.cycle_time_s is not None:
+            return None
+        least = steady_from(self.period)
+        periods = f", two periods of {self.period}" if least > STEADY else ""
+        return f"{len(self.dropoffs)} products; a cycle time is measured from {least} on{periods}"
 
     @property
     def utilisation(self) -> tuple[float, ...]:
@@ -200,6 +217,7 @@ class Run:
             "supervisor_time_s": self.supervisor_time_s,
             "realtime_factor": self.realtime_factor,
             "cycle_time_s": self.cycle_time_s,
+            "cycle_time_missing": self.cycle_time_missing,
             "predicted_cycle_time_s": self.predicted_cycle_time_s,
             "bottleneck": self.bottleneck,
             "transitions_fired": self.fired,

@@ -129,7 +129,8 @@ class Simulation:
     @cached_property
     def cycle(self) -> CycleTime:
         """The predicted cycle time, and what bounds it."""
-        return cycle_of(self.timing, self.word, self.request.wip)
+        scans = self.supervisor.scans if isinstance(self.supervisor, DistributedSupervisor) else ()
+        return cycle_of(self.timing, self.word, self.request.wip, scans)
 
     @property
     def duration(self) -> float:

@@ -12,7 +12,13 @@ from typing import Any
 from factory.lang.writer import write_pag
 from factory.layout.resting import on_demand
 from factory.pipeline import Project
+from factory.plant.demand import Demand, Word
 from factory.plant.family import family
+from factory.timing.on_demand import cycle_of
+from factory.timing.timing import Timing
+
+UNITS = 24
+"""Number of units of one product from which its cycle time is taken."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +46,16 @@ class LiveChange:
         busy = {robot for o in factory.operations if o.turn == turn for robot in o.robots}
         return [robot.name for robot in factory.robots if robot.index not in busy]
 
+    @cached_property
+    def cycles(self) -> dict[str, float]:
+        """The cycle time on this floor while units of each product alone are made [s]."""
+        timing = Timing(on_demand(self.both.layout), self.both.settings)
+        sequence, cycles = timing.factory.sequence, dict[str, float]()
+        for product in (self.old, self.new):
+            word = Word(sequence, Demand(changes=((product, 0),)), UNITS)
+            cycles[product] = cycle_of(timing, word).seconds
+        return cycles
+
     @property
     def files(self) -> dict[str, str]:
         """The texts of the family, and of the orders of a change and one back, by their names."""
@@ -50,7 +66,8 @@ class LiveChange:
     def as_json(self) -> dict[str, Any]:
         """The key `live` of `revise --json`."""
         robots = len(self.both.layout.factory.robots)
-        return {"robots": robots, "products": [self.old, self.new], "idle": self.idle}
+        made = {"products": [self.old, self.new], "cycle_time_s": self.cycles}
+        return {"robots": robots, **made, "idle": self.idle}
 
     def words(self) -> Iterator[str]:
         """The same for people."""
@@ -59,3 +76,5 @@ class LiveChange:
             f"live: {robots} robots make both; with --wip W at most W - 1 more units of"
             f" {self.old} are made after the order, and then these are idle: {idle}"
         )
+        each = " and ".join(f"{seconds:.3f} s for {name}" for name, seconds in self.cycles.items())
+        yield f"live: on the floor for both the cycle is {each}"

@@ -135,6 +135,12 @@ class Settings:
         return TICK if self.timestep == AUTO else self.step * self.steps
 
     @property
+    def lag(self) -> float:
+        """The time by which the engine's speeds lag its positions [s]: half a timestep; of the
+        longest, where it is still to be chosen."""
+        return (TICK if self.timestep == AUTO else self.step) / 2
+
+    @property
     def stride(self) -> int:
         """Ticks between two of the checks that are not made in every tick; the engine takes at most
         these at once."""

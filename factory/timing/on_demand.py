@@ -4,6 +4,7 @@ nobody has ordered take no time."""
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 from math import inf
@@ -11,13 +12,19 @@ from math import inf
 from factory.nets.marked import token_free
 from factory.plant.demand import Word
 from factory.timing.cycle_time import CycleTime
+from factory.timing.distributed import Scan, ScannedTimes
 from factory.timing.timed import Timed, timed
 from factory.timing.timing import Timing
 
 
-def cycle_of(timing: Timing, word: Word, wip: int | None = None) -> CycleTime:
+def cycle_of(
+    timing: Timing, word: Word, wip: int | None = None, scans: Sequence[Scan] = ()
+) -> CycleTime:
     """The cycle time of a layout and what allows no less; on demand, the mean interval between
-    units as far as the `word` is known, and the busiest robot."""
+    units as far as the `word` is known, and the busiest robot; with `scans`, that of robots which
+    run their own programs."""
+    if scans:
+        return ScannedTimes(timed(timing, wip=wip), scans).cycle
     if word.demand is None:
         return timed(timing, wip=wip).cycle
     return WordTimes(timed(timing), word).cycle

@@ -86,6 +86,9 @@ class Timed:
 def timed(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None) -> Timed:
     """The timed net of a layout with a change of its robots and a bound on copies of each part.
 
+    In a run a transition fires a tick after those that it waits for. The net has this tick in each
+    operation, so its ends come a tick late: what else follows an end takes a tick less.
+
     Raises InputError (BadValue) where `wip` is below 1.
     """
     factory, coordinated = timing.factory, timing.coordinated
@@ -94,13 +97,15 @@ def timed(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None) -> 
     seconds = [*delays, *[0.0] * (len(net.tokens) - len(delays))]
     owners = dict(enumerate(factory.net.slots))
     dates = timing.passes(change)
+    dates |= {past: max(0.0, date - timing.tick) for past, date in dates.items() if past.after % 2}
     for past, (place, before) in coordinated.passes.items():
         seconds[place] = max(0.0, dates[past] - (dates[before] if before else 0.0))
         owners[place] = (factory.robot_of(past.axis),)
     for number, served in coordinated.served.items():
-        seconds[served.up], seconds[served.down] = timing.strokes[number]
+        up, seconds[served.down] = timing.strokes[number]
+        seconds[served.up] = up - timing.tick
     for place in coordinated.away.values():
-        seconds[place] = timing.outfeed
+        seconds[place] = timing.outfeed - timing.tick
     bounds: tuple[int, ...] = ()
     if wip is not None:
         bounded = with_wip(factory, min(wip, len(factory.robots)))

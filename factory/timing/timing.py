@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import ceil
 from types import MappingProxyType
 
 import numpy as np
 
-from factory.control.mode import Array, Limits, Mode
-from factory.control.profile import SpeedProfile, World, mode_time
+from factory.control.governed import GovernedAxis, Trajectory, mode_ticks, trajectories
+from factory.control.mode import ROUNDING, Array, Limits, Mode
+from factory.control.profile import SpeedProfile, World
 from factory.layout.coordinating import HOME, Coordinated, without_bodies
 from factory.layout.exclusions import coordinated
 from factory.layout.feeding import feeder_of
@@ -18,6 +20,7 @@ from factory.layout.hands.limbs import rises_first
 from factory.layout.layout import Layout
 from factory.layout.outfeed import away, leaving
 from factory.layout.starting import start_positions
+from factory.mjcf.timestep import timed
 from factory.modes.modes import operation_modes, operation_starts, robot_limits
 from factory.modes.staging import HeadStart, staged, stages_of, with_time
 from factory.nets.coordinated import Past
@@ -110,49 +113,45 @@ class Timing:
                 begin = self.starts[stage.operation].copy()
                 begin[stage.slot] = stage.start
                 key = stage.robot, stage.operation
-                at_once = self._delay(stage.operation, begin, change)
-                if stage.slot not in self.modes[stage.operation].gate:
-                    at_once -= self.settings.tick
+                at_once = self._delay(stage.operation, begin, change) - self.tick
                 ways[key] = max(ways[key], at_once)
         return ways
 
     def passes(self, change: Change = AS_IT_IS) -> dict[Past, float]:
         """How long after the transition that it follows each pass of the coordinated net comes
         [s]: robots set out at once."""
-        delays = self.changed(change)
-        return {past: self._past(past, delays, change) for past in self.coordinated.passes}
+        return {past: self._past(past, change) * self.tick for past in self.coordinated.passes}
 
-    def _past(self, past: Past, delays: Sequence[float], change: Change) -> float:
-        """When an axis comes past a point, from rest."""
+    def _past(self, past: Past, change: Change) -> int:
+        """The ticks until an axis comes past a point, from rest."""
         layout, robot, number = self.layout, self.factory.robot_of(past.axis), past.after // 2
-        profile = self._profile(past.axis, change)
+        drive = self.axis_drive(past.axis, change)
         if past.axis != robot:
-            return profile.passes(layout.strokes[robot], past.at)
-        (before, visit), factor = layout.ways[number, robot], change.way.get(robot, 1.0)
+            stroke = layout.strokes[robot]
+            return drive.way(stroke).passes(stroke - past.at)
+        visit, factor = layout.visits[number, robot], change.way.get(robot, 1.0)
         if past.direction < 0:
-            mode, slot = self.modes[number], self.factory.operations[number].robots.index(robot)
-            left = max(0.0, past.at - visit.at) * factor
-            if mode.gate[slot] >= 0 and left < mode.standoff[slot]:
-                return max(0.0, delays[number] - self.rest - profile.landing(left))
-            way = (before.at - visit.at) * factor
-            return profile.passes(way, way - left)
-        rises = 0.0
+            slot = self.factory.operations[number].robots.index(robot)
+            way = self._trajectories(number, self.starts[number], change)[slot]
+            return way.passes(max(0.0, past.at - visit.at) * factor)
+        rises, length = 0, layout.guidepaths[robot].length
         if rises_first(layout, robot):
-            rises = self._profile(self.factory.lift_axis[robot], change).rest(layout.strokes[robot])
-        way = (layout.guidepaths[robot].length - visit.at) * factor
-        if past.at < layout.guidepaths[robot].length - HOME:
-            return rises + profile.passes(way, min(way, (past.at - visit.at) * factor))
-        return rises + profile.rest(way) + self._adjusted(robot, number)
+            lift = self.axis_drive(self.factory.lift_axis[robot], change)
+            rises = lift.way(layout.strokes[robot]).rests(self.settings.eps)
+        home = drive.way((length - visit.at) * factor)
+        if past.at < length - HOME:
+            return rises + home.passes(min(length - visit.at, length - past.at) * factor)
+        return rises + home.rests(HOME) + self._adjusted(robot, number)
 
-    def _adjusted(self, robot: int, number: int) -> float:
-        """How long the lift of a robot that is at home takes to be set for its next tour [s]."""
+    def _adjusted(self, robot: int, number: int) -> int:
+        """The ticks in which the lift of a robot that is at home is set for its next tour."""
         if robot not in self.factory.adjusted:
-            return 0.0
+            return 0
         gear = self.factory.robots[robot].operations
         after = gear[(gear.index(number) + 1) % len(gear)]
         one, other = (self.layout.visits[n, robot].up for n in (number, after))
-        profile = SpeedProfile(self.settings.speed, self.settings.acceleration)
-        return profile.rest(abs(one - other)) + self.settings.settle
+        lift = self.axis_drive(self.factory.lift_axis[robot], AS_IT_IS)
+        return lift.way(abs(one - other)).rests(self.settings.eps)
 
     @cached_property
     def strokes(self) -> Mapping[int, tuple[float, float]]:
@@ -165,25 +164,48 @@ class Timing:
         """How long a slider goes up after the part of one operation, and comes down with that of
         the next until its robot may set out [s]: a robot comes when the part is down, one whose
         hand holds from above sets out then, and one whose hand is there first is there."""
-        layout, profile = self.layout, SpeedProfile(*self.settings.feeder_limits)
+        layout, tick = self.layout, self.tick
+        slider = GovernedAxis(*self.settings.feeder_limits, tick)
         up, down = (
-            profile.rest(feeder_of(layout, self.factory.operations[n].label).stroke)
-            + (CALM + 1) * self.settings.tick
+            slider.way(feeder_of(layout, self.factory.operations[n].label).stroke).passes(ROUNDING)
+            + CALM
             for n in (before, leaf)
         )
         robot = self.factory.operations[leaf].carrier
-        hand = layout.hand(robot)
+        hand, sooner = layout.hand(robot), 0.0
         if hand is None or not (hand.first or hand.kind == "above"):
             fastest = SpeedProfile(
                 self.settings.speed * (1 + self.jitter), self.settings.acceleration
             )
             at = float(self.starts[leaf][self.factory.operations[leaf].robots.index(robot)])
-            down -= fastest.rest(max(0.0, layout.guidepaths[robot].length - at))
-        return up, max(0.0, down)
+            sooner = fastest.rest(max(0.0, layout.guidepaths[robot].length - at))
+        return up * tick, max(0, ceil(down - sooner / tick - ROUNDING)) * tick
 
-    def _profile(self, axis: int, change: Change) -> SpeedProfile:
+    def axis_drive(self, axis: int, change: Change) -> GovernedAxis:
+        """How an axis moves, with a change."""
         limits = self._limits((axis,), (self.factory.robot_of(axis),), change)
-        return SpeedProfile(float(limits.speed[0]), float(limits.acceleration[0]))
+        return replace(
+            self.drive, speed=float(limits.speed[0]), acceleration=float(limits.acceleration[0])
+        )
+
+    @cached_property
+    def drive(self) -> GovernedAxis:
+        """How axes move in this world."""
+        settings, engine = self.settings, self.world == "mujoco"
+        lag = self.stepped.lag if engine else 0.0
+        return GovernedAxis(
+            settings.speed, settings.acceleration, self.tick, lag, instant=not engine
+        )
+
+    @cached_property
+    def stepped(self) -> Settings:
+        """The settings with the timestep of a run."""
+        return timed(self.settings, self.layout, self.world, self.jitter)
+
+    @property
+    def tick(self) -> float:
+        """Period of the supervisor [s]."""
+        return self.settings.tick
 
     @cached_property
     def first_ways(self) -> Mapping[tuple[int, int], float]:
@@ -197,10 +219,9 @@ class Timing:
         return MappingProxyType(_one_after_the_other(ways))
 
     def _way(self, stage: HeadStart, start: float, change: Change) -> float:
-        start = stage.goal + (start - stage.goal) * change.way.get(stage.robot, 1.0)
-        limits = self._limits((stage.axis,), (stage.robot,), change)
-        settle = self.settings.settle if self.world == "mujoco" else 0.0
-        return mode_time(stage.mode, np.array([start]), limits, self.world) + settle
+        way = abs(start - stage.goal) * change.way.get(stage.robot, 1.0)
+        ticks = self.axis_drive(stage.axis, change).way(way).rests(stage.mode.eps)
+        return ticks * self.tick + self.rest - self.tick
 
     def _limits(self, axes: Sequence[int], robots: Sequence[int], change: Change) -> Limits:
         """The limits of axes, which are those of robots, with a change."""
@@ -253,7 +274,8 @@ class Timing:
         """How long one robot moves in an operation, without stops on its way [s]."""
         mode = self.modes[number]
         axis = self.factory.axes[number][slot]
-        profile = self._profile(axis, AS_IT_IS)
+        drive = self.axis_drive(axis, AS_IT_IS)
+        profile = SpeedProfile(drive.speed, drive.acceleration)
         way = 0.0 if mode.is_still else abs(float(self.left[number][slot] - mode.goals[slot]))
         if self.world == "mujoco":
             return profile.rest(way)
@@ -264,20 +286,25 @@ class Timing:
         """How long the outfeed's tray is away after a dropoff [s]; 0 in the ideal world."""
         if self.world == "ideal":
             return 0.0
-        return away(self.layout, self.settings)
+        return away(self.layout, self.stepped)
 
     @cached_property
     def leaving(self) -> float:
         """How long a product takes from its dropoff until it counts [s]; 0 in the ideal world."""
         if self.world == "ideal":
             return 0.0
-        return leaving(self.layout, self.settings)
+        return leaving(self.layout, self.stepped)
 
     def _of(self, number: int) -> tuple[int, ...]:
         """The robot of each axis of an operation."""
         return tuple(map(self.factory.robot_of, self.factory.axes[number]))
 
     def _delay(self, number: int, start: Array, change: Change) -> float:
+        mode, ways = self.modes[number], self._trajectories(number, start, change)
+        return mode_ticks(mode, ways, self.tick) * self.tick + self.rest
+
+    def _trajectories(self, number: int, start: Array, change: Change) -> list[Trajectory]:
+        """The references of the axes of an operation from `start`, with a change."""
         mode, robots = self.modes[number], self._of(number)
         limits = self._limits(self.factory.axes[number], robots, change)
         if not change.way.keys().isdisjoint(robots):
@@ -285,7 +312,7 @@ class Timing:
             shares = [change.way.get(robot, 1.0) for robot in robots[:carriages]]
             factor = np.array(shares + [1.0] * (len(robots) - carriages))
             start = mode.goals + (start - mode.goals) * factor
-        return mode_time(mode, start, limits, self.world) + self.rest
+        return trajectories(mode, start, limits, self.drive)
 
 
 def _one_after_the_other(

@@ -20,7 +20,7 @@ from factory.layout.hands.places import SMALL, Places
 from factory.layout.hands.reach import back, halves, reach, under_beam
 from factory.layout.hands.surfaces import TOUCH, Way, hit, retreat, swept
 from factory.layout.hands.tips import STRONG
-from factory.layout.presence import ACROSS
+from factory.layout.presence import ACROSS, ALONG
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
 
@@ -41,6 +41,10 @@ PLAY = 1e-6
 
 ROD = 0.008
 """Radius of the pad by which a feeder holds a part, at most [m]."""
+
+ROOM = ACROSS + 2 * ALONG + TOUCH
+"""A hand's face comes no nearer than this to what other robots hold [m]: two robots are off their
+references."""
 
 DIP, PUSHED = 0.02, 0.01
 """A product dips so deep into the slot of the outfeed's tray at the most, which begins so far ahead
@@ -182,6 +186,14 @@ class InTheWay:
         """The boxes (n, 3) of pad and column, of pad and stem, or of pad and bar."""
         return reach(self.holding.product, kind, places.at, places.radius, u)
 
+    def _facing(self, kind: Kind, places: Places, u: Way) -> tuple[Array, Array]:
+        """The same among what other robots hold, with ROOM ahead of a face behind or above."""
+        low, high = self.reach(kind, places, u)
+        axis, ahead = (2, -1.0) if kind == "above" else (0, u[0]) if u[0] else (1, u[1])
+        if kind != "below":
+            (high if ahead > 0 else low)[:, axis] += ahead * ROOM
+        return low, high
+
     def _beside_rod(self, label: str, places: Places, u: Way, t: Way) -> Truth:
         """Whether a part has room for its feeder's rod: behind a hand above it, or on the side away
         from its tower, which stands against t."""
@@ -226,6 +238,7 @@ class InTheWay:
             yield (*gone, self.holding.boxes(last.label))
             return
         # its payload comes along the same way, or takes the bar down with it, which then rises
+        gone = swept(*self._facing(kind, places, u), back(u))
         gone[1][:, 2] += 10.0 * lifted
         for other, guest in zip(last.before, last.robots, strict=True):
             if other != NOPART and (guest != robot or lifted):
@@ -293,7 +306,7 @@ class InTheWay:
         """The sweep of a hand relative to each input of its operations, which comes from either
         side while the hand is there, and as its lift rises; with whether that is so in any case,
         since it has a pile by then and the lift is up."""
-        low, high = self.reach(kind, places, u)
+        low, high = self._facing(kind, places, u)
         rising = low
         if kind == "behind":
             low, high = swept(low, high, back(u))

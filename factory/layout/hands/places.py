@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import pi
+from math import floor, log10, pi
 
 import numpy as np
 
@@ -89,6 +89,12 @@ class Places:
     pinned: Array
     covered: Array
 
+    @classmethod
+    def nowhere(cls) -> Places:
+        """No place."""
+        empty = np.zeros(0)
+        return cls(np.zeros((0, 3)), empty, empty, empty, empty)
+
     def chosen(self, which: Index | Truth) -> Places:
         """A selection of places."""
         every = self.at, self.radius, self.share, self.pinned, self.covered
@@ -160,6 +166,8 @@ def places(
     points = _rounded(points, float((high - low)[:, across].min()), product.middle, asked)
     out = surfaces.outermost(parts, points, side)
     points, out = points[np.isfinite(out)], out[np.isfinite(out)]
+    if not len(points):
+        return Places.nowhere()
     points[:, axis] = way * out
     away = np.linalg.norm((points - centre)[:, across], axis=1)
     # the outermost, of which nothing is in the way, and those near the centre of mass
@@ -278,9 +286,9 @@ def _lines(low: Array, high: Array, centre: Array) -> Array:
 
 
 def _rounded(points: Array, least: float, middle: Array, asked: Array) -> Array:
-    """Points (n, 3) in whole millimetres from the product's middle, or in tenths if the `least`
-    width of a body is small, and those `asked` for as they are; unique."""
-    step = 1e-3 if least > 8e-3 else 1e-4
+    """Points (n, 3) in whole millimetres from the product's middle, in tenths if the `least` width
+    of a body is small, or in what it has room for, and those `asked` for as they are; unique."""
+    step = 1e-3 if least > 8e-3 else min(1e-4, 10.0 ** floor(log10(least / 2)))
     every = np.concatenate([points, asked])
     rounded = middle + np.round((every - middle) / step) * step
     other = np.abs(rounded - every) > 1e-6

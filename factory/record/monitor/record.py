@@ -106,7 +106,8 @@ def verdict_on(
     if faults:
         pairs = [[fault.code, fault.message] for fault in faults]
         figures = {**(figures or {}), FAULTS: [*(figures or {}).get(FAULTS, []), *pairs]}
-    return judged(trouble, refines, figures, report)
+    verdict = judged(trouble, refines, figures, report)
+    return verdict.caused_by(log.failures.unseen if log.failures else ())
 
 
 def _markings(log: Log) -> Iterator[tuple[float, list[int]]]:

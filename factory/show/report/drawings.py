@@ -260,8 +260,8 @@ class _Plan:
 
     def _part(self, body: int) -> None:
         """The outline of a part; a spare one, under the floor, is hidden."""
-        name, geoms = self.m.body(body).name, list(shown(self.m, body))
-        points = np.concatenate([placed(self.m, geom)[0] for geom in geoms])
+        name, (geoms, shapes) = self.m.body(body).name, zip(*self._rigid(body), strict=True)
+        points = np.concatenate(shapes)
         spare = "hidden" if self.stage.position[body, 2] < 0 else None
         fill = hexadecimal(paint(self.m, geoms[0]))
         with self.canvas.group(**self._meant(name), data_body=body, hidden=spare):

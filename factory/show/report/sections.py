@@ -13,7 +13,7 @@ from factory.show.report.drawings import words_of
 from factory.show.report.pace import MeasuredPace, Predicted, excluded
 from factory.show.report.recording import Recording
 from factory.show.report.words import Proof
-from factory.simulation.run import STEADY
+from factory.simulation.run import steady_from
 from factory.study.fidelity.record import QUANTITIES
 from factory.support.errors import Diagnostic
 
@@ -101,7 +101,8 @@ def pace(recording: Recording, run: MeasuredPace, plan: Predicted | None) -> str
     if plan is None:
         note = f'<p class="note">No prediction: {escape(recording.missing)}.</p>'
     elif run.cycle is None:
-        note = f'<p class="note">A cycle time is measured from {STEADY} products on.</p>'
+        least = steady_from(recording.factory.period)
+        note = f'<p class="note">A cycle time is measured from {least} products on.</p>'
     return _table(names, body) + note + _gears(recording, run, plan)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from factory.control.governor import towards
 from factory.control.mode import Array
 from factory.layout.dimensions import BEHIND, PLAY
-from factory.layout.outfeed import tray_profile
+from factory.layout.outfeed import NEAR, tray_profile
 from factory.mjcf.driving import GRAVITY
 from factory.mjcf.model import Model
 from factory.mjcf.outfeed import SHUTTER_MASS
@@ -16,9 +16,6 @@ from factory.simulation.mujoco.axes import Axes
 from factory.simulation.mujoco.courses import AHEAD, Course, Follower, Move, planned
 from factory.simulation.mujoco.drives import Drives
 from factory.support.engine import mujoco
-
-NEAR = 1e-3
-"""The tray is somewhere when it is within this [m]."""
 
 WEIGHT = np.array([0.0, SHUTTER_MASS * GRAVITY])
 """What the drives of tray and shutter carry [N]."""

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import isfinite
+from math import isfinite, radians
 from types import MappingProxyType
 from typing import Any
 
+from factory.record.verdict import MOST
 from factory.support.tables import value_of
 
 KINDS: Mapping[str, str] = MappingProxyType(
@@ -91,6 +92,16 @@ class Sensors:
     noise: float = 5e-5
     delay: float = 0.03
 
+
+SHARE = 0.5
+"""A feeder's camera finds what is off by this share of what a hand-off may be (`verdict.LIMITS`):
+the rest is left to its noise and to the robot that takes the part."""
+
+SHIFTED = SHARE * MOST["handoff_gap_max_mm"] / 1e3
+"""Largest displacement that no camera finds [m]; a template may ask for less."""
+
+TURNED = SHARE * radians(MOST["handoff_angle_max_deg"])
+"""Largest angle that no camera finds [rad]."""
 
 CLEAR, SWAP = 10.0, 30.0
 """How long what has fallen lies, and how long it takes to replace a robot, unless asked otherwise

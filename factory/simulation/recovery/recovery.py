@@ -4,7 +4,8 @@ respond."""
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from factory.simulation.recovery.faults import Campaign, WorldFault
 from factory.simulation.recovery.plant import Plant
 from factory.simulation.recovery.responding import Responding
 from factory.simulation.recovery.standing import patience
-from factory.simulation.recovery.striking import Striking
+from factory.simulation.recovery.striking import Hit, Striking
 from factory.simulation.simulation import Simulation
 from factory.simulation.supervisor import Supervisor
 from factory.support.errors import Diagnostic, InputError
@@ -74,6 +75,18 @@ def summed(
         binned,
         spilled,
     )
+
+
+def _unseen(failures: Failures, hits: Sequence[Hit]) -> Iterator[str]:
+    """The missed faults among those that struck parts, in words: those that struck a label oftener
+    than failures of their test concern it."""
+    named = Counter((one.test, one.operation) for one in failures.found)
+    for kind, label, unit in hits if failures.missed else ():
+        test = CAUSES.get(kind, "")
+        if named[test, label] > 0:
+            named[test, label] -= 1
+        elif test:
+            yield f"{kind} '{label}' of unit {unit + 1}"
 
 
 class Recovery:
@@ -247,7 +260,7 @@ class Recovery:
     def report(self) -> Failures:
         """Summary of faults and failures so far."""
         undone = (e for e in self.books.supervisor.events if isinstance(e, Undone))
-        return summed(
+        failures = summed(
             self.responding.found,
             self.striking.struck,
             sum(len(event.transitions) for event in undone),
@@ -257,6 +270,7 @@ class Recovery:
             self.plant.binned,
             tuple(dict.fromkeys(self.plant.spilled)),
         )
+        return replace(failures, unseen=tuple(_unseen(failures, self.striking.hits)))
 
 
 def recover(simulation: Simulation, campaign: Campaign = Campaign()) -> Recovery:  # noqa: B008

@@ -15,6 +15,10 @@ EARLY, LATE = 0.1, 0.9
 """A robot drops what it carries after a share of its operation's time between these."""
 
 
+Hit = tuple[str, str, int]
+"""The kind of a fault, and the label and the unit that it struck."""
+
+
 class Striking:
     """Applies the faults of a campaign to a plant whose operations take `delays` [s]. `struck`:
     number of faults of each kind; `dark` [s]: end of the sensor blackout; `empty`: by label, when
@@ -29,6 +33,7 @@ class Striking:
         self._spent: set[int] = set()
         self._due: list[tuple[float, int]] = []
         self.struck: dict[str, int] = {}
+        self.hits: list[Hit] = []
         self.dark = -np.inf
         self.empty: dict[str, float] = {}
         self.standing: dict[int, float] = {}
@@ -123,5 +128,6 @@ class Striking:
                     self._spent.add(number)
             if hit:
                 self.count(kind)
+                self.hits.append((kind, label, unit))
                 return fault
         return None

@@ -80,7 +80,7 @@ def _shares(analysis: Analysis, most: int | None) -> PrintedTable:
         busy = (run.busy[number].predicted, run.busy[number].measured) if run else ()
         percents = map(_percent, (share.busy, *busy))
         rows.append((robot.name, robot.type, *(f"{t:.3f}" for t in times), *percents))
-    added = ("in that run", "measured") if run else ()
+    added = ("predicted for that run", "measured") if run else ()
     return cut("Robot time in a cycle [s]", (*columns, *added), rows, most)
 
 

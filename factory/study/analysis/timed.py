@@ -269,7 +269,8 @@ def flow(timing: Timing, net: TimedNet, units: int) -> Flow:
 
 def leaving_dates(timing: Timing, dates: Floats) -> Floats:
     """Date of the dropoff of each product [s], by those of all firings (cycles, T)."""
-    return np.asarray(dates[:, [o.end for o in timing.factory.dropoffs]].ravel())
+    ends = dates[:, [o.end for o in timing.factory.dropoffs]] - timing.tick
+    return np.asarray(ends.ravel())
 
 
 def _share(timing: Timing, net: TimedNet, number: int) -> Share:

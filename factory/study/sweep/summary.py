@@ -21,11 +21,15 @@ from factory.study.sweep.work import FAILING_FIGURES, FIGURES
 
 CONFIDENCE = 0.95
 
-UNTOLD = ("wall_time_s", "physics_time_s", "supervisor_time_s", "refines_net")
-"""Figures that do not depend on the factory: left out of a summary."""
+UNTOLD = ("wall_time_s", "physics_time_s", "supervisor_time_s", "realtime_factor", "refines_net")
+"""Figures that depend on the machine, or on nothing: left out of a summary."""
+
+FIRST = ("cycle_time_s", "predicted_cycle_time_s")
+"""The figures with which a summary begins."""
 
 SUMMED = (
-    *(key for key, kind in FIGURES.items() if kind != "TEXT" and key not in UNTOLD),
+    *FIRST,
+    *(k for k, kind in FIGURES.items() if kind != "TEXT" and k not in (*FIRST, *UNTOLD)),
     *FAILING_FIGURES,
 )
 """Figures that are summarised."""

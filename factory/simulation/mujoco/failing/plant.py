@@ -17,7 +17,7 @@ from factory.simulation.mujoco.failing.fallen import Fallen
 from factory.simulation.mujoco.failing.mishaps import Mishaps
 from factory.simulation.mujoco.holdings import Holdings
 from factory.simulation.mujoco.world import MujocoWorld
-from factory.simulation.recovery.faults import Campaign, WorldFault
+from factory.simulation.recovery.faults import SHIFTED, TURNED, Campaign, WorldFault
 from factory.simulation.recovery.plant import Plant
 
 SCRAP = 1 << 20
@@ -26,9 +26,6 @@ SCRAP = 1 << 20
 
 LOST = 5e-3
 """A part further than this from its place in the hand is lost [m]."""
-
-TURNED = 0.05
-"""What a feeder shows is askew, too, when it is turned so far [rad]."""
 
 
 class Senses:
@@ -89,7 +86,8 @@ class Senses:
         pose, upright = self._world.d.qpos[address], m.qpos0[address[3:]]
         off = np.linalg.norm(pose[:3] - place + self._noise * self._draw.normal(size=3))
         return bool(
-            off > test.limit or 2 * np.arccos(min(1.0, abs(float(pose[3:] @ upright)))) > TURNED
+            off > min(test.limit, SHIFTED)
+            or 2 * np.arccos(min(1.0, abs(float(pose[3:] @ upright)))) > TURNED
         )
 
     def _gaps(self, welds: Index, bodies: Index) -> Array:
