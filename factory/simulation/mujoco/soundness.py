@@ -120,10 +120,16 @@ class Soundness:
 
     def probe(self) -> None:
         """Put parts into everything that is solid, and check that the engine finds the contacts."""
-        if not self.found:
+        if self.found:
+            return
+        try:
             geoms = untouched(self._m, self._stations(), self.masks.solid)
-            names = (self._name[geom] for geom in geoms)
-            self.found = tuple(_each("NotSolid", "nothing can touch {}", names))
+        except mujoco.FatalError as error:
+            words = f"the engine cannot look for contacts: {str(error).splitlines()[0]}"
+            self.found = (Diagnostic("NotSolid", words),)
+            return
+        names = (self._name[geom] for geom in geoms)
+        self.found = tuple(_each("NotSolid", "nothing can touch {}", names))
 
     def _options(self) -> Iterator[Diagnostic]:
         """Engine options that differ from a factory's."""
