@@ -218,10 +218,10 @@ def run(
     where that pays; `distributed`: robots run their own programs; `lenient`: what its bodies do
     does not count; `strict`: a run fails whose success is qualified; `faults`: a file of what goes
     wrong, `spares`: robots in reserve, `swap`: how long an exchange takes [s]; `demand`: a file of
-    the orders for a mix, or a seed that draws them; `log`: a file for every tick; `monitor`: True for one that observes
-    every tick, False for none, None for one that observes events; `progress` is told the simulated
-    time [s] and the units made, after some ticks. Raises RunError for a run that stalls or takes
-    longer, InputError for a wrong value and where the engine refuses a mesh.
+    the orders for a mix, or a seed that draws them; `log`: a file for every tick; `monitor`: True
+    for one that observes every tick, False for none, None for one that observes events; `progress`
+    is told the simulated time [s] and the units made, after some ticks. Raises RunError for a run
+    that stalls or takes longer, InputError for a wrong value and where the engine refuses a mesh.
     """
     from factory.simulation.executing import run_project
     from factory.simulation.options import RunOptions, check_ideal

@@ -36,11 +36,10 @@ BROKEN = (
 """What the header of a log raises that is not what it should be."""
 
 REPEATED = 1.0
-"""So much of a logged run is repeated [s]."""
+"""At most so much of a logged run is repeated [s]."""
 
 SAME = 1e-6
-"""Coordinates of a run that is repeated differ by no more on another machine [m, or a quaternion's
-part]."""
+"""Setpoints of a run that is repeated differ by no more on another machine [m, m/s or N]."""
 
 OF_MODEL = ("Overlap", "Blocked")
 """The codes of what is said of the product of a model."""
@@ -145,23 +144,26 @@ def _unsaid(log: Log, made: Simulation) -> list[Diagnostic]:
 
 
 def _unlike(log: Log, made: Simulation) -> str:
-    """Where the beginning of a logged run is not what its header makes, in words; "" if it is. Runs
+    """Where the setpoints of a logged run, up to its first end of an operation, are not what its
+    header makes, in words; "" if they are. What pushes bodies changes no setpoint so soon. Runs
     with failures are not repeated."""
     if made.request.recovers or log.ctrl is None:
         return ""
     unlike = list[str]()
 
     def compare(state: State) -> None:
-        row, now = log.row_at(state.time), state.observation.qpos
-        if unlike or row >= len(log) or abs(float(log.time[row]) - state.time) > SAME:
+        row, now = log.row_at(state.time), state.observation.ctrl
+        if unlike or row >= len(log) or state.time >= until:
             return
-        far = np.abs(log.qpos[row] - now)
-        if not far.max() <= SAME:
-            coordinate = f"coordinate {int(np.nan_to_num(far, nan=np.inf).argmax())}"
-            words = f"at {state.time:.3f} s {coordinate} is {far.max():.2g} off"
+        assert log.ctrl is not None
+        far = float(np.abs(log.ctrl[row] - now).max(initial=0.0))
+        if not far <= SAME:
+            words = f"at {state.time:.3f} s a setpoint is {far:.2g} off"
             unlike.append(f"the run that its header makes (seed, jitter) is another: {words}")
 
-    made.run([compare], min(REPEATED, float(log.time[-1])))
+    ends = log.fired_t[log.fired % 2 == 1]
+    until = min(REPEATED, float(log.time[-1]), float(ends.min(initial=REPEATED)))
+    made.run([compare], until)
     return unlike[0] if unlike else ""
 
 

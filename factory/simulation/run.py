@@ -69,8 +69,8 @@ class Run:
     reports that watched it, if one did. `lenient`: what is wrong with the bodies does not count;
     `strict`: a qualified success is a failure; `period`: how many units come in a cycle of the net;
     `by_product`: how many units of each product were made; `word`: on demand, the products in the
-    order in which they left; `failures`: what went wrong, in a run that goes on when something does;
-    `exchanges`: the nets that it went on in; `log`: its log."""
+    order in which they left; `failures`: what went wrong, in a run that goes on then; `exchanges`:
+    the nets that it went on in; `log`: its log."""
 
     world: str
     units: int

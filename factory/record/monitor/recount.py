@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from factory.mjcf import names
-from factory.mjcf.masks import NOBODY, masks_of, robot_code
+from factory.mjcf.masks import NOBODY, loose_code, masks_of, robot_code
 from factory.mjcf.pads import Pads, trunks
 from factory.mjcf.replica import Replica
 from factory.mjcf.weld_frames import GRIP, HOLD, PARK
@@ -170,15 +170,20 @@ class _Contacts:
         """Assign parts to the holders in these welds (k, 3), the latest where there are several."""
         before = {*map(tuple, () if self._welds is None else self._welds.tolist())}
         fresh = [row for row in welds.tolist() if tuple(row) not in before]
+        for body in {body for _, _, body in before} - {*welds[:, 2].tolist()}:
+            if self._anatomy.copy_of[body] >= 0:
+                self._mask(body, loose_code(body))
         self._welds = welds
         for weld, holder, body in fresh:
             if self._anatomy.copy_of[body] < 0 or self._anatomy.holder[weld] is None:
                 continue
             parked = self._anatomy.holder[weld] == (PARK, -1)
             code = NOBODY if parked else int(self._code[holder])
-            with_shells = self._trunk == body
-            self._in[with_shells] = code
-            self._replica.mask(self._solid[body], with_shells, *masks_of(code))
+            self._in[self._trunk == body] = code
+            self._mask(body, code)
+
+    def _mask(self, body: int, code: int) -> None:
+        self._replica.mask(self._solid[body], self._trunk == body, *masks_of(code))
 
     def _intended(self, a: int, b: int, apart: float, marked: set[int]) -> bool:
         """Whether two geoms may touch: those of parts that are being joined or overlap in the

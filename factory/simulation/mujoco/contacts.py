@@ -6,7 +6,7 @@ Masks are written on geoms *and* bodies, since the broad phase reads those of bo
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,10 +14,17 @@ from numpy.typing import NDArray
 
 from factory.control.mode import Index, Truth
 from factory.mjcf import names
-from factory.mjcf.masks import masks_of
+from factory.mjcf.masks import loose_code, masks_of
 from factory.mjcf.pads import trunks
 from factory.plant.fused_bodies import Inside
 from factory.simulation.mujoco.model_arrays import ModelArrays
+
+SOFT = 0.02
+"""Time constant of contacts of parts, the engine's own [s]."""
+
+STIFF = 2.0
+"""The same of parts that nothing holds, in timesteps: the least that the engine allows. Those that
+fall on each other press in by what they go in this time."""
 
 LAST = 2**32 - 1
 """The greatest of all signatures, which no pair has."""
@@ -88,15 +95,26 @@ class ContactMasks:
 
     def hold(self, holders: Mapping[int, int]) -> None:
         """Put parts into the hands of holders, by code."""
-        m = self._arrays.m
         for body, holder in holders.items():
-            masks, bodies = masks_of(holder), self._own[body]
-            self.code[bodies] = holder
-            self.fresh.add(holder)
-            with_geoms = bodies[m.body_geomnum[bodies] > 0]
-            self._masks[:, with_geoms] = np.array(masks)[:, None]
-            self._mask("body", with_geoms, np.array(masks))
-            self._mask("geom", self.solid[body], np.array(masks))
+            self.code[self._own[body]] = holder
+            self._cover(body, holder, SOFT)
+
+    def let_go(self, bodies: Iterable[int]) -> None:
+        """Let parts that nothing holds any more collide with each other, too. They still count as
+        those of their last holder."""
+        for body in bodies:
+            self._cover(body, loose_code(body), STIFF * self._arrays.m.opt.timestep)
+
+    def _cover(self, body: int, code: int, softness: float) -> None:
+        """Give a part's body, with its shells, the masks of a code, and contacts of a time constant
+        [s]."""
+        masks, bodies = np.array(masks_of(code)), self._own[body]
+        self.fresh.add(int(self.code[body]))
+        with_geoms = bodies[self._arrays.m.body_geomnum[bodies] > 0]
+        self._masks[:, with_geoms] = masks[:, None]
+        self._mask("body", with_geoms, masks)
+        self._mask("geom", self.solid[body], masks)
+        self._arrays["geom_solref"][self.solid[body], 0] = softness
 
     def remove(self, bodies: Sequence[int]) -> None:
         """Let bodies that are not parts collide with nothing."""

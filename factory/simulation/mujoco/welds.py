@@ -180,6 +180,7 @@ class Welds:
         m, d = self._m, self._d
         off, on = np.array([*self._next.off], np.intp), np.array([*self._next.on], np.intp)
         bodies = np.array([*self._next.on.values()], np.intp)
+        loose = {*m.eq_obj2id[off[d.eq_active[off] != 0]].tolist()} - {*bodies.tolist()}
         touched = [m.eq_obj1id[off], m.eq_obj2id[off], m.eq_obj1id[on], bodies]
         d.eq_active[off] = False
         self._aims[on], d.eq_active[on] = bodies, True
@@ -187,6 +188,7 @@ class Welds:
             self.closed = float(d.time)
         self._sleep.wake({*np.concatenate(touched).tolist(), *self._next.placed})
         self.masks.hold(self._next.held)
+        self.masks.let_go(loose - self._next.held.keys())
         self._next = Gathered()
 
     def _put(self) -> None:
