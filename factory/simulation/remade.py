@@ -38,8 +38,9 @@ BROKEN = (
 REPEATED = 1.0
 """At most so much of a logged run is repeated [s]."""
 
-SAME = 1e-6
-"""Setpoints of a run that is repeated differ by no more on another machine [m, m/s or N]."""
+SAME = 1e-8
+"""Coordinates of a run that is repeated differ by no more on another machine [m, or a quaternion's
+part]; another seed moves robots by some micrometres at once."""
 
 OF_MODEL = ("Overlap", "Blocked")
 """The codes of what is said of the product of a model."""
@@ -144,25 +145,29 @@ def _unsaid(log: Log, made: Simulation) -> list[Diagnostic]:
 
 
 def _unlike(log: Log, made: Simulation) -> str:
-    """Where the setpoints of a logged run, up to its first end of an operation, are not what its
-    header makes, in words; "" if they are. What pushes bodies changes no setpoint so soon. Runs
-    with failures are not repeated."""
+    """Where a logged run, up to its first end of a joining operation, is not what its header makes,
+    in words; "" if it is. Runs with failures are not repeated."""
     if made.request.recovers or log.ctrl is None:
         return ""
-    unlike = list[str]()
+    operations, unlike = made.layout.factory.operations, list[str]()
+    ends = (
+        float(t)
+        for t, event in zip(log.fired_t, log.fired.tolist(), strict=True)
+        if event % 2 and len(operations[event // 2].robots) > 1
+    )
+    until = min(REPEATED, float(log.time[-1]), next(ends, REPEATED))
 
     def compare(state: State) -> None:
-        row, now = log.row_at(state.time), state.observation.ctrl
+        row = log.row_at(state.time)
         if unlike or row >= len(log) or state.time >= until:
             return
-        assert log.ctrl is not None
-        far = float(np.abs(log.ctrl[row] - now).max(initial=0.0))
+        far = float(np.abs(log.qpos[row] - state.observation.qpos).max(initial=0.0))
         if not far <= SAME:
-            words = f"at {state.time:.3f} s a setpoint is {far:.2g} off"
-            unlike.append(f"the run that its header makes (seed, jitter) is another: {words}")
+            unlike.append(
+                "the log is not of the run that its header makes (seed, jitter), or something took"
+                f" part in it that a log does not keep: at {state.time:.3f} s it is {far:.2g} off"
+            )
 
-    ends = log.fired_t[log.fired % 2 == 1]
-    until = min(REPEATED, float(log.time[-1]), float(ends.min(initial=REPEATED)))
     made.run([compare], until)
     return unlike[0] if unlike else ""
 
