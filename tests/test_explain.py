@@ -24,6 +24,7 @@ NOT_PROVOKED = {
     *("Contact", "EngineWarning", "GripGap", "HandOffGap", "Missed", "NotRefined"),
     *("Record", "CannotAssemble", "Hulls", "NotInPlace", "Unit"),
     *("HandOffTurn", "Mass", "NotSolid", "Options", "ProductError", "ProductTurn", "Shape"),
+    *("Altered", "NotJudged", "Qualified"),
 }
 """Codes that need a broken machine, run or factory, which other tests make."""
 

@@ -65,7 +65,7 @@ class Fingerprint:
 
 def fingerprint_of(m: mujoco.MjModel) -> Fingerprint:
     """The fingerprint of a model as it is now."""
-    hashes = {name: crc32(np.ascontiguousarray(array)) for name, array in arrays_of(m).items()}
+    hashes = {name: crc32(array.tobytes()) for name, array in arrays_of(m).items()}
     return Fingerprint(hashes, OptionReader(m).read())
 
 

@@ -122,7 +122,9 @@ class ModelArrays:
                 yield self._change(name, self._arrays.get(name), right.get(name))
 
     def _change(self, name: str, now: Values | None, right: Values | None) -> Diagnostic:
-        code = next((code for begin, code in CODES.items() if name.startswith(begin)), "Altered")
+        code = "Altered"
+        if coded := [code for begin, code in CODES.items() if name.startswith(begin)]:
+            code = coded[0]
         if now is None or right is None or now.shape != right.shape:
             rows = [0 if array is None else len(array) for array in (now, right)]
             words = f"the engine's '{name}' has {rows[0]} rows, not {rows[1]}"
