@@ -100,7 +100,7 @@ def test_a_run_says_that_ways_were_blocked_unless_they_are_allowed(
     assert f" lowered, {counted}" in checked.out
     done = run("run", file, "--no-hands", *options, "--log", log)
     watched = run("monitor", log)
-    last = f"the run succeeded, but parts passed through each other in 1 operation (Blocked: {words}"
+    last = f"succeeded, but parts passed through each other in 1 operation (Blocked: {words}"
     assert (done.status, watched.status) == (0, 0)
     assert (last in done.out, last in watched.out) == (said, said)
     document = run("monitor", log, "--json").json
