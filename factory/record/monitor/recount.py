@@ -76,7 +76,9 @@ def differences(log: Log, counted: Mapping[str, Any], m: Any) -> list[Violation]
     """The figures of a log that its states contradict, and those that it lacks."""
     kept, wrong = log.figures, list[str]()
     if kept is None:
-        return [_contradicted(log, "the log has no figures")] if log.complete else []
+        # a log of an older form has neither figures nor ends of operations
+        ended = log.complete and log.ends is not None
+        return [_contradicted(log, "the log has no figures")] if ended else []
     for key, words in WORDS.items():
         recorded, value = kept.get(key) or 0.0, counted[key] or 0.0
         most = counted[MOST].get(key, value)
