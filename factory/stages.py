@@ -201,6 +201,7 @@ def run(
     fuse: bool | None = None,
     distributed: bool = False,
     lenient: bool = False,
+    strict: bool = False,
     faults: AnyPath | None = None,
     spares: int = 0,
     swap: float | None = None,
@@ -215,19 +216,19 @@ def run(
     simulated time; `wip`: most copies of each part inside; `start`: a legal marking, or the names
     of its places, separated by commas; `fuse`: whether parts joined for good become one body, None
     where that pays; `distributed`: robots run their own programs; `lenient`: what its bodies do
-    does not count; `faults`: a file of what goes wrong, `spares`: robots in reserve, `swap`: how
-    long an exchange takes [s]; `demand`: a file of the orders for a mix, or a seed that draws them;
-    `log`: a file for every tick; `monitor`: True for one that observes
-    every tick, False for none, None for one that observes events; `progress` is told the simulated
-    time [s] and the units made, after some ticks. Raises RunError for a run that stalls or takes
-    longer, InputError for a wrong value and where the engine refuses a mesh.
+    does not count; `strict`: a run fails whose success is qualified; `faults`: a file of what goes
+    wrong, `spares`: robots in reserve, `swap`: how long an exchange takes [s]; `demand`: a file of
+    the orders for a mix, or a seed that draws them; `log`: a file for every tick; `monitor`: True
+    for one that observes every tick, False for none, None for one that observes events; `progress`
+    is told the simulated time [s] and the units made, after some ticks. Raises RunError for a run
+    that stalls or takes longer, InputError for a wrong value and where the engine refuses a mesh.
     """
     from factory.simulation.executing import run_project
     from factory.simulation.options import RunOptions, check_ideal
     from factory.simulation.run import require
 
     asked = RunOptions(world, units, seed, jitter, wip, start, fuse, max_time, distributed, lenient)
-    asked = replace(asked, faults=maybe(faults), spares=spares, swap=swap)
+    asked = replace(asked, faults=maybe(faults), spares=spares, swap=swap, strict=strict)
     asked = replace(asked, demand=None if demand is None else str(demand))
     if world == "ideal":
         check_ideal(fuse, bool(monitor))

@@ -21,12 +21,14 @@ from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.plant.factory import Operation
 from factory.record.log import Log, read_log
+from factory.record.log.reader import digest_of
 from factory.record.log.writer import LogWriter
-from factory.record.monitor.record import verdict_on, watch_log
+from factory.record.monitor.record import recorded_subject, verdict_on, watch_log
 from factory.record.verdict import RunVerdict
 from factory.simulation.mujoco import world as mujoco_world
+from factory.simulation.mujoco.interference import Interference
 from factory.simulation.mujoco.parts import Parts
-from factory.simulation.remade import model_faults
+from factory.simulation.remade import forged, model_faults
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.simulation.watched import watched
@@ -42,13 +44,18 @@ Acts = Callable[[Any, Any], None]
 
 OFF = mujoco.mjtDisableBit
 
+MASKS = ("body_contype", "body_conaffinity", "geom_contype", "geom_conaffinity")
+OPTIONS = ("timestep", "density", "gravity")
+"""What is changed for a while."""
+
 
 @dataclass(frozen=True)
 class Plant:
     """A fault, of a `kind`: `xml` changes the model's text, `engine` the model before the run,
-    `run` model and data once in it, `switch` the same where sub1 is made and no weld is switched
-    yet, `log` the log of an honest run; `product` is a PAG. A run with it fails by all of these
-    `codes`; of none it succeeds."""
+    `run` model and data once in it, `while` the model for 0.2 s, `switch` model and data where sub1
+    is made and no weld is switched yet, `disturbance` declares a change, `mesh` changes the model
+    of a product with meshes, `log` the log of an honest run; `product` is a PAG. A run with it
+    fails by all of these `codes`; of none it succeeds."""
 
     name: str
     kind: str
@@ -78,7 +85,41 @@ def _of_settings(settings: Settings) -> RunVerdict:
     return _run(paper(), units=2, settings=settings)
 
 
-def _of_engine(act: Callable[[Any], None]) -> RunVerdict:
+def _of_mesh(act: Callable[[Any], None]) -> RunVerdict:
+    """The same as `_of_engine`, of a product with meshes."""
+    return _of_engine(act, with_hands("peg"))
+
+
+def _of_disturbance(act: Callable[[Interference], None]) -> RunVerdict:
+    """A run in which something is other than the factory knows, and declared."""
+    simulation = Simulation(paper(), RunRequest(units=2, shown=False))
+    act(Interference(simulation.physical))
+    return watched(simulation).verdict
+
+
+def _of_while(act: Callable[[Any], None]) -> RunVerdict:
+    """A run in which the model is changed at 1 s, and is as it was at 1.2 s."""
+    simulation = Simulation(paper(), RunRequest(units=2, shown=False))
+    world, before = simulation.physical, dict[str, Any]()
+
+    def some_time() -> None:
+        m = world.m
+        if world.time >= 1.0 and not before:
+            before.update({name: getattr(m, name).copy() for name in MASKS})
+            before.update({name: np.array(getattr(m.opt, name)) for name in OPTIONS})
+            act(m)
+        elif world.time >= 1.2 and not world.hooks.ticks:
+            for name in MASKS:
+                getattr(m, name)[:] = before[name]
+            m.opt.timestep, m.opt.density = before["timestep"], before["density"]
+            m.opt.gravity[:] = before["gravity"]
+            world.hooks.ticks.append(lambda: None)  # once
+
+    world.hooks.before_step.append(some_time)
+    return watched(simulation, max_time=12.0).verdict
+
+
+def _of_engine(act: Callable[[Any], None], layout: Layout | None = None) -> RunVerdict:
     """A run in a model that was changed after it had been compiled."""
     load = mujoco_world.load
 
@@ -88,7 +129,7 @@ def _of_engine(act: Callable[[Any], None]) -> RunVerdict:
         return m
 
     with patch.object(mujoco_world, "load", changed):
-        return _run(paper(), units=2)
+        return _run(layout or paper(), units=2)
 
 
 def _of_xml(change: Callable[[str], str]) -> RunVerdict:
@@ -147,9 +188,9 @@ def _of_product(text: str) -> RunVerdict:
 
 def _of_log(change: Callable[[Log], Log]) -> RunVerdict:
     changed = change(honest_log())
-    report, subject = watch_log(changed)
     faults, _ = model_faults(changed, ROOT / "examples")
-    return verdict_on(changed, subject.factory, report, faults)
+    report = None if forged(faults) else watch_log(changed)[0]
+    return verdict_on(changed, recorded_subject(changed.header).factory, report, faults)
 
 
 @cache
@@ -178,6 +219,9 @@ RUNNERS: dict[str, Callable[[Any], RunVerdict]] = {
     "xml": _of_xml,
     "engine": _of_engine,
     "run": _of_run,
+    "while": _of_while,
+    "disturbance": _of_disturbance,
+    "mesh": _of_mesh,
     "switch": _of_switch,
     "product": _of_product,
     "log": _of_log,
@@ -288,6 +332,43 @@ def reframed(weld: str, shift: float = 0.0, degrees: float = 0.0) -> Callable[[A
     return act
 
 
+def array(name: str, by: float, *only: str, plus: float = 0.0) -> Callable[[Any], None]:
+    """An array of the model is so many times as large, and more; of these geoms, bodies or joints
+    only, if any are named."""
+
+    def act(m: Any) -> None:
+        kind = {"geom": m.geom, "body": m.body, "jnt": m.joint}.get(name.partition("_")[0])
+        rows = [kind(one).id for one in only] if kind and only else slice(None)
+        changed = getattr(m, name)
+        changed[rows] = (changed[rows] * by + plus).astype(changed.dtype)
+
+    return act
+
+
+def option(name: str, value: Any) -> Callable[[Any], None]:
+    """An option of the engine is another."""
+
+    def act(m: Any) -> None:
+        setattr(m.opt, name, value)
+
+    return act
+
+
+def faster(m: Any) -> None:
+    """The engine's steps are longer by a tenth."""
+    m.opt.timestep *= 1.1
+
+
+def later(m: Any, d: Any) -> None:
+    """The engine's clock is put forward by a tick."""
+    d.time += 0.01
+
+
+def unmasked(m: Any) -> None:
+    """No body can collide."""
+    m.body_contype[:] = m.body_conaffinity[:] = 0
+
+
 def welded(weld: str, on: bool) -> Acts:
     """A weld is switched, of itself."""
 
@@ -360,6 +441,40 @@ def states(joint: str, by: float, row: int = 150, rows: int = 1) -> Callable[[Lo
         return replace(log, qpos=qpos)
 
     return change
+
+
+def said(**values: Any) -> Callable[[Log], Log]:
+    """The log of an honest run says other figures; it lacks those that are None."""
+
+    def change(log: Log) -> Log:
+        figures = {**(log.figures or {}), **values}
+        return replace(log, figures={k: v for k, v in figures.items() if v is not None})
+
+    return change
+
+
+def lacking(name: str) -> Callable[[Log], Log]:
+    """The log of an honest run lacks a figure."""
+    return lambda log: replace(
+        log, figures={k: v for k, v in (log.figures or {}).items() if k != name}
+    )
+
+
+def header(signed: bool = False, **values: Any) -> Callable[[Log], Log]:
+    """The header of a log says something else; `signed`: the digest at the end of the log too."""
+
+    def change(log: Log) -> Log:
+        other = {**log.header, **values}
+        figures = {**(log.figures or {}), **({"header": digest_of(other)} if signed else {})}
+        return replace(log, header=other, figures=figures)
+
+    return change
+
+
+def crowd(log: Log) -> Log:
+    """The model in a log has 20,000 spheres in one place."""
+    balls = "<body><freejoint/>" + '<geom size="0.1"/>' * 20_000 + "</body>"
+    return replace(log, xml=log.xml.replace("</worldbody>", f"{balls}</worldbody>", 1))
 
 
 def swapped(log: Log) -> Log:
@@ -444,6 +559,39 @@ TABLE: dict[str, dict[str, tuple[str, Any]]] = {
         "a grip holds it turned by 1°": ("Frame", reframed("grip/r3/part2", 0, 1)),
         "a grip holds it turned by 0.2°": ("Frame", reframed("grip/r5/part1", 0, 0.2)),
         "the tray holds it turned by 1°": ("Frame", reframed("hold/part2", 0, 1)),
+        "no body can collide": ("NotSolid", unmasked),
+        "the boxes round geoms are nothing": ("NotSolid", array("geom_aabb", 0.0)),
+        "the boxes of the broad phase are nothing": ("NotSolid", array("bvh_aabb", 0.0)),
+        "the spheres round geoms are nothing": ("NotSolid", array("geom_rbound", 0.0)),
+        "a carriage is half as large": ("Shape", array("geom_size", 0.5, "r2/carriage")),
+        "a wall of a magazine is elsewhere": (
+            "Shape",
+            array("geom_pos", 1.0, "feeder/part1/wall1", plus=0.01),
+        ),
+        "drives are half as strong": ("Altered", array("actuator_forcerange", 0.5)),
+        "setpoints have other bounds": ("Altered", array("actuator_ctrlrange", 1.0, plus=1.0)),
+        "drives are stiffer by a tenth": ("Altered", array("actuator_biasprm", 1.1)),
+        "there is air": ("Options", option("density", 1.2)),
+        "the air is thick": ("Options", option("viscosity", 0.1)),
+        "the wind blows": ("Options", option("wind", (1.0, 0.0, 0.0))),
+        "the solver takes one step": ("Options", option("iterations", 1)),
+        "the solver is content with less": ("Options", option("tolerance", 1e-2)),
+        "contacts begin elsewhere": ("Options", option("o_margin", 0.01)),
+        "the integrator is another": ("Options", option("integrator", 3)),
+        "welds are softer": ("Altered", array("eq_solref", 2.0)),
+        "a motor is heavier": ("Altered", array("dof_armature", 1.0, plus=0.5)),
+        "joints have other ranges": ("Altered", array("jnt_range", 1.0, plus=0.01)),
+        "guides are rougher": ("Altered", array("dof_frictionloss", 1.0, plus=0.1)),
+        "parts are twice as rough": ("Altered", array("geom_friction", 2.0)),
+        "a part is harder to turn": ("Mass", array("body_inertia", 2.0, "part/part1#1")),
+    },
+    "mesh": {"vertices are elsewhere": ("Shape", array("mesh_vert", 0.99))},
+    "while": {
+        "the clock is a tenth fast for 0.2 s": ("Options", faster),
+        "there is no gravity for 0.2 s": ("Options", weightless),
+        "nothing is solid for 0.2 s": ("NotSolid", hollow()),
+        "no body can collide for 0.2 s": ("NotSolid", unmasked),
+        "there is air for 0.2 s": ("Options", option("density", 1.2)),
     },
     "run": {
         "nothing is solid any more": ("NotSolid", both(hollow())),
@@ -465,6 +613,11 @@ TABLE: dict[str, dict[str, tuple[str, Any]]] = {
         "the tray's hold turns by 0.2° in the run": (
             "ProductTurn",
             both(reframed("hold/part3", 0, 0.2)),
+        ),
+        "the clock is put forward": ("Options", later),
+        "spheres round geoms are nothing from 1 s on": (
+            "NotSolid",
+            both(array("geom_rbound", 0.0)),
         ),
         "a weld more": ("TwoHolders", welded("grip/r1/part3", True)),
         "a weld less": ("Dropped", welded("grip/r3/part1", False)),
@@ -560,6 +713,32 @@ TABLE: dict[str, dict[str, tuple[str, Any]]] = {
             "Record",
             model_text(r'(?s)(name="part/part1#1".*?mass=")', r"\g<1>0"),
         ),
+        "the log says a larger gap": ("Record", said(handoff_gap_max_mm=0.9)),
+        "the log says a larger error": ("Record", said(product_error_max_mm=0.09)),
+        "the log says a turn": ("Record", said(product_angle_max_deg=0.09)),
+        "the log says contacts": ("Record", said(unintended_contacts=3)),
+        "the log says a contact of what is apart": (
+            "Record",
+            said(
+                unintended_contacts=1,
+                contacts=["r2/carriage - r6/carriage"],
+                contact_first_s=1.0,
+            ),
+        ),
+        "the log says 99 contacts of many": ("Record", figures(unintended_contacts=99)),
+        "the log lacks the gap": ("Record", lacking("handoff_gap_max_mm")),
+        "the log lacks its contacts": ("Record", lacking("unintended_contacts")),
+        "the log lacks its engine's warnings": ("Record", lacking("engine_warnings")),
+        "the log says what it leaves open": ("Record", said(reservations=["no hand holds x"])),
+        "the log makes up an overlap": ("Record", said(faults=[["Overlap", "a and b overlap"]])),
+        "the log is of another seed": ("Record", header(seed=9)),
+        "the log is of another seed, and signed": ("Record", header(True, seed=9)),
+        "the log is of another jitter, and signed": ("Record", header(True, jitter=0.1)),
+        "the log is of other versions": (
+            "NotJudged",
+            header(versions={"klavins-factory": "0.0.1", "mujoco": "3.0", "numpy": "2.0"}),
+        ),
+        "the log's model is crowded": ("Record", crowd),
         "a robot is paler in the log's model": (
             "Record",
             model_text(r'(class="shown" type="sphere" pos=")-1', r"\g<1>-2"),
@@ -576,27 +755,11 @@ PLANTS = tuple(
 """What must be found."""
 
 
-def rubbed(m: Any) -> None:
-    """Parts are twice as rough."""
-    m.geom_friction[:] *= 2
-
-
-def sticky(m: Any) -> None:
-    """Rails have a little more dry friction."""
-    m.dof_frictionloss[:] += 0.1
-
-
-def stronger(m: Any) -> None:
-    """Drives are stiffer by a tenth."""
-    m.actuator_gainprm[:, 0] *= 1.1
-    m.actuator_biasprm[:, 1:3] *= 1.1
-
-
 BENIGN = (
     Plant("nothing", "run", lambda m, d: None),
-    Plant("parts are twice as rough", "engine", rubbed),
-    Plant("rails have more dry friction", "engine", sticky),
-    Plant("drives are stiffer by a tenth", "engine", stronger),
+    Plant("rails have more dry friction", "disturbance", lambda by: by.rub(np.arange(6), 0.6)),
+    Plant("parts weigh more", "disturbance", lambda by: by.weigh([by._m.nbody - 1], 1.1)),
+    Plant("drives are weaker by a tenth", "disturbance", lambda by: by.weaken(np.arange(6), 0.9)),
     Plant("parts overlap by 0.01 mm", "product", OVERLAP % ("", "0.04", "0.03999")),
     Plant(
         "parts overlap by what is allowed",

@@ -100,11 +100,15 @@ def test_a_run_says_that_ways_were_blocked_unless_they_are_allowed(
     assert f" lowered, {counted}" in checked.out
     done = run("run", file, "--no-hands", *options, "--log", log)
     watched = run("monitor", log)
-    last = "the run succeeded\nparts passed through each other in 1 operation (Blocked)"
+    last = f"succeeded, but parts passed through each other in 1 operation (Blocked: {words}"
     assert (done.status, watched.status) == (0, 0)
     assert (last in done.out, last in watched.out) == (said, said)
-    blocked = run("monitor", log, "--json").json["verdict"]["blocked"]
+    document = run("monitor", log, "--json").json
+    blocked, qualified = document["verdict"]["blocked"], document["qualified"]
     assert [one["message"] for one in blocked] == [words] * said
+    assert qualified[-1] == "1 of 10 pairs of parts were not tested for contact"
+    strictly = run("monitor", log, "--strict")
+    assert strictly.status == 1 and strictly.out.startswith("the run FAILED: Qualified: ")
     if said:
         kept = read_log(log)
         silent = replace(kept, figures={**(kept.figures or {}), "faults": []})

@@ -24,7 +24,7 @@ NOT_PROVOKED = {
     *("Contact", "EngineWarning", "GripGap", "HandOffGap", "Missed", "NotRefined"),
     *("BadRobot", "Record", "CannotAssemble", "Hulls", "NotInPlace", "Unit"),
     *("HandOffTurn", "Mass", "NotSolid", "Options", "ProductError", "ProductTurn", "Shape"),
-    "Unseen",
+    *("Altered", "NotJudged", "Qualified", "Unseen"),
 }
 """Codes that need a broken machine, run or factory, which other tests make."""
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from factory.commands.options import LENIENT, OUTPUT, PATH
+from factory.commands.options import LENIENT, OUTPUT, PATH, STRICT
 from factory.commands.requests import OutputOptions
 from factory.support.console import emit, say
 
@@ -23,48 +23,55 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("file", metavar="LOG", type=PATH)
 @LENIENT
+@STRICT
 @OUTPUT
-def monitor(file: Path, lenient: bool, out: OutputOptions) -> int:
+def monitor(file: Path, lenient: bool, strict: bool, out: OutputOptions) -> int:
     """Judge the run in a LOG that `run --log` has kept against its net, from its states; where
     something failed, from those between failures, and from what fired and was undone.
 
     The status is 1 for a run that does not follow its net, in which bodies did otherwise than the
-    net says, or that was cut off before its units were made, and 2 for a LOG that ends before there
-    is anything to judge."""
+    net says, or that was cut off before its units were made, for a LOG that is not that of its PAG
+    or was kept with other versions, whose states are not judged, and 2 for a LOG that ends before
+    there is anything to judge."""
     from factory.record.log import read_log
-    from factory.record.monitor.record import verdict_on, watch_log
-    from factory.simulation.remade import model_faults
+    from factory.record.monitor.record import recorded_subject, verdict_on, watch_log
+    from factory.simulation.remade import forged, model_faults
 
     log = read_log(file)
-    report, subject = watch_log(log)
+    of = recorded_subject(log.header).factory
     faults, why = model_faults(log, file.parent)
-    verdict = replace(verdict_on(log, subject.factory, report, faults), lenient=lenient)
+    report = None if forged(faults) else watch_log(log)[0]
+    verdict = replace(verdict_on(log, of, report, faults), lenient=lenient, strict=strict)
     if out.as_json:
+        watched = {} if report is None else report.as_json()
         document = {
             "log": str(file),
-            "product": subject.factory.pag.root,
+            "product": of.pag.root,
             "sim_time_s": round(float(log.time[-1]), 6),
             "complete": log.complete,
             "cut_off": log.cut_off and log.cut_off.as_json(),
-            **report.as_json(),
-            "refines_net": verdict.refines and report.refines_net,
-            "monitor_time_s": report.time_s,
+            "judged": report is not None,
+            **watched,
+            "refines_net": verdict.refines and report is not None and report.refines_net,
+            "monitor_time_s": report.time_s if report else None,
             "model_compared": not why,
             "verdict": verdict.as_json(),
+            "qualified": [*verdict.qualified],
             **({} if log.failures is None else {"failures": log.failures.as_json()}),
         }
         emit(document)
     else:
         if not verdict.succeeded:
             say_verdict(verdict, out.verbose)
-        say(found_by(report, log.cut_off))
-        if why:
+        if report is not None:
+            say(found_by(report, log.cut_off))
+        if why and report is not None:
             say(f"its model was not compared with that of its PAG: {why}")
         if log.failures is not None:
             say_failures(log.failures, out.verbose)
         if verdict.succeeded:
             say_verdict(verdict, out.verbose)
-        for firing in (*report.seen, *report.inferred) if out.verbose else ():
+        for firing in (*report.seen, *report.inferred) if out.verbose and report else ():
             how = "inferred" if firing.seen is None else "seen"
             span = f"{firing.earliest:.3f} to {firing.latest:.3f} s"
             say(f"  {firing.transition} of unit {firing.unit}: {how}, {span}")
@@ -79,15 +86,18 @@ def say_verdict(verdict: RunVerdict, verbose: bool = False) -> None:
     `verbose`, a line for each code."""
     failures = verdict.failures if verbose else verdict.gathered
     lines = [f"{failure.code}: {failure.message}" for failure in failures]
+    doubts = "; ".join(verdict.qualified)
     if verdict.succeeded:
-        say("the run succeeded" + (", as --lenient leaves this out:" if lines else ""))
-    else:
+        words = f"the run succeeded, but {doubts}" if doubts else "the run succeeded"
+        say(words + (f"{'; ' if doubts else ', as '}--lenient leaves this out:" if lines else ""))
+    elif verdict.judged:
         say(f"the run FAILED: {lines.pop(0)}")
+    else:
+        say(f"the run was NOT JUDGED: {lines.pop(0)}")
     for line in lines:
         say(f"  {line}")
-    if verdict.blocked:
-        count = len(verdict.blocked)
-        say(f"parts passed through each other in {count} operation{'s' * (count > 1)} (Blocked)")
+    if doubts and not verdict.succeeded and not verdict.strict:
+        say(f"  and {doubts}")
 
 
 def found_by(report: Report, cut_off: CutOff | None) -> str:

@@ -275,6 +275,7 @@ LENIENT = click.option(
     is_flag=True,
     help="Let a run that makes its units succeed, whatever its bodies do.",
 )
+STRICT = click.option("--strict", is_flag=True, help="Fail a run that 'succeeded, but ...'.")
 DRAW = options(
     click.option("--seed", type=SEEDS, default=0, help="Random seed of --jitter."),
     click.option(

@@ -31,6 +31,7 @@ from factory.support.console import emit, say
 @shared.WIP
 @click.option("--max-time", type=shared.SECONDS, help="Stop after this simulated time [s].")
 @shared.LENIENT
+@shared.STRICT
 @shared.RUNS
 @shared.FLOOR
 @shared.RELAY
@@ -40,7 +41,8 @@ def report(options: ProjectOptions, asked: RunOptions, out: OutputOptions, outpu
     """Write one HTML page about a run of FILE.pag, or about the run in a LOG of `run --log`.
 
     The page is always written. The exit status is 1 if the run failed, or was cut off before its
-    units were made; --lenient ignores what its bodies do."""
+    units were made; --lenient ignores what its bodies do, and with --strict a run whose success is
+    qualified fails."""
     from factory.record.log import is_log
     from factory.show.report.page import report_on
     from factory.support.files import write_text
@@ -49,7 +51,7 @@ def report(options: ProjectOptions, asked: RunOptions, out: OutputOptions, outpu
     writable(file, output)
     warnings: list[dict[str, object]] = []
     if is_log(file):
-        for_a_pag(file, "a log", "output", "lenient")
+        for_a_pag(file, "a log", "output", "lenient", "strict")
         made = report_on(file)
     else:
         project = options.project(out.silent)
@@ -58,7 +60,8 @@ def report(options: ProjectOptions, asked: RunOptions, out: OutputOptions, outpu
     write_text(output, made.text)
     recording, run = made.recording, made.run
     size, cut = len(made.text.encode()), recording.log.cut_off
-    verdict = run.verdict if run else replace(recording.verdict, lenient=asked.lenient)
+    verdict = run.verdict if run else recording.verdict
+    verdict = replace(verdict, lenient=asked.lenient, strict=asked.strict)
     document = {
         "output": str(output),
         "bytes": size,
@@ -67,6 +70,7 @@ def report(options: ProjectOptions, asked: RunOptions, out: OutputOptions, outpu
         "cut_off": cut and cut.as_json(),
         "predicted": recording.layout is not None,
         "verdict": verdict.as_json(),
+        "qualified": [*verdict.qualified],
         "warnings": warnings,
     }
     if out.as_json:

@@ -13,7 +13,7 @@ from factory.support.progress import Waiting
 if TYPE_CHECKING:
     from factory.simulation.resuming import Resumed
 
-ALLOWED = ("resume", "max_time", "lenient", "monitor")
+ALLOWED = ("resume", "max_time", "lenient", "strict", "monitor")
 """The options of `run` that go with --resume."""
 
 

@@ -55,6 +55,7 @@ if TYPE_CHECKING:
 )
 @click.option("--resume", is_flag=True, help="Continue an interrupted run, whose log is FILE.")
 @shared.LENIENT
+@shared.STRICT
 @shared.PICTURE
 @shared.FLOOR
 @shared.RELAY
@@ -73,7 +74,9 @@ def run(
     """Run FILE.pag until its products are dropped off.
 
     The exit status is 1 if the run does not make its units, does not follow its net, or moves
-    bodies other than the net says; --lenient ignores the last.
+    bodies other than the net says; --lenient ignores the last. A run "succeeded, but" where no hand
+    holds something, parts passed through each other or pairs of parts were not tested against each
+    other; with --strict the status is 1 then.
 
     With --resume, FILE is a log: its run is repeated up to the end of the log, compared with it,
     and continued in the same log."""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from hashlib import sha256
 from xml.etree import ElementTree
 
+from factory.mjcf.arrays import Fingerprint, fingerprint_of
 from factory.mjcf.model import Model
 from factory.support.engine import mujoco, unwarned
 from factory.support.errors import Diagnostic, InputError
@@ -19,14 +21,38 @@ MANY = 20_000
 PIECE = 10_000
 """Elements of a piece."""
 
+KEPT = 8
+"""Number of models whose fingerprints are kept."""
+
+_fingerprints: dict[bytes, Fingerprint] = {}
+
 
 def load(model: Model) -> mujoco.MjModel:
     """The engine's model of a factory. Raises InputError (BadMesh, BadValue, Engine) where the
     engine refuses it."""
     try:
-        return compiled(model.xml, model.files)
+        m = compiled(model.xml, model.files)
     except ValueError as error:
         raise InputError(_explained(model, str(error))) from error
+    if len(_fingerprints) >= KEPT:
+        del _fingerprints[next(iter(_fingerprints))]
+    _fingerprints[_digest(model)] = fingerprint_of(m)
+    return m
+
+
+def fingerprint(model: Model) -> Fingerprint:
+    """The fingerprint of the engine's model of a factory: that of when it was loaded, or else it is
+    compiled once more."""
+    kept = _fingerprints.get(_digest(model))
+    return kept or fingerprint_of(compiled(model.xml, model.files))
+
+
+def _digest(model: Model) -> bytes:
+    digest = sha256(model.xml.encode())
+    for name in sorted(model.files):
+        digest.update(name.encode())
+        digest.update(model.files[name])
+    return digest.digest()
 
 
 def compiled(xml: str, meshes: Mapping[str, bytes]) -> mujoco.MjModel:

@@ -15,6 +15,9 @@ from factory.plant.factory import Factory
 NOBODY = 0
 """The code of no holder: such a part, a spare one out of sight, touches nothing."""
 
+LOOSE = 1 << 27
+"""The codes of bodies that nothing holds begin here, above those of all holders."""
+
 ALL = (1 << 30) - 1
 """All bits of a code."""
 
@@ -23,6 +26,12 @@ def masks_of(holder: int) -> tuple[int, int]:
     """Contype and conaffinity of what a holder (its code) holds, and of what touches that by
     design."""
     return holder << 1, 0 if holder == NOBODY else ((~holder & ALL) << 1) | 1
+
+
+def loose_code(body: int) -> int:
+    """The code of a body (its number in the engine) that nothing holds any more: it collides with
+    all others, those in the same hands before among them."""
+    return LOOSE + body
 
 
 def robot_code(robot: int) -> int:

@@ -22,7 +22,8 @@ class PhysicsFigures:
     many pairs of parts there are; `excluded`: those whose contact was off; `timestep_chosen`: by
     the factory, not by the user; `wip_chosen`: the bound on units inside at once where the factory
     chose one; `contact_first_s`: when the first unintended contact began, `dropped_s`: when a load
-    was dropped [s]; `faults`: what was not as it should be of the engine's model.
+    was dropped [s]; `faults`: what was not as it should be of the engine's model; `reservations`:
+    what a run of this model does not show, in words.
     """
 
     handoffs: int = 0
@@ -46,6 +47,7 @@ class PhysicsFigures:
     contact_first_s: float | None = None
     dropped_s: float | None = None
     faults: tuple[Diagnostic, ...] = ()
+    reservations: tuple[str, ...] = ()
     joining_error_max_mm: float = 0.0
     grip_strength_share_max: float | None = None
     grip_strength_robot: str | None = None

@@ -3,7 +3,8 @@
 A run succeeds if all its units were made, its record refines the net, and the bodies agree: the
 model was that of the factory, the reconstruction of a monitor from the engine's state agrees with
 the record, and no figure of the bodies exceeds its limit. Failures are in the order of time: the
-first is the cause."""
+first is the cause. What a run does not show, such as pairs of parts that were not tested against
+each other, qualifies its success."""
 
 from __future__ import annotations
 
@@ -98,6 +99,15 @@ FIGURES = (
 FAULTS = "faults"
 """The figure that lists the faults of the model of a run, as pairs of code and message."""
 
+HEADER = "header"
+"""The figure that is the digest of the header of a log."""
+
+RESERVATIONS = "reservations"
+"""The figure that lists what a run does not show, in words."""
+
+NOT_JUDGED = "NotJudged"
+"""The code of a log that cannot be judged here."""
+
 BLOCKED = "Blocked"
 """The code of an operation in which parts passed through each other."""
 
@@ -110,7 +120,9 @@ class RunVerdict:
     """The verdict on a run: the `trouble` that ended it early, whether its record refines the net,
     and the failures of its `bodies`, in the order of time, of which `before` is the number that
     precede the trouble. `lenient`: the bodies do not count. `blocked`: operations in which parts
-    passed through each other, a failure of the order of assembly and not of the run."""
+    passed through each other, a failure of the order of assembly and not of the run;
+    `reservations`: what else qualifies its success, in words. `strict`: a qualified success is a
+    failure."""
 
     trouble: Diagnostic | None = None
     refines: bool = True
@@ -118,6 +130,22 @@ class RunVerdict:
     lenient: bool = False
     before: int = 0
     blocked: tuple[Diagnostic, ...] = ()
+    reservations: tuple[str, ...] = ()
+    strict: bool = False
+
+    @property
+    def qualified(self) -> tuple[str, ...]:
+        """What qualifies the success of the run, in words."""
+        if not self.blocked:
+            return self.reservations
+        count = len(self.blocked)
+        words = f"parts passed through each other in {count} operation{'s' * (count > 1)}"
+        return (f"{words} (Blocked: {self.blocked[0].message})", *self.reservations)
+
+    @property
+    def judged(self) -> bool:
+        """Whether it is a verdict at all."""
+        return self.trouble is None or self.trouble.code != NOT_JUDGED
 
     def caused_by(self, unseen: Sequence[str]) -> RunVerdict:
         """The verdict on a run with faults that no sensor found: where it has failures, they are
@@ -136,7 +164,8 @@ class RunVerdict:
     @property
     def succeeded(self) -> bool:
         """Whether the run has no failure that counts."""
-        return self.trouble is None and self.refines and (self.lenient or not self.bodies)
+        sound = self.trouble is None and self.refines and (self.lenient or not self.bodies)
+        return sound and not (self.strict and self.qualified)
 
     @property
     def failures(self) -> tuple[Diagnostic, ...]:
@@ -144,7 +173,9 @@ class RunVerdict:
         ending = [] if self.trouble is None else [self.trouble]
         if not self.refines:
             ending.append(Diagnostic("NotRefined", "the record does not refine the net"))
-        return (*self.bodies[: self.before], *ending, *self.bodies[self.before :])
+        strictly = self.qualified if self.strict else ()
+        doubts = (Diagnostic("Qualified", words) for words in strictly)
+        return (*self.bodies[: self.before], *ending, *self.bodies[self.before :], *doubts)
 
     @property
     def gathered(self) -> tuple[Diagnostic, ...]:
@@ -162,9 +193,12 @@ class RunVerdict:
         """The key `verdict` of `--json` documents."""
         return {
             "succeeded": self.succeeded,
+            "judged": self.judged,
             "lenient": self.lenient,
             "failures": [failure.as_json() for failure in self.failures],
             "blocked": [operation.as_json() for operation in self.blocked],
+            "strict": self.strict,
+            "qualified": [*self.qualified],
         }
 
 
@@ -183,9 +217,13 @@ def judged(
     ended = inf if dropped is None else dropped
     before = sum(t < ended for t, _ in timed)
     faults = [Diagnostic(code, words) for code, words in (figures or {}).get(FAULTS, [])]
+    unjudged = [fault for fault in faults if fault.code == NOT_JUDGED]
+    if unjudged:
+        return RunVerdict(unjudged[0], refines)
     blocked = tuple(fault for fault in faults if fault.code == BLOCKED)
     bodies = tuple(failure for _, failure in timed)
-    return RunVerdict(trouble, refines, bodies, lenient, before, blocked)
+    doubts = tuple((figures or {}).get(RESERVATIONS, ()))
+    return RunVerdict(trouble, refines, bodies, lenient, before, blocked, doubts)
 
 
 def _failures(
@@ -209,6 +247,7 @@ def kept_figures(physics: Any) -> dict[str, Any]:
     """The figures of the bodies of a run that a verdict needs, or that a log lacks otherwise."""
     kept = {figure: getattr(physics, figure) for figure in (*FIGURES, *NAMES)}
     kept[FAULTS] = [[fault.code, fault.message] for fault in physics.faults]
+    kept[RESERVATIONS] = [*physics.reservations]
     judged_figures = {limit.figure for limit in LIMITS}
     return {figure: value for figure, value in kept.items() if value or figure in judged_figures}
 
@@ -221,7 +260,9 @@ def check_figures(figures: Any) -> None:
         value = figures.get(figure)
         if value is not None and type(value) not in (int, float):
             raise ValueError(f"its figure '{figure}' is not a number")
-    for figure in NAMES:
+    if not isinstance(figures.get(HEADER, ""), str):
+        raise ValueError(f"its figure '{HEADER}' is not a text")
+    for figure in (*NAMES, RESERVATIONS):
         if not _are_texts(figures.get(figure, [])):
             raise ValueError(f"its figure '{figure}' is not a list of texts")
     faults = figures.get(FAULTS, [])

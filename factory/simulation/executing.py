@@ -84,7 +84,8 @@ def carry_on(
 
         with Waiting("judging the run between failures", silent):
             record = replace(record, monitor=watch_log(read_log(log))[0])
-    return replace(record, lenient=asked.lenient, failures=failures, log=log)
+    record = replace(record, lenient=asked.lenient, strict=asked.strict)
+    return replace(record, failures=failures, log=log)
 
 
 def carry_out(

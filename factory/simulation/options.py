@@ -57,8 +57,9 @@ class RunOptions:
     `fuse`: whether parts joined for good become one body, None where that pays; `max_time`: at most
     so long [simulated s]; `distributed`: robots run their own programs; `lenient`: what its bodies
     do does not count; `faults`: a file of what goes wrong, `spares`: robots in reserve, `swap`: how
-    long an exchange takes [s]; `demand`: a file of the orders for a mix, or a seed that draws them.
-    Raises InputError (Usage) with every value out of its bounds."""
+    long an exchange takes [s]; `demand`: a file of the orders for a mix, or a seed that draws them;
+    `strict`: a run fails whose success is qualified. Raises InputError (Usage) with every value out
+    of its bounds."""
 
     world: WorldName = "mujoco"
     units: int = 1
@@ -74,6 +75,7 @@ class RunOptions:
     spares: int = 0
     swap: float | None = None
     demand: str | None = None
+    strict: bool = False
 
     def __post_init__(self) -> None:
         check_choice("world", self.world, WORLDS)

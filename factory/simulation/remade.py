@@ -1,21 +1,27 @@
-"""The model of a logged run, built again from its PAG: the model in a log is not trusted."""
+"""The beginning of a logged run, made again from its PAG: the model, the header and the figures in
+a log are not trusted."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from factory.layout.layout import Layout
+from factory.mjcf.reservations import reservations_of
 from factory.plant.demand import Demand
 from factory.record.log import Log
+from factory.record.log.reader import digest_of
 from factory.record.log.writer import packed, versions
 from factory.record.monitor.subject import subject_of_run
 from factory.record.project_table import project_of, settings_of
-from factory.record.verdict import FAULTS
+from factory.record.state import State
+from factory.record.verdict import FAULTS, HEADER, RESERVATIONS
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.errors import Diagnostic, FactoryError
@@ -28,6 +34,16 @@ BROKEN = (
     *(OverflowError, RecursionError, AssertionError, MemoryError),
 )
 """What the header of a log raises that is not what it should be."""
+
+REPEATED = 1.0
+"""At most so much of a logged run is repeated [s]."""
+
+SAME = 1e-8
+"""Coordinates of a run that is repeated differ by no more on another machine [m, or a quaternion's
+part]; another seed moves robots by some micrometres at once."""
+
+OF_MODEL = ("Overlap", "Blocked")
+"""The codes of what is said of the product of a model."""
 
 WIDTH = 120
 """So many characters of an element are said."""
@@ -53,12 +69,18 @@ def request_of(header: Mapping[str, Any]) -> RunRequest:
 def model_faults(
     log: Log, beside: Path, layout: Layout | None = None
 ) -> tuple[tuple[Diagnostic, ...], str]:
-    """Defects of the model in a log of a MuJoCo run in the folder `beside`: it differs from what
-    its PAG gives (Record), or its product has faults that the log does not mention; and the reason
-    why the two cannot be compared, "" if they can. `layout`: if known."""
+    """Defects of a log of a MuJoCo run in the folder `beside`: its model, what it says of that, or
+    its beginning differ from what its PAG and header give (Record); its header is not the one that
+    it was ended with (Record); its product has faults; or it was kept with other versions than
+    those that would judge it (NotJudged). And the reason why it cannot be compared with its PAG, ""
+    if it can. `layout`: if known."""
+    if words := other_versions(log):
+        return (Diagnostic("NotJudged", words, None, "judge it with those versions"),), words
+    said = (log.figures or {}).get(HEADER, "")
+    if log.complete and log.figures is not None and said != digest_of(log.header):
+        words = "the header of the log is not the one that it was ended with"
+        return (Diagnostic("Record", words),), ""
     try:
-        if log.header["versions"] != {**log.header["versions"], **versions()}:
-            return (), "the log was kept with other versions"
         layout = layout or project_of(log.header, beside).layout
         request = request_of(log.header)
         made = Simulation(layout, request)
@@ -72,16 +94,82 @@ def model_faults(
     except BROKEN as error:
         return (), str(error)
     assert made.model is not None
-    said = [*map(tuple, (log.figures or {}).get(FAULTS, []))]
-    faults = [f for f in made.model.overlaps if (f.code, f.message) not in said]
-    if faults and log.figures is not None:
-        faults.insert(0, Diagnostic("Record", f"the log does not say: {faults[0].message}"))
+    faults = _unsaid(log, made)
     files = {f"mesh/{name}": content for name, content in log.files.items()}
     kept = {"xml": log.xml.encode(), **files}
     words = _difference(packed(made.model), kept)
     if words and kept != packed(Simulation(layout, replace(request, shown=False)).model):
         faults.append(Diagnostic("Record", f"the log's model is not that of its PAG: {words}"))
+    elif words := _unlike(log, made):
+        faults.append(Diagnostic("Record", words))
     return tuple(faults), ""
+
+
+def other_versions(log: Log) -> str:
+    """The versions with which a log was kept and that are others here, in words; "" for none."""
+    then, here = log.header["versions"], versions()
+    other = [name for name in here if then.get(name) != here[name]]
+    kept = ", ".join(f"{name} {then.get(name, 'unknown')}" for name in other)
+    return f"the log was kept with {kept}; here: {_listed(here, other)}" if other else ""
+
+
+def _listed(versions: Mapping[str, str], names: Iterable[str]) -> str:
+    return ", ".join(f"{name} {versions[name]}" for name in names)
+
+
+def forged(faults: Iterable[Diagnostic]) -> bool:
+    """Whether a log with these faults of its model is not worth judging from its states."""
+    return any(fault.code in ("Record", "NotJudged") for fault in faults)
+
+
+def _unsaid(log: Log, made: Simulation) -> list[Diagnostic]:
+    """The faults of the product that a log does not mention; those that it makes up, and what it
+    does not say of its model."""
+    assert made.model is not None
+    kept = log.figures or {}
+    said = [tuple(fault) for fault in kept.get(FAULTS, [])]
+    faults = [f for f in made.model.overlaps if (f.code, f.message) not in said]
+    if log.figures is None:
+        return faults
+    right = [(fault.code, fault.message) for fault in made.model.overlaps]
+    doubts = [*reservations_of(made.layout, made.model.excluded)]
+    unlike = [f"the log does not say: {fault.message}" for fault in faults[:1]]
+    unlike += [
+        f"the log says what is not so: {words}"
+        for code, words in said
+        if code in OF_MODEL and (code, words) not in right
+    ]
+    if kept.get(RESERVATIONS, []) != doubts:
+        unlike.append(f"the log does not say what its run leaves open: {'; '.join(doubts) or 'no'}")
+    return [*(Diagnostic("Record", words) for words in unlike), *faults]
+
+
+def _unlike(log: Log, made: Simulation) -> str:
+    """Where a logged run, up to its first end of a joining operation, is not what its header makes,
+    in words; "" if it is. Runs with failures are not repeated."""
+    if made.request.recovers or log.ctrl is None:
+        return ""
+    operations, unlike = made.layout.factory.operations, list[str]()
+    ends = (
+        float(t)
+        for t, event in zip(log.fired_t, log.fired.tolist(), strict=True)
+        if event % 2 and len(operations[event // 2].robots) > 1
+    )
+    until = min(REPEATED, float(log.time[-1]), next(ends, REPEATED))
+
+    def compare(state: State) -> None:
+        row = log.row_at(state.time)
+        if unlike or row >= len(log) or state.time >= until:
+            return
+        far = float(np.abs(log.qpos[row] - state.observation.qpos).max(initial=0.0))
+        if not far <= SAME:
+            unlike.append(
+                "the log is not of the run that its header makes (seed, jitter), or something took"
+                f" part in it that a log does not keep: at {state.time:.3f} s it is {far:.2g} off"
+            )
+
+    made.run([compare], until)
+    return unlike[0] if unlike else ""
 
 
 def _difference(wanted: Mapping[str, bytes], kept: Mapping[str, bytes]) -> str:

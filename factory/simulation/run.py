@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -73,10 +73,10 @@ class Run:
     """The record of a run: figures and events. `replays`: an independent replay of the events is a
     run of the net; `trouble` is None for a run that reached its end; `monitor` is what a monitor
     reports that watched it, if one did. `lenient`: what is wrong with the bodies does not count;
-    `period`: how many units come in a cycle of the net; `by_product`: how many units of each
-    product were made; `word`: on demand, the products in the order in which they left; `failures`:
-    what went wrong, in a run that goes on when something does;
-    `exchanges`: the nets that it went on in; `log`: its log."""
+    `strict`: a qualified success is a failure; `period`: how many units come in a cycle of the net;
+    `by_product`: how many units of each product were made; `word`: on demand, the products in the
+    order in which they left; `failures`: what went wrong, in a run that goes on then; `exchanges`:
+    the nets that it went on in; `log`: its log."""
 
     world: str
     units: int
@@ -98,6 +98,7 @@ class Run:
     trouble: Diagnostic | None = None
     monitor: Report | None = None
     lenient: bool = False
+    strict: bool = False
     period: int = 1
     by_product: Mapping[str, int] = field(default_factory=dict)
     word: tuple[str, ...] = field(default=(), repr=False)
@@ -107,7 +108,8 @@ class Run:
 
     def __repr__(self) -> str:
         made = f"{self.products} of {self.units} products in {self.sim_time_s:.2f} s"
-        how = "succeeded" if self.succeeded else "FAILED"
+        doubts = "; ".join(self.verdict.qualified)
+        how = "succeeded" + (f", but {doubts}" if doubts else "") if self.succeeded else "FAILED"
         return f"<Run in {self.world}: {how}, {made}>"
 
     def _repr_html_(self) -> str | None:
@@ -134,7 +136,8 @@ class Run:
         """Whether the run made its units, is a run of the net, and its bodies agree."""
         figures = None if self.physics is None else kept_figures(self.physics)
         verdict = judged(self.trouble, self.replays, figures, self.monitor, self.lenient)
-        return verdict.caused_by(self.failures.unseen if self.failures else ())
+        verdict = verdict.caused_by(self.failures.unseen if self.failures else ())
+        return replace(verdict, strict=self.strict)
 
     @property
     def succeeded(self) -> bool:
@@ -231,6 +234,7 @@ class Run:
             **({"failures": self.failures.as_json()} if self.failures else {}),
             **({"exchanges": [x.as_json() for x in self.exchanges]} if self.exchanges else {}),
             "verdict": self.verdict.as_json(),
+            "qualified": [*self.verdict.qualified],
             "events": [event.as_json() for event in self.events],
         }
 

@@ -35,6 +35,7 @@ OPTIONS: Mapping[str, object] = {
     "fps": 30,
     "camera": "overview",
     "lenient": True,
+    "strict": True,
 }
 """The keys that are options of commands, each with an example; the others are those of Settings,
 LINES, TEES and PARALLEL."""

@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from hashlib import sha256
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -171,6 +172,11 @@ def read_log(path: Path | str) -> Log:
 def is_log(path: Path | str) -> bool:
     """Whether a file begins as a log does."""
     return head_of(Path(path), len(LOG)) == LOG
+
+
+def digest_of(header: Mapping[str, Any]) -> str:
+    """The digest of a header, which the last block of its log repeats."""
+    return sha256(json.dumps(dict(header), sort_keys=True).encode()).hexdigest()
 
 
 def header_in(data: memoryview) -> tuple[dict[str, Any], int]:

@@ -20,13 +20,14 @@ from factory.nets.undone import Undone
 from factory.pipeline import Project
 from factory.record.log.blocks import LENGTH, MAGIC, STATES, Arrays, bad_log, block, pack_rows
 from factory.record.log.failed import Written
+from factory.record.log.reader import digest_of, header_in
 from factory.record.monitor.subject import subject_of_run
 from factory.record.project_table import project_table
 from factory.record.state import Array, Event, Observation, Recordable, Recorder, State
-from factory.record.verdict import kept_figures
+from factory.record.verdict import HEADER, kept_figures
 from factory.support.claim import claimed
 from factory.support.errors import Diagnostic, FactoryError, InputError
-from factory.support.files import unwritten
+from factory.support.files import RECORD, mapped, unwritten
 from factory.support.settings import AUTO
 from factory.support.tables import table_of
 from factory.support.version import release
@@ -207,7 +208,9 @@ class LogWriter(Recorder):
         if self.trouble is not None:
             texts = {"code": self.trouble.code, "message": self.trouble.message}
         if (figures := self.simulation.figures()) is not None:
-            texts["figures"] = json.dumps(kept_figures(figures))
+            header, _ = header_in(mapped(self.path, RECORD))
+            kept = {**kept_figures(figures), HEADER: digest_of(header)}
+            texts["figures"] = json.dumps(kept)
         if (account := self.simulation.state().account) is not None:
             texts["failures"] = json.dumps(table_of(account.report()))
         return {name: _text(text) for name, text in texts.items()}

@@ -68,7 +68,7 @@ def _seen(log: Log, subject: MonitorSubject, m: Any) -> Report:
         monitor.see(observation)
     report = monitor.report(log.events)
     counted = recounted(log, subject, anatomy, m, observations(log))
-    wrong = [*jumps(log, m), *differences(log.figures or {}, counted, float(log.time[-1]))]
+    wrong = [*jumps(log, m), *differences(log, counted, m)]
     return replace(report, violations=(*report.violations, *wrong), figures=counted)
 
 

@@ -20,7 +20,7 @@ from factory.record.monitor.record import verdict_on, watch_log
 from factory.record.project_table import factory_of, project_of
 from factory.record.verdict import RunVerdict
 from factory.show.report.scene import DrawnFactory, stations
-from factory.simulation.remade import model_faults
+from factory.simulation.remade import forged, model_faults
 from factory.study.analysis.measured import conditions
 from factory.support.errors import Diagnostic, InputError, RunError
 
@@ -60,7 +60,10 @@ class Recording:
 
     @cached_property
     def monitor(self) -> Report | None:
-        """The report of a monitor on the log; None where the log has no states for it."""
+        """The report of a monitor on the log; None where the log has no states for it, or is not
+        that of its PAG."""
+        if forged(self.faults):
+            return None
         try:
             return watch_log(self.log)[0]
         except InputError:
@@ -104,11 +107,11 @@ def recording_of(path: Path, layout: Layout | None = None) -> Recording:
     if layout is None:
         try:
             layout = _laid_out(log, path.parent)
-            faults, _ = model_faults(log, path.parent, layout)
         except (InputError, RunError) as error:
             missing = error.diagnostics[0].message
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             missing = str(error)
+        faults, _ = model_faults(log, path.parent, layout)
     factory = layout.factory if layout else factory
     return Recording(str(path), log, motion, factory, layout, missing, faults)
 

@@ -13,6 +13,7 @@ from factory.show.report.drawings import words_of
 from factory.show.report.pace import MeasuredPace, Predicted, excluded
 from factory.show.report.recording import Recording
 from factory.show.report.words import Proof
+from factory.simulation.remade import forged
 from factory.simulation.run import steady_from
 from factory.study.fidelity.record import QUANTITIES
 from factory.support.errors import Diagnostic
@@ -55,13 +56,18 @@ def heading(
     held, monitor = recording.verdict.follows, recording.monitor
     judge = "record only" if monitor is None else "record and monitor agree"
     cut = recording.log.cut_off
-    if held and cut:
+    if not recording.verdict.judged:
+        trouble = recording.verdict.failures[0]
+        cards.append(("Run", *_verdict(False, "", "not judged"), trouble.message))
+    elif held and cut:
         judge = f"follows the net up to there; {judge}"
         cards.append(("Run", *_verdict(False, "", f"cut off at {cut.t:.2f} s"), judge))
     else:
         follows = recording.verdict.refines and (not monitor or monitor.refines_net)
         wrong = "bodies differ" if follows else "does not follow the net"
         cards.append(("Run", *_verdict(held, "follows the net", wrong), judge))
+    if doubts := recording.verdict.qualified:
+        cards.append(("But", f"{len(doubts)} <small>reservations</small>", "; ".join(doubts)))
     return "".join(_card(*card) for card in cards)
 
 
@@ -239,8 +245,12 @@ def _judged(recording: Recording) -> Iterator[str]:
     verdict, report = recording.verdict, recording.monitor
     yield "<p>The record of firings " + ("refines" if verdict.refines else "does not refine")
     yield " the net. "
+    if not verdict.judged:
+        yield f"Its states are not judged: {escape(verdict.failures[0].message)}.</p>"
+        return
     if report is None:
-        yield "The log has no states for the monitor.</p>"
+        why = "is not that of its PAG" if forged(recording.faults) else "has no states for it"
+        yield f"There is no report of a monitor: the log {why}.</p>"
         yield from _listed(verdict.bodies)
         return
     yield f"The monitor, from states of the engine alone, observed {len(report.seen)} firings and "

@@ -6,16 +6,25 @@ Masks are written on geoms *and* bodies, since the broad phase reads those of bo
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from factory.control.mode import Index, Truth
 from factory.mjcf import names
-from factory.mjcf.masks import masks_of
+from factory.mjcf.masks import loose_code, masks_of
 from factory.mjcf.pads import trunks
 from factory.plant.fused_bodies import Inside
-from factory.support.engine import mujoco
+from factory.simulation.mujoco.model_arrays import ModelArrays
+
+SOFT = 0.02
+"""Time constant of contacts of parts, the engine's own [s]."""
+
+STIFF = 2.0
+"""The same of parts that nothing holds, in timesteps: the least that the engine allows. Those that
+fall on each other press in by what they go in this time."""
 
 LAST = 2**32 - 1
 """The greatest of all signatures, which no pair has."""
@@ -33,13 +42,15 @@ class ContactMasks:
 
     def __init__(
         self,
-        m: mujoco.MjModel,
+        arrays: ModelArrays,
         bodies: Mapping[str, Index],
         apart: Sequence[tuple[Inside, Inside]],
     ) -> None:
+        m = arrays.m
         self.code, self.unit = np.zeros(m.nbody, np.int64), np.full(m.nbody, -1)
         self.trunk = trunks(m)
-        self._m, self._of, self._masks = m, bodies, np.array([m.body_contype, m.body_conaffinity])
+        self._arrays, self._of = arrays, bodies
+        self._masks = np.array([m.body_contype, m.body_conaffinity])
         self._own = {int(b): np.array([b]) for ids in bodies.values() for b in ids}
         for shell in np.flatnonzero(self.trunk != np.arange(m.nbody)).tolist():
             trunk = int(self.trunk[shell])
@@ -61,16 +72,17 @@ class ContactMasks:
 
     def _solid_geoms(self, bodies: Index) -> Index:
         """The geoms of bodies that collide: all except group 1, which convex pieces replace."""
-        first, count = self._m.body_geomadr[bodies], self._m.body_geomnum[bodies]
+        m = self._arrays.m
+        first, count = m.body_geomadr[bodies], m.body_geomnum[bodies]
         geoms = np.concatenate([at + np.arange(n) for at, n in zip(first, count, strict=True)])
-        return np.asarray(geoms[self._m.geom_group[geoms] != 1])
+        return np.asarray(geoms[m.geom_group[geoms] != 1])
 
     def own(self, trees: Mapping[int, int], last: int) -> int:
         """Assign codes to everything that collides and is not a part: one for each kinematic tree,
         and one after `last` for each body fixed to the floor. Returns the greatest code."""
         for body in np.flatnonzero(self._masks.any(axis=0)).tolist():
             if self.trunk[body] not in self.solid:
-                tree = int(self._m.body_treeid[body])
+                tree = int(self._arrays.m.body_treeid[body])
                 last += tree not in trees
                 self.code[body] = trees.get(tree, last)
         return last
@@ -79,30 +91,44 @@ class ContactMasks:
         """Exclude the bodies of all holders from the broad phase except those `seen` (holders,), by
         code."""
         shown = seen[self.code]
-        np.multiply(self._masks[0], shown, out=self._m.body_contype)
-        np.multiply(self._masks[1], shown, out=self._m.body_conaffinity)
+        self._mask("body", np.arange(len(shown)), self._masks * shown)
 
     def hold(self, holders: Mapping[int, int]) -> None:
         """Put parts into the hands of holders, by code."""
-        m = self._m
         for body, holder in holders.items():
-            geoms = self.solid[body]
-            contype, conaffinity = masks_of(holder)
-            bodies = self._own[body]
-            self.code[bodies] = holder
-            self.fresh.add(holder)
-            with_geoms = bodies[m.body_geomnum[bodies] > 0]
-            self._masks[:, with_geoms] = [[contype], [conaffinity]]
-            m.body_contype[with_geoms], m.body_conaffinity[with_geoms] = contype, conaffinity
-            m.geom_contype[geoms], m.geom_conaffinity[geoms] = contype, conaffinity
+            self.code[self._own[body]] = holder
+            self._cover(body, holder, SOFT)
+
+    def let_go(self, bodies: Iterable[int]) -> None:
+        """Let parts that nothing holds any more collide with each other, too. They still count as
+        those of their last holder."""
+        for body in bodies:
+            self._cover(body, loose_code(body), STIFF * self._arrays.m.opt.timestep)
+
+    def _cover(self, body: int, code: int, softness: float) -> None:
+        """Give a part's body, with its shells, the masks of a code, and contacts of a time constant
+        [s]."""
+        masks, bodies = np.array(masks_of(code)), self._own[body]
+        self.fresh.add(int(self.code[body]))
+        with_geoms = bodies[self._arrays.m.body_geomnum[bodies] > 0]
+        self._masks[:, with_geoms] = masks[:, None]
+        self._mask("body", with_geoms, masks)
+        self._mask("geom", self.solid[body], masks)
+        self._arrays["geom_solref"][self.solid[body], 0] = softness
 
     def remove(self, bodies: Sequence[int]) -> None:
         """Let bodies that are not parts collide with nothing."""
-        m = self._m
+        m = self._arrays.m
         for body in bodies:
             geoms = m.body_geomadr[body] + np.arange(m.body_geomnum[body])
-            m.geom_contype[geoms] = m.geom_conaffinity[geoms] = 0
-            self._masks[:, body] = m.body_contype[body] = m.body_conaffinity[body] = 0
+            self._masks[:, body] = 0
+            self._mask("body", np.array([body]), np.zeros(2))
+            self._mask("geom", geoms, np.zeros(2))
+
+    def _mask(self, kind: str, at: Index, masks: NDArray[Any]) -> None:
+        """Write the contypes and conaffinities (2,) or (2, n) of bodies or geoms."""
+        for name, mask in zip(("contype", "conaffinity"), masks, strict=True):
+            self._arrays[f"{kind}_{name}"][at] = mask
 
     def enter(self, label: str, unit: int, body: int) -> None:
         """A body enters the factory, for a unit."""
@@ -130,6 +156,7 @@ class ContactMasks:
         for low, high in pairs:
             (self._signatures.add if now else self._signatures.discard)((low << 16) + high)
         if pairs:
-            listed = self._m.exclude_signature.view(np.uint32)
+            left_out = self._arrays["exclude_signature"]
+            listed = np.full(len(left_out.now), LAST, np.uint32)
             listed[: len(self._signatures)] = sorted(self._signatures)
-            listed[len(self._signatures) :] = LAST
+            left_out[:] = listed.view(left_out.now.dtype)

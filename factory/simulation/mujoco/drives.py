@@ -19,6 +19,7 @@ import numpy as np
 
 from factory.control.mode import Array, Index
 from factory.simulation.mujoco.axes import Across
+from factory.simulation.mujoco.model_arrays import ModelArrays
 from factory.support.engine import mujoco
 
 NO_AXES = np.empty(0, np.intp)
@@ -38,7 +39,7 @@ class Drives:
 
     def __init__(
         self,
-        m: mujoco.MjModel,
+        arrays: ModelArrays,
         d: mujoco.MjData,
         actuators: Index,
         inertia: Array,
@@ -48,9 +49,10 @@ class Drives:
         self._across = across
         if across is not None:
             actuators = np.concatenate([actuators, across.actuator])
+        m = arrays.m
         self.timestep = float(m.opt.timestep)
         self._d, self._actuators = d, actuators
-        self._history = m.actuator_delay, m.actuator_history[:, 0]
+        self._delay, self._history = arrays["actuator_delay"], arrays["actuator_history"]
         samples = int(m.actuator_history[actuators[0], 0])
         size = 2 + (1 + INPUTS) * samples
         at = m.actuator_historyadr[actuators]
@@ -121,8 +123,8 @@ class Drives:
         """Let axes follow setpoints (n, samples, 3), one each timestep; the last is held."""
         drives, samples = self._rows(axes), setpoints.shape[1]
         actuators, rows, head = self._actuators[drives], self._row[drives], self._head.copy()
-        delay, kept = self._history
-        delay[actuators], kept[actuators] = self.most * self.timestep, len(head) - 1
+        self._delay[actuators] = self.most * self.timestep
+        self._history[actuators, 0] = len(head) - 1
         head[1:] += self.time + samples * self.timestep
         self._buffers[rows, 1 : 1 + len(head)] = head
         self._buffers[rows, -INPUTS * samples :] = setpoints.reshape(len(drives), -1)
@@ -134,8 +136,8 @@ class Drives:
 
     def stand(self, axes: Index, x: Array) -> None:
         """Let axes stand at x [m]."""
-        actuators, (delay, kept) = self._actuators[self._rows(axes)], self._history
-        delay[actuators] = kept[actuators] = 0
+        actuators = self._actuators[self._rows(axes)]
+        self._delay[actuators] = self._history[actuators, 0] = 0
         setpoint = self._d.ctrl.reshape(-1, INPUTS)
         setpoints = np.stack([x, np.zeros(len(axes)), self.weight[axes]], axis=-1)[:, None]
         setpoint[actuators] = self.bent(axes, setpoints, np.zeros((len(axes), 1)), np.zeros(1))[

@@ -128,7 +128,7 @@ class Holdings:
 
     def drop(self, holder: int) -> dict[str, int]:
         """Release all bodies of a holder (code), which fall; returns them by label. They collide
-        with the same bodies as before."""
+        with each other, too, from now on."""
         bodies = dict(self.held(holder))
         for body in bodies.values():
             self._let_go(body)

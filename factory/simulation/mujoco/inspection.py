@@ -10,6 +10,7 @@ import numpy as np
 
 from factory.layout.layout import Layout
 from factory.mjcf.model import Model
+from factory.mjcf.reservations import reservations_of
 from factory.mjcf.weld_frames import residuals
 from factory.record.figures import PhysicsFigures
 from factory.simulation.mujoco.pressing import Pressing
@@ -143,6 +144,7 @@ class Inspection:
             grip_gap_max_mm=None if pads is None else 1e3 * pads,
             product_angle_max_deg=None if misfit is None else degrees(misfit.angle),
             faults=(*self.soundness.found, *self._model.overlaps),
+            reservations=reservations_of(self._model.layout, self._model.excluded),
             contact_first_s=self.onsets.begun,
             misplaced=() if misfit is None else (misfit.label,),
             handoff_angle_max_deg=degrees(welds.taken.turn),

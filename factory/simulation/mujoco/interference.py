@@ -37,36 +37,40 @@ class Interference:
         self._gain = np.ones(len(self._actuator))
         self._measures: list[Measure] = []
         self._measured: tuple[Array, Array] | None = None
-        self._hooked = False
+        self._hooked, self._bias = False, world.arrays["actuator_biasprm"]
 
     def weigh(self, bodies: Iterable[int], factor: float) -> None:
         """Bodies weigh `factor` times as much."""
         heavier = [*bodies]
+        self._world.inspection.soundness.look()
         self._world.inspection.soundness.weigh(heavier, factor)
         for body in heavier:
             self._m.body_mass[body] *= factor
             self._m.body_inertia[body] *= factor
         mujoco.mj_setConst(self._m, mujoco.MjData(self._m))
+        self._world.arrays.accept()
         self._world.parts.joining.weigh(self._m, self._d)
 
     def rub(self, axes: Index, newtons: float) -> None:
         """Set the dry friction of empty axes; the share of the load stays as it is."""
         self._world.motion.guides.rub(axes, newtons)
-        self._m.dof_solimp[self._dof[self._slides(axes)], :2] = HARD
+        self._world.arrays["dof_solimp"][self._dof[self._slides(axes)], :2] = HARD
 
     def drag(self, axes: Index, speed: Array) -> None:
         """Give axes the damping at which their drives' greatest force sustains a `speed` [m/s]."""
         force, second = self._m.actuator_forcerange[self._actuator[axes], 1], self._second(axes)
         damping = force / speed
-        self._m.dof_damping[self._dof[self._slides(axes)]] = [*damping, *damping[second]]
+        dofs = self._dof[self._slides(axes)]
+        self._world.arrays["dof_damping"][dofs] = [*damping, *damping[second]]
 
     def weaken(self, axes: Index, factor: float) -> None:
         """Scale the forces of drives by `factor`."""
         slides = self._slides(axes)
         drives = self._actuator[slides]
         self._gain[slides] *= factor
-        self._m.actuator_biasprm[drives, 1:3] *= factor
-        self._m.actuator_forcerange[drives] *= factor
+        force = self._world.arrays["actuator_forcerange"]
+        self._bias[drives, 1:3] = factor * self._bias.now[drives, 1:3]
+        force[drives] = factor * force.now[drives]
         if factor != 1.0:
             self._hook()
 
@@ -109,7 +113,7 @@ class Interference:
             off, slip = self._axes.across.spread(x, wrong)
             bias += kp * off + kv * slip
             self._world.motion.sleep.wake(self._world.motion.axes.body[self._robots].tolist())
-        self._m.actuator_biasprm[self._actuator, 0] = bias
+        self._bias[self._actuator, 0] = bias
 
     def _setpoint(self, axis: int) -> Array:
         """What a drive reads in this step: position [m], speed [m/s], force [N]."""

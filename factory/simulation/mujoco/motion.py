@@ -14,6 +14,7 @@ from factory.mjcf.model import Model
 from factory.simulation.mujoco.axes import Across, Axes
 from factory.simulation.mujoco.courses import AHEAD, Course, Follower, along, planned
 from factory.simulation.mujoco.drives import Drives
+from factory.simulation.mujoco.model_arrays import ModelArrays
 from factory.simulation.mujoco.outfeed import Outfeed
 from factory.simulation.mujoco.sleep import Sleep
 from factory.simulation.mujoco.sliders import Sliders
@@ -25,9 +26,10 @@ class Guides:
     """The guides of axes with degrees of freedom `dof` (axes,). `empty` (axes,): friction without a
     load [N], as in the model."""
 
-    def __init__(self, m: mujoco.MjModel, dof: Index, across: Across) -> None:
-        self._m, self._dof, self._across = m, dof, across
-        self.empty = m.dof_frictionloss[dof].copy()
+    def __init__(self, arrays: ModelArrays, dof: Index, across: Across) -> None:
+        self._dof, self._across = dof, across
+        self._friction = arrays["dof_frictionloss"]
+        self.empty = self._friction.now[dof]
         self._loads = np.zeros(len(dof))
 
     def load(self, axes: Index, loads: Array) -> None:
@@ -42,11 +44,11 @@ class Guides:
 
     def _rub(self, axes: Index) -> None:
         weight = self._loads[axes] * GRAVITY
-        self._m.dof_frictionloss[self._dof[axes]] = self.empty[axes] + ROLLING * weight
+        self._friction[self._dof[axes]] = self.empty[axes] + ROLLING * weight
         which, rows = self._across.among(np.asarray(axes))
         if len(rows):
-            same = self._m.dof_frictionloss[self._dof[np.asarray(axes)[which]]]
-            self._m.dof_frictionloss[self._across.dof[rows]] = same[:, None]
+            same = self._friction.now[self._dof[np.asarray(axes)[which]]]
+            self._friction[self._across.dof[rows]] = same[:, None]
 
 
 class Motion:
@@ -60,25 +62,27 @@ class Motion:
     stepping: Stepping
 
     def __init__(
-        self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, start: Array, gains: Array
+        self, arrays: ModelArrays, d: mujoco.MjData, model: Model, start: Array, gains: Array
     ) -> None:
+        m = arrays.m
         self.axes, self.settings, self._d = Axes.of(m, model.layout), model.settings, d
         robots, across = self.axes.actuator[: self.axes.tray], self.axes.across
-        m.actuator_biasprm[robots, 1:3] *= np.asarray(gains)[:, None]
-        m.actuator_biasprm[across.actuator, 1:3] *= np.asarray(gains)[across.axes, None]
+        bias, factors = arrays["actuator_biasprm"], np.asarray(gains)[:, None]
+        bias[robots, 1:3] = bias.now[robots, 1:3] * factors
+        bias[across.actuator, 1:3] = bias.now[across.actuator, 1:3] * factors[across.axes]
         body, dof = self.axes.body, self.axes.dof
         inertia = m.body_subtreemass[body] + m.dof_armature[dof]
         turns = self.axes.turns
         inertia[turns] = m.dof_M0[dof[turns]]
-        self.drives = Drives(m, d, self.axes.actuator, inertia.round(9), across)
-        self.guides = Guides(m, dof, across)
-        self.sleep = Sleep(m, d, self.axes.tree)
+        self.drives = Drives(arrays, d, self.axes.actuator, inertia.round(9), across)
+        self.guides = Guides(arrays, dof, across)
+        self.sleep = Sleep(arrays, d, self.axes.tree)
         x, v = np.append(start, [0.0, 0.0]), np.zeros(len(self.axes))
         self.axes.put(d, np.arange(len(x)), x)
         self.robots = Follower(x, v, self.drives, self.settings.steps)
         tray = Follower(x, v, self.drives, self.settings.steps)
         self.outfeed = Outfeed(d, model, self.axes, tray, self.drives)
-        self.sliders = Sliders(m, d, model, self.sleep)
+        self.sliders = Sliders(arrays, d, model, self.sleep)
         self.active: Index = np.empty(0, np.intp)
         self.plan = np.zeros((4, len(self.axes)))
 

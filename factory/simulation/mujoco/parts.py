@@ -15,6 +15,7 @@ from factory.simulation.mujoco.contacts import ContactMasks
 from factory.simulation.mujoco.feeders import Feeders
 from factory.simulation.mujoco.fusing import RIGID, SETTLING, Fusion
 from factory.simulation.mujoco.holdings import Holdings, copies_of
+from factory.simulation.mujoco.model_arrays import ModelArrays
 from factory.simulation.mujoco.motion import Motion
 from factory.simulation.mujoco.passing import Passing
 from factory.simulation.mujoco.product_error import Misfit
@@ -107,22 +108,23 @@ class Parts:
 
     def __init__(
         self,
-        m: mujoco.MjModel,
+        arrays: ModelArrays,
         d: mujoco.MjData,
         model: Model,
         motion: Motion,
         request: RunRequest,
         counts: Mapping[int, int],
     ) -> None:
-        factory, body = model.factory, copies_of(m, model)
+        m, factory = arrays.m, model.factory
+        body = copies_of(m, model)
         self.model, self._d = model, d
         self._labels = [model.carried.carried[product] for product in factory.products]
         self.tray = tray_code(factory)
-        self.masks = ContactMasks(m, body, model.apart)
+        self.masks = ContactMasks(arrays, body, model.apart)
         radii = np.zeros(m.nbody)
         for label, ids in body.items():
             radii[ids] = model.carried.radius[label]
-        self.welds = Welds(m, d, self.masks, motion.sleep, radii)
+        self.welds = Welds(arrays, d, self.masks, motion.sleep, radii)
         self.holdings = Holdings(m, model, body, self.welds)
         passing, supply = Passing(m, d, model, request), Supply(model, request, counts)
         self.feeders = Feeders(model, self.holdings, self.welds, motion.sliders, passing, supply)

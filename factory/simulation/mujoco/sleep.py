@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from factory.control.mode import Index
+from factory.simulation.mujoco.model_arrays import ModelArrays
 from factory.support.engine import mujoco
 
 MAY_SLEEP, STAYS_AWAKE = (
@@ -23,7 +24,8 @@ FRESH = -1 - int(mujoco.mjMINAWAKE)
 class Sleep:
     """Keeps axes awake, by their kinematic `trees` (axes,), and wakes bodies."""
 
-    def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, trees: Index) -> None:
+    def __init__(self, arrays: ModelArrays, d: mujoco.MjData, trees: Index) -> None:
+        m, self._policy = arrays.m, arrays["tree_sleep_policy"]
         self._m, self._d, self._trees = m, d, trees
         self._tree = np.where(m.body_dofnum > 0, m.body_treeid, -1)
         self._awake = np.zeros(len(trees), bool)
@@ -33,14 +35,14 @@ class Sleep:
         new = axes[~self._awake[axes]]
         if len(new):
             self._awake[new] = True
-            self._m.tree_sleep_policy[self._trees[new]] = STAYS_AWAKE
+            self._policy[self._trees[new]] = STAYS_AWAKE
             self._rouse(self._trees[new])
 
     def may_sleep(self, axes: Index) -> None:
         """Let axes sleep that are in no active mode, except in trees with an awake axis."""
         self._awake[axes] = False
-        self._m.tree_sleep_policy[self._trees[axes]] = MAY_SLEEP
-        self._m.tree_sleep_policy[self._trees[self._awake]] = STAYS_AWAKE
+        self._policy[self._trees[axes]] = MAY_SLEEP
+        self._policy[self._trees[self._awake]] = STAYS_AWAKE
 
     def wake(self, bodies: Iterable[int]) -> None:
         """Wake bodies that sleep, and keep those awake that are about to fall asleep."""

@@ -19,6 +19,7 @@ from factory.mjcf.feeders import SLIDER_MASS
 from factory.mjcf.model import Model, stroke_ticks
 from factory.simulation.mujoco.courses import Course, Move, planned
 from factory.simulation.mujoco.drives import Drives
+from factory.simulation.mujoco.model_arrays import ModelArrays
 from factory.simulation.mujoco.sleep import Sleep
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
@@ -76,8 +77,8 @@ class Sliders:
     `trees` (n,): their kinematic trees.
     """
 
-    def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, sleep: Sleep) -> None:
-        outlets = outlets_of(model.layout)
+    def __init__(self, arrays: ModelArrays, d: mujoco.MjData, model: Model, sleep: Sleep) -> None:
+        m, outlets = arrays.m, outlets_of(model.layout)
         feeds = [m.equality(names.feed(outlet.name)).id for outlet in outlets]
         self._body, settings = m.eq_obj1id[feeds], model.settings
         sliders = [m.body(body).name for body in self._body.tolist()]
@@ -86,7 +87,7 @@ class Sliders:
         self.trees = m.body_treeid[self._body]
         self._d, self._address = d, m.jnt_qposadr[joint]
         inertia = m.body_subtreemass[self._body] + m.dof_armature[m.jnt_dofadr[joint]]
-        self._drives, self._sleep = Drives(m, d, drives, inertia.round(9)), sleep
+        self._drives, self._sleep = Drives(arrays, d, drives, inertia.round(9)), sleep
         self._loads = np.array([model.masses[outlet.label] for outlet in outlets])
         lengths = np.array([outlet.feeder.stroke for outlet in outlets])
         named = {names.slider(outlet.name): number for number, outlet in enumerate(outlets)}

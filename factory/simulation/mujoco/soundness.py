@@ -1,13 +1,15 @@
 """Whether the engine's model is that of the factory: solid things collide, bodies have the mass and
-shape of their parts, and nothing in the engine is switched off. A run of another model proves
-nothing.
+shape of their parts, nothing in the engine is switched off, and nothing differs from what was
+compiled and rightly written since. A run of another model proves nothing.
 
-The expectation comes from the layout's parts and from the holdings, not from the written model.
+What is expected of solids, masses and shapes comes from the layout's parts and from the holdings,
+not from the written model.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from itertools import chain
 
 import numpy as np
 
@@ -22,6 +24,8 @@ from factory.mjcf.model import Model
 from factory.mjcf.outfeed import SHUTTER_MASS, TRAY_MASS
 from factory.simulation.mujoco.contacts import ContactMasks
 from factory.simulation.mujoco.fusing import angles, rotations
+from factory.simulation.mujoco.model_arrays import ModelArrays
+from factory.simulation.mujoco.probing import untouched
 from factory.support.engine import mujoco
 from factory.support.errors import Diagnostic
 
@@ -62,14 +66,15 @@ class Soundness:
 
     def __init__(
         self,
-        m: mujoco.MjModel,
+        arrays: ModelArrays,
         d: mujoco.MjData,
         model: Model,
         masks: ContactMasks,
         bodies: Mapping[str, Index],
         grips: Callable[[], Iterable[tuple[int, int]]],
     ) -> None:
-        self._m, self._d, self._model, self._of, self._grips = m, d, model, bodies, grips
+        self.arrays, self._clock, m = arrays, float(d.time), arrays.m
+        self._d, self._model, self._of, self._grips = d, model, bodies, grips
         self.masks, self.gone, self.found = masks, set[int](), tuple[Diagnostic, ...]()
         self._name = [m.geom(geom).name for geom in range(m.ngeom)]
         called = [m.body(body).name for body in range(m.nbody)]
@@ -79,30 +84,54 @@ class Soundness:
         for label, ids in bodies.items():
             self.mass[ids] = model.carried.mass[label]
         self._shape: Array = np.empty(0)
-        solid = masks.solid
-        owner = np.repeat([*solid], [len(geoms) for geoms in solid.values()])
-        self._geoms = np.stack([np.concatenate([*solid.values()]), owner])
+
+    @property
+    def _m(self) -> mujoco.MjModel:
+        return self.arrays.m
 
     def weigh(self, bodies: Iterable[int], factor: float) -> None:
         """Expect bodies to weigh `factor` times as much, as a disturbance has set."""
         self.mass[[*bodies]] *= factor
 
-    def glance(self) -> None:
-        """Check that all parts have the masks of their holders' payloads, before hands change."""
-        geoms, owner = self._geoms
-        wrong = self._m.geom_contype[geoms] != masks_of(1)[0] * self.masks.code[owner]
-        if wrong.any() and not self.found:
-            names = (self._name[geom] for geom in geoms[wrong].tolist())
-            self.found = tuple(_each("NotSolid", "{} is not solid", names))
-
     def look(self) -> None:
         """Check everything, unless a fault was found before."""
-        self.found = self.found or (
-            *self._options(),
-            *self._loose(),
-            *self._heavy(),
-            *self._misshapen(),
-        )
+        if self.found:
+            return
+        wrong = *self._options(), *self._loose(), *self._heavy(), *self._misshapen()
+        codes = {fault.code for fault in wrong}
+        changed = [*self.arrays.first, *self.arrays.changes()]
+        by_code: dict[str, list[str]] = {}
+        for change in changed:
+            if change.code not in codes:
+                by_code.setdefault(change.code, []).append(change.message)
+        others = (_each(code, "{}", words) for code, words in by_code.items())
+        self.found = (*wrong, *chain.from_iterable(others))
+
+    def watch(self, steps: int) -> None:
+        """After some timesteps of the engine, check its clock, that nothing but the run has changed
+        options or masks and, from time to time, anything else of its model."""
+        if self.found:
+            return
+        now, step = float(self._d.time), self._model.settings.step
+        self._clock += steps * step
+        if abs(now - self._clock) > step / 2 and not self._d.warning.number.any():
+            words = f"the engine's clock shows {now:.3f} s, {self._clock:.3f} s after its steps"
+            self.found = (Diagnostic("Options", words),)
+        elif not self.arrays.same(now):
+            self.look()
+
+    def probe(self) -> None:
+        """Put parts into everything that is solid, and check that the engine finds the contacts."""
+        if self.found:
+            return
+        try:
+            geoms = untouched(self._m, self._stations(), self.masks.solid)
+        except mujoco.FatalError as error:
+            words = f"the engine cannot look for contacts: {str(error).splitlines()[0]}"
+            self.found = (Diagnostic("NotSolid", words),)
+            return
+        names = (self._name[geom] for geom in geoms)
+        self.found = tuple(_each("NotSolid", "nothing can touch {}", names))
 
     def _options(self) -> Iterator[Diagnostic]:
         """Engine options that differ from a factory's."""

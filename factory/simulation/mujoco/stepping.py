@@ -57,7 +57,12 @@ class SingleSteps:
         """Every body stays in the broad phase."""
 
     def advance(self, steps: int) -> None:
-        """Advance by timesteps; hooks are called before each."""
+        """Advance by timesteps, and compare the model with what it should be."""
+        self.take(steps)
+        self.inspection.soundness.watch(steps)
+
+    def take(self, steps: int) -> None:
+        """Take timesteps; hooks are called before each."""
         for number in range(steps):
             if number and number % self._substeps == 0:
                 self.inspection.tick()

@@ -13,6 +13,7 @@ from factory.mjcf.pads import Pads
 from factory.mjcf.weld_frames import WeldFrames
 from factory.simulation.mujoco.contacts import ContactMasks
 from factory.simulation.mujoco.fusing import rotations
+from factory.simulation.mujoco.model_arrays import ModelArrays
 from factory.simulation.mujoco.sleep import Sleep
 from factory.support.engine import mujoco
 
@@ -111,9 +112,10 @@ class Welds:
     """
 
     def __init__(
-        self, m: mujoco.MjModel, d: mujoco.MjData, masks: ContactMasks, sleep: Sleep, radii: Array
+        self, arrays: ModelArrays, d: mujoco.MjData, masks: ContactMasks, sleep: Sleep, radii: Array
     ) -> None:
-        self.masks = masks
+        self.masks, m = masks, arrays.m
+        self._frames, self._aims = arrays["eq_data"], arrays["eq_obj2id"]
         self._m, self._d, self._sleep = m, d, sleep
         mujoco.mj_kinematics(m, d)
         self.taken = Takeovers(m, d, radii)
@@ -149,13 +151,13 @@ class Welds:
     def bend(self, weld: int, place: Array) -> None:
         """A weld holds its body at another place in its holder (7,), until it is switched on anew,
         or straightened."""
-        self._bent.setdefault(weld, self._m.eq_data[weld, 3:10].copy())
-        self._m.eq_data[weld, 3:10] = place
+        self._bent.setdefault(weld, self._frames.now[weld, 3:10].copy())
+        self._frames[weld, 3:10] = place
 
     def straighten(self, welds: Iterable[int]) -> None:
         """Welds hold their bodies where they should."""
         for weld in self._bent.keys() & welds:
-            self._m.eq_data[weld, 3:10] = self._bent.pop(weld)
+            self._frames[weld, 3:10] = self._bent.pop(weld)
 
     def turn(self, body: int, quaternion: Array, aside: Array) -> None:
         """Turn a free body, displaced by `aside` (3,) [m]."""
@@ -178,13 +180,15 @@ class Welds:
         m, d = self._m, self._d
         off, on = np.array([*self._next.off], np.intp), np.array([*self._next.on], np.intp)
         bodies = np.array([*self._next.on.values()], np.intp)
+        loose = {*m.eq_obj2id[off[d.eq_active[off] != 0]].tolist()} - {*bodies.tolist()}
         touched = [m.eq_obj1id[off], m.eq_obj2id[off], m.eq_obj1id[on], bodies]
         d.eq_active[off] = False
-        m.eq_obj2id[on], d.eq_active[on] = bodies, True
+        self._aims[on], d.eq_active[on] = bodies, True
         if len(on):
             self.closed = float(d.time)
         self._sleep.wake({*np.concatenate(touched).tolist(), *self._next.placed})
         self.masks.hold(self._next.held)
+        self.masks.let_go(loose - self._next.held.keys())
         self._next = Gathered()
 
     def _put(self) -> None:

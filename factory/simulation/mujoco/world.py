@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Container, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
+from functools import partial
 from math import ceil
 
 import numpy as np
@@ -17,7 +18,7 @@ import numpy as np
 from factory.control.mode import Array, Index
 from factory.control.navigation import Bundle
 from factory.layout.layout import Layout
-from factory.mjcf.loading import load
+from factory.mjcf.loading import compiled, fingerprint, load
 from factory.mjcf.model import Model
 from factory.nets.coordinated import Past
 from factory.plant.demand import Word
@@ -27,6 +28,7 @@ from factory.record.state import EngineView, Observation
 from factory.simulation.mujoco.fast.neighbours import Neighbours
 from factory.simulation.mujoco.fast.strides import Strides
 from factory.simulation.mujoco.inspection import Inspection
+from factory.simulation.mujoco.model_arrays import ModelArrays
 from factory.simulation.mujoco.motion import Motion
 from factory.simulation.mujoco.parts import Parts
 from factory.simulation.mujoco.sliders import NEVER, ROUNDED
@@ -69,11 +71,13 @@ class MujocoWorld:
         self._before = model.factory.units(counts)
         self._unseen = 0
         with by_name():
-            self.motion = Motion(self.m, self.d, model, start, gains)
-            self.parts = Parts(self.m, self.d, model, self.motion, request, counts)
+            again = partial(compiled, model.xml, model.files)
+            arrays = ModelArrays(self.m, fingerprint(model), again)
+            self.motion = Motion(arrays, self.d, model, start, gains)
+            self.parts = Parts(arrays, self.d, model, self.motion, request, counts)
             parts = self.parts
         held = parts.holdings
-        soundness = Soundness(self.m, self.d, model, parts.masks, held.body, held.welds)
+        soundness = Soundness(arrays, self.d, model, parts.masks, held.body, held.welds)
         self.inspection = Inspection(self.m, self.d, model, soundness)
         for operation in model.factory.operations:
             begun, over = (counts.get(t, 0) for t in (operation.start, operation.end))
@@ -87,12 +91,18 @@ class MujocoWorld:
         )
         self.motion.begin(self.parts.holdings.loads())
         soundness.look()
+        soundness.probe()
         mujoco.mj_forward(self.m, self.d)
 
     @property
     def time(self) -> float:
         """Simulated time [s]."""
         return float(self.d.time)
+
+    @property
+    def arrays(self) -> ModelArrays:
+        """The arrays of the model, through which they are written."""
+        return self.inspection.soundness.arrays
 
     @property
     def word(self) -> Word:
@@ -138,7 +148,6 @@ class MujocoWorld:
             self.hooks.tell_ended()
 
     def _hand_over(self, ended: Sequence[Job]) -> None:
-        self.inspection.soundness.glance()
         self.parts.complete(ended)
         for operation, unit in ended:
             self.inspection.joining.pop(operation.index, None)

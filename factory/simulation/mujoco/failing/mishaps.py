@@ -115,8 +115,9 @@ class Mishaps:
     def _press(self, body: int, presses: bool) -> None:
         """Let a body press on what it touches, or only touch it: a housing is as narrow as a part
         that hangs straight in it."""
-        m, geoms = self._world.m, self._world.parts.masks.solid[body]
-        m.geom_gap[geoms], m.geom_margin[geoms] = (0.0, 0.0) if presses else (FAR, -FAR)
+        arrays, geoms = self._world.arrays, self._world.parts.masks.solid[body]
+        gap, margin = arrays["geom_gap"], arrays["geom_margin"]
+        gap[geoms], margin[geoms] = (0.0, 0.0) if presses else (FAR, -FAR)
         inspection = self._world.inspection
         for ghosts in (inspection.pressing.askew, inspection.soundness.gone):
             (ghosts.discard if presses else ghosts.add)(body)

@@ -52,14 +52,14 @@ class Strides(SingleSteps):
         """What that can meet is what is near its way."""
         self._neighbours.follow(axes, course.x)
 
-    def advance(self, steps: int) -> None:
+    def take(self, steps: int) -> None:
         """Some timesteps: at once, and one by one where anything touches or leaves its way."""
         d = self.d
         self._neighbours.look()
         if d.ncon or self.hooks.each_step or self._neighbours.astray():
             self._neighbours.everything()
         if d.ncon or self.hooks.each_step or steps == 1:
-            super().advance(steps)
+            super().take(steps)
             return
         mujoco.mj_copyData(self._before, self.m, d)
         d.maxuse_con = 0
@@ -67,7 +67,7 @@ class Strides(SingleSteps):
         if d.maxuse_con or self._neighbours.astray():
             mujoco.mj_copyData(d, self.m, self._before)
             self._neighbours.everything()
-            super().advance(steps)
+            super().take(steps)
 
     def course(self, begin: Hashable, make: Callable[[], Course]) -> Course:
         """That of before, or it is planned now."""
