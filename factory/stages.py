@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from factory.support.errors import usage_error
+from factory.support.guard import guarding, reading, will_write
 from factory.support.settings import Settings
 
 if TYPE_CHECKING:
@@ -50,6 +51,9 @@ def project_of(
     from factory.record.plan_file import read_plan
     from factory.support.files import is_plan
 
+    pag = product.factory.pag if isinstance(product, Layout) else getattr(product, "pag", product)
+    if isinstance(pag, PAG):
+        reading(*pag.files)
     if isinstance(product, Project):
         return product if settings is None else product.with_settings(settings)
     if isinstance(product, PAG):
@@ -187,6 +191,7 @@ def lay_out(
     return project.layout
 
 
+@guarding
 def run(
     product: Stage,
     world: WorldName = "mujoco",
@@ -231,10 +236,12 @@ def run(
     asked = replace(asked, demand=None if demand is None else str(demand))
     if world == "ideal":
         check_ideal(fuse, bool(monitor))
+    will_write(maybe(log))
     project = project_of(product, settings)
     return require(run_project(project, asked, True, maybe(log), None, monitor, progress))
 
 
+@guarding
 def build(
     product: Stage,
     output: AnyPath | None = None,
@@ -259,11 +266,14 @@ def build(
     from factory.support.bounds import check_values
 
     check_values({"units": units, "wip": wip})
+    request = BuildRequest(maybe(mjcf), maybe(output), units, wip)
+    will_write(request.mjcf)
     project = project_of(product, settings)
-    verdict = proved(project.layout.factory.net)
-    return build_files(project, verdict, BuildRequest(maybe(mjcf), maybe(output), units, wip))
+    request.claim(project.name)
+    return build_files(project, proved(project.layout.factory.net), request)
 
 
+@guarding
 def export(
     product: Stage,
     form: str,
@@ -287,6 +297,7 @@ def export(
     from factory.support.files import write_all
 
     chosen = exporter(form, of, [*map(path_of, exporters)])
+    will_write(maybe(output))
     file = named(product)
     source: Source | None = None if file is None else read_source(file)
     if file is None or source is None:

@@ -30,7 +30,7 @@ def write_planned(
     tree = planned.tree, planned.orientation
     made = planned_product(placed, *tree, source.name, allow, templates)
     files = {folder / name: content for name, content in made.files.items()}
-    own_names(folder, files, [source])
+    own_names(folder, files)
     write_all(files)
     return tuple(files)
 

@@ -20,6 +20,7 @@ from types import MappingProxyType, ModuleType
 from typing import Any
 
 from factory.support.errors import Diagnostic, FactoryError, InputError, Position
+from factory.support.guard import reading
 
 HINT = "mend that line; docs: Extensions"
 
@@ -56,6 +57,7 @@ def user_modules(folder: Path) -> Iterator[ModuleType]:
         message = f"'{folder}' is no folder"
         raise InputError(Diagnostic("Usage", message, None, "give a folder with modules (*.py)"))
     for path in sorted(folder.glob("*.py")):
+        reading(path)
         spec = spec_from_file_location(f"factory_user_{path.stem}", path)
         assert spec is not None and spec.loader is not None
         module = module_from_spec(spec)
