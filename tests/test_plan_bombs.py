@@ -181,7 +181,8 @@ def test_strips_fans_and_places_are_read() -> None:
         {"mesh": 1, "matrix": [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 0, 0, 1]},
     ]
     meshes = [{"primitives": [{**fan, "mode": 5}]}, {"primitives": [fan]}]
-    strip, other = glb_reader.read_glb(glb(lambda d: d.update(nodes=nodes, meshes=meshes)))
+    content = glb(lambda d: d.update(nodes=nodes, meshes=meshes))
+    strip, other = glb_reader.read_glb(content, np.eye(4))
     assert strip.bodies[0][0] == pytest.approx(
         np.array([[0, 0, 0], [0, 2, 0], [-2, 0, 0], [0, 0, 2]])
     )

@@ -19,7 +19,7 @@ class _InputPath(click.Path):
     """A path that is read, which no output may write over."""
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        path = super().convert(value, param, ctx)
+        path = Path(os.fsdecode(super().convert(value, param, ctx)))
         reading(path)
         return path
 

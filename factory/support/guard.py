@@ -86,7 +86,8 @@ def declare(paths: Iterable[Path], chosen: bool = False) -> list[Diagnostic]:
         identity = _identity(path)
         if identity is None and path.exists():  # a pipe or a device
             continue
-        keys = [os.path.realpath(path), *([identity] if identity else [])]
+        keys: list[Identity | str] = [os.path.realpath(path)]
+        keys += [identity] if identity else []
         before = [guard.outputs[key][1] for key in keys if key in guard.outputs]
         if guard.is_input(path):
             faults.append(_fault(path))
