@@ -160,9 +160,11 @@ def _printed(project: Project, built: Built, spent: float, wip: int | None) -> d
 
 
 def _shipped_and_own(folders: tuple[Path, ...]) -> tuple[Path, ...]:
-    """The folders of operations and of robot types, and the files in them."""
+    """The folders of operations and of robot types, and the files in them: the shipped ones, the
+    user's own, and those of installed packages with all that these have."""
+    from factory.support.extensions import extension_files
     from factory.support.resources import mjcf_folder, templates_folder
 
     every = (*folders, templates_folder(), mjcf_folder())
     inside = (path for folder in every for path in folder.iterdir() if path.is_file())
-    return (*every, *inside)
+    return (*every, *inside, *extension_files())
