@@ -161,7 +161,7 @@ def to_networkx(product: Stage) -> nx.DiGraph:
 def lay_out(
     product: Stage,
     clearance: float | None = None,
-    floor: tuple[float, float] | None = None,
+    floor: tuple[float, float] | str | None = None,
     relay: bool = False,
     cycle: float | None = None,
     *,
@@ -171,20 +171,24 @@ def lay_out(
 ) -> Layout:
     """The stretched tree of guidepaths (paper, section 5.1), sized by the parts' real geometry.
 
-    `clearance` and `floor` (width, depth) in [m]. `relay`: several robots share guidepaths that
-    set the pace, to reach a `cycle` time [s] or the least there can be; the layout's factory has
+    `clearance` and `floor` (width, depth) in [m]; a floor also as a command takes it, "4x3".
+    `relay`: several robots share guidepaths that set the pace, to reach a `cycle` time [s] or the
+    least there can be; the layout's factory has
     more robots then. `deputies`: robots can take over for others where there is room. `tile`: they
     go over a platen of tiles of this size [m], on guidepaths that may bend. With none of these the
     layout is that of the product's plan.json, or the layout itself. Raises InputError for a mesh
     that cannot be read, RunError where the factory does not fit the floor.
     """
-    from factory.layout.request import Ground
+    from factory.layout.request import WIDEST, Ground
     from factory.simulation.options import check_together
+    from factory.support.bounds import pair
 
     check_together({"--relay": relay, "--deputies": deputies, "--platen": tile is not None})
     project = project_of(product, settings)
     if clearance is not None:
         project = project.with_settings(replace(project.settings, clearance=clearance))
+    if isinstance(floor, str):
+        floor = pair(floor, "floor", "4x3", float, WIDEST)
     ground = Ground(floor, relay, cycle if relay else None, deputies, tile)
     if ground != Ground() or settings is not None:
         project = project.with_ground(ground if ground != Ground() else project.ground)
@@ -238,6 +242,7 @@ def run(
         check_ideal(fuse, bool(monitor))
     will_write(maybe(log))
     project = project_of(product, settings)
+    asked.check(project)
     return require(run_project(project, asked, True, maybe(log), None, monitor, progress))
 
 

@@ -84,15 +84,18 @@ def run(
     if asked.demand is not None:
         reading(Path(asked.demand))
     writable(video, log, shown.poster)
+    asked.check_with(options.deputies)
+    if asked.world == "ideal":
+        check_ideal(asked.fuse, bool(monitor))
+    if video is not None:
+        shown.area()
     project = options.project(out.silent)
+    asked.check(project)
     with Waiting("reading the shapes and laying out", out.silent):
         layout = project.layout
     warnings = announced(project.warnings, out)
     if not out.silent:
         say_allowed(project)
-    shown.area()
-    if asked.world == "ideal":
-        check_ideal(asked.fuse, bool(monitor))
     from factory.simulation.executing import run_project
 
     film = _film(project, asked, video, shown)

@@ -81,7 +81,7 @@ def read_demand(path: Path, pag: PAG) -> Demand:
     return Demand(tuple(orders))
 
 
-NUMBER = re.compile(r"[0-9]+(\.[0-9]*)?|\.[0-9]+")
+NUMBER = re.compile(r"([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]{1,2})?")
 """A number as people write it."""
 
 

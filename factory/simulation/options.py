@@ -86,6 +86,33 @@ class RunOptions:
         """Whether the run recovers from failures."""
         return self.faults is not None or self.spares > 0
 
+    def check_with(self, deputies: bool) -> None:
+        """Raises InputError (BadValue) where options of the run, and `deputies` of the layout, do
+        not go together. Nothing is laid out for that."""
+        check_together(
+            {
+                "--demand": self.demand is not None,
+                "--from": self.start is not None,
+                "--distributed": self.distributed,
+                "--faults": self.faults is not None,
+                "--spares": self.spares > 0,
+                "--deputies": deputies,
+            }
+        )
+
+    def check(self, project: Project) -> None:
+        """The same, before a project is laid out; files are read, but for pipes, which are read
+        once. Raises InputError."""
+        from factory.simulation.demand_file import demand_of
+
+        self.check_with(project.ground.deputies)
+        if self.demand is not None and not Path(self.demand).is_fifo():
+            demand_of(self.demand, project.pag, self.units)
+        if self.faults is not None and not self.faults.is_fifo():
+            from factory.simulation.recovery.fault_file import read_campaign
+
+            read_campaign(self.faults)
+
     def campaign(self, factory: Factory) -> Campaign:
         """The faults of the run, and its spares. Raises InputError."""
         from factory.simulation.recovery.fault_file import check_names, read_campaign
@@ -105,17 +132,8 @@ class RunOptions:
         from factory.simulation.demand_file import demand_of
         from factory.simulation.request import RunRequest
 
+        self.check_with(project.ground.deputies)
         layout, start, units, demand = project.layout, self.start, self.units, None
-        check_together(
-            {
-                "--demand": self.demand is not None,
-                "--from": start is not None,
-                "--distributed": self.distributed,
-                "--faults": self.faults is not None,
-                "--spares": self.spares > 0,
-                "--deputies": project.ground.deputies,
-            }
-        )
         if self.demand is not None:
             demand = demand_of(self.demand, project.pag, units)
             units = len(demand.orders) or units
