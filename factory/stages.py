@@ -189,6 +189,8 @@ def lay_out(
         project = project.with_settings(replace(project.settings, clearance=clearance))
     if isinstance(floor, str):
         floor = pair(floor, "floor", "4x3", float, WIDEST)
+    elif isinstance(floor, list):
+        floor = tuple(floor)
     ground = Ground(floor, relay, cycle if relay else None, deputies, tile)
     if ground != Ground() or settings is not None:
         project = project.with_ground(ground if ground != Ground() else project.ground)

@@ -60,6 +60,9 @@ class PlanFile:
             why = f"'{path}' is of another plan, or for other settings, meshes or floor"
         hint = "`factory build` with `-o DIR` writes both files"
         warn(Diagnostic("BadPlan", f"{why}: the plan is laid out again", None, hint))
+        if made.plan.turns:
+            with _fitting(self.path):
+                made.layout  # noqa: B018 (laid out once)
         return made
 
 
