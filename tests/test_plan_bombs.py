@@ -157,6 +157,16 @@ def test_what_announces_gigabytes_is_refused_within_little_memory(tmp_path: Path
         assert line.startswith(name) and (why or "1 bodies") in line, line
 
 
+@pytest.mark.parametrize("encoding", ["utf-7", "nope", "utf-16", "big5"])
+def test_an_encoding_that_is_not_read_is_told(encoding: str) -> None:
+    head = f'<?xml version="1.0" encoding="{encoding}"?>'
+    stream = BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        archive.writestr("3D/3dmodel.model", head + MODEL.format(CUBE, ""))
+    with pytest.raises(UnreadableMesh, match=r"is not XML|encoding that is not read"):
+        read_scene(stream.getvalue(), ".3mf")
+
+
 def test_few_triangles_at_many_places_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     content = glb(lambda d: d.update(nodes=[{"mesh": 0}] * 30))
     assert len(read_scene(content, ".glb").bodies) == 30
