@@ -34,7 +34,8 @@ def written(scene: Any, binary: bool) -> bytes:
     """A scene as a file, binary or as JSON with its buffer inside (section 4.4)."""
     import trimesh
 
-    gltf, options = trimesh.exchange.gltf, {"tree_postprocessor": _linear_colours}
+    gltf = trimesh.exchange.gltf
+    options: dict[str, Any] = {"tree_postprocessor": _linear_colours}
     if binary:
         return bytes(gltf.export_glb(scene, include_normals=True, **options))
     options |= {"merge_buffers": True, "embed_buffers": True}
