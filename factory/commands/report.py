@@ -52,7 +52,7 @@ def report(options: ProjectOptions, asked: RunOptions, out: OutputOptions, outpu
         for_a_pag(file, "a log", "output", "lenient")
         made = report_on(file)
     else:
-        asked.check_with(options.deputies)
+        asked.check_with(options)
         project = options.project(out.silent)
         warnings = announced(project.layout.product.warnings, out)
         made = report_on(project, asked, out.silent)

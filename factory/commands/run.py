@@ -84,7 +84,7 @@ def run(
     if asked.demand is not None:
         reading(Path(asked.demand))
     writable(video, log, shown.poster)
-    asked.check_with(options.deputies)
+    asked.check_with(options)
     if asked.world == "ideal":
         check_ideal(asked.fuse, bool(monitor))
     if video is not None:
