@@ -28,6 +28,7 @@ from factory.problem.template import Template
 from factory.support.errors import Diagnostic, InputError
 from factory.support.resources import templates_folder
 from factory.support.settings import Settings
+from factory.support.tables import MISFITS
 
 if TYPE_CHECKING:
     from factory.compiler.mating.findings import Matings
@@ -327,8 +328,9 @@ class Project:
             factory = with_relays(plain, relays, self.templates, self.catalogue)
         try:
             return laid.laid_out(factory, self.product, plain)
-        except ValueError as error:
-            message = f"the layout that is kept is not of this factory: {error}"
+        except MISFITS as error:
+            why = error if type(error) is ValueError else "its values do not fit each other"
+            message = f"the layout that is kept is not of this factory: {why}"
             raise InputError(Diagnostic("BadPlan", message)) from error
 
     @property

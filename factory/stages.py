@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from factory.support.errors import usage_error
+from factory.support.guard import guarding, reading, will_write
 from factory.support.settings import Settings
 
 if TYPE_CHECKING:
@@ -50,6 +51,9 @@ def project_of(
     from factory.record.plan_file import read_plan
     from factory.support.files import is_plan
 
+    pag = product.factory.pag if isinstance(product, Layout) else getattr(product, "pag", product)
+    if isinstance(pag, PAG):
+        reading(*pag.files)
     if isinstance(product, Project):
         return product if settings is None else product.with_settings(settings)
     if isinstance(product, PAG):
@@ -157,7 +161,7 @@ def to_networkx(product: Stage) -> nx.DiGraph:
 def lay_out(
     product: Stage,
     clearance: float | None = None,
-    floor: tuple[float, float] | None = None,
+    floor: tuple[float, float] | str | None = None,
     relay: bool = False,
     cycle: float | None = None,
     *,
@@ -167,26 +171,33 @@ def lay_out(
 ) -> Layout:
     """The stretched tree of guidepaths (paper, section 5.1), sized by the parts' real geometry.
 
-    `clearance` and `floor` (width, depth) in [m]. `relay`: several robots share guidepaths that
-    set the pace, to reach a `cycle` time [s] or the least there can be; the layout's factory has
+    `clearance` and `floor` (width, depth) in [m]; a floor also as a command takes it, "4x3".
+    `relay`: several robots share guidepaths that set the pace, to reach a `cycle` time [s] or the
+    least there can be; the layout's factory has
     more robots then. `deputies`: robots can take over for others where there is room. `tile`: they
     go over a platen of tiles of this size [m], on guidepaths that may bend. With none of these the
     layout is that of the product's plan.json, or the layout itself. Raises InputError for a mesh
     that cannot be read, RunError where the factory does not fit the floor.
     """
-    from factory.layout.request import Ground
+    from factory.layout.request import WIDEST, Ground
     from factory.simulation.options import check_together
+    from factory.support.bounds import pair
 
     check_together({"--relay": relay, "--deputies": deputies, "--platen": tile is not None})
     project = project_of(product, settings)
     if clearance is not None:
         project = project.with_settings(replace(project.settings, clearance=clearance))
+    if isinstance(floor, str):
+        floor = pair(floor, "floor", "4x3", float, WIDEST)
+    elif isinstance(floor, list):
+        floor = tuple(floor)
     ground = Ground(floor, relay, cycle if relay else None, deputies, tile)
     if ground != Ground() or settings is not None:
         project = project.with_ground(ground if ground != Ground() else project.ground)
     return project.layout
 
 
+@guarding
 def run(
     product: Stage,
     world: WorldName = "mujoco",
@@ -232,10 +243,13 @@ def run(
     asked = replace(asked, demand=None if demand is None else str(demand))
     if world == "ideal":
         check_ideal(fuse, bool(monitor))
+    will_write(maybe(log))
     project = project_of(product, settings)
+    asked.check(project)
     return require(run_project(project, asked, True, maybe(log), None, monitor, progress))
 
 
+@guarding
 def build(
     product: Stage,
     output: AnyPath | None = None,
@@ -260,11 +274,14 @@ def build(
     from factory.support.bounds import check_values
 
     check_values({"units": units, "wip": wip})
+    request = BuildRequest(maybe(mjcf), maybe(output), units, wip)
+    will_write(request.mjcf)
     project = project_of(product, settings)
-    verdict = proved(project.layout.factory.net)
-    return build_files(project, verdict, BuildRequest(maybe(mjcf), maybe(output), units, wip))
+    request.claim(project.name)
+    return build_files(project, proved(project.layout.factory.net), request)
 
 
+@guarding
 def export(
     product: Stage,
     form: str,
@@ -288,6 +305,7 @@ def export(
     from factory.support.files import write_all
 
     chosen = exporter(form, of, [*map(path_of, exporters)])
+    will_write(maybe(output))
     file = named(product)
     source: Source | None = None if file is None else read_source(file)
     if file is None or source is None:

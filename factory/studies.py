@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from factory.stages import AnyPath, Stage, maybe, named, path_of, project_of
+from factory.support.guard import guarding, will_write
 from factory.support.settings import Settings
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ def _logged(product: Stage) -> Path | None:
     return path if path is not None and is_log(path) else None
 
 
+@guarding
 def render(
     product: Stage,
     output: AnyPath,
@@ -66,11 +68,13 @@ def render(
     asked = RunOptions("mujoco", units, seed, jitter, wip, max_time=max_time)
     picture = Picture(size, camera, panels=tuple(panels), title=title)
     shot = Shot(path_of(output), picture, fps, at, maybe(poster))
+    will_write(shot.output, shot.poster)
     log = _logged(product)
     source = read_log(log) if log else project_of(product, settings)
     return taken(source, shot, asked, progress=progress)
 
 
+@guarding
 def report(
     product: Stage,
     output: AnyPath | None = None,
@@ -90,6 +94,7 @@ def report(
     from factory.support.files import write_text
 
     asked = RunOptions("mujoco", units, seed, jitter, wip, max_time=max_time)
+    will_write(maybe(output))
     made = report_on(_logged(product) or project_of(product, settings), asked, progress=progress)
     if output is not None:
         write_text(path_of(output), made.text)
@@ -148,6 +153,7 @@ def analyze(
     return analyse(timing, count, made.wip, change, record)
 
 
+@guarding
 def sweep(
     product: Stage,
     database: AnyPath,
@@ -182,9 +188,10 @@ def sweep(
     if world is not None:
         check_choice("world", world, WORLDS)
     axes = read_axes([f"{key}={','.join(map(str, values))}" for key, values in vary.items()])
+    kept = path_of(database)
+    will_write(kept)
     project = project_of(product, settings)
     recipe = recipe_of(project, axes, {**shared, "world": world}, max_time, fuse)
-    kept = path_of(database)
     swept(recipe, axes, kept, jobs or cores(), retry)
     return summarise(kept)
 
@@ -198,6 +205,7 @@ class PlannedAssembly(NamedTuple):
     files: tuple[Path, ...]
 
 
+@guarding
 def plan(
     source: AnyPath,
     output: AnyPath,

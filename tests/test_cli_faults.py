@@ -296,7 +296,7 @@ def test_what_build_names_itself_is_not_the_input(
 ) -> None:
     monkeypatch.chdir(out)
     (out / name).write_bytes(PAPER.read_bytes())
-    assert run("build", name, *words, "--json").codes == ["Usage"]
+    assert run("build", name, *words, "--json").codes == ["BadFile"]
     assert files_in(out) == {name: PAPER.read_bytes()}
 
 

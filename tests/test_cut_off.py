@@ -378,16 +378,18 @@ def test_a_log_that_has_no_more_room_is_closed_and_says_so(run: Terminal, out: P
         (["export", "--format", "pnml", "-o"], "a.pnml"),
         (["report", "--units", 1, "-o"], "a.html"),
         (["run", "--units", 9, "--size", "320x240", "--video"], "a.mp4"),
+        (["render", "--size", "320x240", "-o"], "header.mp4"),
+        (["render", "--size", "320x240", "-o"], "a.png"),
     ],
-    ids=["log", "build", "export", "report", "film"],
+    ids=["log", "build", "export", "report", "film", "header", "still"],
 )
 def test_what_has_no_room_is_named(out: Path, words: list[object], name: str) -> None:
-    if "--video" in words:
+    if "--size" in words:
         try:
             probe()
         except MissingError:
             pytest.skip("no GL here")
-    room = {"a.log": 2000, "a.html": 300_000}.get(name, 8000)
+    room = {"a.log": 2000, "a.html": 300_000, "header.mp4": 100}.get(name, 8000)
     done = with_room(room, words[0], PAPER, *words[1:], out / name, "-q")
     assert done.returncode == 2
     assert name in done.stderr and "File too large" in done.stderr

@@ -205,6 +205,13 @@ def test_orders_may_come_late() -> None:
     assert run.dropoffs[1] > 60.0
 
 
+def test_an_order_that_does_not_come_in_time_is_named() -> None:
+    demand = Demand((("b", 0.0), ("a", 60.0)))
+    run = Simulation(little().layout, RunRequest(units=2, demand=demand)).run(max_time=20.0)
+    assert run.trouble is not None and run.trouble.code == "Timeout"
+    assert run.trouble.message.endswith("; order 2, a, is placed at 60 s only")
+
+
 def test_the_next_order_waits_for_room() -> None:
     """A change takes effect after the units that are inside."""
     demand = Demand(changes=(("a", 0), ("b", 3), ("a", 6)))
@@ -355,6 +362,8 @@ def test_a_robot_that_rests_in_the_way_is_refused(monkeypatch: pytest.MonkeyPatc
         ("product,time\nc,0", "'c' is no product of the mix"),
         ("product,time\na,soon", "'soon' is no time [s] from 0 on"),
         ("product,time\na,nan", "'nan' is no time [s] from 0 on"),
+        ("product,time\na,1_0", "'1_0' is no time [s] from 0 on"),
+        ("product,time\na,\u0661", "'\u0661' is no time [s] from 0 on"),
         ("product,made\na,0\nb,1.5", "'1.5' is no count from 0 on"),
         ("product,time\na,5\nb,1", "1 comes after 5: orders are in the order of time"),
         ("product,time\na", "1 values, where there are 2 columns"),

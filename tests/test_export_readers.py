@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -258,6 +258,15 @@ ATTRIBUTES = {
 """The attributes of the same."""
 
 
+def encoded(colour: Sequence[float]) -> list[float]:
+    """A linear colour of glTF in sRGB (IEC 61966-2-1)."""
+    *light, opacity = colour
+    return [
+        *(12.92 * x if x < 0.0031308 else 1.055 * x ** (1 / 2.4) - 0.055 for x in light),
+        opacity,
+    ]
+
+
 def _of(table: Mapping[str, str], tag: str) -> str:
     return next((row for tags, row in table.items() if tag in tags.split("|")), "")
 
@@ -343,7 +352,7 @@ def gltf_by_pygltflib(folder: Path) -> None:
         solid = chosen.product.solids[part]
         primitive = document.meshes[nodes[part].mesh].primitives[0]
         colour = document.materials[primitive.material].pbrMetallicRoughness.baseColorFactor
-        assert np.allclose(colour, solid.rgba, atol=0.01)
+        assert np.allclose(encoded(colour), solid.rgba, atol=0.01)
         accessor = document.accessors[primitive.attributes.POSITION]
         size = np.array(accessor.max) - np.array(accessor.min)
         assert np.allclose(size, solid.high - solid.low, atol=2e-4), part
@@ -413,7 +422,7 @@ def factory_by_pygltflib(log: Path) -> None:
     for label, solid in project(LAMP).product.solids.items():
         primitive = document.meshes[nodes[f"part/{label}#1/shape"].mesh].primitives[0]
         colour = document.materials[primitive.material].pbrMetallicRoughness.baseColorFactor
-        assert np.allclose(colour, solid.rgba, atol=0.01)
+        assert np.allclose(encoded(colour), solid.rgba, atol=0.01)
     masts = {nodes[f"{robot.name}/mast"].mesh for robot in project(LAMP).factory.robots}
     assert len(masts) == 1
 

@@ -157,6 +157,16 @@ def test_what_announces_gigabytes_is_refused_within_little_memory(tmp_path: Path
         assert line.startswith(name) and (why or "1 bodies") in line, line
 
 
+@pytest.mark.parametrize("encoding", ["utf-7", "nope", "utf-16", "big5"])
+def test_an_encoding_that_is_not_read_is_told(encoding: str) -> None:
+    head = f'<?xml version="1.0" encoding="{encoding}"?>'
+    stream = BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        archive.writestr("3D/3dmodel.model", head + MODEL.format(CUBE, ""))
+    with pytest.raises(UnreadableMesh, match=r"is not XML|encoding that is not read"):
+        read_scene(stream.getvalue(), ".3mf")
+
+
 def test_few_triangles_at_many_places_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     content = glb(lambda d: d.update(nodes=[{"mesh": 0}] * 30))
     assert len(read_scene(content, ".glb").bodies) == 30
@@ -181,7 +191,8 @@ def test_strips_fans_and_places_are_read() -> None:
         {"mesh": 1, "matrix": [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 0, 0, 1]},
     ]
     meshes = [{"primitives": [{**fan, "mode": 5}]}, {"primitives": [fan]}]
-    strip, other = glb_reader.read_glb(glb(lambda d: d.update(nodes=nodes, meshes=meshes)))
+    content = glb(lambda d: d.update(nodes=nodes, meshes=meshes))
+    strip, other = glb_reader.read_glb(content, np.eye(4))
     assert strip.bodies[0][0] == pytest.approx(
         np.array([[0, 0, 0], [0, 2, 0], [-2, 0, 0], [0, 0, 2]])
     )

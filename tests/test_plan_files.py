@@ -403,3 +403,38 @@ def test_visits_that_are_refused(change: Callable[[Any], object], words: str) ->
     change(table["visits"])
     with pytest.raises(InputError, match=words):
         _ = replace(project, laid=value_of(LayoutTable, table, "layout")).layout
+
+
+def test_a_plan_with_one_change_is_another_plan_or_none(run: Terminal, tmp_path: Path) -> None:
+    """Of robots in turns, templates, forms: a diagnosis of the plan, whatever is changed."""
+    (tmp_path / "p.pag").write_text(
+        "root = s; s = mate(f, c); f = insert(a, b); a = atomic(); b = atomic(); c = atomic()"
+    )
+    project = read(tmp_path / "p.pag").with_plan(Plan(turns=((0, 1, 2, 3),)))
+    plan, (content,) = tmp_path / "plan.json", plan_files(project, tmp_path, None, False).values()
+    table = json.loads(content)
+    turns = [
+        [*turn[:at], robot, *turn[at + 1 :]]
+        for turn in ([0, 1, 2, 3], [0, 1, 2, 0], [0, 2, 1, 2])
+        for at in range(4)
+        for robot in (-1, 0, 1, 2, 3, 99)
+    ]
+    tables = [{**table, "plan": {"turns": [turn], "lifts": []}} for turn in turns]
+    for name in table["templates"]:
+        others = {key: text for key, text in table["templates"].items() if key != name}
+        tables.append({**table, "templates": {**others, "nope": table["templates"][name]}})
+        tables.append({**table, "templates": {**others, name: ""}})
+    refused = 0
+    for made in tables:
+        plan.write_text(json.dumps(made))
+        done = run("programs", plan, "--json")
+        refused += done.status
+        codes = {"BadPlan"} if made["templates"] == table["templates"] else {"BadPlan", "Syntax"}
+        assert done.status == 0 or {*done.codes} <= codes, (made["plan"], done.out)
+    assert refused > 20
+
+
+def test_a_plan_that_is_not_utf_8_is_told_as_a_pag_is(run: Terminal, tmp_path: Path) -> None:
+    (tmp_path / "plan.json").write_bytes(b'{"schema": "\xff"}')
+    (error,) = run("check", tmp_path / "plan.json", "--json").json["errors"]
+    assert error["message"] == "byte 0xff is not UTF-8 text" and error["col"] == 13

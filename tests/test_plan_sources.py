@@ -14,6 +14,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import factory
 from factory.geometry.alike import (
     PartShape,
     RigidMotion,
@@ -25,10 +26,12 @@ from factory.geometry.alike import (
 from factory.geometry.meshes import Array
 from factory.pipeline import all_templates, read
 from factory.planning.parts import InPlace
+from factory.planning.plan import Planned, PlanOptions, plan
 from factory.planning.source import SourceOptions, read_source
 from factory.planning.writing import planned_product
 from factory.support.files import write_all
 from tests.command_line import ROOT, Terminal, files_in
+from tests.plan_models import box, model_source, rod
 from tests.step_boxes import step_of
 
 TEMPLATES = all_templates(())
@@ -54,10 +57,17 @@ def table() -> dict[str, trimesh.Trimesh]:
     return {"top": block((0, 0, 400), (600, 400, 425)), **legs}
 
 
+def axes_of(suffix: str) -> Array:
+    """From z upwards to what is up in a format: y in GLB."""
+    turn = -np.pi / 2 if suffix == ".glb" else 0.0
+    return trimesh.transformations.rotation_matrix(turn, (1, 0, 0)).round()
+
+
 def folder_of(folder: Path, meshes: Mapping[str, trimesh.Trimesh], suffix: str = ".stl") -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     for name, mesh in meshes.items():
-        (folder / f"{name}{suffix}").write_bytes(_bytes(mesh.export(file_type=suffix[1:])))
+        drawn = mesh.copy().apply_transform(axes_of(suffix))
+        (folder / f"{name}{suffix}").write_bytes(_bytes(drawn.export(file_type=suffix[1:])))
     return folder
 
 
@@ -68,7 +78,7 @@ def _bytes(content: Any) -> bytes:
 def scene_of(meshes: Mapping[str, trimesh.Trimesh], suffix: str) -> bytes:
     scene = trimesh.Scene()
     for name, mesh in meshes.items():
-        scene.add_geometry(mesh, node_name=name, geom_name=name)
+        scene.add_geometry(mesh, name, name, transform=axes_of(suffix))
     return _bytes(scene.export(file_type=suffix[1:]))
 
 
@@ -111,8 +121,36 @@ def test_a_scene_keeps_its_names_and_colours(tmp_path: Path) -> None:
     assert boxes_of(source) == TABLE
     assert any("metres by its standard" in note for note in source.notes)
     colours = {part.label: part.node.parameter("rgba") for part in source.parts}
-    assert colours["top"] == (0.2, 0.4, 0.6, 1.0)
+    assert colours["top"] == (0.485, 0.665, 0.798, 1.0)  # linear in the file
     assert len({colours[f"leg-{n}"] for n in range(1, 5)}) == 1
+
+
+def test_an_exported_glb_is_planned_as_its_product(tmp_path: Path) -> None:
+    """The same tree, with the same side up, in the same colours, screws driven."""
+    unlaid = PlanOptions(lay_out=False)
+    parts = {
+        "base": box(60, 40, 10) - rod(2.5, 30).translate((20, 0, 0)),
+        "lid": box(60, 40, 6, (0, 0, 8)) - rod(2.5, 30).translate((20, 0, 8)),
+        "screw": rod(2.4, 16).translate((20, 0, 3)) + rod(4.5, 5).translate((20, 0, 13.5)),
+    }
+    (tmp_path / "drawn").mkdir()
+    source = model_source(tmp_path / "drawn", parts)
+    first = plan(source, unlaid)
+    assert isinstance(first, Planned)
+    made = planned_product(source, first.tree, first.orientation)
+    (name,) = (name for name in made.files if name.endswith(".pag"))
+    text = made.files[name].decode()
+    text = text.replace("screw = atomic (", "screw = atomic ( rgba = ( 0.2, 0.4, 0.6, 1 ),")
+    write_all({tmp_path / "made" / name: content for name, content in made.files.items()})
+    (tmp_path / "made" / "drawn.pag").write_text(text)
+    factory.export(tmp_path / "made" / "drawn.pag", "gltf", tmp_path / "made.glb")
+    again = read_source(tmp_path / "made.glb", TEMPLATES)
+    second = plan(again, unlaid)
+    assert isinstance(second, Planned)
+    assert second.tree == first.tree and "Screwed" in str(first.tree)
+    assert np.allclose(second.orientation, np.eye(3)) and np.allclose(first.orientation, np.eye(3))
+    colours = {part.label: part.node.parameter("rgba") for part in again.parts}
+    assert colours["screw"] == (0.2, 0.4, 0.6, 1.0)
 
 
 def test_a_scene_in_the_wrong_unit_is_told(tmp_path: Path) -> None:

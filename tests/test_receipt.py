@@ -7,8 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from factory.support.extensions import extensions
 from factory.support.files import user_cache
 from tests.command_line import PAPER, ROOT, Terminal, files_in
+from tests.plug_in import write_package
 
 MESHED = """root = a;
 a = mate(b, c);
@@ -159,3 +161,18 @@ def test_a_name_that_is_no_text_has_a_receipt(run: Terminal, out: Path) -> None:
         assert run("build", file, "-o", out / "x", "--json").status == 0
         times.append([path.stat().st_mtime_ns for path in sorted((out / "x").iterdir())])
     assert times[0] == times[1]
+
+
+def test_a_package_that_changed_is_built_with(
+    run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> None:
+    """One that is installed: its operation, its law, its robot type."""
+    write_package(tmp_path, installed=True, name="gluing2")
+    monkeypatch.syspath_prepend(tmp_path)
+    request.addfinalizer(extensions.cache_clear)
+    assert not again(lines(run, PAPER, "-o", tmp_path / "x"))
+    for name in ("dab.op", "laws.py", "dabber.xml", "catalogue.toml"):
+        assert again(lines(run, PAPER, "-o", tmp_path / "x"))
+        (file,) = (tmp_path / "gluing2").rglob(name)
+        file.write_text(file.read_text() + "\n")
+        assert not again(lines(run, PAPER, "-o", tmp_path / "x")), name

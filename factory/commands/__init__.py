@@ -45,6 +45,7 @@ from factory.support.errors import (
     usage_error,
 )
 from factory.support.files import NO_ROOM
+from factory.support.guard import guarded
 from factory.support.interruption import interrupt, stop_on_signals
 from factory.support.version import __version__
 
@@ -153,7 +154,8 @@ def run_command(words: list[str]) -> int:
     """The exit status of a command line: 0 ok, 1 a check or run failed, 2 bad input, 3 something is
     missing on the machine, 130 interrupted."""
     try:
-        result = cli.main(words, prog_name="factory", standalone_mode=False)
+        with guarded():
+            result = cli.main(words, prog_name="factory", standalone_mode=False)
         return result if isinstance(result, int) else 0
     except click.exceptions.Exit as done:
         return done.exit_code

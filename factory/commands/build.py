@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from factory.commands.grouped import Grouped
-from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, RELAY, SOURCE, UNITS, WIP
+from factory.commands.options import FLOOR, MOTION, OUT, OUTPUT, RELAY, SOURCE, UNITS, WIP
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import condensed
@@ -32,8 +32,8 @@ SHOWN = 20
 
 @click.command(cls=Grouped)
 @SOURCE
-@click.option("--mjcf", type=PATH, help="Write the MJCF model as one XML file.")
-@click.option("-o", "--output", type=PATH, help="Folder for all output files.")
+@click.option("--mjcf", type=OUT, help="Write the MJCF model as one XML file.")
+@click.option("-o", "--output", type=OUT, help="Folder for all output files.")
 @click.option("--units", type=UNITS, help="Number of products to size the part pool for.")
 @WIP
 @FLOOR
@@ -53,7 +53,7 @@ def build(
     from factory.support.cache import build_name, find_build, keep_build
 
     begin = perf_counter()
-    writable(options.file, mjcf)
+    writable(mjcf)
     writable_folder(output)
     wanted = {"mjcf": mjcf, "output": output, "units": units, "wip": wip}
     settings = options.settings()
@@ -61,21 +61,24 @@ def build(
     kept = find_build(name)
     is_current = kept is not None
     if kept is None:
-        from factory.exporting.build import BuildRequest, files_read
+        from factory.exporting.build import BuildRequest
         from factory.exporting.build import build as build_files
         from factory.nets.verify import proved
         from factory.record.plan_file import plan_and_layout
 
+        request = BuildRequest(mjcf, output, units, wip)
+        if not is_plan(options.file):  # a search for few robots lays out too
+            request.claim(options.file.stem)
         project = options.project(out.silent)
+        request.claim(project.name)
         with Waiting("reading the shapes and laying out", out.silent):
             verdict = proved(project.layout.factory.net)
         spent = perf_counter() - begin
         plan = plan_and_layout(options.file) if is_plan(options.file) else ()
-        request = BuildRequest(mjcf, output, units, wip, plan)
         with Waiting("compiling the model", out.silent):
             built = build_files(project, verdict, request)
         kept = _printed(project, built, spent, wip)
-        inputs = (*files_read(project), *plan, *_shipped_and_own(options.folders))
+        inputs = (*project.pag.files, *plan, *_shipped_and_own(options.folders))
         keep_build(name, inputs, built.files, kept)
     else:
         kept["document"]["compile_s"] = perf_counter() - begin
@@ -157,9 +160,11 @@ def _printed(project: Project, built: Built, spent: float, wip: int | None) -> d
 
 
 def _shipped_and_own(folders: tuple[Path, ...]) -> tuple[Path, ...]:
-    """The folders of operations and of robot types, and the files in them."""
+    """The folders of operations and of robot types, and the files in them: the shipped ones, the
+    user's own, and those of installed packages with all that these have."""
+    from factory.support.extensions import extension_files
     from factory.support.resources import mjcf_folder, templates_folder
 
     every = (*folders, templates_folder(), mjcf_folder())
     inside = (path for folder in every for path in folder.iterdir() if path.is_file())
-    return (*every, *inside)
+    return (*every, *inside, *extension_files())

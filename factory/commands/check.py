@@ -13,6 +13,7 @@ from factory.commands.allowing import ALLOW
 from factory.commands.grouped import Grouped
 from factory.commands.options import (
     HANDS,
+    OUT,
     OUTPUT,
     PATH,
     PROJECT,
@@ -20,9 +21,9 @@ from factory.commands.options import (
     TEMPLATES,
     WIP,
     options,
-    pag_files,
 )
 from factory.commands.outputs import for_a_pag, without_others, writable, writable_folder
+from factory.commands.paths import pag_files
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced, say_allowed
 from factory.support.collector import collector_paused
@@ -63,12 +64,12 @@ POOLED = 8
 
 @click.command(cls=Grouped)
 @SOURCE
-@click.option("--certificate", type=PATH, help="Write the proof to this file.")
+@click.option("--certificate", type=OUT, help="Write the proof to this file.")
 @click.option("--against", type=PATH, help="Check a proof written by --certificate.")
 @click.option("--clearance", "folder", type=PATH, help=PROOF)
 @WIP
 @ALLOW
-@click.option("--clashes", type=PATH, help=PICTURES)
+@click.option("--clashes", type=OUT, help=PICTURES)
 @RELAY
 @HANDS
 @OUTPUT
@@ -94,7 +95,7 @@ def check(
     file = options.file
     if is_net(file):
         for_a_pag(file, "a net in PNML", "certificate", "against")
-    writable(file, certificate)
+    writable(certificate)
     writable_folder(clashes)
     project = None if is_net(file) else options.project(out.silent)
     with Waiting("reading the shapes and proving", out.silent):
@@ -110,7 +111,7 @@ def check(
     proved = None if against is None else _proved(against, checked)
     if clashes is not None:
         files = _pictures(checked, clashes)
-        own_names(clashes, files, [file])
+        own_names(clashes, files)
         write_all(files)
     if certificate is not None:
         from factory.exporting.certificate.writer import certificate as document

@@ -11,7 +11,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from factory.commands.grouped import Grouped
-from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, RELAY, SOURCE
+from factory.commands.options import FLOOR, MOTION, OUT, OUTPUT, PATH, RELAY, SOURCE
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced, cut_off
@@ -71,7 +71,7 @@ class _Format(click.ParamType[str]):
     help="Folder of additional exporters, *.py (repeatable).",
 )
 @click.option(
-    "-o", "--output", type=PATH, help="Output file, - for stdout (default for text formats)."
+    "-o", "--output", type=OUT, help="Output file, - for stdout (default for text formats)."
 )
 @click.option("--of", default="", help="What to export, where a format offers a choice.")
 @FLOOR
@@ -101,7 +101,7 @@ def export(
     if takes_folder(chosen, output):
         writable_folder(output)
     else:
-        writable(options.file, output)
+        writable(output)
     source: Source | None = read_source(options.file)
     check_taken(chosen, options.file, source)
     if isinstance(source, Log) and source.cut_off:

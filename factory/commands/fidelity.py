@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     help="Draw each robot's speed and gain at random within ± this fraction.",
 )
 @shared.JOBS
-@click.option("-o", "--output", type=shared.PATH, help="Write the figures to this file, as JSON.")
+@click.option("-o", "--output", type=shared.OUT, help="Write the figures to this file, as JSON.")
 @click.option("--max-time", type=shared.SECONDS, help="Stop a run after this simulated time [s].")
 @shared.FLOOR
 @shared.RELAY
@@ -60,7 +60,7 @@ def fidelity(
     from factory.support.files import write_text
     from factory.support.progress import StepBar
 
-    writable(options.file, output)
+    writable(output)
     project = options.project(out.silent)
     layout, settings = project.layout, project.settings
     proved(layout.factory.net)

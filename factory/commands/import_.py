@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, cast
 
 import click
 
-from factory.commands.options import LIBRARY, OUTPUT, PATH, TEMPLATES
+from factory.commands.options import LIBRARY, OUT, OUTPUT, PATH, TEMPLATES
 from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions
 from factory.commands.warnings import announced
@@ -24,7 +24,7 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 
 @click.command("import")
 @click.argument("source", type=PATH)
-@click.option("-o", "--output", type=PATH, help="Output folder (default: named after SOURCE).")
+@click.option("-o", "--output", type=OUT, help="Output folder (default: named after SOURCE).")
 @LIBRARY
 @click.option("--boxes", is_flag=True, help="Use boxes for parts without a shape.")
 @click.option("--meshes", type=PATH, help="Folder of the meshes of a tree or a bill.")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from factory.commands.options import OUTPUT, PATH, TEMPLATES, pag_files
+from factory.commands.options import OUT, OUTPUT, PATH, TEMPLATES, pag_files
 from factory.commands.outputs import writable
 from factory.commands.requests import OutputOptions
 from factory.support.console import emit, say
@@ -19,7 +19,7 @@ from factory.support.settings import MOST_UNITS
 @click.argument("other", type=PATH, shell_complete=pag_files)
 @TEMPLATES
 @click.option("--count", default="1:1", help="How many of each are made in a period, as 3:1.")
-@click.option("-o", "output", type=PATH, required=True, help="The file to write.")
+@click.option("-o", "output", type=OUT, required=True, help="The file to write.")
 @OUTPUT
 def mix(
     one: Path,
@@ -35,8 +35,7 @@ def mix(
     from factory.plant.family import family
     from factory.support.files import write_all
 
-    writable(one, output)
-    writable(other, output)
+    writable(output)
     templates, counts = all_templates(folders), _counts(count)
     pags = [load_pag(file, templates) for file in (one, other)]
     made = family(pags[0], pags[1], counts, output.parent)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from factory.commands.options import OUTPUT, PATH
+from factory.commands.options import OUT, OUTPUT
 from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions
 from factory.support.console import emit, say
@@ -25,7 +25,7 @@ GRIP = "0 0, 9 0, 12 15, 13 32, 10 52, 7 60, 0 60"
 
 
 @click.command()
-@click.argument("name", type=PATH)
+@click.argument("name", type=OUT)
 @OUTPUT
 def new(name: Path, out: OutputOptions) -> int:
     """Write a small example product to a new folder NAME."""

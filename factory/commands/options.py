@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import fields
 from functools import wraps
@@ -11,8 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import click
-from click.shell_completion import CompletionItem
 
+from factory.commands.paths import OUT as OUT
+from factory.commands.paths import PATH as PATH
+from factory.commands.paths import pag_files as pag_files
 from factory.commands.requests import OutputOptions, PictureOptions, ProjectOptions
 from factory.simulation.options import RunOptions
 from factory.support.bounds import BOUNDS, TIMES
@@ -23,26 +24,6 @@ if TYPE_CHECKING:
     from factory.problem.pag import PAG
 
 F = TypeVar("F", bound=Callable[..., Any])
-
-
-PATH = click.Path(path_type=Path, readable=False)
-"""A path that is not checked here: the stage that opens it reports its faults."""
-
-
-def pag_files(ctx: click.Context, param: click.Parameter, begun: str) -> list[CompletionItem]:
-    """Completions of FILE in a shell: PAG files, plans and folders; if there are no such files, any
-    path."""
-    folder, start = os.path.split(begun)
-    try:
-        names = sorted(n for n in os.listdir(folder or ".") if n.startswith(start))
-    except OSError:
-        names = []
-    shown = [os.path.join(folder, n) for n in names if start or not n.startswith(".")]
-    files = [name for name in shown if name.endswith((".pag", "plan.json"))]
-    if not files:
-        return [CompletionItem(begun, type="file")]
-    folders = [f"{name}/" for name in shown if os.path.isdir(name)]
-    return [CompletionItem(name) for name in (*files, *folders)]
 
 
 def cameras(ctx: click.Context, param: click.Parameter, begun: str) -> list[str]:
@@ -329,7 +310,7 @@ PICTURE = options(
         help="Panels beside the 3-D view: net, gantt (modes over time) or net,gantt.",
     ),
     click.option("--title", default="", help="Title at the start of a film."),
-    click.option("--poster", type=PATH, help="Write a still of a film's best moment (.png)."),
+    click.option("--poster", type=OUT, help="Write a still of a film's best moment (.png)."),
     gathered(PictureOptions, "shown"),
 )
 

@@ -12,26 +12,21 @@ from click.core import ParameterSource
 from factory.commands.options import OF_A_PICTURE
 from factory.support.claim import IN_USE, is_claimed
 from factory.support.errors import Diagnostic, InputError
+from factory.support.guard import declare
 
 
-def writable(file: Path | None, *outputs: Path | None) -> None:
-    """Check that output files can be written: their folders exist and are writable, they are no
-    folders, all different, none is the input, and no run is writing them. Raises InputError
-    (BadFile) with every fault."""
-    taken = {} if file is None else {os.path.realpath(file): "the input"}
-    faults = []
+def writable(*outputs: Path | None) -> None:
+    """Declare output files, and check that they can be written: their folders exist and are
+    writable, they are no folders, all different, none is an input, and no run is writing them.
+    Raises InputError (BadFile) with every fault."""
+    faults: list[Diagnostic] = []
     for path in outputs:
         if path is None:
             continue
-        trouble = _unwritable(path)
-        place = os.path.realpath(path)
-        if trouble is None and place in taken:
-            trouble = f"'{path}' is {taken[place]}", "give another name"
-        if trouble is not None:
+        if (trouble := _unwritable(path)) is None:
+            faults += declare([path])
+        else:
             faults.append(Diagnostic("BadFile", trouble[0], None, trouble[1]))
-        elif path.exists() and not path.is_file():
-            continue
-        taken[place] = "given twice"
     if faults:
         raise InputError(faults)
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from factory.commands.grouped import Grouped
-from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, SECONDS, SOURCE
+from factory.commands.options import FLOOR, MOTION, OUT, OUTPUT, SECONDS, SOURCE
 from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced
@@ -35,9 +35,7 @@ PAGE_NAME = "pareto.html"
     default=0,
     help="Number of points, spread over the front, to run in both worlds.",
 )
-@click.option(
-    "-o", "--output", type=PATH, help="Folder for a web page and the files of each point."
-)
+@click.option("-o", "--output", type=OUT, help="Folder for a web page and the files of each point.")
 @click.option(
     "--effort",
     type=click.IntRange(1, 10**6),
@@ -69,11 +67,14 @@ def pareto(
     Ctrl-C ends the search; the points found until then are printed and written. The exit status
     is 1 if a point that was run fails, or differs from its prediction by more than 2 %."""
     from factory.study.pareto import Effort
+    from factory.support.files import own_names
 
     if trials and not layouts:
         message = "without layouts there is nothing to run"
         raise usage_error(message, "leave out --validate or --no-layouts")
     writable_folder(output)
+    if output is not None:
+        own_names(output, [output / PAGE_NAME])
     project = options.project(out.silent)
     warnings = announced(project.warnings, out)
     effort = Effort(layouts, options.effort, options.limit or inf, options.branches())
@@ -142,7 +143,7 @@ def _written(
     plans = floor_plans(front, folder)
     page = front_page(front, commands, plans, folder)
     files = {folder / PAGE_NAME: page.encode(), **point_files(front, folder), **plans}
-    own_names(folder, files, [project.file])
+    own_names(folder, files)
     write_all(files)
     return commands, list(files)
 

@@ -12,7 +12,7 @@ import click
 
 from factory.commands.asking import asked
 from factory.commands.interlocking import refuse
-from factory.commands.options import LIBRARY, OUTPUT, PATH, SECONDS, TEMPLATES
+from factory.commands.options import LIBRARY, OUT, OUTPUT, PATH, SECONDS, TEMPLATES
 from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions
 from factory.commands.warnings import announced, say_allowed
@@ -40,7 +40,7 @@ KINDS: tuple[Kind, ...] = ("slide", "lower", "blocked")
 
 @click.command()
 @click.argument("source", type=PATH)
-@click.option("-o", "--output", type=PATH, help="Output folder (default: SOURCE-planned).")
+@click.option("-o", "--output", type=OUT, help="Output folder (default: SOURCE-planned).")
 @click.option(
     "--for",
     "aim",
@@ -103,11 +103,13 @@ def plan(
     write the assembly tree as a PAG with its meshes. SOURCE is a folder of meshes, a file with
     named bodies (.glb, .3mf, .step), an LDraw model (.ldr, .mpd), or a PAG whose assembly tree is
     to be ignored."""
+    from factory.importing.draft import file_stem
     from factory.lang.overlaps import overlaps_in
     from factory.pipeline import all_templates, read
     from factory.planning.outcome import write_planned
     from factory.planning.plan import CannotAssemble, PlanOptions
     from factory.planning.source import SourceOptions, read_source
+    from factory.support.files import own_names
 
     templates = all_templates(folders)
     writable_folder(output)
@@ -123,6 +125,9 @@ def plan(
     placed = replace(placed, allowed=(*placed.allowed, *meant))
     folder = output or Path(f"{placed.name}-planned")
     writable_folder(folder)
+    stem = file_stem(placed.name)
+    names = f"{stem}.pag", *placed.files, *_looks_of(stem)
+    own_names(folder, (folder / name for name in names))
     warnings = announced(placed.warnings, out)
     if not out.as_json:
         for note in placed.notes:
@@ -177,10 +182,8 @@ def _looks(project: Project, out: OutputOptions) -> list[Path]:
     a machine without GL."""
     from factory.planning.exploding import explosion
     from factory.rendering.exploded import ExplodedView
-    from factory.support.files import own_names
 
-    still, film = (project.file.with_name(f"{project.name}-{end}") for end in LOOKS)
-    own_names(project.file.parent, [still, film])
+    still, film = map(project.file.with_name, _looks_of(project.name))
     if project.matings is None:
         return []
     view = ExplodedView(project.product, explosion(project.pag, project.matings, project.product))
@@ -192,6 +195,11 @@ def _looks(project: Project, out: OutputOptions) -> list[Path]:
         announced(error.diagnostics, out)
         return []
     return [still, film]
+
+
+def _looks_of(name: str) -> list[str]:
+    """The names of the still and of the film of a product of this name."""
+    return [f"{name}-{end}" for end in LOOKS]
 
 
 def _document(

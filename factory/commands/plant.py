@@ -64,6 +64,7 @@ def plant(
     if asked.start is not None:
         message = "a plant starts where every robot waits with no part"
         raise usage_error(message, "leave out --from")
+    asked.check_with(options)
     project = options.project(out.silent)
     layout = project.layout
     proved(layout.factory.net)

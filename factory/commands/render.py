@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 @click.option(
     "-o",
     "--output",
-    type=shared.PATH,
+    type=shared.OUT,
     required=True,
     help="OUT.mp4, or OUT.png for a still.",
 )
@@ -52,7 +52,7 @@ def render(
     file = options.file
     if is_log(file):
         for_a_pag(file, "a log", "output", "at", *shared.OF_A_PICTURE)
-    writable(file, output, shown.poster)
+    writable(output, shown.poster)
     shot = Shot(output, shown.picture(), shown.fps, _moment(at), shown.poster)
     size, is_still, moment = shot.picture.size, shot.is_still, shot.at
     log = None
@@ -61,6 +61,7 @@ def render(
         log = read_partly(file, out.silent)
         frames, _ = taken(log, shot)
     else:
+        asked.check_with(options)
         project = options.project(out.silent)
         warnings = announced(project.layout.product.warnings, out)
         frames, run = taken(project, shot, asked, out.silent)

@@ -20,7 +20,7 @@ from factory.support.console import emit, say
 
 @click.command(cls=Grouped)
 @shared.SOURCE
-@click.option("-o", "--output", type=shared.PATH, required=True, help="Output page: OUT.html.")
+@click.option("-o", "--output", type=shared.OUT, required=True, help="Output page: OUT.html.")
 @click.option(
     "--units",
     type=click.IntRange(1, 10_000),
@@ -48,12 +48,13 @@ def report(options: ProjectOptions, asked: RunOptions, out: OutputOptions, outpu
     from factory.support.files import write_text
 
     file = options.file
-    writable(file, output)
+    writable(output)
     warnings: list[dict[str, object]] = []
     if is_log(file):
         for_a_pag(file, "a log", "output", "lenient", "strict")
         made = report_on(file)
     else:
+        asked.check_with(options)
         project = options.project(out.silent)
         warnings = announced(project.layout.product.warnings, out)
         made = report_on(project, asked, out.silent)

@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 from itertools import count
 from math import inf, prod
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from factory.simulation.options import check_together
+from factory.support.bounds import pair
 from factory.support.errors import Diagnostic, InputError, did_you_mean, usage_error
 
 if TYPE_CHECKING:
@@ -231,17 +232,3 @@ OF_A_PLAN = "leave it out, or give the PAG and make another plan: `factory build
 
 LARGEST = 10**5
 """Upper bound on the width and height of a picture [px]."""
-
-
-def pair(text: str, option: str, example: str, number: type, most: int) -> tuple[Any, Any]:
-    """`4x3` as two positive numbers of at most `most`. Raises InputError (BadValue)."""
-    try:
-        width, depth = (number(word) for word in text.lower().split("x"))
-        if "_" in text or not (0 < width <= most and 0 < depth <= most):
-            raise ValueError
-    except ValueError:
-        message = f"{option} takes two positive numbers up to {most}, not '{text}'"
-        raise InputError(
-            Diagnostic("BadValue", message, None, f"for example {option} {example}")
-        ) from None
-    return width, depth

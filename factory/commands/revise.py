@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from factory.commands.options import OUTPUT, PATH, TEMPLATES, pag_files
+from factory.commands.options import OUT, OUTPUT, PATH, TEMPLATES, pag_files
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.support.console import emit, say, warn
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 @click.argument("old", type=PATH, shell_complete=pag_files)
 @click.argument("new", type=PATH, shell_complete=pag_files)
 @TEMPLATES
-@click.option("-o", "output", type=PATH, help="Folder for NEW's factory, as `build` writes it.")
+@click.option("-o", "output", type=OUT, help="Folder for NEW's factory, as `build` writes it.")
 @click.option(
     "--pin",
     type=click.Choice(["all", "hands", "none"]),
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 )
 @click.option("--afresh", is_flag=True, help="Also say the cycle time of a layout made afresh.")
 @click.option("--live", is_flag=True, help="Also lay out a floor for both, to change during a run.")
-@click.option("--picture", type=PATH, help="Draw what stays on NEW's floor: OUT.svg.")
+@click.option("--picture", type=OUT, help="Draw what stays on NEW's floor: OUT.svg.")
 @OUTPUT
 def revise(
     old: Path,
@@ -50,17 +50,22 @@ def revise(
 
     With --live, -o DIR also writes DIR/family.pag, the mix of both, and DIR/live.csv, orders for a
     change: factory run DIR/family.pag --demand DIR/live.csv --units 18 --wip 4"""
+    from factory.exporting.build import BuildRequest, build
     from factory.nets.verify import proved
-    from factory.study.live import LiveChange
+    from factory.study.live import FAMILY_NAME, ORDERS_NAME, LiveChange
     from factory.study.revision import revised
-    from factory.support.files import write_all
+    from factory.support.files import own_names, write_all
     from factory.timing.timed import pace
 
-    writable(new, picture)
+    writable(picture)
     writable_folder(output)
     options, seconds = ProjectOptions(old, folders), None
     before = options.project(out.silent)
     after = replace(options, file=new).project(out.silent, before.settings)
+    request = BuildRequest(None, output)
+    request.claim(after.name)
+    if live and output is not None:
+        own_names(output, (output / name for name in (FAMILY_NAME, ORDERS_NAME)))
     with Waiting("laying out with what stays", out.silent):
         revision = revised(before, after, pin)
         verdict = proved(revision.new.layout.factory.net)
@@ -72,10 +77,8 @@ def revise(
         change = LiveChange.of(before, after, output or Path()) if live else None
     files: list[str] = []
     if output is not None:
-        from factory.exporting.build import BuildRequest, build
-
         with Waiting("compiling the model", out.silent):
-            built = build(revision.new, verdict, BuildRequest(None, output))
+            built = build(revision.new, verdict, request)
         files += map(str, built.files)
     if output is not None and change is not None:
         texts = {output / name: text.encode() for name, text in change.files.items()}

@@ -23,6 +23,7 @@ from factory.commands.warnings import announced, say_allowed
 from factory.simulation.options import RunOptions, check_ideal
 from factory.support.console import emit, say, table
 from factory.support.errors import usage_error
+from factory.support.guard import reading
 from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
@@ -43,8 +44,8 @@ if TYPE_CHECKING:
     metavar="FILE|SEED",
     help="Orders for a mix: a file with a line product,time for each; or drawn by a seed.",
 )
-@click.option("--video", type=shared.PATH, help="Film the run (.mp4).")
-@click.option("--log", type=shared.PATH, help="Log every tick to a file.")
+@click.option("--video", type=shared.OUT, help="Film the run (.mp4).")
+@click.option("--log", type=shared.OUT, help="Log every tick to a file.")
 @click.option(
     "--distributed", is_flag=True, help="Each robot runs its own program (paper, section 6)."
 )
@@ -83,16 +84,21 @@ def run(
     if resume:
         going = resumed(options.file, asked.max_time, out)
         return 0 if going is None else _continue(going, asked, monitor, out)
-    writable(options.file, video, log, shown.poster)
+    if asked.demand is not None:
+        reading(Path(asked.demand))
+    writable(video, log, shown.poster)
+    asked.check_with(options)
+    if asked.world == "ideal":
+        check_ideal(asked.fuse, bool(monitor))
+    if video is not None:
+        shown.area()
     project = options.project(out.silent)
+    asked.check(project)
     with Waiting("reading the shapes and laying out", out.silent):
         layout = project.layout
     warnings = announced(project.warnings, out)
     if not out.silent:
         say_allowed(project)
-    shown.area()
-    if asked.world == "ideal":
-        check_ideal(asked.fuse, bool(monitor))
     from factory.simulation.executing import run_project
 
     film = _film(project, asked, video, shown)

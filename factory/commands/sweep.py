@@ -49,7 +49,7 @@ class SweepOptions:
     metavar="KEY=VALUES",
     help="Values to vary: seed=0:100, jitter=0.1,0.3, speed=0.2:0.6:0.1 ... (repeatable).",
 )
-@click.option("-o", "--output", "database", type=shared.PATH, help="Database of the results.")
+@click.option("-o", "--output", "database", type=shared.OUT, help="Database of the results.")
 @shared.JOBS
 @click.option("--retry", is_flag=True, help="Repeat failed runs.")
 @click.option("--summary", is_flag=True, help="Print means, deviations and confidence intervals.")
@@ -115,7 +115,7 @@ def _carry_out(
     from factory.study.sweep.recipe import recipe_of
     from factory.study.sweep.sweeping import sweep
 
-    writable(options.file, database)
+    writable(database)
     axes = read_axes(vary)
     asked = asdict(options)
     for axis in axes:

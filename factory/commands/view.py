@@ -56,6 +56,7 @@ def view(
     from factory.support.interruption import Interruption
 
     check_server(host, expose)
+    asked.check_with(options)
     project = options.project(out.silent)
     layout = project.layout
     proved(layout.factory.net)

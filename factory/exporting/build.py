@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,23 +22,69 @@ from factory.modes.modes import operation_modes
 from factory.nets.verdict import Verdict
 from factory.pipeline import Project
 from factory.plant.programs import program_of, write_program
-from factory.record.plan_file import plan_files
+from factory.record.plan_file import LAYOUT_NAME, PLAN_NAME, plan_files
 from factory.simulation.modelling import physical_model
 from factory.support.errors import RunError
 from factory.support.files import own_names, write_all
 
 
+def _json(document: object) -> str:
+    return json.dumps(document, ensure_ascii=False) + "\n"
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """What the documents of a build are about."""
+
+    project: Project
+    clearance: Certificate
+    verdict: Verdict
+    model: Model
+
+
+def _programs(what: _Drawn) -> str:
+    factory = what.project.layout.factory
+    programs = (write_program(program_of(factory, robot.index)) for robot in factory.robots)
+    return "\n\n".join(programs) + "\n"
+
+
+DOCUMENTS: Mapping[str, Callable[[_Drawn], str]] = {
+    "svg": lambda what: write_svg(what.project.layout),
+    "programs.txt": _programs,
+    "proof.json": lambda what: _json(certificate(what.project.layout.factory.net, what.verdict)),
+    "clearance.json": lambda what: _json(what.clearance.as_json()),
+    "dot": lambda what: write_dot(what.project.layout.factory.net),
+    "pnml": lambda what: write_pnml(what.project.layout.factory.net),
+    "coordinated.pnml": lambda what: write_pnml(coordinated(what.project.layout).net),
+    "ways.json": lambda what: _json(ways(what.model)),
+}
+"""Everything about a factory but the model: by the endings of their files, what writes the text."""
+
+
 @dataclass(frozen=True, slots=True)
 class BuildRequest:
     """What a build writes: the model at `mjcf`, and everything into the folder `output`. The model
-    has parts for so many `units` (None: for ever) with `wip` units inside at once. `read`: files
-    that were read, beside the PAG and its meshes."""
+    has parts for so many `units` (None: for ever) with `wip` units inside at once."""
 
     mjcf: Path | None = None
     output: Path | None = None
     units: int | None = None
     wip: int | None = None
-    read: tuple[Path, ...] = ()
+
+    def model_path(self, name: str) -> Path | None:
+        """Where the model of a product of this `name` is written; None where it is not."""
+        return self.mjcf or (self.output and self.output / f"{name}.xml")
+
+    def claim(self, name: str) -> None:
+        """Declare the files that a build of this `name` writes, except meshes, before it begins.
+        Raises InputError (BadFile)."""
+        if mjcf := self.model_path(name):
+            binary = beside(mjcf)
+            chosen = () if self.mjcf else (mjcf,)
+            own_names(mjcf.parent, (*chosen, *((binary, seal_of(binary)) if binary else ())))
+        if self.output is not None:
+            documents = *(f"{name}.{end}" for end in DOCUMENTS), PLAN_NAME, LAYOUT_NAME
+            own_names(self.output, (self.output / document for document in documents))
 
 
 @dataclass(frozen=True)
@@ -57,38 +104,30 @@ def build(project: Project, verdict: Verdict, request: BuildRequest) -> Built:
     Raises RunError where the layout is not certified; InputError where an operation cannot reach
     its goal in it, where the engine refuses the model, and where a file whose name is chosen here
     would be written through a link, or over what was read. Nothing is written then."""
+    request.claim(project.name)
     layout, settings, output = project.layout, project.settings, request.output
     operation_modes(layout, settings.eps)
     clearance = layout.certificate or certify(layout)
     if not clearance.holds:
         raise RunError(fault.diagnostic() for fault in clearance.faults)
     model = written(physical_model(layout, request.units, settings, project.catalogue, request.wip))
-    mjcf, read = request.mjcf, (*files_read(project), *request.read)
-    if output is not None:
-        mjcf = mjcf or output / f"{project.name}.xml"
+    mjcf = request.model_path(project.name)
     path = beside(mjcf) if mjcf else None
     binary = _binary(model, path)
     files: dict[Path, bytes] = {}
     if mjcf is not None:
         files |= model_files(model, mjcf)
-        own_names(mjcf.parent, (files.keys() | binary.keys()) - {request.mjcf}, read)
+        own_names(mjcf.parent, (files.keys() | binary.keys()) - {request.mjcf})
     if output is not None:
-        texts = _documents(project, clearance, verdict)
-        texts["ways.json"] = _json(ways(model))
-        documents = {output / f"{project.name}.{end}": t.encode() for end, t in texts.items()}
+        what = _Drawn(project, clearance, verdict, model)
+        texts = {f"{project.name}.{end}": write(what) for end, write in DOCUMENTS.items()}
+        documents = {output / name: text.encode() for name, text in texts.items()}
         documents |= plan_files(project, output)
-        own_names(output, documents, read)
+        own_names(output, documents)
         files |= documents
     write_all(files | binary)
     named = (*files, path, seal_of(path)) if path else tuple(files)
     return Built(model, clearance, mjcf, named)
-
-
-def files_read(project: Project) -> tuple[Path, ...]:
-    """The PAG's file, and those of its meshes."""
-    named = (node.parameter("mesh") for node in project.pag.parts())
-    meshes = (Path(project.pag.folder) / str(mesh) for mesh in named if mesh)
-    return (project.file, *meshes)
 
 
 def _binary(model: Model, path: Path | None) -> dict[Path, bytes]:
@@ -100,23 +139,3 @@ def _binary(model: Model, path: Path | None) -> dict[Path, bytes]:
 
     m = load(model)
     return sealed(path, key_of(model), packed(m)) if path else {}
-
-
-def _documents(project: Project, clearance: Certificate, verdict: Verdict) -> dict[str, str]:
-    """Everything about the factory but the model, as texts by the endings of their files."""
-    layout = project.layout
-    factory = layout.factory
-    programs = (write_program(program_of(factory, r.index)) for r in factory.robots)
-    return {
-        "svg": write_svg(layout),
-        "programs.txt": "\n\n".join(programs) + "\n",
-        "proof.json": _json(certificate(factory.net, verdict)),
-        "clearance.json": _json(clearance.as_json()),
-        "dot": write_dot(factory.net),
-        "pnml": write_pnml(factory.net),
-        "coordinated.pnml": write_pnml(coordinated(layout).net),
-    }
-
-
-def _json(document: object) -> str:
-    return json.dumps(document, ensure_ascii=False) + "\n"

@@ -11,13 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from factory.exporting.subject import Subject, triangles, wanted
+from factory.geometry.glb_reader import UPRIGHT, linear
 from factory.geometry.meshes import Array, Indices, Mesh
 from factory.geometry.solids import Product, rotation
 from factory.mjcf.mesh_files import corner_normals
 from factory.problem.pag import PAG
-
-UPRIGHT = ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, -1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
-"""From z upwards to y upwards."""
 
 WORLD = "/world"
 """The outermost node."""
@@ -28,7 +26,7 @@ def new_scene(root: str) -> Any:
     import trimesh
 
     scene = trimesh.Scene(base_frame=WORLD)
-    scene.graph.update(root, WORLD, matrix=np.array(UPRIGHT))
+    scene.graph.update(root, WORLD, matrix=UPRIGHT.T)
     return scene
 
 
@@ -37,10 +35,19 @@ def written(scene: Any, binary: bool) -> bytes:
     import trimesh
 
     gltf = trimesh.exchange.gltf
+    options: dict[str, Any] = {"tree_postprocessor": _linear_colours}
     if binary:
-        return bytes(gltf.export_glb(scene, include_normals=True))
-    inside = {"merge_buffers": True, "embed_buffers": True}
-    return bytes(gltf.export_gltf(scene, include_normals=True, **inside)["model.gltf"])
+        return bytes(gltf.export_glb(scene, include_normals=True, **options))
+    options |= {"merge_buffers": True, "embed_buffers": True}
+    return bytes(gltf.export_gltf(scene, include_normals=True, **options)["model.gltf"])
+
+
+def _linear_colours(document: Any) -> None:
+    """Make the colours of a document, which are in sRGB, linear (section 3.9.2)."""
+    for material in document.get("materials", ()):
+        surface = material["pbrMetallicRoughness"]
+        *light, opacity = surface["baseColorFactor"]
+        surface["baseColorFactor"] = [*map(linear, light), opacity]
 
 
 def pose(position: ArrayLike, turn: ArrayLike) -> Array:

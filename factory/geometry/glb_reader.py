@@ -40,6 +40,9 @@ TRIANGLES, STRIP, FAN = 4, 5, 6
 Object = dict[str, Any]
 Matrix = NDArray[np.float64]
 
+UPRIGHT = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
+"""From y upwards, as in glTF by its standard (section 3.4), to z upwards."""
+
 
 Colour = tuple[float, ...] | None
 Triangles = tuple[Array, Indices]
@@ -49,7 +52,7 @@ Triangles = tuple[Array, Indices]
 @dataclass(frozen=True, slots=True)
 class GlbBody:
     """A mesh at a node: the names of node and mesh, "" for none; its primitives in place, in the
-    file's unit, and the colour of each as written, None for none."""
+    file's unit, and the colour of each in sRGB, None for none."""
 
     names: tuple[str, str]
     bodies: tuple[Triangles, ...] = field(repr=False)
@@ -57,9 +60,9 @@ class GlbBody:
 
 
 @np.errstate(all="ignore")
-def read_glb(content: bytes) -> list[GlbBody]:
-    """The bodies of a GLB file, one per node that has triangles, in the order of the scene. Raises
-    UnreadableMesh."""
+def read_glb(content: bytes, upright: Matrix = UPRIGHT) -> list[GlbBody]:
+    """The bodies of a GLB file, one per node that has triangles, in the order of the scene, turned
+    `upright` (4, 4): y is up in the file, and z in what is returned. Raises UnreadableMesh."""
     glb = _Glb(*_chunks(content))
     bodies, total = [], 0
     for node, matrix in glb.nodes():
@@ -68,7 +71,7 @@ def read_glb(content: bytes) -> list[GlbBody]:
         if total > MOST:
             raise _broken(f"its nodes have more than {MOST} triangles together")
         if shape.bodies:
-            placed = tuple(moved_by(matrix, *body) for body in shape.bodies)
+            placed = tuple(moved_by(upright @ matrix, *body) for body in shape.bodies)
             bodies.append(GlbBody((_name(node), shape.names[1]), placed, shape.colours))
     return bodies
 
@@ -77,6 +80,18 @@ def moved_by(matrix: Matrix, vertices: Array, faces: Indices) -> Triangles:
     """Triangles after an affine map (4, 4), still oriented outwards if it mirrors them."""
     flips = bool(np.linalg.det(matrix[:3, :3]) < 0)
     return vertices @ matrix[:3, :3].T + matrix[:3, 3], faces[:, ::-1] if flips else faces
+
+
+def gamma_encoded(light: float) -> float:
+    """A linear component of a colour in sRGB (IEC 61966-2-1); colours of glTF are linear (section
+    3.9.2)."""
+    return float(12.92 * light if light <= 0.0031308 else 1.055 * light ** (1 / 2.4) - 0.055)
+
+
+def linear(component: float) -> float:
+    """The inverse of `gamma_encoded`."""
+    encoded = component / 12.92 if component <= 0.04045 else ((component + 0.055) / 1.055) ** 2.4
+    return float(encoded)
 
 
 def _chunks(content: bytes) -> tuple[Object, bytes]:
@@ -235,7 +250,8 @@ class _Glb:
         if not isinstance(surface, dict) or "baseColorFactor" not in surface:
             return None
         factor = np.clip(_numbers(surface["baseColorFactor"], 4, "a colour"), 0, 1)
-        return tuple(round(float(x), 3) for x in factor)
+        light = [*map(gamma_encoded, factor[:3]), float(factor[3])]
+        return tuple(round(x, 3) for x in light)
 
     def accessor(self, number: object, width: int) -> NDArray[Any]:
         """The numbers (n, width) of an accessor."""

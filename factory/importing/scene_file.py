@@ -14,6 +14,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import numpy as np
+
 from factory.geometry.glb_reader import Colour, GlbBody, read_glb
 from factory.geometry.mesh_file import EXPECTED, MeshFile, UnreadableMesh, checked
 from factory.geometry.mesh_reader import read_mesh
@@ -34,6 +36,9 @@ STATED = {
     ".step": ("m", "a STEP file states its unit", True),
 }
 """The unit of length by format, the rule that states it, and whether the file itself does."""
+
+Y_UP = "y is up in a GLB file by its standard; --up -y where it was written with z up"
+"""The note on the axes of a GLB file, which become x, -z, y."""
 
 NAMELESS = re.compile(
     r"(?i)(|=>.*|\W*\d*\W*|(nauo|node|mesh|object|geometry|solid|body|group|component|world)"
@@ -81,7 +86,8 @@ def read_scene(content: bytes, suffix: str) -> Bodies:
     if not bodies:
         checked((), kind)
     if kind != ".step":
-        return Bodies(tuple(bodies), *stated, _merged(bodies))
+        axes = (Y_UP,) * (kind == ".glb")
+        return Bodies(tuple(bodies), *stated, (*axes, *_merged(bodies)))
     parts = [solids_of(body) for body in bodies]
     notes = [
         f"component '{body.name}' has {len(solids)} solids: one part each"
@@ -153,14 +159,11 @@ def read_step(content: bytes) -> list[GlbBody]:
             raise UnreadableMesh("it has too many triangles: export it as GLB, coarser") from None
     return [
         GlbBody(body.names, body.bodies, tuple(map(_stated, body.colours)))
-        for body in read_glb(glb)
+        for body in read_glb(glb, np.eye(4))  # the axes are those of the STEP file
     ]
 
 
-def _stated(linear: Colour) -> Colour:
-    """A colour as STEP states it, in sRGB; glTF has linear values (IEC 61966-2-1). What is
-    fully transparent is opaque here: SolveSpace writes opacity in place of transparency."""
-    if linear is None:
-        return None
-    light = [12.92 * x if x <= 0.0031308 else 1.055 * x ** (1 / 2.4) - 0.055 for x in linear[:3]]
-    return (*(round(x, 3) for x in light), linear[3] or 1.0)
+def _stated(colour: Colour) -> Colour:
+    """A colour as STEP states it. What is fully transparent is opaque here: SolveSpace writes
+    opacity in place of transparency."""
+    return colour and (*colour[:3], colour[3] or 1.0)

@@ -119,6 +119,8 @@ class _Model:
             parser.Parse(text, True)
         except expat.ExpatError as error:
             raise _broken(f"line {error.lineno} of {self.file} is not XML") from None
+        except (LookupError, ValueError):
+            raise _broken(f"{self.file} has an encoding that is not read: write UTF-8") from None
 
     def _doctype(self, *_: object) -> None:
         raise _broken("a document type declaration is not accepted")

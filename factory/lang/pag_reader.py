@@ -36,6 +36,7 @@ from factory.problem.pag import PAG, AllowedOverlap, Assembly
 from factory.problem.template import Template
 from factory.support.collector import collector_paused
 from factory.support.errors import did_you_mean, usage_error
+from factory.support.guard import reading
 
 KINDS = {
     ".pnml": (
@@ -71,7 +72,7 @@ def read_pag(
     text: str, templates: Mapping[str, Template], file: str = "<text>", folder: str | None = "."
 ) -> PAG:
     """The PAG of a text. Mesh paths start at `folder`; they are not followed where that is None.
-    Raises InputError."""
+    Raises InputError, also where its file or a mesh will be written over."""
     findings = Findings(source_of(text, file))
     statements = read_statements(findings)
     signatures = {name: signature(template) for name, template in templates.items()}
@@ -83,7 +84,10 @@ def read_pag(
     allowed = allowances_of(statements, nodes, unit, findings)
     findings.raise_if_any()
     count = next((int(token.lstrip("0") or 0) for token in statements.counts), None)
-    return PAG(str(statements.roots[0]), nodes, count, folder or ".", file, allowed, mix)
+    pag = PAG(str(statements.roots[0]), nodes, count, folder or ".", file, allowed, mix)
+    if folder is not None:
+        reading(*pag.files)
+    return pag
 
 
 def unit_of(statements: Statements, findings: Findings) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import TYPE_CHECKING
 
 from factory.plant.factory import Factory
@@ -46,8 +47,10 @@ class Ground:
 
     def __post_init__(self) -> None:
         check_values({"cycle": self.cycle, "tile": self.tile})
-        if self.floor is not None and not all(0 < side <= WIDEST for side in self.floor):
-            message = f"floor = {self.floor} is not two positive lengths up to {WIDEST} m"
+        sides = self.floor if isinstance(self.floor, tuple) else ()
+        fits = len(sides) == 2 and all(isinstance(x, Real) and 0 < x <= WIDEST for x in sides)
+        if self.floor is not None and not fits:
+            message = f"floor = {self.floor!r:.60} is not two positive lengths up to {WIDEST} m"
             raise InputError(Diagnostic("BadValue", message, None, "for example (4.0, 3.0)"))
 
     @property

@@ -36,7 +36,7 @@ def write_planned(
     made = planned_product(placed, *tree, source.name, allow, templates, planned.screws)
     files = {folder / name: content for name, content in made.files.items()}
     files |= _settings(folder / NAME, planned.lines)
-    own_names(folder, files, [source])
+    own_names(folder, files)
     write_all(files)
     return tuple(files)
 

@@ -70,6 +70,15 @@ class Word:
         return self.demand is not None and self._admits and self._letter() is None
 
     @property
+    def late_order(self) -> str:
+        """The order that is awaited, in words, where one is late; else ""."""
+        if self.demand is None or not self.is_late:
+            return ""
+        number = len(self.units)
+        product, placed = self.demand.orders[number]
+        return f"order {number + 1}, {product}, is placed at {placed:g} s only"
+
+    @property
     def _admits(self) -> bool:
         number = len(self.units)
         return number < self.most and (self.wip is None or number < self.made + self.wip)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 from types import MappingProxyType
 
 from factory.support.errors import Diagnostic, InputError, Position
@@ -135,6 +136,13 @@ class PAG(Pictured):
             raise InputError(Diagnostic("BadMix", message, None, hint))
         counts = tuple((product, sequence.count(product)) for product in self.products)
         return replace(self, mix=Mix(counts, tuple(sequence)))
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The file of its text, and those of its meshes."""
+        named = (node.parameter("mesh") for node in self.parts())
+        meshes = dict.fromkeys(str(mesh) for mesh in named if mesh)
+        return Path(self.file), *(Path(self.folder) / mesh for mesh in meshes)
 
     @property
     def title(self) -> str:

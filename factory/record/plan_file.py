@@ -12,19 +12,22 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from factory.lang.source import read_text
 from factory.layout.request import Ground
 from factory.layout.saved import LAID_FOR, LayoutTable
 from factory.pipeline import Project
 from factory.problem.pag import PAG
 from factory.record.project_table import ProjectTable, project_of, project_table
 from factory.support.errors import Diagnostic, InputError, Position
-from factory.support.files import MESH, TEXT, read_bytes
+from factory.support.files import MESH, read_bytes
 from factory.support.settings import Settings
-from factory.support.tables import table_of, value_of
+from factory.support.tables import MISFITS, table_of, value_of
 
 PLAN_NAME, LAYOUT_NAME = "plan.json", "layout.json"
 
 SCHEMA, LAYOUT_SCHEMA = "factory.plan.1", "factory.layout.2"
+
+MISFIT = "no factory has this plan: its turns, forms and templates do not fit each other"
 
 AGAIN = "write it again: `factory build FILE.pag -o DIR`"
 
@@ -45,6 +48,8 @@ class PlanFile:
         this plan and for these; `warn` is told where it is not. Raises InputError."""
         with _of_a_plan(self.path):
             made = project_of(self.table, self.path.parent, settings, ground)
+        with _fitting(self.path):
+            made.plain  # noqa: B018 (compiled once)
         path = self.path.parent / LAYOUT_NAME
         why = f"there is no '{path}'"
         if path.is_file():
@@ -55,6 +60,9 @@ class PlanFile:
             why = f"'{path}' is of another plan, or for other settings, meshes or floor"
         hint = "`factory build` with `-o DIR` writes both files"
         warn(Diagnostic("BadPlan", f"{why}: the plan is laid out again", None, hint))
+        if made.plan.turns:
+            with _fitting(self.path):
+                made.layout  # noqa: B018 (laid out once)
         return made
 
 
@@ -109,7 +117,7 @@ def _digest(
 
 def _table(path: Path, schema: str) -> dict[str, Any]:
     """The table in a file. Raises OSError, ValueError."""
-    table = json.loads(read_bytes(path, TEXT))
+    table = json.loads(read_text(path))
     if not isinstance(table, dict) or table.get("schema") != schema:
         stated = table.get("schema") if isinstance(table, dict) else table
         words = f"its schema must be '{schema}', not {stated!r:.40}"
@@ -133,3 +141,13 @@ def _of_a_plan(path: Path) -> Iterator[None]:
     except (ValueError, KeyError, RecursionError) as error:
         words = f"it has no {error}" if isinstance(error, KeyError) else str(error)
         raise InputError(Diagnostic("BadPlan", words, Position(str(path), 1, 1), AGAIN)) from error
+
+
+@contextmanager
+def _fitting(path: Path) -> Iterator[None]:
+    """Raises InputError (BadPlan) where the values of a plan do not fit each other."""
+    try:
+        yield
+    except MISFITS as error:
+        at = Position(str(path), 1, 1)
+        raise InputError(Diagnostic("BadPlan", MISFIT, at, AGAIN)) from error

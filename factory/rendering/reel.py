@@ -9,8 +9,7 @@ import imageio.v3 as iio
 from factory.rendering.camerawork import Camerawork, Moment, Take
 from factory.rendering.ink import Pixels
 from factory.rendering.video import VideoFile, check_output
-from factory.support.errors import Diagnostic, InputError
-from factory.support.files import write_bytes
+from factory.support.files import unwritten, write_bytes
 from factory.support.resource import Closing
 
 SAMPLES = 24
@@ -120,5 +119,4 @@ def write_still(path: Path, pixels: Pixels) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_bytes(path, content)
     except OSError as error:
-        message = f"'{path}' cannot be written: {error.strerror}"
-        raise InputError(Diagnostic("BadValue", message, None, "choose another file")) from error
+        raise unwritten(path, error) from error

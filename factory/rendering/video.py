@@ -11,10 +11,12 @@ less (docs/decisions/films.md)."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from fractions import Fraction
+from io import FileIO
 from math import isfinite
 from pathlib import Path
 from types import MappingProxyType
@@ -47,6 +49,9 @@ ENCODERS: Mapping[str, Mapping[str, str]] = MappingProxyType(
 without what is under the GPL, VP9. Neither reorders frames."""
 
 LARGEST, SMALLEST = 7680, 16
+
+HEADER = 4096
+"""Room for the header of a film [bytes]."""
 
 
 def check_output(
@@ -94,13 +99,12 @@ class VideoFile(Closing):
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self.claim = claimed(path)
+            _reserve(path, self.claim)
             kind, options = FRAGMENTS[path.suffix.lower()]
             options = {**options, "flush_packets": "1"}
             self.container: Any = av.open(str(path), "w", format=kind, options=options)
         except OSError as error:
-            raise _bad(
-                f"'{path}' cannot be written: {error.strerror}", "choose another file"
-            ) from error
+            raise unwritten(path, error) from error
         self.stream: Any = self.container.add_stream(encoder, rate=rate)
         self.stream.width, self.stream.height = size
         self.stream.pix_fmt = "yuv420p"
@@ -164,6 +168,20 @@ class VideoFile(Closing):
             yield
         except OSError as error:
             raise unwritten(self.path, error) from error
+
+
+def _reserve(path: Path, file: FileIO) -> None:
+    """Raises OSError, and leaves no file, where there is no room for a film's header: without it
+    FFmpeg crashes at the end."""
+    if not path.is_file():
+        return
+    try:
+        os.posix_fallocate(file.fileno(), 0, HEADER)
+    except OSError:
+        file.close()
+        path.unlink()
+        raise
+    file.truncate(0)
 
 
 def _rewrap(path: Path, rate: Fraction) -> None:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import random
-from math import isfinite
+import re
 from pathlib import Path
 
 from factory.plant.demand import Demand
 from factory.problem.pag import PAG
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 from factory.support.files import TABLE, read_bytes
+
+MOST = 10**9
+"""The latest time of an order [s], and the largest count."""
 
 COLUMNS = ("product,time", "product,made", "product")
 HINT = (
@@ -78,10 +81,11 @@ def read_demand(path: Path, pag: PAG) -> Demand:
     return Demand(tuple(orders))
 
 
+NUMBER = re.compile(r"([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]{1,2})?")
+"""A number as people write it."""
+
+
 def _number(text: str) -> float | None:
-    """A non-negative number; None for anything else."""
-    try:
-        number = float(text)
-    except ValueError:
-        return None
-    return number if isfinite(number) and 0 <= number <= 1e9 else None
+    """A non-negative number, at most MOST; None for anything else."""
+    number = float(text) if NUMBER.fullmatch(text) else MOST + 1.0
+    return number if number <= MOST else None

@@ -117,7 +117,8 @@ def carry_out(
                 record = watched(made, seeing, max_time, glances, bool(monitor), since)
             for recorder in opened:
                 recorder.end(record.trouble)
-            return record
+        stop.observe()  # a signal while the recorders finish their files
+        return record
     except KeyboardInterrupt as error:
         came = CutOff(made.world.time, made.world.delivered() - made.before, made.request.units)
         message = f"stopped by the user, {came}"

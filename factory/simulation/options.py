@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from factory.support.bounds import WORLDS, WorldName, check_choice, check_values
 from factory.support.errors import Diagnostic, InputError, usage_error
@@ -87,6 +87,33 @@ class RunOptions:
         """Whether the run recovers from failures."""
         return self.faults is not None or self.spares > 0
 
+    def check_with(self, ground: Any) -> None:
+        """Raises InputError (BadValue) where options of the run do not go together, or not with
+        those of a `ground` or of a command that has these. Nothing is laid out for that."""
+        check_together(
+            {
+                "--demand": self.demand is not None,
+                "--from": self.start is not None,
+                "--distributed": self.distributed,
+                "--faults": self.faults is not None,
+                "--spares": self.spares > 0,
+                "--deputies": ground.deputies,
+            }
+        )
+
+    def check(self, project: Project) -> None:
+        """The same, before a project is laid out; files are read, but for pipes, which are read
+        once. Raises InputError."""
+        from factory.simulation.demand_file import demand_of
+
+        self.check_with(project.ground)
+        if self.demand is not None and not Path(self.demand).is_fifo():
+            demand_of(self.demand, project.pag, self.units)
+        if self.faults is not None and not self.faults.is_fifo():
+            from factory.simulation.recovery.fault_file import read_campaign
+
+            read_campaign(self.faults)
+
     def campaign(self, factory: Factory) -> Campaign:
         """The faults of the run, and its spares. Raises InputError."""
         from factory.simulation.recovery.fault_file import check_names, read_campaign
@@ -106,17 +133,8 @@ class RunOptions:
         from factory.simulation.demand_file import demand_of
         from factory.simulation.request import RunRequest
 
+        self.check_with(project.ground)
         layout, start, units, demand = project.layout, self.start, self.units, None
-        check_together(
-            {
-                "--demand": self.demand is not None,
-                "--from": start is not None,
-                "--distributed": self.distributed,
-                "--faults": self.faults is not None,
-                "--spares": self.spares > 0,
-                "--deputies": project.ground.deputies,
-            }
-        )
         if self.demand is not None:
             demand = demand_of(self.demand, project.pag, units)
             units = len(demand.orders) or units

@@ -320,14 +320,14 @@ class Simulation:
         )
 
     def _trouble(self, code: str, what: str, hint: str) -> Diagnostic:
-        """Names the robots that are in an operation, or else those that wait for one that cannot
-        start."""
+        """Names the order that has not been placed, the robots that are in an operation, or else
+        those that wait for one that cannot start."""
         factory, supervisor = self.supervisor.factory, self.supervisor
         numbers = supervisor.active.operations or tuple(o.index for o in supervisor.awaited())
         places = [factory.operations[n] for n in numbers[:3]]
         pairs = ((factory.robots[r].name, o) for o in places for r in o.robots)
         robots = ", ".join(f"{name} in {o.template.name}({o.label})" for name, o in pairs)
-        message = f"{what}; {robots or 'no robot can start'}"
+        message = f"{what}; {self.word.late_order or robots or 'no robot can start'}"
         return Diagnostic(code, message, places[0].position if places else None, hint)
 
 

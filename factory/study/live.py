@@ -20,6 +20,9 @@ from factory.timing.timing import Timing
 UNITS = 24
 """Number of units of one product from which its cycle time is taken."""
 
+FAMILY_NAME, ORDERS_NAME = "family.pag", "live.csv"
+"""Files of a change: the mix of both products, and orders for it."""
+
 
 @dataclass(frozen=True)
 class LiveChange:
@@ -61,7 +64,7 @@ class LiveChange:
         """The texts of the family, and of the orders of a change and one back, by their names."""
         changes = (self.old, 0), (self.new, 6), (self.old, 12)
         rows = "".join(f"{product},{made}\n" for product, made in changes)
-        return {"family.pag": write_pag(self.both.pag), "live.csv": f"product,made\n{rows}"}
+        return {FAMILY_NAME: write_pag(self.both.pag), ORDERS_NAME: f"product,made\n{rows}"}
 
     def as_json(self) -> dict[str, Any]:
         """The key `live` of `revise --json`."""

@@ -125,3 +125,17 @@ def _faults(name: str, value: Any) -> Iterator[Diagnostic]:
     if value is not None and not inside:
         hint = f"{name} is a {noun}, {least} {low} and at most {high}"
         yield Diagnostic("Usage", f"{name} = {value!r:.60} is not valid", None, hint)
+
+
+def pair(text: str, option: str, example: str, number: type, most: int) -> tuple[Any, Any]:
+    """`4x3` as two positive numbers of at most `most`. Raises InputError (BadValue)."""
+    try:
+        width, depth = (number(word) for word in text.lower().split("x"))
+        if "_" in text or not (0 < width <= most and 0 < depth <= most):
+            raise ValueError
+    except ValueError:
+        message = f"{option} takes two positive numbers up to {most}, not '{text}'"
+        raise InputError(
+            Diagnostic("BadValue", message, None, f"for example {option} {example}")
+        ) from None
+    return width, depth

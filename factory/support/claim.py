@@ -6,6 +6,7 @@ from io import FileIO
 from pathlib import Path
 
 from factory.support.errors import Diagnostic, InputError
+from factory.support.guard import about_to_write
 
 IN_USE = "is being written by another run", "give another name, or wait until that run ends"
 """The fault of a claimed file, and its remedy."""
@@ -16,8 +17,10 @@ def claimed(path: Path) -> FileIO:
 
     The claim is a lock of the operating system, which ends with the process, however that ends. A
     pipe or a device is not claimed. Raises InputError (BadFile) where another process holds it,
-    which leaves that one's file as it is, and OSError where it cannot be opened.
+    which leaves that one's file as it is, and where it is an input; OSError where it cannot be
+    opened.
     """
+    about_to_write(path)
     file = _claimed(path, "a")
     if path.is_file():
         file.truncate(0)

@@ -20,6 +20,7 @@ from types import MappingProxyType, ModuleType
 from typing import Any
 
 from factory.support.errors import Diagnostic, FactoryError, InputError, Position
+from factory.support.guard import reading
 
 HINT = "mend that line; docs: Extensions"
 
@@ -50,12 +51,33 @@ def extension_folders(kind: str) -> list[Path]:
     return folders
 
 
+def extension_files() -> Iterator[Path]:
+    """The files of all packages with entry points, and the folders in them; nothing is loaded."""
+    from importlib.metadata import entry_points
+    from importlib.util import find_spec
+
+    points = entry_points()
+    groups = sorted(group for group in points.groups if group.startswith("factory."))
+    for name in sorted(
+        {p.module.partition(".")[0] for g in groups for p in points.select(group=g)}
+    ):
+        spec = find_spec(name)
+        if spec is None:
+            continue
+        folders = map(Path, spec.submodule_search_locations or ())
+        inside = (path for folder in folders for path in (folder, *sorted(folder.rglob("*"))))
+        yield from (path for path in inside if "__pycache__" not in path.parts)
+        if spec.submodule_search_locations is None and spec.origin:
+            yield Path(spec.origin)
+
+
 def user_modules(folder: Path) -> Iterator[ModuleType]:
     """The modules in a folder of the user, by name. Raises InputError: Usage, BadExtension."""
     if not folder.is_dir():
         message = f"'{folder}' is no folder"
         raise InputError(Diagnostic("Usage", message, None, "give a folder with modules (*.py)"))
     for path in sorted(folder.glob("*.py")):
+        reading(path)
         spec = spec_from_file_location(f"factory_user_{path.stem}", path)
         assert spec is not None and spec.loader is not None
         module = module_from_spec(spec)

@@ -15,6 +15,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from factory.support.errors import Diagnostic, InputError
+from factory.support.guard import about_to_write, declare, reading
 
 AGAIN = "record it again: `factory run FILE.pag --log OUT`"
 """What helps where a log cannot be used."""
@@ -40,8 +41,10 @@ def read_bytes(path: Path, most: int) -> bytes:
     """The content of a file, or what comes through a pipe: at most so many bytes.
 
     Raises OSError where it cannot be read. Refused before anything is read are folders, devices and
-    larger files; pipes as soon as more has come, or that nothing writes to.
+    larger files; pipes as soon as more has come, or that nothing writes to. It is an input then,
+    which is not written over: raises InputError where it will be.
     """
+    reading(path)
     status = os.stat(path)
     is_file, is_pipe = stat.S_ISREG(status.st_mode), stat.S_ISFIFO(status.st_mode)
     if stat.S_ISDIR(status.st_mode):
@@ -70,6 +73,7 @@ def read_bytes(path: Path, most: int) -> bytes:
 def mapped(path: Path, most: int) -> memoryview:
     """The content of a file, or what comes through a pipe, as `read_bytes` gives it; of a large
     file what is asked for alone is read."""
+    reading(path)
     status = os.stat(path)
     if not (stat.S_ISREG(status.st_mode) and LARGE < status.st_size <= most):
         return memoryview(read_bytes(path, most))
@@ -110,8 +114,10 @@ def write_all(contents: Mapping[Path, bytes]) -> None:
     """Write files, and the folders they need: all of them or, where one cannot be written, none.
 
     A link is followed; a pipe or a device is written in place. The permissions of a file stay as
-    they are. Raises OSError.
+    they are. Raises OSError, and InputError (BadFile) where one is an input.
     """
+    for path in contents:
+        about_to_write(path)
     made: list[Path] = []
     partials: dict[Path, Path] = {}
     try:
@@ -157,10 +163,10 @@ def make_folder(folder: Path) -> list[Path]:
     return made
 
 
-def own_names(folder: Path, paths: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
-    """Check paths in a folder whose names the program chooses: none is a link, and none is an input
-    that would be written over. Raises InputError (BadFile)."""
-    paths, read = list(paths), set(map(os.path.realpath, inputs))
+def own_names(folder: Path, paths: Iterable[Path]) -> None:
+    """Declare files in a folder whose names the program chooses, and check them: none is a link, an
+    input, or named by the user too. Raises InputError (BadFile)."""
+    paths = list(paths)
     below = {f for path in paths for f in (path, *path.parents) if folder in f.parents}
     hint = "remove it, or choose another folder"
     faults = [
@@ -168,12 +174,7 @@ def own_names(folder: Path, paths: Iterable[Path], inputs: Iterable[Path] = ()) 
         for path in sorted(below)
         if path.is_symlink()
     ]
-    faults += [
-        Diagnostic("BadFile", f"'{path}' is read and would be written over", None, "choose another")
-        for path in paths
-        if os.path.realpath(path) in read
-    ]
-    if faults:
+    if faults := faults + declare(paths, chosen=True):
         raise InputError(faults)
 
 

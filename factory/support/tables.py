@@ -17,6 +17,12 @@ from factory.support.errors import InputError, did_you_mean
 
 T = TypeVar("T")
 
+MISFITS = (
+    *(ArithmeticError, AssertionError, AttributeError, LookupError),
+    *(RecursionError, TypeError, ValueError),
+)
+"""What is raised where values of a table have the right types and do not fit each other."""
+
 LARGE = 10**9
 """Upper bound on every length [m] and time [s] in a table."""
 

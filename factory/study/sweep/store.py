@@ -18,6 +18,7 @@ from factory.study.sweep.grid import FAULT_RATE, KEYS, WHOLE, Value
 from factory.study.sweep.recipe import name_of
 from factory.study.sweep.work import FAILING_FIGURES, FIGURES, Outcome
 from factory.support.errors import Diagnostic, InputError
+from factory.support.guard import about_to_write
 from factory.support.resource import Closing
 
 COLUMNS: Mapping[str, str] = {
@@ -153,6 +154,8 @@ def reading(path: Path) -> Iterator[tuple[dict[str, Any], Iterator[Mapping[str, 
 
 
 def _connect(path: Path, mode: str = "rwc") -> sqlite3.Connection:
+    if mode == "rwc":
+        about_to_write(path)
     uri = f"{path.absolute().as_uri()}?mode={mode}"
     return sqlite3.connect(uri, timeout=PATIENCE, isolation_level=None, uri=True)
 
