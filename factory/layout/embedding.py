@@ -138,7 +138,7 @@ def _reason(layout: Layout, fault: Fault) -> Diagnostic:
                 f"{', '.join(fault.robots)}: `factory check --clashes DIR` draws the nearest miss"
             )
             made = factory.by_label.get(label)
-            return Diagnostic("NoGrip", message, made and made.position, hint)
+            return Diagnostic("NoGrip", message, made.position if made else None, hint)
     return fault.diagnostic()
 
 
