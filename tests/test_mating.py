@@ -515,7 +515,7 @@ right = atomic ( box = (0.01, 0.06, 0.03), pos = (0.025, 0, 0.025) );
 front = atomic ( box = (0.0398, 0.01, 0.03), pos = (0, -0.025, 0.025) );
 rear = atomic ( box = (0.0398, 0.01, 0.03), pos = (0, 0.025, 0.025) );
 lid = atomic ( box = (0.06, 0.06, 0.01), pos = (0, 0, 0.045) );
-b = atomic ( box = (0.03, 0.03, 0.02), pos = (0, 0, 0.022) )
+b = atomic ( box = (0.03, 0.03, 0.02), pos = (0, 0, 0.02) )
 """
 
 
@@ -575,10 +575,10 @@ def test_of_many_blocked_operations_the_first_are_told_and_how_many_more() -> No
 def test_all_pairs_that_clash_in_one_operation_are_one_entry(run: Terminal, closed: Path) -> None:
     """Three parts in a closed box: one line, one entry, every pair in it."""
     text = CLOSED.replace("b = atomic", "b = mate ( b1, b2, b3 ); b1 = atomic").replace(
-        "(0.03, 0.03, 0.02), pos = (0, 0, 0.022)", "(0.008, 0.03, 0.02), pos = (0, 0, 0.022)"
+        "(0.03, 0.03, 0.02), pos = (0, 0, 0.02)", "(0.008, 0.03, 0.02), pos = (0, 0, 0.02)"
     )
     for name, x in (("b2", -0.0101), ("b3", 0.0101)):
-        text += f"; {name} = atomic ( box = (0.008, 0.03, 0.02), pos = ({x}, 0, 0.022) )"
+        text += f"; {name} = atomic ( box = (0.008, 0.03, 0.02), pos = ({x}, 0, 0.02) )"
     closed.write_text(text)
     document = run("check", closed, "--no-hands", "--json").json
     (clashes,), (warning,) = document["clashes"], document["warnings"]
