@@ -11,6 +11,7 @@ import numpy as np
 
 from factory.nets.marked import NONE, MarkedNet
 from factory.nets.petri import PetriNet, Place
+from factory.simulation.run import steady_from
 from factory.study.analysis.firing import Floats, Slack, circuits, earliest_firings
 from factory.timing.timed import FEEDER, OUTFEED, SAME, Timed, timed
 from factory.timing.timing import AS_IT_IS, Change, Timing
@@ -201,7 +202,7 @@ def _alone(timing: Timing, change: Change) -> list[int]:
 APART = 1e-3
 """Relative deviation of the mean interval up to which the pace counts as reached."""
 
-LEAST, MOST = 4, 100
+MOST = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -302,9 +303,10 @@ def steady_units(timing: Timing) -> int:
 def reached(dates: Floats, pace: float, period: int = 1) -> int:
     """The same number, for the `dates` [s] of at least 4 dropoffs, with `period` of them in a
     cycle; the number of all if the pace is not reached."""
-    units = np.arange(LEAST, len(dates) + 1)
+    least = steady_from(period)
+    units = np.arange(least, len(dates) + 1)
     count = units - units // 2
-    count -= np.where(count >= period, count % period, 0)
+    count -= count % period
     mean = (dates[units - 1] - dates[units - 1 - count]) / count
     late = np.flatnonzero(np.abs(mean / pace - 1) > APART)
-    return min(LEAST + int(late[-1]) + 1, len(dates)) if len(late) else LEAST
+    return min(least + int(late[-1]) + 1 if len(late) else least, len(dates))

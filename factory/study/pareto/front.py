@@ -18,6 +18,7 @@ from factory.plant.fused_bodies import fusing_pays
 from factory.record.plan_file import PLAN_NAME, plan_files
 from factory.record.state import Observer
 from factory.simulation.request import RunRequest
+from factory.simulation.run import steady_from
 from factory.simulation.simulation import Simulation
 from factory.simulation.watched import watched
 from factory.study.allocation.aim import Least
@@ -63,7 +64,7 @@ SEED, JITTER = 0, 0.3
 """Seed and jitter of the robots' speeds and gains."""
 
 MOST = 24
-"""Upper bound on the products of a trial."""
+"""Upper bound on the products of a trial, but for those of two periods of the net."""
 
 CLOSE = 0.02
 """Relative error up to which a prediction holds."""
@@ -106,9 +107,10 @@ class Trial:
 
 def tried(project: Project, glances: Sequence[Observer] = ()) -> Trial:
     """The trial of a project's factory: as many units as are needed to reach the pace of its net,
-    at most MOST."""
+    at most MOST, or two periods."""
     layout, settings = project.layout, project.settings
-    units = min(MOST, steady_units(Timing(layout, settings, "mujoco", SEED, JITTER)))
+    most = max(MOST, steady_from(layout.factory.period))
+    units = min(most, steady_units(Timing(layout, settings, "mujoco", SEED, JITTER)))
     fuse = fusing_pays(layout.factory, layout.product)
     asked = RunRequest("mujoco", units, SEED, JITTER, settings, fuse=fuse, shown=False)
     asked = replace(asked, catalogue=project.catalogue)
