@@ -201,10 +201,11 @@ class Project:
     def warnings(self) -> tuple[Diagnostic, ...]:
         """What is wrong with the geometry of its parts, which touch no others, what overlaps, what
         is blocked, and what no hand can hold, unless the product is of an unlikely size."""
-        from factory.geometry.touching_groups import apart_in
+        apart: tuple[Diagnostic, ...] = ()
+        if self.pag.is_shaped:
+            from factory.geometry.touching_groups import apart_in
 
-        insides = self.pag.insides if self.pag.mix else ()
-        apart = apart_in(self.product, *insides) if self.pag.is_shaped else ()
+            apart = apart_in(self.product, *(self.pag.insides if self.pag.mix else ()))
         product = () if self.pag.is_plain else self.product.warnings
         blocked = self.matings.faults(self.pag.allowed) if self.matings else ()
         sized = any(warning.code == "Size" for warning in product)

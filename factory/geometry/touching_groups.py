@@ -1,4 +1,4 @@
-"""TouchingGroups of parts of a finished product that touch each other."""
+"""Groups of parts of a finished product that touch each other."""
 
 from __future__ import annotations
 
@@ -63,10 +63,14 @@ def _gap(one: Solid, other: Solid, reach: float) -> float:
     other, as with links of a chain. An open mesh is represented by its hull."""
     from manifold3d import Manifold
 
-    hulls: list[Any] = [Manifold.hull_points(solid.corners) for solid in (one, other)]
+    bodies = [drawn(solid) for solid in (one, other)]
+    hulls: list[Any] = [
+        body.hull() if body else Manifold.hull_points(solid.corners)
+        for body, solid in zip(bodies, (one, other), strict=True)
+    ]
     if (hulls[0] ^ hulls[1]).volume() > 0:
         return 0.0
-    pair = [drawn(solid) or hull for solid, hull in zip((one, other), hulls, strict=True)]
+    pair = [body or hull for body, hull in zip(bodies, hulls, strict=True)]
     return float(pair[0].min_gap(pair[1], reach))
 
 
