@@ -59,13 +59,12 @@ class Project:
     @classmethod
     def of_made(cls, made: Factory | Layout, settings: Settings | None = None) -> Project:
         """The project of a factory or a layout, neither of which is made again. Without `settings`
-        they are the default ones, with the clearance and the hands of a layout."""
+        they are the default ones, with the clearance of a layout."""
         layout = None if isinstance(made, Factory) else made
         plain = made if isinstance(made, Factory) else (made.plain or made).factory
         ground, stages = Ground(), dict[str, Any](plain=plain, planned=plain)
         if layout is not None:
-            hands = int(bool(layout.hands))
-            settings = settings or Settings(clearance=layout.clearance, hands=hands)
+            settings = settings or Settings(clearance=layout.clearance)
             ground = Ground(relay=layout.plain is not None, deputies=layout.standby is not None)
             stages["layout"] = layout
             if plain.period == 1:
@@ -214,10 +213,8 @@ class Project:
         return (*product, *apart, *overlaps, *blocked, *grips)
 
     @cached_property
-    def _hands(self) -> Hands | None:
-        """The hands to choose from, where they are chosen."""
-        if not self.settings.hands:
-            return None
+    def _hands(self) -> Hands:
+        """The hands to choose from."""
         unlifted = not self.plain.adjusted and "_unlifted" in self.__dict__
         return self._unlifted if unlifted else hands_of(self.plain, self.product, self.settings)
 
@@ -228,8 +225,8 @@ class Project:
 
     @cached_property
     def no_grips(self) -> tuple[NoGrip, ...]:
-        """What no hand can hold, where hands are chosen; nothing for a product of default boxes."""
-        if not self.pag.is_shaped or self._hands is None:
+        """What no hand can hold; nothing for a product of default boxes."""
+        if not self.pag.is_shaped:
             return ()
         from factory.layout.hands.nearest import no_grips
 
@@ -239,7 +236,7 @@ class Project:
     def plain(self) -> Factory:
         """The factory of the plan, without relays. Raises InputError where there is none."""
         factory, plan = self.planned, self.planned.plan
-        if not (self.settings.hands and plan.turns) or plan.lifts is not None:
+        if not plan.turns or plan.lifts is not None:
             return factory
         from factory.layout.hands.adjusting import lifts_for
 

@@ -92,13 +92,13 @@ def test_a_run_says_that_ways_were_blocked_unless_they_are_allowed(
     file.write_text(CLOSED % "")
     options = [word for one in allow for word in ("--allow", one)]
     words = "core cannot come to all: core and front 35.00 mm"
-    checked = run("check", file, "--no-hands", *options)
+    checked = run("check", file, *options)
     assert checked.status == 0 and (words in checked.err) == said
     passes = "a pair of parts passes through each other on the way by up to 35.00 mm"
     assert (passes in checked.out) == (not said)
     counted = "1 blocked" if said else "1 allowed to pass through each other, 0 blocked"
     assert f" lowered, {counted}" in checked.out
-    done = run("run", file, "--no-hands", *options, "--log", log)
+    done = run("run", file, *options, "--log", log)
     watched = run("monitor", log)
     last = f"succeeded, but parts passed through each other in 1 operation (Blocked: {words}"
     assert (done.status, watched.status) == (0, 0)
@@ -211,7 +211,7 @@ def test_parts_that_touch_nowhere_or_lie_inside_another_are_named(
     ):
         file = tmp_path / f"product{number}.pag"
         file.write_text(PLACED % (b, c))
-        done = run("check", file, "--no-hands")
+        done = run("check", file)
         assert done.status == 0
         assert found in done.err if found else "warning" not in done.err
         assert ("approach: 2 of 2 operations clear; " in done.out) == (found[:1] != "O")

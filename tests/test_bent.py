@@ -160,7 +160,7 @@ def test_a_urdf_has_both_slides_of_a_robot_on_a_bend(layout: Layout, tmp_path: P
     """MuJoCo reads it, and puts all bodies where they are in the written model."""
     file = tmp_path / "lamp.urdf"
     factory.export(layout, "urdf", file)
-    one = load(stock(physical_model(layout, 1, Settings(hands=0))))
+    one = load(stock(physical_model(layout, 1, Settings())))
     other = mujoco.MjModel.from_xml_path(str(file))
     here, there = mujoco.MjData(one), mujoco.MjData(other)
     for name, value in (("r9/slide", 0.3), ("r9/slide_across", -0.07)):

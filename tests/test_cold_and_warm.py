@@ -225,4 +225,3 @@ def test_meshes_that_are_known_are_checked_without_libraries(file: Path, cache: 
     """But for the edges of their bodies, which hands touch: SciPy finds those."""
     assert {"trimesh", "scipy"} <= imported("check", file, cache=cache)
     assert imported("check", file, cache=cache) & set(ENGINES) <= {"scipy"}
-    assert not imported("check", file, "--no-hands", cache=cache) & set(ENGINES)

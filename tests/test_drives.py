@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from factory.layout.request import Ground
+from factory.layout.durations import Pace
+from factory.layout.embedding import lay_out
 from factory.mjcf import driving
 from factory.mjcf.driving import GRAVITY, HOIST_STIFFNESS, STIFFNESS, drive_for
 from factory.mjcf.robots import Drive
@@ -70,10 +71,11 @@ def test_with_short_timesteps_drives_are_as_stiff_as_ever() -> None:
 @pytest.mark.parametrize("timestep", [0.008, 0.02])
 def test_long_timesteps_do(name: str, timestep: float) -> None:
     """Gaps stay below 0.3 mm and welds hold, with robots and drives that differ. At 20 ms drives
-    may be further off than the 0.2 mm of air over a pad, so that is without hands."""
-    settings = Settings(timestep=timestep, substeps=1, hands=int(timestep <= TICK))
-    made = layout_of(name)
-    layout = made if settings.hands else Ground().lay_out(made.factory, made.product, settings)
+    may be further off than the 0.2 mm of air over a pad, so that is a draft without hands."""
+    settings = Settings(timestep=timestep, substeps=1)
+    layout = layout_of(name)
+    if timestep > TICK:
+        layout = lay_out(layout.factory, layout.product, pace=Pace.of(settings))
     run = ready(layout, jitter=0.5, settings=settings).run()
     figures: Any = run.physics
     assert run.trouble is None

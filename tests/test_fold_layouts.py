@@ -42,7 +42,7 @@ def welded_again(settings: Settings) -> Layout:
 
 def test_a_robot_that_comes_back_to_a_tool_is_clear_of_its_feeder() -> None:
     """It stalled where it met the next part."""
-    settings = Settings(hands=False)
+    settings = Settings()
     layout = welded_again(settings)
     run = Simulation(layout, RunRequest(units=2, world="mujoco", settings=settings)).run()
     assert run.products == 2 and run.succeeded
@@ -50,7 +50,7 @@ def test_a_robot_that_comes_back_to_a_tool_is_clear_of_its_feeder() -> None:
 
 
 def test_one_that_comes_back_under_its_feeder_is_refused() -> None:
-    layout = welded_again(Settings(hands=False))
+    layout = welded_again(Settings())
     operations = layout.factory.by_label
     stations = {operations[label].index: 0.0 for label in ("x2", "x4", "x5", "x6")}
     moved = with_visits(layout, stations)
@@ -62,12 +62,12 @@ def test_one_that_comes_back_under_its_feeder_is_refused() -> None:
 @pytest.mark.parametrize("seed", [42, 139, 179])
 def test_folds_are_laid_out(seed: int) -> None:
     """Seed 139: a pile overlapped the housing as it came back to its tool."""
-    assert fold_layout(seed, Settings(hands=False)).certificate is not None
+    assert fold_layout(seed, Settings()).certificate is not None
 
 
 @pytest.mark.parametrize("seed", [30, 51])
 def test_folds_are_laid_out_with_hands(seed: int) -> None:
     """The line of a robot with several tours is that of the hand it has."""
     settings = Settings()
-    plain = fold_layout(seed, Settings(hands=False))
+    plain = fold_layout(seed, settings)
     assert Ground().lay_out(plain.factory, plain.product, settings).certificate is not None

@@ -443,7 +443,7 @@ def test_a_dead_train_has_no_cycle_time() -> None:
 def test_the_ideal_world_has_the_predicted_cycle_time(seed: int) -> None:
     """Within the tick that each operation of the critical circuit may wait for; and prediction,
     analysis and layout are one."""
-    settings = Settings().with_options({"hands": 0, "stage": seed % 2})
+    settings = Settings(stage=seed % 2)
     layout = fold_layout(seed, settings)
     simulation = Simulation(layout, RunRequest("ideal", 24, settings=settings))
     simulation.run()
@@ -461,7 +461,7 @@ def test_the_ideal_world_has_the_predicted_cycle_time(seed: int) -> None:
 @pytest.mark.parametrize("seed", [6, 33, 51, 53])
 def test_the_slack_of_an_operation_on_a_fold(seed: int) -> None:
     """So much longer it may take, and no longer, until the cycle is longer."""
-    settings = Settings().with_options({"hands": 0})
+    settings = Settings()
     timing = Timing(fold_layout(seed, settings), settings, "ideal")
     net = timed_net(timing)
     assert " with " in net.critical[0].name

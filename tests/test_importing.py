@@ -434,7 +434,7 @@ def test_import_warns_of_what_build_will(bring: Importer, run: Terminal, out: Pa
     bill = bring.folder / "b.csv"
     bill.write_text("level,name,mesh,x [mm]\n0,table,,\n1,leg,leg.stl,0\n1,leg,leg.stl,50\n")
     done = run("import", bill, "-o", out)
-    built = run("build", out / "b.pag", "--no-hands")
+    built = run("build", out / "b.pag")
     assert "Size warning: the product is 60 m long" in done.err and "--unit mm" in done.err
     assert done.status == built.status == 0 and done.err == built.err
     found = run("import", bill, "-o", out, "--unit", "mm", "--json")

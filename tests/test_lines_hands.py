@@ -15,6 +15,7 @@ import pytest
 from factory.geometry.solids import Product
 from factory.layout import hanging
 from factory.layout.clearance import certify
+from factory.layout.embedding import lay_out
 from factory.layout.feeding import feeder_of
 from factory.layout.hands import holding
 from factory.layout.hands.hand import AIR, Hand
@@ -29,7 +30,6 @@ from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from factory.simulation.watched import watched
 from factory.study.fidelity.hidden import HiddenPenetrations
-from factory.support.settings import Settings
 from tests.layout_values import with_visits
 
 AT_MOST_MM = 0.1
@@ -96,17 +96,17 @@ things that are lowered, and one that no hand can hold."""
 
 
 @cache
-def project(name: str, hands: int = 1, shared: bool = True) -> Project:
+def project(name: str, shared: bool = True) -> Project:
     """A product with or without a line."""
-    return planned(*PRODUCTS[name], hands, shared)
+    return planned(*PRODUCTS[name], shared)
 
 
-def planned(text: str, line: tuple[str, ...], hands: int = 1, shared: bool = True) -> Project:
+def planned(text: str, line: tuple[str, ...], shared: bool = True) -> Project:
     """A product with or without a line."""
     with TemporaryDirectory() as folder:
         file = Path(folder) / "product.pag"
         file.write_text(text)
-        found = read(file, (), Settings(hands=hands))
+        found = read(file)
         found = found.with_lines([line]) if shared else found
         assert found.layout
         return found
@@ -208,12 +208,13 @@ def test_a_line_with_a_place_on_all_parts_has_one_slider(name: str) -> None:
 
 
 def test_parts_apart_hang_from_sliders_apart() -> None:
-    """Without hands parts are beside each other in the housing, as in the product."""
+    """In a draft without hands parts are beside each other in the housing, as in the product."""
     text = """root = s2; s1 = insert ( base, a ); s2 = insert ( s1, b );
 base = atomic ( box = ( 0.1, 0.1, 0.02 ), pos = ( 0, 0, 0.01 ) );
 a = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( -0.04, 0.06, 0.01 ) );
 b = atomic ( box = ( 0.02, 0.02, 0.03 ), pos = ( 0.04, 0.06, 0.015 ) )"""
-    layout = planned(text, ("a", "b"), hands=0).layout
+    made = planned(text, ("a", "b"))
+    layout = lay_out(made.plain, made.product)
     found = Hanging.of(layout)
     assert dict(found.slider) == {"base": "base", "a": "a", "b": "b"}
     run, hidden = looked_into(layout)
@@ -252,19 +253,6 @@ def test_places_of_hands_are_found_once_for_all_plans(monkeypatch: pytest.Monkey
     assert visits == planned(*PRODUCTS["shelf"]).layout.visits, "whatever was looked at before"
 
 
-def test_without_hands_front_ends_are_in_one_place() -> None:
-    layout = project("shelf", hands=0).layout
-    assert not layout.hands and certify(layout).holds
-    robot = next(r for r, tours in enumerate(layout.factory.tours) if tours[1:])
-    path, fronts = layout.guidepaths[robot], set[float]()
-    for tour, label in zip(layout.factory.tours[robot], layout.magazine(robot), strict=True):
-        fronts.add(round(path.frame(layout.held(robot, tour[0], label))[1], 6))
-    assert len(fronts) == 1
-    run = run_of(layout)
-    assert run.succeeded, run.verdict.failures
-    assert run.physics is not None and run.physics.unintended_contacts == 0
-
-
 def test_the_carrier_stands_where_each_label_comes() -> None:
     layout = project("blocks").layout
     robot, _ = of_line(layout)
@@ -292,7 +280,6 @@ def test_nothing_is_shifted_where_no_robot_has_several_tours() -> None:
     layout = project("shelf", shared=False).layout
     assert {visit.shift for visit in layout.visits.values()} == {(0.0, 0.0)}
     assert not layout.factory.adjusted
-    assert project("shelf", hands=0).layout.factory.adjusted == frozenset()
     (robot,) = project("shelf").layout.factory.adjusted
     assert project("shelf").factory.robots[robot].type == "lift"
 

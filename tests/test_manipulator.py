@@ -13,6 +13,7 @@ from factory.compiler.folding import folded
 from factory.exporting.ways import ways
 from factory.geometry.solids import rotation
 from factory.geometry.turning import axis_of, presented, turning_box, turning_pieces
+from factory.layout.embedding import lay_out
 from factory.layout.layout import Layout, carriers, delivery
 from factory.layout.request import Ground
 from factory.layout.stops import stops_of
@@ -129,8 +130,8 @@ def test_a_manipulator_goes_no_way_that_can_be_relayed(cell: Layout) -> None:
     assert read(PEG).with_ground(Ground(relay=True)).layout.factory == cell.factory
 
 
-def test_a_manipulator_needs_a_hand() -> None:
-    layout = read(PEG, settings=Settings(hands=False)).layout
+def test_a_manipulator_needs_a_hand(cell: Layout) -> None:
+    layout = lay_out(cell.factory, cell.product)
     with pytest.raises(InputError, match="NoGrip r2 has no hand to turn 'peg/pick' with"):
         Simulation(layout, RunRequest())
 

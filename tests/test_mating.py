@@ -528,7 +528,7 @@ def closed(tmp_path: Path) -> Path:
 
 
 def test_check_tells_figures_and_names_what_is_blocked(run: Terminal, closed: Path) -> None:
-    done = run("check", closed, "--no-hands")
+    done = run("check", closed)
     out = done.out
     assert done.status == 0
     assert (
@@ -580,13 +580,13 @@ def test_all_pairs_that_clash_in_one_operation_are_one_entry(run: Terminal, clos
     for name, x in (("b2", -0.0101), ("b3", 0.0101)):
         text += f"; {name} = atomic ( box = (0.008, 0.03, 0.02), pos = ({x}, 0, 0.02) )"
     closed.write_text(text)
-    document = run("check", closed, "--no-hands", "--json").json
+    document = run("check", closed, "--json").json
     (clashes,), (warning,) = document["clashes"], document["warnings"]
     pairs = [pair["parts"] for pair in clashes["pairs"]]
     assert (clashes["label"], clashes["line"]) == ("r", 2)
     assert sorted(pairs) == [["b1", "front"], ["b2", "front"], ["b3", "front"]]
     assert warning["message"].startswith("b cannot come to r: ")
-    assert len(run("check", closed, "--no-hands").err.splitlines()) == 3
+    assert len(run("check", closed).err.splitlines()) == 3
     tried = run("run", closed, "--json").json
     assert {*map(tuple, tried["excluded"])} == {*map(tuple, pairs)}, "those that check names"
 

@@ -13,7 +13,6 @@ import factory
 from factory.layout.hands.misses import NoGrip
 from factory.layout.hands.tips import STRONG
 from factory.pipeline import read
-from factory.support.settings import Settings
 from tests.command_line import ROOT, Terminal
 
 GEARBOX = ROOT / "examples" / "gearbox.pag"
@@ -53,8 +52,6 @@ def test_what_no_hand_can_hold_is_said(tub: Path) -> None:
     assert told.hint.startswith("above, 180 of 180 places: parts that are lowered")
     assert "at the nearest miss, (0, 9, 50) mm, gear lowered onto it; behind, " in told.hint
     assert told.position is not None and told.position.line == 1
-    bare = read(tub, (), Settings(hands=0))
-    assert not [w for w in bare.warnings if w.code == "NoGrip"]
     assert not found(ROOT / "examples" / "stool.pag")
 
 
@@ -175,12 +172,6 @@ def test_check_lists_and_draws_it(run: Terminal, tub: Path, out: Path) -> None:
     assert again == document and file.read_text() == text
 
 
-def test_without_hands_nothing_is_listed_or_drawn(run: Terminal, tub: Path, out: Path) -> None:
-    bare = run("check", tub, "--no-hands", "--clashes", out, "--json").json
-    assert "no_grips" not in bare and bare["warnings"] == []
-    assert not list(out.iterdir())
-    tub.with_name("factory.toml").write_text("hands = 0\n")
-    assert "no_grips" not in run("check", tub, "--json").json
-    assert run("check", tub, "--hands", "--json").json["no_grips"]
+def test_what_hands_can_hold_is_not_drawn(run: Terminal, out: Path) -> None:
     stool = run("check", ROOT / "examples" / "stool.pag", "--clashes", out, "--json")
     assert stool.json["no_grips"] == [] and not list(out.iterdir())

@@ -118,10 +118,10 @@ def test_every_stage_gives_the_same_run() -> None:
 
 
 def test_a_layout_is_not_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    layout = factory.lay_out(PAPER, clearance=0.03, settings=factory.Settings(hands=0))
+    layout = factory.lay_out(PAPER, clearance=0.03)
     monkeypatch.setattr("factory.layout.request.Ground.lay_out", None)
     built = factory.build(layout)
-    assert (built.model.settings.clearance, built.model.settings.hands) == (0.03, 0)
+    assert built.model.settings.clearance == 0.03
     assert factory.analyze(layout).timing.layout is layout
     with pytest.raises(TypeError):
         factory.build(layout.factory)  # the fault that is planted: this one is laid out
@@ -177,14 +177,14 @@ def test_a_plan_is_a_product_and_what_interlocks_is_refused(tmp_path: Path) -> N
 
 def test_a_layout_keeps_the_settings_and_the_ground_of_its_plan(tmp_path: Path) -> None:
     """What a call does not choose is that of the plan.json, or of the layout."""
-    factory.build(PAPER, tmp_path, settings=factory.Settings(hands=False))
+    factory.build(PAPER, tmp_path, settings=factory.Settings(acceleration=1.5))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         layout = factory.lay_out(tmp_path / "plan.json")
-    assert not layout.hands and factory.lay_out(layout) is layout
+    kept = factory.build(tmp_path / "plan.json").model.settings
+    assert kept.acceleration == 1.5 and factory.lay_out(layout) is layout
     wider = factory.lay_out(layout, clearance=0.03)
-    assert wider.clearance == 0.03 and not wider.hands
-    assert factory.lay_out(layout, settings=factory.Settings()).hands
+    assert (wider.clearance, wider.hands[0]) == (0.03, layout.hands[0])
 
 
 def test_settings_replace_those_of_a_project() -> None:

@@ -39,7 +39,6 @@ from factory.simulation.watched import watched
 from factory.study.analysis.analysing import least_wip
 from factory.study.analysis.timed import flow, timed_net
 from factory.support.errors import InputError
-from factory.support.settings import Settings
 from factory.timing.cycle_time import cycle_time
 from factory.timing.pool import part_pool
 from factory.timing.timing import Timing
@@ -224,16 +223,15 @@ def test_a_mate_has_room_for_two_on_a_side() -> None:
 
 
 @cache
-def project(k: int, hands: int = 0) -> Project:
+def project(k: int) -> Project:
     """That product with so many branches."""
-    settings = Settings(hands=hands)
-    made = Project(slow(), all_templates(), load_catalogue(), settings)
+    made = Project(slow(), all_templates(), load_catalogue())
     return made.with_branches([("sub2", k)])
 
 
-def carried_out(k: int, world: WorldName, units: int, hands: int = 0, **more: Any) -> Run:
+def carried_out(k: int, world: WorldName, units: int, **more: Any) -> Run:
     """A run of it, with a monitor where there are bodies."""
-    made = project(k, hands)
+    made = project(k)
     request = RunRequest(world, units, settings=made.settings, **more)
     simulation = Simulation(made.layout, request)
     return simulation.run() if world == "ideal" else watched(simulation, [], None, [], True)
@@ -265,19 +263,13 @@ def test_the_floor_and_the_bound_are_those_of_one_unit() -> None:
 
 
 def test_three_branches_in_mujoco() -> None:
-    """Without hands: no contact, each product is right, and the monitor explains the run."""
+    """No contact, each product is right, and the monitor explains the run."""
     run = carried_out(3, "mujoco", 12)
     assert run.succeeded and run.refines_net and made_in_order(run, 3)
     assert run.physics is not None and not run.physics.unintended_contacts
     assert run.physics.product_error_max_mm is not None
     assert run.physics.product_error_max_mm < 0.001
     assert run.cycle_time_s == pytest.approx(run.predicted_cycle_time_s, rel=0.06)
-
-
-def test_three_branches_in_mujoco_with_hands() -> None:
-    run = carried_out(3, "mujoco", 5, hands=1)
-    assert run.succeeded and run.refines_net
-    assert run.physics is not None and not run.physics.unintended_contacts
 
 
 @pytest.mark.parametrize("world", ["ideal", pytest.param("mujoco", marks=pytest.mark.slow)])
@@ -427,13 +419,13 @@ def file(tmp_path: Path) -> Path:
 
 
 def test_the_option_and_the_table_say_the_same(run: Terminal, file: Path) -> None:
-    one = run("check", file, "--no-hands", "--json").json
-    two = run("check", file, "--no-hands", "--parallel", "sub2=2", "--json").json
+    one = run("check", file, "--json").json
+    two = run("check", file, "--parallel", "sub2=2", "--json").json
     assert (one["robots"], two["robots"]) == (4, 7)
     assert two["live"] and two["safe"] and two["reversible"]
     file.with_name("factory.toml").write_text("[parallel]\nsub2 = 2\n")
-    assert run("check", file, "--no-hands", "--json").json == two
-    assert run("check", file, "--no-hands", "--parallel", "sub2=1", "--json").json == one
+    assert run("check", file, "--json").json == two
+    assert run("check", file, "--parallel", "sub2=1", "--json").json == one
 
 
 def test_a_branch_that_gains_nothing_is_named(run: Terminal, file: Path) -> None:
@@ -443,7 +435,7 @@ def test_a_branch_that_gains_nothing_is_named(run: Terminal, file: Path) -> None
         paper = run("analyze", "examples/paper.pag", "--parallel", f"{label}=2").out
         assert f"one branch for {label} would do: {alone:.3f} s with one" in paper
     file.write_text(TEXT.replace("dwell = 2", f"dwell = {DWELL}"))
-    assert "would do" not in run("analyze", file, "--no-hands", "--parallel", "sub2=2").out
+    assert "would do" not in run("analyze", file, "--parallel", "sub2=2").out
 
 
 def test_a_unit_waits_for_none_that_comes_after_it() -> None:

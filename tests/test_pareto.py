@@ -22,7 +22,6 @@ from factory.study.pareto import Effort, FrontPoint, FrontSweep, ParetoFront, pa
 from factory.study.pareto.front import Trial, commands_of, point_files, tried, undominated
 from factory.support import progress
 from factory.support.progress import StepBar
-from factory.support.settings import Settings
 from tests.command_line import PAPER, ROOT, Screen, Terminal, files_in
 from tests.report_values import EVIL
 from tests.waiting import until
@@ -38,14 +37,14 @@ b = atomic ( mesh = "../in/a.stl", pos = ( 0.1, 0, 0.02 ) );
 
 @pytest.fixture(scope="module")
 def front() -> ParetoFront:
-    """That of the paper's example, without hands."""
-    return pareto(read(PAPER, settings=Settings(hands=0)))
+    """That of the paper's example."""
+    return pareto(read(PAPER))
 
 
 @pytest.fixture(scope="module")
 def quick() -> Project:
     """A product with so many parts that there is something to choose."""
-    return read(EXAMPLES / "balanced.pag", settings=Settings(hands=0))
+    return read(EXAMPLES / "balanced.pag")
 
 
 PROJECT = read(PAPER)
@@ -141,7 +140,7 @@ def test_a_run_that_fails_or_is_off_does_not_hold() -> None:
 def test_each_point_is_made_again_by_its_command(
     run: Terminal, out: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    done = run("pareto", PAPER, "-o", out / "front", "--speed", 0.4, "--no-hands", "--json")
+    done = run("pareto", PAPER, "-o", out / "front", "--speed", 0.4, "--json")
     assert done.status == 0, done.err
     monkeypatch.chdir(out)  # beside which nothing is configured
     for one in done.json["points"]:
@@ -167,7 +166,7 @@ def read_back(file: Path) -> Project:
 
 def test_files_stand_alone_and_stay_in_their_folder(out: Path, own_folder: Path) -> None:
     """Meshes and operations of the user's are copied, by names that lead nowhere else."""
-    project = read(own_folder / "pag" / "s.pag", [own_folder / "ops"], Settings(hands=0))
+    project = read(own_folder / "pag" / "s.pag", [own_folder / "ops"])
     front = pareto(project, Effort(factories=12))
     files = point_files(front, out / "a" / "b")
     assert all(out / "a" / "b" in path.parents and ".." not in path.parts for path in files)
@@ -240,7 +239,7 @@ def test_axes_have_enough_marks(front: ParetoFront) -> None:
 
 
 def test_the_command_tells_its_points(run: Terminal, out: Path) -> None:
-    words = "pareto", PAPER, "--validate", 2, "-o", out / "front", "--no-hands"
+    words = "pareto", PAPER, "--validate", 2, "-o", out / "front"
     done = run(*words, "--json")
     assert done.status == 0, done.err
     document = done.json
@@ -257,7 +256,7 @@ def test_the_command_tells_its_points(run: Terminal, out: Path) -> None:
     names = {"p01/plan.json", "p01/layout.json", "p01/floor.svg"}
     assert {"pareto.html", *names} <= set(written)
     assert not any(p["validated"] for p in document["points"] if p["validation"] is None)
-    told = run("pareto", PAPER, "--no-hands", "-o", out / "front")
+    told = run("pareto", PAPER, "-o", out / "front")
     count = len(document["points"])
     assert f"{count} points" in told.out
     said = f"{count} of {count} points were not run: their cycle times are predictions"
@@ -267,11 +266,11 @@ def test_the_command_tells_its_points(run: Terminal, out: Path) -> None:
 
 
 def test_what_fits_a_floor_is_found_where_the_product_as_written_does_not(run: Terminal) -> None:
-    done = run("pareto", PAPER, "--no-hands", "--floor", "0.7x0.52", "--json")
+    done = run("pareto", PAPER, "--floor", "0.72x0.34", "--json")
     assert done.status == 0, done.err
     assert done.json["written"] is None
     assert {p["robots"] for p in done.json["points"]} == {5}
-    none = run("pareto", PAPER, "--no-hands", "--floor", "0.1x0.1", "--json")
+    none = run("pareto", PAPER, "--floor", "0.1x0.1", "--json")
     assert none.status == 1
     assert none.codes == ["Layout"]
 
@@ -279,7 +278,7 @@ def test_what_fits_a_floor_is_found_where_the_product_as_written_does_not(run: T
 def test_a_failed_run_is_told(run: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
     failed = Trial(4, 1.0, 1.0, 1.0, ("mujoco: Contact: r1 meets r2",))
     monkeypatch.setattr("factory.study.pareto.front.tried", lambda _: failed)
-    done = run("pareto", PAPER, "--validate", 1, "--no-hands")
+    done = run("pareto", PAPER, "--validate", 1)
     assert done.status == 1
     assert "failed" in done.out
     assert "r1 meets r2" in done.err
@@ -304,7 +303,7 @@ def test_a_search_that_is_stopped_keeps_what_it_has(
             raise KeyboardInterrupt
 
     monkeypatch.setattr(StepBar, "show", stop)
-    words = "pareto", PAPER, "--no-hands", "--validate", 1, "-o", out / "front", "--json"
+    words = "pareto", PAPER, "--validate", 1, "-o", out / "front", "--json"
     done = run(*words)
     assert done.status == 130, done.err
     assert done.codes == ["Interrupted"]
@@ -352,10 +351,10 @@ def test_a_search_for_few_robots_shows_the_best(
 ) -> None:
     told: list[str] = []
     monkeypatch.setattr(StepBar, "show", lambda _, what, *words: told.append(f"{what} {words}"))
-    assert run("check", PAPER, "--robots", "least", "--no-hands").status == 0
+    assert run("check", PAPER, "--robots", "least").status == 0
     assert "searching for few robots" in told[-1]
     assert re.search(r"best: 3 robots, \d\.\d\d s", told[-1])
-    assert run("check", PAPER, "--cycle", "3", "--effort", "1", "--no-hands").status == 0
+    assert run("check", PAPER, "--cycle", "3", "--effort", "1").status == 0
     assert "searching for few robots (1, 1," in told[-1]
 
 

@@ -11,7 +11,6 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from benches.speed.factories import cube
 from factory.commands.options import MOTION, OUTPUT, SOURCE
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.layout.request import Ground
@@ -19,6 +18,7 @@ from factory.pipeline import read
 from factory.support.errors import InputError
 from factory.support.settings import Settings
 from tests.command_line import PAPER, ROOT
+from tests.test_relay_hands import sawn
 
 
 def test_each_stage_is_computed_when_it_is_first_used() -> None:
@@ -33,8 +33,8 @@ def test_each_stage_is_computed_when_it_is_first_used() -> None:
 
 
 def test_the_factory_of_a_project_has_the_relays_of_its_layout(tmp_path: Path) -> None:
-    (tmp_path / "cube.pag").write_text(cube(32))
-    project = read(tmp_path / "cube.pag", (), Settings(hands=0), Ground(relay=True))
+    (tmp_path / "slab.pag").write_text(sawn(4))
+    project = read(tmp_path / "slab.pag", ground=Ground(relay=True))
     assert project.factory is project.layout.factory
     assert len(project.factory.robots) > len(project.plain.robots)
 

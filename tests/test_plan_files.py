@@ -16,7 +16,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benches.speed.factories import cube
 from factory.layout import request
 from factory.layout.layout import Layout
 from factory.layout.request import Ground
@@ -28,7 +27,6 @@ from factory.show.report import page, recording_of
 from factory.simulation.modelling import physical_model
 from factory.study.analysis import Timing, analyse
 from factory.support.errors import Diagnostic, InputError
-from factory.support.settings import Settings
 from factory.support.tables import table_of, value_of
 from tests.command_line import PAPER, ROOT, Terminal
 from tests.layout_values import (
@@ -66,8 +64,7 @@ def assert_same(made: Layout, layout: Layout) -> None:
 
 def with_text(text: str, folder: Path, **ground: Any) -> Project:
     (folder / "p.pag").write_text(text, "utf-8")
-    hands = ground.pop("hands", 1)
-    return read(folder / "p.pag", (), Settings(hands=hands), Ground(**ground))
+    return read(folder / "p.pag", (), ground=Ground(**ground))
 
 
 # --- values and tables ----------------------------------------------------------------------------
@@ -85,12 +82,11 @@ def test_a_layout_is_read_as_it_was_written(drawn: Drawn) -> None:
 
 VARIANTS: dict[str, Callable[[Path], Project]] = {
     "written": lambda folder: read(PAPER),
-    "bare": lambda folder: read(EXAMPLES / "lamp.pag", (), Settings(hands=False)),
+    "lamp": lambda folder: read(EXAMPLES / "lamp.pag"),
     "lines": lambda folder: with_text(ON_ONE, folder).with_lines([["part2", "part3"]]),
     "forms": lambda folder: read(PAPER).with_plan(Plan({"sub3": 0, "sub1": 1})),
     "branches": lambda folder: with_text(BESIDE, folder).with_branches([("sub2", 3)]),
-    "relays": lambda folder: with_text(cube(32), folder, hands=0, relay=True),
-    "relays in line": lambda folder: with_text(sawn(1), folder, relay=True),
+    "relays": lambda folder: with_text(sawn(1), folder, relay=True),
     "deputies": lambda folder: with_text(BESIDE, folder, deputies=True),
     "branches with deputies": lambda folder: with_text(BESIDE, folder, deputies=True).with_branches(
         [("sub2", 2)]
@@ -200,7 +196,7 @@ def test_a_log_of_other_forms_has_all_operations_of_its_pag(run: Terminal, tmp_p
     (tmp_path / "ops" / "join.op").write_text(text.replace("mate =", "join ="), "utf-8")
     pag, log = tmp_path / "p.pag", tmp_path / "run.log"
     pag.write_text(PAPER.read_text("utf-8").replace("mate", "join"), "utf-8")
-    words = ("--templates", tmp_path / "ops", "--robots", 3, "--no-hands", "--log", log)
+    words = ("--templates", tmp_path / "ops", "--robots", 3, "--log", log)
     assert run("run", pag, *words).status == 0
     shutil.rmtree(tmp_path / "ops")
     assert run("monitor", log).status == 0

@@ -76,13 +76,12 @@ def test_magazines_of_lines_are_solid(run: Terminal, name: str, robots: int) -> 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("hands", ["--hands", "--no-hands"])
 @pytest.mark.parametrize(
     "file", [product(SMALL[0]), PAPER.with_name("truck.pag")], ids=["light", "truck"]
 )
-def test_few_robots_take_the_time_that_is_predicted(run: Terminal, file: Path, hands: str) -> None:
+def test_few_robots_take_the_time_that_is_predicted(run: Terminal, file: Path) -> None:
     robots = 7 if file.parent == FOLDER else 17
-    words = ("--robots", robots, "--effort", 40, "--units", 12, hands, "--json")
+    words = ("--robots", robots, "--effort", 40, "--units", 12, "--json")
     done = run("run", file, *words).json
     assert done["cycle_time_s"] == pytest.approx(done["predicted_cycle_time_s"], rel=0.02)
 

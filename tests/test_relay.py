@@ -12,9 +12,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benches.speed.factories import cube, laid_out
+from benches.speed.factories import cube
 from factory.compiler.compiler import compile_pag
 from factory.compiler.expanding import expand, nodes_of
+from factory.geometry.product import product_geometry
 from factory.lang import read_pag, write_pag
 from factory.lang.template_reader import load_templates
 from factory.layout.clearance import certify
@@ -47,9 +48,7 @@ from tests.layout_values import (
 from tests.pag_values import SHAPES
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
-SETTINGS = Settings(hands=0)
-"""Hands cannot relay cubes, which are heavy and narrow: relays with hands are tested for slabs, in
-`test_relay_hands`."""
+SETTINGS = Settings()
 
 PACE = Pace.of(SETTINGS)
 
@@ -58,8 +57,12 @@ seeds = st.integers(0, 10_000)
 
 @cache
 def bare(parts: int) -> Layout:
-    """A cube of so many parts, laid out without hands."""
-    return laid_out(cube(parts), SETTINGS)
+    """A draft for a cube of so many parts, in which hands are not chosen yet: they cannot relay
+    cubes, which are heavy and narrow. Relays with hands are tested in `test_relay_hands`."""
+    shipped = load_templates([templates_folder()])
+    pag = read_pag(cube(parts), shipped, "cube.pag")
+    factory = compile_pag(pag, shipped, load_catalogue())
+    return lay_out(factory, product_geometry(factory.pag), pace=PACE)
 
 
 @cache

@@ -201,7 +201,7 @@ def test_what_hands_cannot_relay_is_not_cut() -> None:
     layout = plain(cube(32))
     found = relayed(layout, SETTINGS)
     assert not hand_overs(found)
-    bare = relayed(replace(layout, hands=()), Settings(hands=0))
+    bare = relayed(replace(layout, hands=()), Settings())
     assert hand_overs(bare)
 
 

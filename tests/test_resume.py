@@ -357,7 +357,7 @@ FACTORIES: tuple[tuple[object, ...], ...] = (
     (PAPER, "--units", 60, "--jitter", 0.3),
     (EXAMPLES / "truck.pag", "--units", 4, "--fuse"),
     (EXAMPLES / "gearbox.pag", "--units", 3, "--jitter", 0.2),
-    (PAPER, "--units", 60, "--robots", 3, "--no-hands"),
+    (PAPER, "--units", 60, "--robots", 3),
 )
 
 

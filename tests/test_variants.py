@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from benches.speed.factories import cube
 from tests.command_line import PAPER, Terminal
+from tests.test_relay_hands import sawn
 
 SLOW = """root = c; c = insert(p, b); b = weld(a, dwell = 6); a = insert(q, r);
 p = atomic(); q = atomic(); r = atomic()"""
@@ -18,11 +18,10 @@ p = atomic(); q = atomic(); r = atomic()"""
 
 VARIANTS = {
     "as written": (PAPER.read_text(), ()),
-    "without hands": (PAPER.read_text(), ("--no-hands",)),
     "fewer robots": (PAPER.read_text(), ("--robots", "least")),
-    "branches": (SLOW, ("--no-hands", "--parallel", "b=2")),
+    "branches": (SLOW, ("--parallel", "b=2")),
     "deputies": (SLOW, ("--deputies",)),
-    "relays": (cube(8, side=0.15), ("--no-hands", "--relay")),
+    "relays": (sawn(4), ("--relay",)),
 }
 """A product's text and options."""
 
@@ -65,8 +64,7 @@ def test_an_option_makes_another_factory_or_run(run: Terminal, out: Path) -> Non
     file, robots = out / "p.pag", dict[str, tuple[int, int]]()
     for name, (text, options) in VARIANTS.items():
         file.write_text(text)
-        plain = [word for word in options if word == "--no-hands"]
-        found = [run("check", file, *words, "--json").json for words in (plain, options)]
+        found = [run("check", file, *words, "--json").json for words in ((), options)]
         robots[name] = found[0]["robots"], found[1]["robots"]
     grown = {name for name, (before, after) in robots.items() if after > before}
     assert grown == {"branches", "relays"}

@@ -234,13 +234,10 @@ def test_a_monitor_that_is_not_wanted(run: Terminal) -> None:
 
 
 @pytest.mark.parametrize("logged", [False, True])
-@pytest.mark.parametrize("hands", [0, 1])
-def test_a_weld_that_is_on_for_50_ms(tmp_path: Path, logged: bool, hands: int) -> None:
+def test_a_weld_that_is_on_for_50_ms(tmp_path: Path, logged: bool) -> None:
     """It is switched in the middle of a call of the engine, where nothing else happens. Two robots
     that pull are too much for a hand: it lets go."""
-    settings = Settings(hands=hands)
-    paper = read(PAPER, (), settings).layout
-    simulation = Simulation(paper, RunRequest(settings=settings, shown=False))
+    simulation = Simulation(read(PAPER).layout, RunRequest(shown=False))
     d, m = simulation.physical.d, simulation.physical.m
     extra = m.equality("grip/r5/part1").id
 
@@ -253,7 +250,7 @@ def test_a_weld_that_is_on_for_50_ms(tmp_path: Path, logged: bool, hands: int) -
     if not logged:
         run = watched(simulation)
         trouble = run.trouble.code if run.trouble else None
-        assert "TwoHolders" in codes(run.verdict) and trouble == ("Dropped" if hands else None)
+        assert "TwoHolders" in codes(run.verdict) and trouble == "Dropped"
         return
     with LogWriter(log, simulation) as writer:
         simulation.run([writer.observe])

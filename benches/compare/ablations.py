@@ -15,13 +15,12 @@ from factory.nets.verdict import listing
 from factory.simulation.ordering import Ordering
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
-from factory.support.settings import Settings
 
 NAMES, UNITS = ("paper", "lamp", "stool", "truck", "chair", "gearbox"), 4
 
 
 def measure(quick: bool = False) -> Iterator[dict[str, Any]]:
-    """Each product as it is, without its waits, and without hands; its net with each order turned
+    """Each product as it is, without its waits; its net with each order turned
     round."""
     rows: list[dict[str, Any]] = []
     for name in NAMES[:2] if quick else NAMES:
@@ -29,18 +28,15 @@ def measure(quick: bool = False) -> Iterator[dict[str, Any]]:
         row: dict[str, Any] = {"product": name, "orders": orders(layout), "as it is": made(layout)}
         if row["orders"]["places"]:
             row["without waits"] = made(layout, waits=False)
-        plain = Settings(hands=0)
-        bare = factory.lay_out(file_of(name), settings=plain)
-        row["without hands"] = made(bare, settings=plain)
         rows.append(row)
         print(".", end="", flush=True)
         yield {"rows": rows}
     print()
 
 
-def made(layout: Layout, waits: bool = True, settings: Settings | None = None) -> dict[str, Any]:
+def made(layout: Layout, waits: bool = True) -> dict[str, Any]:
     """What becomes of a few units: of the run's verdict the first reason."""
-    request = RunRequest(units=UNITS, shown=False, settings=settings or Settings())
+    request = RunRequest(units=UNITS, shown=False)
     simulation = Simulation(layout, request)
     if not waits:
         simulation.supervisor.ordering = Ordering()
@@ -76,7 +72,7 @@ def section(results: dict[str, Any]) -> str:
     """The report."""
     rows, nets = [], []
     for row in results["rows"]:
-        for what in ("as it is", "without waits", "without hands"):
+        for what in ("as it is", "without waits"):
             if said := row.get(what):
                 rows.append(
                     (
@@ -97,8 +93,7 @@ TEXT = f"""\
 `python -m benches.compare ablations`, in MuJoCo, {UNITS} units, jitter 0. *As it is*: `factory run
 FILE --units {UNITS}`. *Without waits*: the same layout; the supervisor does not keep the order
 places of the [coordinated net](theory/coordinated.md), so robots do not wait until the hands of
-others are gone. Products whose layout needs no such wait have no such row. *Without hands*:
-`--no-hands`; parts are held by welds alone, and nothing has to get out of the way. The reason is
+others are gone. Products whose layout needs no such wait have no such row. The reason is
 the [code](reference/diagnostics.md) that the verdict of the run gives first."""
 
 NETS = """\

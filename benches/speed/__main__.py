@@ -19,7 +19,6 @@ REPORT = Report(
         "floors",
         "profile_300",
         "movers",
-        "relays",
         "few_robots",
         "states",
         "proving",

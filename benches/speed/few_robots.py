@@ -18,7 +18,6 @@ from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.study.allocation.aim import Aim, least_robots
 from factory.study.allocation.search import allocated
-from factory.support.settings import Settings
 
 JITTER, UNITS = 0.3, 6
 """Of all runs, but for a product of which one unit is enough."""
@@ -32,7 +31,6 @@ class Wanted:
     file: Path
     robots: int
     cycle: float
-    hands: int = 0
     effort: int | None = None
     seeds: int = 5
     units: int = UNITS
@@ -41,16 +39,13 @@ class Wanted:
     def command(self) -> str:
         """What makes this factory."""
         words = f"factory run {self.file.name} --robots {self.robots}"
-        words += f" --effort {self.effort}" if self.effort else ""
-        return words if self.hands else f"{words} --no-hands"
+        return words + (f" --effort {self.effort}" if self.effort else "")
 
 
 ROWS = (
-    Wanted(EXAMPLES / "paper.pag", 3, 4.1, hands=1),
-    Wanted(BRICKS / "889-1-RadarTruck.pag", 18, 7.3),
-    Wanted(BRICKS / "889-1-RadarTruck.pag", 18, 7.3, hands=1, seeds=3),
-    Wanted(BRICKS / "30023-1-Lighthouse.pag", 7, 15.4),
-    Wanted(BRICKS / "30023-1-Lighthouse.pag", 7, 15.4, hands=1, seeds=3),
+    Wanted(EXAMPLES / "paper.pag", 3, 4.1),
+    Wanted(BRICKS / "889-1-RadarTruck.pag", 18, 7.3, seeds=3),
+    Wanted(BRICKS / "30023-1-Lighthouse.pag", 7, 15.4, seeds=3),
     Wanted(BRICKS / "5935-1-IslandHopper.pag", 12, 150.0, seeds=1),
     Wanted(BRICKS / "4494-1-Imperial_Shuttle-Mini.pag", 50, 7.1, seeds=2),
     Wanted(BRICKS.parent / "rocket.pag", 250, 120.0, seeds=1, units=1),
@@ -69,7 +64,7 @@ def measure(quick: bool = False) -> dict[str, Any]:
 
 
 def _measured(wanted: Wanted) -> dict[str, Any]:
-    project = read(wanted.file, settings=Settings(hands=wanted.hands))
+    project = read(wanted.file)
     begin = perf_counter()
     found = allocated(project, Aim(wanted.robots, effort=wanted.effort))
     layout, looked = found.layout, perf_counter() - begin
@@ -102,7 +97,7 @@ def _measured(wanted: Wanted) -> dict[str, Any]:
         "written": len(project.plain.robots),
         "area_m2": layout.area,
         "proved": verify(layout.factory.net).holds and layout.certificate.holds,
-        "in_hands": len(labels) - len(set(bare) & set(labels)) if wanted.hands else None,
+        "in_hands": len(labels) - len(set(bare) & set(labels)),
         "labels": len(labels),
         "looked_s": looked,
         "runs": runs,
@@ -136,7 +131,7 @@ def section(results: dict[str, Any]) -> str:
                 f"{100 * max(off):.1f} %" if off else None,
                 sum(run["contacts"] for run in row["runs"]),
                 sum(not run["succeeded"] for run in row["runs"]),
-                None if row["in_hands"] is None else f"{row['in_hands']} of {row['labels']}",
+                f"{row['in_hands']} of {row['labels']}",
                 f"{row['area_m2']:.2f}",
                 f"{row['looked_s']:.0f}",
             )
@@ -148,7 +143,7 @@ def section(results: dict[str, Any]) -> str:
             f" jitter {results['jitter']:g} over several seeds ({UNITS} units each; of the rocket"
             " one, without jitter, which has no cycle). *As written*: the robots with one for each"
             " label. *Least*: the bound that is proved, tools included. *In hands*: labels that are"
-            " held by a hand; without hands robots hold by welds alone.",
+            " held by a hand.",
             table(head, rows),
         ]
     )

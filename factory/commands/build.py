@@ -147,8 +147,7 @@ def _printed(project: Project, built: Built, spent: float, wip: int | None) -> d
     ]
     if wip is None and model.wip is not None:
         lines.insert(1, f"parts for at most {model.wip} units inside at once: {POOL_BOUND}")
-    if layout.hands:
-        document["bores"] = [bore.as_json() for bore in drilled]
+    document["bores"] = [bore.as_json() for bore in drilled]
     if drilled:
         where = ", ".join(dict.fromkeys(bore.label for bore in drilled))
         lines.append(f"hands grip with pins in bores of {where} (positions: --json)")

@@ -12,7 +12,6 @@ import click
 from factory.commands.allowing import ALLOW
 from factory.commands.grouped import Grouped
 from factory.commands.options import (
-    HANDS,
     OUT,
     OUTPUT,
     PATH,
@@ -71,7 +70,6 @@ POOLED = 8
 @ALLOW
 @click.option("--clashes", type=OUT, help=PICTURES)
 @RELAY
-@HANDS
 @OUTPUT
 @collector_paused()
 def check(

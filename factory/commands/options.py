@@ -162,11 +162,6 @@ class RobotCount(click.ParamType[int | str]):
         return value if value == LEAST else bounded("robots").convert(value, param, ctx)
 
 
-HANDS = click.option(
-    "--hands/--no-hands",
-    default=None,
-    help="Give robots solid hands (grippers), chosen from the geometry of the parts.",
-)
 MOTION = options(
     click.option("--speed", type=float, help="Robot speed [m/s]."),
     click.option("--acceleration", type=float, help="Robot acceleration [m/s²]."),
@@ -193,7 +188,6 @@ MOTION = options(
         default=None,
         help="Move idle robots ahead to where they are needed next.",
     ),
-    HANDS,
 )
 FLOOR = options(
     click.option("--clearance", type=float, help="Minimum distance between moving bodies [m]."),

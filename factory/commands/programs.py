@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from factory.commands.options import HANDS, OUTPUT, RELAY, SOURCE
+from factory.commands.options import OUTPUT, RELAY, SOURCE
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.support.console import emit, say
 from factory.support.errors import did_you_mean, usage_error
@@ -14,7 +14,6 @@ from factory.support.errors import did_you_mean, usage_error
 @SOURCE
 @click.option("--robot", help="Only this robot, for example r3.")
 @RELAY
-@HANDS
 @OUTPUT
 def programs(options: ProjectOptions, out: OutputOptions, robot: str | None) -> int:
     """Print each robot's program, in the paper's form."""

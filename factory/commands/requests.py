@@ -49,7 +49,6 @@ class ProjectOptions:
     timestep: float | str | None = None
     substeps: int | None = None
     stage: bool | None = None
-    hands: bool | None = None
     clearance: float | None = None
     overlap: float | None = None
     floor: str | None = None
@@ -74,7 +73,6 @@ class ProjectOptions:
         names = ("speed", "acceleration", "force", "timestep", "substeps", "clearance", "overlap")
         values = {name: getattr(self, name) for name in names}
         values["stage"] = None if self.stage is None else int(self.stage)
-        values["hands"] = None if self.hands is None else int(self.hands)
         plan = self._plan()
         settings = plan.settings if plan else defaults_for(self.file).settings()
         return settings.with_options(environment()).with_options(values)

@@ -81,8 +81,7 @@ class Ground:
         factory, product = judged(factory, product), repeated(product, factory)
         if self.deputies:
             return self._with_deputies(factory, product, settings, hands, catalogue)
-        if settings.hands and hands is None:
-            hands = hands_of(factory, product, settings)
+        hands = hands or hands_of(factory, product, settings)
         floor = None if self.tile else self.floor
         layout = lay_out(factory, product, settings.clearance, floor, pace, hands, draft)
         if self.tile:

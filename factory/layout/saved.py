@@ -20,7 +20,7 @@ from factory.plant.factory import Factory
 from factory.plant.fused_bodies import repeated
 from factory.support.errors import RunError
 
-LAID_FOR = ("clearance", "hands", "acceleration")
+LAID_FOR = ("clearance", "acceleration")
 """The settings that a layout depends on: what is for others is laid out anew."""
 
 AXES = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))

@@ -52,8 +52,7 @@ def timed(
     longest timestep in which nothing goes as far as the certified clearance, with which no axis is
     predicted to get off its reference by more than ALLOWED, all end stops hold, and every robot
     gets into its goal ball; 2 ms, or the longest below it that the clearance allows, where none
-    does that. Whether robots have hands is as the layout says."""
-    settings = replace(settings, hands=int(any(layout.hands)))
+    does that."""
     if settings.timestep != AUTO:
         return replace(settings, substeps=settings.steps)
     least = settings.substeps or 1
@@ -66,7 +65,7 @@ def timed(
     axes, heaviest_fed = tuple(dict.fromkeys(_axes(settings, layout, jitter))), 0.0
     unusual = [axis for axis in axes if not axis.usual]
     candidates = [s for s in candidates if all(a.follows(s) for a in unusual)] or candidates[-1:]
-    if settings.hands:
+    if any(layout.hands):
         heaviest_fed = max(layout.product.solids[o.label].mass for o in layout.factory.leaves)
     good = (s for s in candidates if _good(s, axes) and _dip(s, heaviest_fed) < DEEPEST)
     return next(good, _usual(candidates))

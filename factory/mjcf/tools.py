@@ -64,7 +64,7 @@ def gyration(layout: Layout, robot: int) -> float:
     if hand is None or hand.kind == "none":
         message = f"{layout.factory.robots[robot].name} has no hand to turn '{label}' with"
         position = layout.factory.by_label[label].position
-        hint = "give the part a flat place above, and the robots hands (--hands)"
+        hint = "give the part a flat place above"
         raise InputError(Diagnostic("NoGrip", message, position, hint))
     solids = [layout.product.solids[part] for part in parts]
     axis = np.array(hand.places[0][:2])

@@ -31,7 +31,7 @@ class Checked:
     """A net with its verdict, of a PAG called `name` or read from PNML. `pool`: number of copies of
     each part inside at once; `matings`: how inputs come together, None if no part has its own
     shape; `product`: None if every part is a default box; `no_grips`: what no hand can hold, None
-    if hands are not chosen; `factory` and the `least` number of robots for its product, None for a
+    for a net from PNML; `factory` and the `least` number of robots for its product, None for a
     net from PNML; the `deputies` of each robot, and the `coordinated` net with hands, magazines and
     the tray, None if not requested; the number of robots for each product of a mix `alone`."""
 
@@ -165,7 +165,7 @@ def check_project(
         project.matings,
         None if project.pag.is_plain else project.product,
         project.warnings,
-        project.no_grips if project.settings.hands else None,
+        project.no_grips,
         factory,
         None if project.pag.mix else least_robots(project.pag, project.templates),
         _deputies(project, factory) if deputies else None,

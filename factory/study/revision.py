@@ -190,7 +190,7 @@ def _laid_out(new: Project, was: Layout, factory: Factory, pins: Pins, pin: Pin)
     if pin == "none":
         return new.layout
     product, settings = framed(new.product, was.product), new.settings
-    hands = Hands(factory, product, settings.acceleration, pins.hands) if was.hands else None
+    hands = Hands(factory, product, settings.acceleration, pins.hands)
     if pin == "hands":
         return new.ground.lay_out(factory, product, settings, hands)
     size, speed = Clearance(settings.clearance, factory.carriage), Pace.of(settings)

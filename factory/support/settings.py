@@ -23,7 +23,6 @@ RANGES = {
     "settle": (0.0, 10.0),
     "outfeed": (1e-3, 10.0),
     "stage": (0, 1),
-    "hands": (0, 1),
 }
 """Least and greatest value of each setting; beyond them a run overflows or never ends."""
 
@@ -52,10 +51,10 @@ LOOK = 0.1
 MOST = 10
 """Maximum number of ticks that the engine takes at once."""
 
-WHOLE = ("substeps", "stage", "hands")
+WHOLE = ("substeps", "stage")
 """Settings that are whole numbers."""
 
-SWITCHES = ("stage", "hands")
+SWITCHES = ("stage",)
 """Settings that are 0 or 1, or False or True."""
 
 EXAMPLES: Mapping[str, str] = MappingProxyType({"timestep": '0.002, or "auto"', "substeps": "5"})
@@ -71,8 +70,7 @@ class Settings:
     are smaller where they collide; `force`: the actuators'
     limit as a multiple of what the payload needs; `settle`: time to come to rest within eps [s],
     used only to predict; `outfeed` speed [m/s]; `stage`: 1 where robots that wait empty-handed go
-    ahead to where their next operation needs them; `hands`: 1 where robots hold by solid hands that
-    are chosen from the geometry of the parts.
+    ahead to where their next operation needs them.
 
     With AUTO a tick is TICK, whatever is chosen for a layout (`factory.mjcf.timestep`): so layouts
     and predictions need not know. Raises InputError (BadValue) with every value out of its range.
@@ -89,7 +87,6 @@ class Settings:
     settle: float = 0.0
     outfeed: float = 1.0
     stage: int = 0
-    hands: int = 1
 
     def __post_init__(self) -> None:
         for name in SWITCHES:
@@ -107,10 +104,10 @@ class Settings:
 
     @property
     def feeder_limits(self) -> tuple[float, float]:
-        """Speed [m/s] and acceleration [m/s²] of the feeders' sliders: the speed of the tray, eight
-        times the acceleration of a robot. Down to a hand it is half of that: a heavy part is not to
-        come further than to 0.1 mm from the pad."""
-        return self.outfeed, (4 if self.hands else 8) * self.acceleration
+        """Speed [m/s] and acceleration [m/s²] of the feeders' sliders: the speed of the tray, four
+        times the acceleration of a robot, with which a heavy part comes no further than to 0.1 mm
+        from the pad of a hand."""
+        return self.outfeed, 4 * self.acceleration
 
     @property
     def shutter_limits(self) -> tuple[float, float]:

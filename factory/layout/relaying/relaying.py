@@ -53,7 +53,7 @@ def relayed(
     RunError (Layout) where it does not fit the floor."""
     if plain.factory.folded:
         return plain
-    if hands is None and settings.hands:
+    if hands is None and plain.hands:
         hands = Hands(plain.factory, plain.product, settings.acceleration)
     room = Room(plain, Pace.of(settings), floor, hands)
     search = _searched(room, room.cuttable(), settings, cycle)

@@ -121,7 +121,7 @@ _ALL = (
         "grip_strength_share_max",
         "",
         "Largest share of the strength of a hand's tips used by the force and moment of its load, "
-        "measured several times a second; none if hands are not chosen (--no-hands). "
+        "measured several times a second; none if no robot has a hand. "
         "Above 1 the hand lets go (Dropped).",
         1,
     ),

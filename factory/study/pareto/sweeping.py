@@ -132,8 +132,7 @@ class FrontSweep:
             self.written = self._added(Candidate(self.project, self.estimator.written.forms))
         whole = self._estimate()
         if layouts:
-            if self.project.settings.hands:
-                self._hold()
+            self._hold()
             whole = self._lay_out() and self._relay() and whole
             if not self.points:
                 self.project.layout  # noqa: B018 (says why there is none)
