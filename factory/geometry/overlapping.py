@@ -148,13 +148,15 @@ def _found(product: Product, insides: Insides) -> DrawnOverlaps:
 def stood_in(solids: Sequence[Solid]) -> frozenset[str]:
     """The parts that collide as their hulls although another part stands in a hole or a hollow of
     theirs: it is in the hull by more than it is in the part as drawn."""
-    hulls = {solid.label for solid in solids if solid.mesh and collides_as_hull(solid.mesh)}
+    pairs = near_pairs(solids, -SILENT).tolist()
+    near = [solids[number] for number in sorted({number for pair in pairs for number in pair})]
+    hulls = {solid.label for solid in near if solid.mesh and collides_as_hull(solid.mesh)}
     if not hulls:
         return frozenset()
     from manifold3d import Manifold
 
     labels: set[str] = set()
-    for pair in near_pairs(solids, -SILENT).tolist():
+    for pair in pairs:
         for solid, other in ((solids[one], drawn(solids[two])) for one, two in (pair, pair[::-1])):
             body = drawn(solid) if solid.label in hulls - labels else None
             if body is not None and other is not None:
