@@ -47,7 +47,7 @@ def taken_apart(path: Path) -> tuple[dict[str, Any], Blocks]:
     found = []
     while at < len(data):
         kind, length, _ = HEAD.unpack_from(data, at)
-        found.append((kind, unpacked(memoryview(data)[at + HEAD.size : at + HEAD.size + length])))
+        found.append((kind, unpacked(data[at + HEAD.size : at + HEAD.size + length])))
         at += HEAD.size + length
     return json.loads(data[LENGTH.size : LENGTH.size + LENGTH.unpack_from(data)[0]]), found
 
