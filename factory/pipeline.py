@@ -45,7 +45,8 @@ class Project:
     """A PAG with all that follows from it: its geometry, factory and layout, each computed when it
     is first used. `templates`, `catalogue` and `plan` are what it is compiled with, `settings` and
     `ground` what it is laid out for; `laid`: the table of its layout, None where one is looked
-    for. `lowered`: by operations the input to be lowered there, if it can be."""
+    for. `lowered`: by operations the input to be lowered there, if it can be. Raises InputError
+    (BadValue) where relays are asked for of robots with several tours."""
 
     pag: PAG
     templates: Mapping[str, Template] = field(repr=False)
@@ -55,6 +56,9 @@ class Project:
     plan: Plan = field(default_factory=Plan)
     laid: LayoutTable | None = field(default=None, repr=False)
     lowered: Mapping[str, str] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        self.ground.check(self.pag.mix is not None or bool(self.plan.turns))
 
     @classmethod
     def of_made(cls, made: Factory | Layout, settings: Settings | None = None) -> Project:
