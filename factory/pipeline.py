@@ -18,6 +18,7 @@ from factory.compiler.expanding import expand
 from factory.compiler.turning import check_shapes, placed
 from factory.lang.pag_reader import load_pag
 from factory.lang.template_reader import all_templates as all_templates
+from factory.lang.template_reader import is_shipped
 from factory.layout.request import Ground, hands_of
 from factory.plant.approaches import Approach
 from factory.plant.factory import Factory
@@ -26,9 +27,8 @@ from factory.problem.plan import Plan
 from factory.problem.robot_types import Catalogue, load_catalogue
 from factory.problem.template import Template
 from factory.support.errors import Diagnostic, InputError
-from factory.support.resources import templates_folder
 from factory.support.settings import Settings
-from factory.support.tables import MISFITS
+from factory.support.tables import MISFITS, misfit
 
 if TYPE_CHECKING:
     from factory.compiler.mating.findings import Matings
@@ -293,7 +293,7 @@ class Project:
             self.pag, self.templates, self.catalogue, self.approaches, self._single
         )
         check_shapes(factory, self.pag.is_shaped)
-        users = {name for name, template in self.templates.items() if not _is_shipped(template)}
+        users = {name for name, template in self.templates.items() if not is_shipped(template)}
         tried = users and users & {operation.template.name for operation in factory.operations}
         if tried:
             from factory.modes.modes import check_modes
@@ -333,8 +333,7 @@ class Project:
         try:
             return laid.laid_out(factory, self.product, plain)
         except MISFITS as error:
-            why = error if type(error) is ValueError else "its values do not fit each other"
-            message = f"the layout that is kept is not of this factory: {why}"
+            message = f"the layout that is kept is not of this factory: {misfit(error)}"
             raise InputError(Diagnostic("BadPlan", message)) from error
 
     @property
@@ -342,12 +341,6 @@ class Project:
         """The factory with the relays of its layout if its ground asks for them, else the plain
         one. Raises as these do."""
         return self.layout.factory if self.ground.relays else self.plain
-
-
-def _is_shipped(template: Template) -> bool:
-    """Whether a template is known to have a mode in every layout."""
-    at = template.position
-    return at is not None and Path(at.file).parent == templates_folder()
 
 
 def read(

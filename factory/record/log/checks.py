@@ -103,15 +103,15 @@ def check_block(arrays: Arrays, header: Mapping[str, Any]) -> None:
     where one is missing."""
     for name, (kind, row) in ARRAYS.items():
         _check_kind(name, arrays[name], kind, row)
+    for one, other in PAIRS:
+        if len(arrays[one]) != len(arrays[other]):
+            raise ValueError(f"{one} and {other} differ in length")
     count = len(arrays["time"])
     for name, width in (("qpos", header["nq"]), ("qvel", header["nv"]), ("ctrl", None)):
         if width is not None or header["world"] != "ideal" or f"{name}_first" in arrays:
             _check_rows(name, arrays, count, width)
     for name in RAGGED:
         _check_ragged(name, arrays, count)
-    for one, other in PAIRS:
-        if len(arrays[one]) != len(arrays[other]):
-            raise ValueError(f"{one} and {other} differ in length")
     _check_range("ended_at", arrays["ended_at"], count - 1)
     _check_range("time", arrays["time"], LARGE)
     _check_range("fired_t", arrays["fired_t"], LARGE)

@@ -37,6 +37,7 @@ from factory.record.verdict import check_figures
 from factory.support.claim import is_claimed
 from factory.support.errors import InputError
 from factory.support.files import LOG, RECORD, Content, content_of, head_of
+from factory.support.tables import misfit
 
 Index = NDArray[np.int32]
 
@@ -176,7 +177,7 @@ def read_log(path: Path | str) -> Log:
     except UnicodeDecodeError as error:
         raise InputError(bad_log(path, "is damaged: a text in it is not UTF-8")) from error
     except (ValueError, KeyError, IndexError, TypeError, OverflowError, RecursionError) as error:
-        raise InputError(bad_log(path, f"is damaged: {error}")) from error
+        raise InputError(bad_log(path, f"is damaged: {misfit(error)}")) from error
 
 
 def is_log(path: Path | str) -> bool:
