@@ -75,13 +75,8 @@ class Project:
             if plain.period == 1:
                 stages["product"] = layout.product
         used = {o.template.name: o.template for o in plain.operations}
-        project = cls(
-            plain.pag,
-            {**all_templates(), **used},
-            settings=settings or Settings(),
-            ground=ground,
-            plan=plain.plan,
-        )
+        conditions = settings or Settings(), ground, plain.plan
+        project = cls(plain.pag, {**all_templates(), **used}, load_catalogue(), *conditions)
         project.__dict__.update(stages)
         return project
 

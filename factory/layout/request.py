@@ -27,7 +27,7 @@ WIDEST = 10**5
 
 def is_side(length: object) -> bool:
     """Whether it is a width or depth [m] that a floor can have."""
-    return isinstance(length, Real) and not isinstance(length, bool) and 0 < length <= WIDEST
+    return isinstance(length, Real) and not isinstance(length, bool) and 0 < float(length) <= WIDEST
 
 
 @dataclass(frozen=True, slots=True)

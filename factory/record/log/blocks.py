@@ -40,8 +40,9 @@ class Unpacking:
     def row(self, name: str, number: int) -> NDArray[np.float64]:
         """The state (width,) in a row of the whole log, locked, apart from its block."""
         block = int(np.searchsorted(self._first, number, side="right")) - 1
-        state: NDArray[np.float64] = self._block(block)[name][number - self._first[block]]
-        return locked(state.copy())
+        state: NDArray[np.float64] = self._block(block)[name][number - self._first[block]].copy()
+        state.setflags(write=False)
+        return state
 
     def _unpack(self, block: int) -> Arrays:
         begin, count = self._begins[block], int(self._first[block + 1] - self._first[block])
