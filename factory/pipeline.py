@@ -18,6 +18,7 @@ from factory.compiler.expanding import expand
 from factory.compiler.turning import check_shapes, placed
 from factory.lang.pag_reader import load_pag
 from factory.lang.template_reader import all_templates as all_templates
+from factory.lang.template_reader import is_shipped
 from factory.layout.request import Ground, hands_of
 from factory.plant.approaches import Approach
 from factory.plant.factory import Factory
@@ -26,9 +27,8 @@ from factory.problem.plan import Plan
 from factory.problem.robot_types import Catalogue, load_catalogue
 from factory.problem.template import Template
 from factory.support.errors import Diagnostic, InputError
-from factory.support.resources import templates_folder
 from factory.support.settings import Settings
-from factory.support.tables import MISFITS
+from factory.support.tables import MISFITS, misfit
 
 if TYPE_CHECKING:
     from factory.compiler.mating.findings import Matings
@@ -45,7 +45,8 @@ class Project:
     """A PAG with all that follows from it: its geometry, factory and layout, each computed when it
     is first used. `templates`, `catalogue` and `plan` are what it is compiled with, `settings` and
     `ground` what it is laid out for; `laid`: the table of its layout, None where one is looked
-    for. `lowered`: by operations the input to be lowered there, if it can be."""
+    for. `lowered`: by operations the input to be lowered there, if it can be. Raises InputError
+    (BadValue) where relays are asked for of robots with several tours."""
 
     pag: PAG
     templates: Mapping[str, Template] = field(repr=False)
@@ -55,6 +56,9 @@ class Project:
     plan: Plan = field(default_factory=Plan)
     laid: LayoutTable | None = field(default=None, repr=False)
     lowered: Mapping[str, str] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        self.ground.check(self.pag.mix is not None or bool(self.plan.turns))
 
     @classmethod
     def of_made(cls, made: Factory | Layout, settings: Settings | None = None) -> Project:
@@ -70,13 +74,8 @@ class Project:
             if plain.period == 1:
                 stages["product"] = layout.product
         used = {o.template.name: o.template for o in plain.operations}
-        project = cls(
-            plain.pag,
-            {**all_templates(), **used},
-            settings=settings or Settings(),
-            ground=ground,
-            plan=plain.plan,
-        )
+        conditions = settings or Settings(), ground, plain.plan
+        project = cls(plain.pag, {**all_templates(), **used}, load_catalogue(), *conditions)
         project.__dict__.update(stages)
         return project
 
@@ -287,7 +286,7 @@ class Project:
             self.pag, self.templates, self.catalogue, self.approaches, self._single
         )
         check_shapes(factory, self.pag.is_shaped)
-        users = {name for name, template in self.templates.items() if not _is_shipped(template)}
+        users = {name for name, template in self.templates.items() if not is_shipped(template)}
         tried = users and users & {operation.template.name for operation in factory.operations}
         if tried:
             from factory.modes.modes import check_modes
@@ -327,8 +326,7 @@ class Project:
         try:
             return laid.laid_out(factory, self.product, plain)
         except MISFITS as error:
-            why = error if type(error) is ValueError else "its values do not fit each other"
-            message = f"the layout that is kept is not of this factory: {why}"
+            message = f"the layout that is kept is not of this factory: {misfit(error)}"
             raise InputError(Diagnostic("BadPlan", message)) from error
 
     @property
@@ -336,12 +334,6 @@ class Project:
         """The factory with the relays of its layout if its ground asks for them, else the plain
         one. Raises as these do."""
         return self.layout.factory if self.ground.relays else self.plain
-
-
-def _is_shipped(template: Template) -> bool:
-    """Whether a template is known to have a mode in every layout."""
-    at = template.position
-    return at is not None and Path(at.file).parent == templates_folder()
 
 
 def read(

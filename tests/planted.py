@@ -436,7 +436,7 @@ def states(joint: str, by: float, row: int = 150, rows: int = 1) -> Callable[[Lo
         m = mujoco.MjModel.from_xml_string(
             log.xml, {f"meshes/{n}": f for n, f in log.files.items()}
         )
-        qpos = log.qpos.copy()
+        qpos = np.array(log.qpos)
         qpos[row : row + rows, m.jnt_qposadr[m.joint(joint).id]] += by
         return replace(log, qpos=qpos)
 

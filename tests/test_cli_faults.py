@@ -33,6 +33,26 @@ def commands(folder: Path) -> list[list[object]]:
     ]
 
 
+# --- what libraries say ---------------------------------------------------------------------------
+
+WARNS = """
+import numpy
+from factory import commands
+commands.run_command = lambda words: int(numpy.float64(0) / numpy.float64(0) > 1)
+commands.main([])
+"""
+"""A command in which a library warns."""
+
+
+def test_warnings_of_libraries_are_for_programmers() -> None:
+    said = [
+        subprocess.run([sys.executable, *options, "-c", WARNS], capture_output=True, text=True)
+        for options in ((), ("-W", "default"))
+    ]
+    assert [done.returncode for done in said] == [0, 0]
+    assert said[0].stderr == "" and "RuntimeWarning" in said[1].stderr
+
+
 # --- broken files ---------------------------------------------------------------------------------
 
 

@@ -4,6 +4,7 @@ files are refused with a diagnostic."""
 from __future__ import annotations
 
 import random
+import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 from unittest.mock import ANY
@@ -16,8 +17,10 @@ from hypothesis.extra import numpy as arrays
 
 import factory
 from factory.record.log import MAGIC, Log, LogWriter, is_log, read_log
-from factory.record.log.blocks import HEAD, LENGTH, StoredRows, pack_rows, unpack_rows
-from factory.record.monitor.record import watch_log
+from factory.record.log.blocks import HEAD, LENGTH, Arrays, block, blocks, pack_rows, unpack_rows
+from factory.record.log.model import model_of
+from factory.record.log.reader import header_in
+from factory.record.monitor.record import jumps, observations, watch_log
 from factory.record.state import State
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
@@ -86,22 +89,62 @@ def test_a_log_says_what_happened(recorded) -> None:
     )
 
 
-def test_the_states_of_a_large_log_are_unpacked_as_they_are_asked_for(
-    recorded, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Whether a log is large is a matter of its states and of its bytes; nothing else changes."""
+def test_a_large_log_is_read_in_pieces(recorded, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only where its bytes come from depends on its size."""
     path, small = recorded[0], read_log(recorded[0])
-    monkeypatch.setattr("factory.record.log.reader.ROOM", 100_000)
     monkeypatch.setattr("factory.support.files.LARGE", 1000)
     large = read_log(path)
-    assert isinstance(large.qpos, StoredRows) and large.qpos.shape == small.qpos.shape
     assert small.ends is not None and large.ends is not None
     for one, other in ((small, large), (small.ends, large.ends)):
         for name in ("qpos", "qvel", "ctrl"):
-            rows, unpacked = getattr(one, name), getattr(other, name)
-            assert len(unpacked) == len(rows) > 0
-            assert all((unpacked[n] == rows[n]).all() for n in (-1, *range(0, len(rows), 7)))
+            rows, others = getattr(one, name), getattr(other, name)
+            assert len(others) == len(rows) > 0 and others.shape == rows.shape
+            assert all((others[n] == rows[n]).all() for n in (-1, *range(0, len(rows), 7)))
     assert watch_log(large)[0] == replace(watch_log(small)[0], time_s=ANY)
+
+
+def longer(log: Path, times: int, path: Path) -> Path:
+    """A log with the ticks of another so many times, one after the other, without contacts."""
+    data = log.read_bytes()
+    _, at = header_in(data)
+    ticks: list[Arrays] = []
+    for kind, tick, end in blocks(data, at):
+        at = end if kind == b"M" else at
+        ticks += [tick] if kind == b"T" else []
+    span, made = ticks[-1]["time"][-1] + 0.01, ticks[-1]["delivered"][-1]
+    with path.open("wb") as stream:
+        stream.write(data[:at])
+        for turn in range(times):
+            for tick in ticks:
+                later = {name: tick[name] + turn * span for name in ("time", "fired_t")}
+                later["delivered"] = np.maximum(tick["delivered"], made if turn else 0)
+                apart = {name: a[:0] for name, a in tick.items() if name.startswith("contact")}
+                stream.write(block(b"T", {**tick, **later, **apart}))
+    return path
+
+
+def peak(path: Path) -> int:
+    """The memory that going through the states of a log takes at most [bytes]."""
+    tracemalloc.start()
+    try:
+        log = read_log(path)
+        list(jumps(log, model_of(log)))
+        for _ in observations(log):
+            pass
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def test_the_memory_for_a_log_does_not_grow_with_its_states(
+    recorded, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is kept of each row, such as its time, takes a small share of them."""
+    monkeypatch.setattr("factory.record.monitor.record.SPAN", 100)
+    short, long = (longer(recorded[0], times, tmp_path / f"{times}") for times in (2, 6))
+    log, more = read_log(long), peak(long) - peak(short)
+    states = 8 * 4 / 6 * len(log) * (log.header["nq"] + log.header["nv"])
+    assert 0 < more < states / 3, (more, states)
 
 
 def test_a_row_is_found_by_its_time(recorded) -> None:
@@ -146,9 +189,9 @@ def test_what_is_read_is_locked(recorded) -> None:
     log = read_log(recorded[0])
     for values in (
         log.time,
-        log.qpos,
-        log.qvel,
-        log.ctrl,
+        log.qpos[0],
+        log.qvel[0],
+        log.ctrl[0],
         log.fired,
         log.marking.values,
         log.active.values,
@@ -183,7 +226,7 @@ def test_a_file_cut_off_anywhere_gives_its_beginning(recorded, tmp_path: Path) -
             log = read_log(cut)
             seen.append(len(log))
             assert not log.complete
-            assert (log.qpos == whole.qpos[: len(log)]).all()
+            assert all((log.qpos[row] == whole.qpos[row]).all() for row in range(len(log)))
             assert log.events == whole.events[: len(log.events)]
             if len(log):
                 last = len(log) - 1

@@ -17,6 +17,7 @@ from factory.record.log.checks import LogHeader
 from factory.record.log.model import model_of
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
+from factory.support.tables import misfit
 from tests.command_line import PAPER, Terminal
 from tests.layout_values import paper_layout
 
@@ -47,7 +48,7 @@ def taken_apart(path: Path) -> tuple[dict[str, Any], Blocks]:
     found = []
     while at < len(data):
         kind, length, _ = HEAD.unpack_from(data, at)
-        found.append((kind, unpacked(memoryview(data)[at + HEAD.size : at + HEAD.size + length])))
+        found.append((kind, unpacked(data[at + HEAD.size : at + HEAD.size + length])))
         at += HEAD.size + length
     return json.loads(data[LENGTH.size : LENGTH.size + LENGTH.unpack_from(data)[0]]), found
 
@@ -191,6 +192,8 @@ def first(value: float) -> Callable[[np.ndarray], np.ndarray]:
         ("active", lambda values: values.ravel(), "active is <i4"),
         ("qpos_first", longer, "qpos has"),
         ("qvel_first", lambda values: values[:-1], "qvel has"),
+        ("qpos_change", lambda values: values[:, 1:], "qpos has |u1 (8, "),
+        ("qvel_change", lambda values: values.astype("<i4"), "qvel has <i4 (8, "),
         ("qpos_moving", first(-1), "qpos_moving is out of range"),
         ("contact_dist", lambda values: np.zeros(3), "contact and contact_dist differ"),
     ],
@@ -207,6 +210,27 @@ def test_damaged_ticks(
     assert is_refused(put_together(tmp_path / "bad.log", header, found), words)
 
 
+@pytest.mark.parametrize("name", ["time", "fired_t", "qpos_change", "active_at"])
+def test_a_block_that_lacks_an_array(log: Path, tmp_path: Path, name: str) -> None:
+    header, blocks = taken_apart(log)
+    found = [(kind, {n: a for n, a in arrays.items() if n != name}) for kind, arrays in blocks]
+    assert is_refused(put_together(tmp_path / "bad.log", header, found), f"it has no '{name}'")
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        IndexError("index 5 is out of bounds for axis 0 with size 3"),
+        UnicodeDecodeError("utf-8", b"\xff", 0, 1, "invalid start byte"),
+        TypeError("'NoneType' object is not subscriptable"),
+        OverflowError("cannot convert float infinity to integer"),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+def test_what_python_says_of_values_that_do_not_fit_is_not_said(error: Exception) -> None:
+    assert misfit(error) == "its values do not fit each other"
+
+
 @pytest.mark.parametrize("value", [-1, 10**6])
 def test_constraints_and_contacts_of_no_model(log: Path, value: int) -> None:
     kept = read_log(log)
@@ -219,7 +243,7 @@ def test_constraints_and_contacts_of_no_model(log: Path, value: int) -> None:
     with pytest.raises(InputError, match="BadLog the log's constraints"):
         model_of(replace(kept, contacts=replace(kept.contacts, values=pairs)))
     with pytest.raises(InputError, match="BadLog the log's states"):
-        model_of(replace(kept, qvel=kept.qvel[:, 1:]))
+        model_of(replace(kept, qvel=np.array(kept.qvel)[:, 1:]))
 
 
 def test_a_file_that_is_made_to_fill_the_memory(log: Path, tmp_path: Path) -> None:

@@ -41,6 +41,10 @@ WRONG: tuple[tuple[Callable[[Any], object], tuple[object, ...]], ...] = (
     (lambda p: factory.Settings(clearance=-3), ("run", PAPER, "--clearance", -3)),
     (lambda p: factory.Settings(speed=float("nan")), ("run", PAPER, "--speed", "nan")),
     (lambda p: factory.lay_out(p, floor=(0, 3)), ("build", PAPER, "--floor", "0x3")),
+    *(
+        (lambda p, floor=floor: factory.lay_out(p, floor=floor), ("build", PAPER, "--floor", floor))
+        for floor in ("4", "4x3x2", "fourx3", "-4x3", "nanx3", "1e9x3", "\u0664x3", "")
+    ),
     (lambda p: factory.lay_out(p, floor=(0.3, 0.3)), ("build", PAPER, "--floor", "0.3x0.3")),
     (
         lambda p: factory.lay_out(p, relay=True, deputies=True),
@@ -98,6 +102,19 @@ def test_a_wrong_call_gives_the_code_of_the_command(
     assert done.status == caught.value.exit_status
     assert done.codes == [diagnostic.code for diagnostic in caught.value.diagnostics]
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("floor", [(4,), (4, "3"), (True, 3), 4, b"4x3", {3.0, 4.0}], ids=repr)
+def test_a_floor_is_two_lengths(floor: Any) -> None:
+    with pytest.raises(factory.InputError, match="is not two positive lengths"):
+        factory.lay_out(PAPER, floor=floor)
+
+
+def test_a_floor_is_given_in_numbers_or_as_a_command_takes_it() -> None:
+    layouts = [factory.lay_out(PAPER, floor=floor) for floor in ("2x1.5", (2, 1.5), [2.0, 1.5])]
+    assert len({str(layout.guidepaths) for layout in layouts}) == 1
+    width, depth = (layouts[0].floor[i + 2] - layouts[0].floor[i] for i in (0, 1))
+    assert 0 < width <= 2 and 0 < depth <= 1.5
 
 
 def test_what_is_no_product_is_told() -> None:

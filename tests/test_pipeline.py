@@ -15,9 +15,10 @@ from factory.commands.options import MOTION, OUTPUT, SOURCE
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.layout.request import Ground
 from factory.pipeline import read
+from factory.problem.plan import Plan
 from factory.support.errors import InputError
 from factory.support.settings import Settings
-from tests.command_line import PAPER, ROOT
+from tests.command_line import PAPER, ROOT, Terminal
 from tests.test_relay_hands import sawn
 
 
@@ -37,6 +38,40 @@ def test_the_factory_of_a_project_has_the_relays_of_its_layout(tmp_path: Path) -
     project = read(tmp_path / "slab.pag", ground=Ground(relay=True))
     assert project.factory is project.layout.factory
     assert len(project.factory.robots) > len(project.plain.robots)
+
+
+FAMILY = ROOT / "examples" / "family.pag"
+
+UNFIT = (
+    (PAPER, "--relay", "--parallel", "sub2=2"),
+    (PAPER, "--relay", "--robots", "least"),
+    (FAMILY, "--relay"),
+    (FAMILY, "--relay", "--parallel", "body=2"),
+    (FAMILY, "--demand", 3, "--deputies"),
+    (PAPER, "--demand", 3, "--world", "ideal"),
+    (PAPER, "--fuse", "--world", "ideal"),
+)
+"""Files and options that do not go together."""
+
+
+@pytest.mark.parametrize("words", UNFIT, ids=lambda words: " ".join(map(str, words[1:])))
+def test_options_that_do_not_go_together_are_refused_before_any_work(
+    words: tuple[object, ...], run: Terminal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def work(*_: object) -> None:
+        raise AssertionError("something was compiled")
+
+    monkeypatch.setattr("factory.pipeline.compile_pag", work)
+    done = run("run", *words, "--json")
+    assert done.status == 2 and done.codes[0] in ("BadValue", "BadDemand", "Usage")
+
+
+def test_no_plan_with_several_tours_gets_relays() -> None:
+    project = read(PAPER).with_plan(Plan(turns=((0, 1, 2, 3, 4, 4),)))
+    with pytest.raises(InputError, match="several tours"):
+        project.with_ground(Ground(relay=True))
+    with pytest.raises(InputError, match="several tours"):
+        read(PAPER, ground=Ground(relay=True)).with_plan(project.plan)
 
 
 def test_a_project_is_laid_out_for_its_settings() -> None:

@@ -226,7 +226,7 @@ def test_a_good_run_has_good_figures(recording) -> None:
 def test_planted_faults_show_in_the_figures(recording) -> None:
     log, m = recording.log, recording.motion.m
     joint = m.jnt_qposadr[m.body("part/part2#1").jntadr[0]]
-    qpos, ctrl = log.qpos.copy(), log.ctrl.copy()
+    qpos, ctrl = np.array(log.qpos), np.array(log.ctrl)
     qpos[:, joint] += 2e-3
     ctrl[:, m.actuator_ctrladr[0]] += 5e-3
     found = fidelity(replace(recording, log=replace(log, qpos=qpos, ctrl=ctrl), layout=None))

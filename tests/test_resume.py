@@ -25,7 +25,7 @@ from factory.simulation.resuming import Resumed
 from factory.simulation.simulation import Compiled, Simulation, compiled
 from factory.support.claim import claimed, claimed_again
 from factory.support.errors import InputError
-from factory.support.files import RECORD, mapped
+from factory.support.files import RECORD, content_of
 from tests.command_line import PAPER, ROOT, Terminal, spawn, started
 from tests.simulation_values import FINE, layout_of
 from tests.test_log import block_ends
@@ -40,7 +40,7 @@ EXAMPLES = ROOT / "examples"
 def ticks_of(path: Path) -> bytes:
     """All of a log but its header, which has the command line."""
     data = path.read_bytes()
-    return data[header_in(memoryview(data))[1] :]
+    return data[header_in(data)[1] :]
 
 
 def cut(whole: Path, path: Path, size: int) -> Path:
@@ -52,7 +52,7 @@ def cut(whole: Path, path: Path, size: int) -> Path:
 def go_on(made: Simulation, path: Path, max_time: float | None = None) -> float:
     """Let a simulation that has not begun come to where its log ends, and go on; gives when that
     is [s]."""
-    end, since = last_full(mapped(path, RECORD), rows_of_a_block(made.request.settings.tick))
+    end, since = last_full(content_of(path, RECORD), rows_of_a_block(made.request.settings.tick))
     going = Resumed(path, made, read_log(path), claimed_again(path), end, since)
     with going.recorder() as recorder:
         recorder.end(made.run([recorder.observe], max_time, (), recorder.since).trouble)

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
+from warnings import simplefilter
 
 import click
 from click.core import ParameterSource
@@ -124,6 +125,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """The entry point: runs a command and exits with its status, never with a traceback."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     _open_streams()
+    if not sys.warnoptions:  # what libraries warn programmers of is shown with `python -W default`
+        simplefilter("ignore")
     stop_on_signals(interrupt)
     status = run_command(words)
     try:

@@ -83,6 +83,7 @@ class ProjectOptions:
         from factory.support.user_defaults import defaults_for
 
         floor = None if self.floor is None else pair(self.floor, "--floor", "4x3", float, WIDEST)
+        kept = defaults_for(self.file)
         check_together(
             {
                 "--relay": self.relay,
@@ -90,7 +91,9 @@ class ProjectOptions:
                 "--robots": self.robots is not None,
                 "--deputies": self.deputies,
                 "--platen": self.platen or self.tile is not None,
-                "[tees]": bool(defaults_for(self.file).tees()),
+                "--parallel": bool(self.branches()),
+                "[lines]": bool(kept.lines()),
+                "[tees]": bool(kept.tees()),
             }
         )
         tile = self.tile or (TILE if self.platen else None)

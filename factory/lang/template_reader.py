@@ -38,6 +38,12 @@ def read_template(text: str, file: str = "<text>") -> Template:
     return template
 
 
+def is_shipped(template: Template) -> bool:
+    """Whether a template is one of the package's, which have a mode in every layout."""
+    at = template.position
+    return at is not None and Path(at.file).parent == templates_folder()
+
+
 def all_templates(folders: Sequence[Folder] = ()) -> Mapping[str, Template]:
     """The templates of the user's folders, of entry points and the shipped ones. Raises
     InputError."""

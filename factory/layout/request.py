@@ -18,17 +18,16 @@ if TYPE_CHECKING:
     from factory.problem.robot_types import Catalogue
 
 
-SEVERAL_TOURS = Diagnostic(
-    "BadValue",
-    "--relay does not go with robots that have several tours: a relay cuts the way of one tour",
-    hint="leave out --relay, or what shares robots: a mix, --robots, --parallel, [lines]",
-)
-
 TILE = 0.24
 """The usual size of the tiles of a platen [m]."""
 
 WIDEST = 10**5
 """Upper bound on the width and depth of a floor [m]."""
+
+
+def is_side(length: object) -> bool:
+    """Whether it is a width or depth [m] that a floor can have."""
+    return isinstance(length, Real) and not isinstance(length, bool) and 0 < float(length) <= WIDEST
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +47,7 @@ class Ground:
     def __post_init__(self) -> None:
         check_values({"cycle": self.cycle, "tile": self.tile})
         sides = self.floor if isinstance(self.floor, tuple) else ()
-        fits = len(sides) == 2 and all(isinstance(x, Real) and 0 < x <= WIDEST for x in sides)
+        fits = len(sides) == 2 and all(map(is_side, sides))
         if self.floor is not None and not fits:
             message = f"floor = {self.floor!r:.60} is not two positive lengths up to {WIDEST} m"
             raise InputError(Diagnostic("BadValue", message, None, "for example (4.0, 3.0)"))
@@ -57,6 +56,15 @@ class Ground:
     def relays(self) -> bool:
         """Whether relays are asked for: a cycle time asks for them too."""
         return self.relay or self.cycle is not None
+
+    def check(self, shared: bool) -> None:
+        """Raises InputError (BadValue) where relays are asked for of robots with several tours
+        (`shared`)."""
+        if self.relay and shared:
+            message = "--relay does not go with robots that have several tours"
+            hint = "leave out --relay, or what shares robots: a mix, --robots, --parallel, [lines]"
+            words = f"{message}: a relay cuts the way of one tour"
+            raise InputError(Diagnostic("BadValue", words, None, hint))
 
     def lay_out(
         self,
@@ -75,8 +83,7 @@ class Ground:
         from factory.layout.embedding import lay_out
         from factory.plant.fused_bodies import repeated
 
-        if self.relay and factory.folded:
-            raise InputError(SEVERAL_TOURS)
+        self.check(factory.folded)
         pace = Pace.of(settings)
         factory, product = judged(factory, product), repeated(product, factory)
         if self.deputies:

@@ -21,7 +21,7 @@ from factory.record.project_table import ProjectTable, project_of, project_table
 from factory.support.errors import Diagnostic, InputError, Position
 from factory.support.files import MESH, read_bytes
 from factory.support.settings import Settings
-from factory.support.tables import MISFITS, table_of, value_of
+from factory.support.tables import MISFITS, misfit, table_of, value_of
 
 PLAN_NAME, LAYOUT_NAME = "plan.json", "layout.json"
 
@@ -139,7 +139,7 @@ def _of_a_plan(path: Path) -> Iterator[None]:
             Diagnostic("BadPlan", f"it is not JSON: {error.msg}", at, AGAIN)
         ) from error
     except (ValueError, KeyError, RecursionError) as error:
-        words = f"it has no {error}" if isinstance(error, KeyError) else str(error)
+        words = misfit(error)
         raise InputError(Diagnostic("BadPlan", words, Position(str(path), 1, 1), AGAIN)) from error
 
 

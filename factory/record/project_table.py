@@ -29,7 +29,7 @@ from factory.problem.template import Template
 from factory.support.errors import Diagnostic, InputError
 from factory.support.files import AGAIN
 from factory.support.settings import Settings
-from factory.support.tables import MISFITS, table_of, value_of
+from factory.support.tables import MISFITS, misfit, table_of, value_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,8 +120,7 @@ def of_its_factory() -> Iterator[None]:
     try:
         yield
     except MISFITS as error:
-        words = str(error) if type(error) is ValueError else "its values do not fit each other"
-        raise _of_another(words) from error
+        raise _of_another(misfit(error)) from error
     except InputError as error:
         if error.diagnostics[0].code != "BadPlan":
             raise

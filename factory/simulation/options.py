@@ -18,6 +18,11 @@ if TYPE_CHECKING:
     from factory.simulation.request import RunRequest
 
 APART = (
+    (
+        "--relay",
+        ("--robots", "--parallel", "[lines]"),
+        "a relay cuts the way of one tour, and a robot has several then",
+    ),
     ("--deputies", ("--relay", "--cycle"), "no robot can take over for one that relays"),
     ("[tees]", ("--robots", "--cycle", "--relay"), "they change the robots that share a stem"),
     (
@@ -36,8 +41,8 @@ APART = (
         "what they change has no room on guidepaths that bend",
     ),
 )
-"""Options that exclude others, with the reason. All other pairs can be combined, except --relay and
-robots with several tours, which is refused at the layout."""
+"""Options that exclude others, with the reason. All other pairs can be combined; of a product,
+--relay goes with none of a mix, and with no plan whose robots have several tours (`Project`)."""
 
 
 def check_together(values: Mapping[str, bool]) -> None:

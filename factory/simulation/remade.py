@@ -25,7 +25,7 @@ from factory.record.verdict import FAULTS, HEADER, RESERVATIONS
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.errors import Diagnostic, FactoryError
-from factory.support.tables import value_of
+from factory.support.tables import misfit, value_of
 
 TAG = re.compile(r"<[^>]+>")
 
@@ -92,7 +92,7 @@ def model_faults(
             return (Diagnostic("Record", first.message),), ""
         return (), first.message
     except BROKEN as error:
-        return (), str(error)
+        return (), misfit(error)
     if made.model is None:
         return (), "a run in the ideal world has no model"
     faults = _unsaid(log, made)

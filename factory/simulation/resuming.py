@@ -21,7 +21,7 @@ from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.claim import claimed_again
 from factory.support.errors import Diagnostic, InputError
-from factory.support.files import AGAIN, RECORD, mapped
+from factory.support.files import AGAIN, RECORD, content_of
 from factory.support.settings import AUTO
 
 IN_ITSELF = ("Stalled", "Dropped", "Unstable", "Failed")
@@ -76,7 +76,7 @@ def resume(path: Path, max_time: float | None = None) -> Resumed | CutOff:
             project, request = project_of(log.header, path.parent), request_of(log.header)
         simulation = _made(path, log, project, request)
         rows = rows_of_a_block(request.settings.tick)
-        end, since = last_full(mapped(path, RECORD), rows)
+        end, since = last_full(content_of(path, RECORD), rows)
     except BaseException:
         file.close()
         raise

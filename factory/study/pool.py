@@ -113,7 +113,8 @@ class _Processes(Generic[Item, Result]):
     does not reach it."""
 
     def __init__(self, work: Callable[[Item], Result], variables: Mapping[str, str]) -> None:
-        self.work, self.env = work, {**os.environ, **variables}
+        self.work = work
+        self.env = {"PYTHONWARNINGS": "ignore", **os.environ, **variables}
         self.started, self.free, self.ended = list[Popen[bytes]](), list[Popen[bytes]](), False
 
     def do(self, number: int, item: Item) -> Worked[Result]:

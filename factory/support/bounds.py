@@ -131,7 +131,7 @@ def pair(text: str, option: str, example: str, number: type, most: int) -> tuple
     """`4x3` as two positive numbers of at most `most`. Raises InputError (BadValue)."""
     try:
         width, depth = (number(word) for word in text.lower().split("x"))
-        if "_" in text or not (0 < width <= most and 0 < depth <= most):
+        if not text.isascii() or "_" in text or not (0 < width <= most and 0 < depth <= most):
             raise ValueError
     except ValueError:
         message = f"{option} takes two positive numbers up to {most}, not '{text}'"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import mmap
 import os
 import re
 import select
@@ -13,6 +12,7 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
+from weakref import finalize
 
 from factory.support.errors import Diagnostic, InputError
 from factory.support.guard import about_to_write, declare, reading
@@ -30,8 +30,8 @@ TEXT, TABLE, NET, MESH, RECORD = 32 * MIB, MIB, 256 * MIB, 256 * MIB, 4096 * MIB
 table in TOML, a net or a certificate, a mesh, a log. A text takes up to 150 times its bytes of
 memory, a net 15 times. 10^6 labels are 20 MiB of text, and a net of 10,000 parts is 40 MiB."""
 
-LARGE = 64 * MIB
-"""A record of more is mapped, not read."""
+LARGE = MIB
+"""A record of more is read in pieces."""
 
 PATIENCE = 2.0
 """Time to wait for the first byte of a pipe that no process has open for writing [s]."""
@@ -70,15 +70,34 @@ def read_bytes(path: Path, most: int) -> bytes:
     return b"".join(content)
 
 
-def mapped(path: Path, most: int) -> memoryview:
+class Stored:
+    """The content of a file on the disk, of which what is asked for alone is read."""
+
+    def __init__(self, path: Path) -> None:
+        self._file = os.open(path, os.O_RDONLY)
+        self._size = os.fstat(self._file).st_size
+        finalize(self, os.close, self._file)
+
+    def __len__(self) -> int:
+        return self._size
+
+    def __getitem__(self, part: slice) -> bytes:
+        first, end, _ = part.indices(self._size)
+        return os.pread(self._file, max(0, end - first), first)
+
+
+Content = bytes | Stored
+"""The bytes of a file; slices of it are bytes."""
+
+
+def content_of(path: Path, most: int) -> Content:
     """The content of a file, or what comes through a pipe, as `read_bytes` gives it; of a large
     file what is asked for alone is read."""
     reading(path)
     status = os.stat(path)
-    if not (stat.S_ISREG(status.st_mode) and LARGE < status.st_size <= most):
-        return memoryview(read_bytes(path, most))
-    with path.open("rb") as stream:
-        return memoryview(mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ))
+    if stat.S_ISREG(status.st_mode) and LARGE < status.st_size <= most:
+        return Stored(path)
+    return read_bytes(path, most)
 
 
 def _open(path: str, flags: int) -> int:

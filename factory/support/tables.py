@@ -23,6 +23,15 @@ MISFITS = (
 )
 """What is raised where values of a table have the right types and do not fit each other."""
 
+
+def misfit(error: BaseException) -> str:
+    """What is wrong with values that do not fit each other, without the words of Python's own
+    errors."""
+    if type(error) is KeyError:
+        return f"it has no {error}"
+    return str(error) if type(error) is ValueError else "its values do not fit each other"
+
+
 LARGE = 10**9
 """Upper bound on every length [m] and time [s] in a table."""
 

@@ -205,8 +205,8 @@ class ScannedTimes:
             return 0.0
         left, speed, (then, after) = eps, way.speed[begin], way.left[begin : begin + 2]
         # in a tick its way is (1 - share) of the first speed and share of the last
-        mean = 2 * (then - after)
-        first = mean * speed / (speed + way.speed[begin + 1])
+        mean, both = 2 * (then - after), speed + way.speed[begin + 1]
+        first = mean * speed / both if both else mean / 2  # the ideal world has no acceleration
         gain = (mean - 2 * first) / 2
         way_left = then - left
         if abs(gain) < 1e-12:

@@ -1,5 +1,5 @@
 """The blocks of a log file: named arrays packed, compressed, and checked when they are read. States
-that do not fit the memory of a reader are unpacked on demand.
+are unpacked on demand, so that the memory of a reader does not grow with them.
 
 A block is one letter, the length of its content and its CRC-32 (`<cII`), then the content, zlib.
 Unpacked, that is the length (`<I`) of a JSON directory [[name, dtype, shape], ...], the directory,
@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.support.errors import Diagnostic, InputError
-from factory.support.files import AGAIN, LOG
+from factory.support.files import AGAIN, LOG, Content
 
 STATES = ("qpos", "qvel", "ctrl")
 
@@ -32,22 +32,22 @@ class Unpacking:
     """Unpacks the states in the blocks of ticks that begin at the given bytes of a file, with the
     numbers of rows of each."""
 
-    def __init__(self, data: memoryview, begins: Sequence[int], counts: Sequence[int]) -> None:
+    def __init__(self, data: Content, begins: Sequence[int], counts: Sequence[int]) -> None:
         self._data, self._begins = data, begins
         self._first = np.cumsum([0, *counts])
         self._block = lru_cache(maxsize=KEPT)(self._unpack)
 
     def row(self, name: str, number: int) -> NDArray[np.float64]:
-        """The state (width,) in a row of the whole log."""
+        """The state (width,) in a row of the whole log, locked, apart from its block."""
         block = int(np.searchsorted(self._first, number, side="right")) - 1
-        state: NDArray[np.float64] = self._block(block)[name][number - self._first[block]]
+        state: NDArray[np.float64] = self._block(block)[name][number - self._first[block]].copy()
+        state.setflags(write=False)
         return state
 
     def _unpack(self, block: int) -> Arrays:
         begin, count = self._begins[block], int(self._first[block + 1] - self._first[block])
-        length = HEAD.unpack_from(self._data, begin)[1]
-        content = self._data[begin + HEAD.size : begin + HEAD.size + length]
-        arrays = unpacked(content)
+        _, length, _ = HEAD.unpack(self._data[begin : begin + HEAD.size])
+        arrays = unpacked(self._data[begin + HEAD.size : begin + HEAD.size + length])
         there = [name for name in STATES if f"{name}_first" in arrays]
         return {name: unpack_rows(name, arrays, count) for name in there}
 
@@ -75,12 +75,6 @@ class StoredRows:
 
 StateRows = NDArray[np.float64] | StoredRows
 """The rows (n, width) of a state."""
-
-
-def all_rows(name: str, width: int, ticks: Sequence[Arrays]) -> NDArray[np.float64]:
-    """The rows of a state in all blocks."""
-    rows = [unpack_rows(name, arrays, len(arrays["time"])) for arrays in ticks]
-    return np.concatenate([np.zeros((0, width)), *rows])
 
 
 def without_states(arrays: Arrays) -> Arrays:
@@ -120,11 +114,11 @@ def block(kind: bytes, arrays: Mapping[str, NDArray[Any]], level: int = 1) -> by
     return HEAD.pack(kind, len(content), zlib.crc32(content)) + content
 
 
-def blocks(data: memoryview, at: int) -> Iterator[tuple[bytes, Arrays, int]]:
+def blocks(data: Content, at: int) -> Iterator[tuple[bytes, Arrays, int]]:
     """The blocks in a file from byte `at` on, up to the first that is cut off or damaged, each with
     the byte at which the next begins."""
     while at + HEAD.size <= len(data):
-        kind, length, check = HEAD.unpack_from(data, at)
+        kind, length, check = HEAD.unpack(data[at : at + HEAD.size])
         content = data[at + HEAD.size : at + HEAD.size + length]
         if len(content) != length or zlib.crc32(content) != check:
             return
@@ -132,14 +126,14 @@ def blocks(data: memoryview, at: int) -> Iterator[tuple[bytes, Arrays, int]]:
         yield kind, unpacked(content), at
 
 
-def is_cut(data: memoryview, at: int) -> bool:
+def is_cut(data: Content, at: int) -> bool:
     """Whether a file ends within the block that begins at byte `at`."""
     if at + HEAD.size > len(data):
         return True
-    return at + HEAD.size + int(HEAD.unpack_from(data, at)[1]) > len(data)
+    return at + HEAD.size + int(HEAD.unpack(data[at : at + HEAD.size])[1]) > len(data)
 
 
-def unpacked(content: memoryview) -> Arrays:
+def unpacked(content: bytes) -> Arrays:
     """The arrays of a block. Raises ValueError where it is not one."""
     try:
         packed = zlib.decompressobj()
@@ -189,7 +183,7 @@ def bad_log(
     return Diagnostic("BadLog", f"'{path}' {words}", None, hint)
 
 
-def check_magic(path: Path, data: memoryview) -> None:
+def check_magic(path: Path, data: Content) -> None:
     """Raises InputError (BadLog) where a file is no log, or one of another version."""
     if data[: len(MAGIC)] == MAGIC:
         return

@@ -103,15 +103,15 @@ def check_block(arrays: Arrays, header: Mapping[str, Any]) -> None:
     where one is missing."""
     for name, (kind, row) in ARRAYS.items():
         _check_kind(name, arrays[name], kind, row)
-    count = len(arrays["time"])
-    for name, width in (("qpos", header["nq"]), ("qvel", header["nv"]), ("ctrl", None)):
-        if width is not None or header["world"] != "ideal" or f"{name}_first" in arrays:
-            _check_rows(name, arrays, width)
-    for name in RAGGED:
-        _check_ragged(name, arrays, count)
     for one, other in PAIRS:
         if len(arrays[one]) != len(arrays[other]):
             raise ValueError(f"{one} and {other} differ in length")
+    count = len(arrays["time"])
+    for name, width in (("qpos", header["nq"]), ("qvel", header["nv"]), ("ctrl", None)):
+        if width is not None or header["world"] != "ideal" or f"{name}_first" in arrays:
+            _check_rows(name, arrays, count, width)
+    for name in RAGGED:
+        _check_ragged(name, arrays, count)
     _check_range("ended_at", arrays["ended_at"], count - 1)
     _check_range("time", arrays["time"], LARGE)
     _check_range("fired_t", arrays["fired_t"], LARGE)
@@ -144,13 +144,17 @@ def _check_range(name: str, values: NDArray[Any], most: int) -> None:
         raise ValueError(f"{name} is out of range: not from 0 to {most}")
 
 
-def _check_rows(name: str, arrays: Arrays, width: int | None) -> None:
+def _check_rows(name: str, arrays: Arrays, count: int, width: int | None) -> None:
     first, moving = arrays[f"{name}_first"], arrays[f"{name}_moving"]
+    planes = arrays[f"{name}_change"]
     _check_kind(f"{name}_first", first, "<f8", ())
     _check_kind(f"{name}_moving", moving, "<i4", ())
     if width is not None and len(first) != width:
         raise ValueError(f"{name} has {len(first)} columns, where its header says {width}")
     _check_range(f"{name}_moving", moving, len(first) - 1)
+    if planes.dtype != "|u1" or planes.shape != (8, (count - 1) * len(moving)):
+        size = f"{planes.dtype.str} {planes.shape}"
+        raise ValueError(f"{name} has {size} for {count} rows of {len(moving)} that change")
 
 
 def _check_ragged(name: str, arrays: Arrays, count: int) -> None:

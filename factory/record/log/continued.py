@@ -11,7 +11,7 @@ from factory.record.log.reader import Log, header_in
 from factory.record.log.writer import LogWriter
 from factory.record.state import Event, Recordable, Recorder, State
 from factory.support.errors import Diagnostic, InputError
-from factory.support.files import AGAIN
+from factory.support.files import AGAIN, Content
 
 HINT = (
     "the log was changed or comes from another machine, or something took part in its run that a "
@@ -19,7 +19,7 @@ HINT = (
 )
 
 
-def last_full(data: memoryview, rows: int) -> tuple[int, float]:
+def last_full(data: Content, rows: int) -> tuple[int, float]:
     """End of the last complete block of ticks: its byte and time [s]; the byte after the model and
     0 where there is none. `rows`: least number of rows of a complete block. Raises ValueError where
     the data are not a log."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
@@ -24,7 +24,6 @@ from factory.record.log.blocks import (
     StateRows,
     StoredRows,
     Unpacking,
-    all_rows,
     bad_log,
     blocks,
     check_magic,
@@ -37,13 +36,14 @@ from factory.record.log.failed import Placed, failures_of, failures_so_far, undo
 from factory.record.verdict import check_figures
 from factory.support.claim import is_claimed
 from factory.support.errors import InputError
-from factory.support.files import LOG, RECORD, head_of, mapped
+from factory.support.files import LOG, RECORD, Content, content_of, head_of
+from factory.support.tables import misfit
 
 Index = NDArray[np.int32]
 
-ROOM, WIDEST = 1 << 29, 1 << 27
-"""Upper bounds on the bytes of unpacked states, of all blocks and of one. A day of the paper's
-example takes 30 times the first; its blocks, of a second, take 200 kB each."""
+WIDEST = 1 << 27
+"""Upper bound on the bytes of the unpacked states of a block. Those of a second of the paper's
+example take 200 kB."""
 
 ROUNDING = 1e-9
 """Times that differ by less are equal [s]."""
@@ -51,18 +51,29 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Ragged:
-    """An array for each row i of a log: `values` from starts[i] to ends[i]."""
+    """An array for each row i of a log, which is row `numbers[i]` of its file: the one recorded at
+    that row or, where arrays are `lasting`, the last one up to it; empty where there is none.
+
+    `at` (k,): the rows of the file at which arrays were recorded; `ends` (k,): where each ends in
+    `values`."""
 
     values: NDArray[Any] = field(repr=False)
-    starts: NDArray[np.int64] = field(repr=False)
+    at: NDArray[np.int64] = field(repr=False)
     ends: NDArray[np.int64] = field(repr=False)
+    numbers: NDArray[np.int64] = field(repr=False)
+    lasting: bool
 
     def __getitem__(self, row: int) -> NDArray[Any]:
-        return self.values[self.starts[row] : self.ends[row]]
+        number = self.numbers[row]
+        last = int(np.searchsorted(self.at, number, side="right")) - 1
+        if last < 0 or not (self.lasting or self.at[last] == number):
+            return self.values[:0]
+        return self.values[self.ends[last - 1] if last else 0 : self.ends[last]]
 
-    def chosen(self, rows: NDArray[np.bool_]) -> Ragged:
-        """The values of some rows."""
-        return Ragged(self.values, self.starts[rows], self.ends[rows])
+    def recorded(self) -> NDArray[np.int64]:
+        """The rows from which on an array is another recorded one than before."""
+        rows = np.unique(np.searchsorted(self.numbers, self.at))
+        return rows[rows < len(self.numbers)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +166,7 @@ def read_log(path: Path | str) -> Log:
     """The log in a file, whole or cut off. Raises InputError (BadLog) where it is not a log."""
     path = Path(path)
     try:
-        written, data = is_claimed(path), mapped(path, RECORD)
+        written, data = is_claimed(path), content_of(path, RECORD)
     except OSError as error:
         raise InputError(bad_log(path, f"cannot be read: {error.strerror}")) from error
     check_magic(path, data)
@@ -166,7 +177,7 @@ def read_log(path: Path | str) -> Log:
     except UnicodeDecodeError as error:
         raise InputError(bad_log(path, "is damaged: a text in it is not UTF-8")) from error
     except (ValueError, KeyError, IndexError, TypeError, OverflowError, RecursionError) as error:
-        raise InputError(bad_log(path, f"is damaged: {error}")) from error
+        raise InputError(bad_log(path, f"is damaged: {misfit(error)}")) from error
 
 
 def is_log(path: Path | str) -> bool:
@@ -179,26 +190,26 @@ def digest_of(header: Mapping[str, Any]) -> str:
     return sha256(json.dumps(dict(header), sort_keys=True).encode()).hexdigest()
 
 
-def header_in(data: memoryview) -> tuple[dict[str, Any], int]:
+def header_in(data: Content) -> tuple[dict[str, Any], int]:
     """The header of a log, and the byte at which its blocks begin. Raises ValueError where it is
     not a valid header."""
     begin = len(MAGIC) + LENGTH.size
-    kept = begin + (LENGTH.unpack_from(data, len(MAGIC))[0] if begin <= len(data) else 0)
+    kept = begin + (LENGTH.unpack(data[len(MAGIC) : begin])[0] if begin <= len(data) else 0)
     if kept > len(data) or begin > len(data):
         raise ValueError(f"it ends in its header, at byte {len(data)}")
-    header = json.loads(bytes(data[begin:kept]))
+    header = json.loads(data[begin:kept])
     check_header(header)
     return header, kept
 
 
-def log_in(data: memoryview, written: bool = False) -> Log:
+def log_in(data: Content, written: bool = False) -> Log:
     """The log in the bytes of a file; `written`: its run is still in progress. Raises ValueError,
     KeyError, IndexError, TypeError, OverflowError or RecursionError where it is not a log."""
     header, kept = header_in(data)
     xml, files, complete = "", {}, False
     trouble: Arrays = {}
     ticks: list[Arrays] = []
-    begins, size, wide = list[int](), 0, None
+    begins, wide = list[int](), None
     for kind, arrays, end in blocks(data, kept):
         if kind == b"M":
             xml = arrays["xml"].tobytes().decode()
@@ -206,14 +217,10 @@ def log_in(data: memoryview, written: bool = False) -> Log:
         elif kind == b"T":
             check_block(arrays, header)
             wide = len(arrays["ctrl_first"]) if "ctrl_first" in arrays else None
-            if (more := state_bytes(arrays)) > WIDEST:
+            if state_bytes(arrays) > WIDEST:
                 raise ValueError("the states in a block of it take too much memory")
-            ticks.append(arrays)
+            ticks.append(without_states(arrays))
             begins.append(kept)
-            size += more
-            if size > ROOM:  # from here on they are unpacked on demand
-                first = 0 if size - more <= ROOM else -1
-                ticks[first:] = [*map(without_states, ticks[first:])]
         complete, kept = kind == b"E", end
         trouble = arrays if complete else {}
     counts = [len(a["time"]) for a in ticks]
@@ -228,37 +235,33 @@ def log_in(data: memoryview, written: bool = False) -> Log:
     last = float(time[-1]) if len(time) else 0.0
     cut = made < units or any(why)
     at_end = _at_end(ticks, counts)
-    tick = ~at_end
-    unpacking = Unpacking(data, begins, counts) if size > ROOM else None
-    numbers = np.flatnonzero(tick), np.flatnonzero(at_end)
+    ended, numbers = np.flatnonzero(at_end), np.flatnonzero(~at_end)
+    unpacking = Unpacking(data, begins, counts)
 
-    def states(name: str, width: int) -> tuple[Any, Any]:
+    def states(name: str, width: int) -> tuple[StateRows, StateRows]:
         """The rows of a state, those that are ends of operations apart."""
-        if unpacking is not None:
-            here, ended = (StoredRows(unpacking, name, width, each) for each in numbers)
-            return here, ended
-        rows = all_rows(name, width, ticks)
-        return locked(rows[tick]), locked(rows[at_end])
+        rows = (StoredRows(unpacking, name, width, each) for each in (numbers, ended))
+        return next(rows), next(rows)
 
     (qpos, qpos_ended), (qvel, qvel_ended) = (
         states("qpos", header["nq"]),
         states("qvel", header["nv"]),
     )
     ctrl, ctrl_ended = (None, None) if wide is None else states("ctrl", wide)
-    active = _lasting("active", ticks, counts)
-    follows = np.cumsum(tick, dtype=np.int64)[at_end]
+    active = _ragged("active", ticks, numbers)
+    contacts = _ragged("contact", ticks, numbers, lasting=False)
     return Log(
         MappingProxyType(header),
         xml,
         MappingProxyType(files),
-        locked(time[tick]),
-        locked(delivered[tick]),
+        locked(time[numbers]),
+        locked(delivered[numbers]),
         qpos,
         qvel,
-        _lasting("marking", ticks, counts).chosen(tick),
-        active.chosen(tick),
-        _single("contact", "contact", ticks, counts).chosen(tick),
-        _single("contact", "contact_dist", ticks, counts).chosen(tick),
+        _ragged("marking", ticks, numbers),
+        active,
+        contacts,
+        replace(contacts, values=_joined("contact_dist", ticks, np.float64)),
         _joined("fired", ticks, np.int32),
         _joined("fired_t", ticks, np.float64),
         ctrl,
@@ -266,7 +269,14 @@ def log_in(data: memoryview, written: bool = False) -> Log:
         CutOff(last, made, units, *why) if cut else None,
         None
         if ctrl_ended is None
-        else Ends(follows, time[at_end], qpos_ended, qvel_ended, ctrl_ended, active.chosen(at_end)),
+        else Ends(
+            ended - np.arange(len(ended)),
+            time[ended],
+            qpos_ended,
+            qvel_ended,
+            ctrl_ended,
+            replace(active, numbers=ended),
+        ),
         _figures(trouble["figures"]) if "figures" in trouble else None,
         undone_in(ticks, header),
         _failures(trouble, ticks, header),
@@ -297,7 +307,7 @@ def _failures(end: Arrays, ticks: Sequence[Arrays], header: Mapping[str, Any]) -
     return failures_so_far(ticks, robots)
 
 
-def _broken(data: memoryview, kept: int, written: bool) -> str:
+def _broken(data: Content, kept: int, written: bool) -> str:
     """The reason why a file that was read up to byte `kept` lacks its last block."""
     if written:
         return f"its run is still in progress, and has written {kept} bytes"
@@ -312,35 +322,16 @@ def _joined(name: str, ticks: Sequence[Arrays], kind: Any) -> Any:
     return locked(np.concatenate([np.zeros(0, kind), *(a[name] for a in ticks)]))
 
 
-def _spans(
-    name: str, ticks: Sequence[Arrays], counts: Sequence[int]
-) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """Rows of the whole log at which an array is recorded, and where its values start and end."""
-    base = np.cumsum([0, *counts])
-    at = np.concatenate(
-        [np.zeros(0, int), *(a[f"{name}_at"] + b for a, b in zip(ticks, base, strict=False))]
-    )
-    ends = np.cumsum(np.concatenate([np.zeros(0, int), *(a[f"{name}_count"] for a in ticks)]))
-    return at, np.concatenate([[0], ends])[: len(ends)], ends
-
-
-def _lasting(name: str, ticks: Sequence[Arrays], counts: Sequence[int]) -> Ragged:
-    """Values that are valid from their row until the next recorded row."""
-    at, starts, ends = _spans(name, ticks, counts)
-    values = np.concatenate([a[name] for a in ticks]) if ticks else np.zeros((0,), np.int32)
-    if not len(at):
-        nothing = np.zeros(sum(counts), int)
-        return Ragged(locked(values.reshape(0, *values.shape[1:])), nothing, nothing)
-    which = np.searchsorted(at, np.arange(sum(counts)), side="right") - 1
-    if which.min(initial=0) < 0:
+def _ragged(
+    name: str, ticks: Sequence[Arrays], numbers: NDArray[np.int64], lasting: bool = True
+) -> Ragged:
+    """The arrays of that name at the rows `numbers`. Raises ValueError where the first row lacks
+    one that lasts."""
+    base = np.cumsum([0, *(len(a["time"]) for a in ticks)])
+    rows = [a[f"{name}_at"] + first for a, first in zip(ticks, base, strict=False)]
+    at = np.concatenate([np.zeros(0, np.int64), *rows])
+    if lasting and at[:1].any():
         raise ValueError(f"the first tick has no {name}")
-    return Ragged(locked(values), starts[which], ends[which])
-
-
-def _single(name: str, values: str, ticks: Sequence[Arrays], counts: Sequence[int]) -> Ragged:
-    """Values that are valid for one row."""
-    at, first, last = _spans(name, ticks, counts)
-    starts, ends = np.zeros(sum(counts), int), np.zeros(sum(counts), int)
-    starts[at], ends[at] = first, last
-    joined = np.concatenate([a[values] for a in ticks]) if ticks else np.zeros(0)
-    return Ragged(locked(joined), starts, ends)
+    counts = np.concatenate([np.zeros(0, np.int64), *(a[f"{name}_count"] for a in ticks)])
+    values = np.concatenate([a[name] for a in ticks]) if ticks else np.zeros(0, np.int32)
+    return Ragged(locked(values), at, np.cumsum(counts), numbers, lasting)

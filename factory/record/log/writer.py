@@ -27,7 +27,7 @@ from factory.record.state import Array, Event, Observation, Recordable, Recorder
 from factory.record.verdict import HEADER, kept_figures
 from factory.support.claim import claimed
 from factory.support.errors import Diagnostic, FactoryError, InputError
-from factory.support.files import RECORD, mapped, unwritten
+from factory.support.files import RECORD, content_of, unwritten
 from factory.support.settings import AUTO
 from factory.support.tables import table_of
 from factory.support.version import release
@@ -208,7 +208,7 @@ class LogWriter(Recorder):
         if self.trouble is not None:
             texts = {"code": self.trouble.code, "message": self.trouble.message}
         if (figures := self.simulation.figures()) is not None:
-            header, _ = header_in(mapped(self.path, RECORD))
+            header, _ = header_in(content_of(self.path, RECORD))
             kept = {**kept_figures(figures), HEADER: digest_of(header)}
             texts["figures"] = json.dumps(kept)
         if (account := self.simulation.state().account) is not None:

@@ -33,7 +33,7 @@ JUMP = 3e-4
 """Tolerance of the displacement of a joint in a tick against its speeds [m]; correct logs stay
 below a tenth of it."""
 
-SPAN = 20_000
+SPAN = 2_000
 """Number of ticks that are checked at once."""
 
 
@@ -112,8 +112,8 @@ def verdict_on(
 
 def _markings(log: Log) -> Iterator[tuple[float, list[int]]]:
     """Each marking in a log that differs from the previous one, with its time [s]."""
-    rows = np.flatnonzero(np.diff(log.marking.starts, prepend=-1))
-    return ((float(log.time[row]), log.marking[row].tolist()) for row in rows.tolist())
+    rows = log.marking.recorded().tolist()
+    return ((float(log.time[row]), log.marking[row].tolist()) for row in rows)
 
 
 def observations(log: Log, first: int = 0, last: int | None = None) -> Iterator[Observation]:

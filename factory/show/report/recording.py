@@ -23,6 +23,7 @@ from factory.show.report.scene import DrawnFactory, stations
 from factory.simulation.remade import forged, model_faults
 from factory.study.analysis.measured import conditions
 from factory.support.errors import Diagnostic, InputError, RunError
+from factory.support.tables import misfit
 
 
 @dataclass(frozen=True)
@@ -110,7 +111,7 @@ def recording_of(path: Path, layout: Layout | None = None) -> Recording:
         except (InputError, RunError) as error:
             missing = error.diagnostics[0].message
         except (KeyError, TypeError, ValueError, AttributeError) as error:
-            missing = str(error)
+            missing = misfit(error)
         faults, _ = model_faults(log, path.parent, layout)
     factory = layout.factory if layout else factory
     return Recording(str(path), log, motion, factory, layout, missing, faults)
