@@ -262,15 +262,17 @@ def test_a_file_that_is_made_to_fill_the_memory(log: Path, tmp_path: Path) -> No
     assert is_refused(bad, "unpacks to more than 200 times")
 
 
-@pytest.mark.parametrize("error", [MemoryError, OverflowError])
+@pytest.mark.parametrize(
+    ("error", "words"), [(MemoryError, "too much"), (OverflowError, "do not fit each other")]
+)
 def test_a_log_that_does_not_fit(
-    log: Path, monkeypatch: pytest.MonkeyPatch, error: type[Exception]
+    log: Path, monkeypatch: pytest.MonkeyPatch, error: type[Exception], words: str
 ) -> None:
     def full(*_: object) -> None:
         raise error("too much")
 
-    monkeypatch.setattr("factory.record.log.blocks.unpack_rows", full)
-    assert is_refused(log, "too much")
+    monkeypatch.setattr("factory.record.log.blocks.unpacked", full)
+    assert is_refused(log, words)
 
 
 def planted(after: str, what: str) -> Callable[[str], str]:
