@@ -77,7 +77,7 @@ class Layout(Keeping, Pictured):
         return f"<Layout of {self.factory}: {self.area:.2f} m²>"
 
     def hand(self, robot: int) -> Hand | None:
-        """The hand of a robot; None for a tool, and if hands are not chosen."""
+        """The hand of a robot; None for a tool, and in a draft without hands."""
         return self.hands[robot] if self.hands else None
 
     def held(self, robot: int, operation: int, label: str) -> Box:
