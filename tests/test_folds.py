@@ -441,8 +441,8 @@ def test_a_dead_train_has_no_cycle_time() -> None:
 
 @pytest.mark.parametrize("seed", [2, 5, 19, 56])
 def test_the_ideal_world_has_the_predicted_cycle_time(seed: int) -> None:
-    """Within the tick that each operation of the critical circuit may wait for; and prediction,
-    analysis and layout are one."""
+    """Within the tick that each operation of the critical circuit may wait for; and prediction and
+    analysis are one. The layout's estimate, without ticks, is below by no more than these."""
     settings = Settings(stage=seed % 2)
     layout = fold_layout(seed, settings)
     simulation = Simulation(layout, RunRequest("ideal", 24, settings=settings))
@@ -455,7 +455,7 @@ def test_the_ideal_world_has_the_predicted_cycle_time(seed: int) -> None:
     assert predicted - 1e-6 <= measured <= predicted + ticks
     assert left[-1] <= simulation.duration + 24 * ticks
     engine = timed_net(Timing(layout, settings, "mujoco"))
-    assert cycle_of(layout, Pace.of(settings)) == pytest.approx(engine.pace)
+    assert engine.pace - ticks <= cycle_of(layout, Pace.of(settings)) <= engine.pace + 1e-6
 
 
 @pytest.mark.parametrize("seed", [6, 33, 51, 53])

@@ -178,6 +178,8 @@ class FrontSweep:
 
     def _hold(self) -> None:
         """Lay out those with a robot for each label in which each robot has a hand."""
+        if self.budget.over():
+            return
         aim = Aim(effort=ceil(HELD * self.budget.effort / SINGLE), seconds=self.budget.left)
         search = Search(self.project, aim, self.estimator)
         for number, one in enumerate(search.singles()):
