@@ -159,10 +159,11 @@ def test_a_stall(run: Terminal, out: Path) -> None:
     carry_out(simulation, True, None, [lambda: LogWriter(log, simulation)])
     assert cut_off(log).code == "Stalled" and "nothing fired for" in cut_off(log).message
     done = run("monitor", log)
-    assert done.status == 1 and f"VIOLATIONS, {cut_off(log)}\n" in done.out
+    assert done.status == 1 and "Altered: 'actuator_biasprm' of r5/drive is 0" in done.out
+    assert cut_off(log).message in done.out
     assert run("report", log, "-o", out / "a.html").status == 1
     words = Page((out / "a.html").read_text("utf-8")).words
-    assert "✗ does not follow the net" in words and f"C{cut_off(log).with_cause[1:]}." in words
+    assert f"C{cut_off(log).with_cause[1:]}." in words
 
 
 def test_an_error_of_another_observer(out: Path) -> None:
@@ -191,7 +192,7 @@ def test_what_ended_a_run_is_text(whole: Path, out: Path) -> None:
     header, blocks = taken_apart(whole)
     texts = {"code": EVIL, "message": EVIL}
     end = {name: np.frombuffer(text.encode(), "u1") for name, text in texts.items()}
-    log = put_together(out / "evil.log", header, [*blocks[:-1], (b"E", end)])
+    log = put_together(out / "evil.log", header, [*blocks[:-1], (b"E", {**blocks[-1][1], **end})])
     found, usual = Page(page(recording_of(log))), Page(page(recording_of(whole)))
     assert len(found.tags) == len(usual.tags) + 3
     assert {tag for tag, _ in found.tags} == {tag for tag, _ in usual.tags}

@@ -197,7 +197,8 @@ def test_a_robot_keeps_its_type() -> None:
     """One with a lift can stand in for one without, not the other way round."""
     inserts = plain(inserted(paper()))
     part2, part3 = robot_of(inserts, "part2"), robot_of(inserts, "part3")
-    robots = (replace(r, type="lift") if r.index == part2 else r for r in inserts.robots)
+    lift = load_catalogue()["lift"]
+    robots = (replace(r, kind=lift) if r.index == part2 else r for r in inserts.robots)
     rows = deputies(replace(inserts, robots=tuple(robots)), load_catalogue())
     assert (rows[part2], rows[part3]) == ((), (part2,))
 

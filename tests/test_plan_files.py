@@ -361,7 +361,7 @@ def test_the_meshes_of_a_plan(run: Terminal, tmp_path: Path) -> None:
     trimesh.creation.box((0.04, 0.04, 0.04)).export(folder / "a.stl")
     (folder / "p.pag").write_text(
         'root = x; x = mate(a, b); a = atomic(mesh = "a.stl");'
-        " b = atomic(box = (0.03, 0.03, 0.03), pos = (0, 0, 0.04))"
+        " b = atomic(box = (0.03, 0.03, 0.03), pos = (0, 0, 0.035))"
     )
     assert run("build", folder / "p.pag", "-o", folder / "d", "-q").status == 0
     shutil.copytree(folder / "d", moved)

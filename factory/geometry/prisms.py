@@ -29,9 +29,12 @@ AXES = 6
 """The number of directions that are tried: those of the largest faces."""
 
 THIN, FEW = (5e-5, 1e-3), 1e-3
-"""Prisms that are thinner than the first [m], and than the second share of the body, are omitted,
-the thinnest first, up to a share of FEW of its volume: a thin one has no room to recede in a close
-fit, and what is beside it is solid."""
+"""Prisms that are thinner than the first [m], and than the second share of the body, and have
+others along their sides but for a share of OPEN, are omitted, the thinnest first, up to a share of
+FEW of its volume: a thin one has no room to recede in a close fit, and what is beside it is solid.
+A thin wall stays."""
+
+OPEN = 0.25
 
 Loop = tuple[int, ...]
 """The corners of a convex polygon by number, anticlockwise."""
@@ -52,7 +55,8 @@ def prisms(vertices: Array, faces: Indices) -> tuple[Array, ...]:
             thick = np.array([_breadth(base) for base, _, _ in stack]) * size
             order = np.argsort(thick, kind="stable")
             few = np.cumsum(volumes[order]) <= FEW * volume
-            thin = {*order[few & (thick[order] < min(THIN[0], THIN[1] * size))].tolist()}
+            slight = (thick < min(THIN[0], THIN[1] * size)) & (_open(stack) < OPEN)
+            thin = {*order[few & slight[order]].tolist()}
             kept = (prism for number, prism in enumerate(stack) if number not in thin)
             return tuple(_prism(*prism) @ frame * size for prism in kept)
     return ()
@@ -162,6 +166,21 @@ def _breadth(base: Array) -> float:
     """A lower bound on the radius of the largest circle in a convex polygon."""
     rim = np.linalg.norm(np.roll(base, -1, axis=0) - base, axis=1).sum()
     return _area(base) / float(rim)
+
+
+def _open(stack: Sequence[tuple[Array, float, float]]) -> Array:
+    """The share of the sides of each prism (n,) along which there is no other of its slab."""
+    keys = [
+        [(low, *u, *v) for u, v in zip(base.tolist(), np.roll(base, -1, 0).tolist(), strict=True)]
+        for base, low, _ in stack
+    ]
+    known = {key for rim in keys for key in rim}
+    shares = []
+    for rim in keys:
+        lengths = np.array([np.hypot(u - x, v - y) for _, x, y, u, v in rim])
+        alone = [(low, u, v, x, y) not in known for low, x, y, u, v in rim]
+        shares.append(lengths[alone].sum() / lengths.sum())
+    return np.array(shares)
 
 
 def _prism(base: Array, low: float, high: float) -> Array:

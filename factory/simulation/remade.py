@@ -76,6 +76,8 @@ def model_faults(
     if it can. `layout`: if known."""
     if words := other_versions(log):
         return (Diagnostic("NotJudged", words, None, "judge it with those versions"),), words
+    if not len(log):
+        return (), "it has no states"
     said = (log.figures or {}).get(HEADER, "")
     if log.complete and log.figures is not None and said != digest_of(log.header):
         words = "the header of the log is not the one that it was ended with"
