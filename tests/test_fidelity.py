@@ -120,7 +120,8 @@ def test_a_stalled_run_is_told_and_fails() -> None:
     record = altered(dead)
     assert not record.passed
     codes = [one.code for one in record.trouble]
-    assert codes[0] == "Contact", "the shutter falls onto the belt: what comes first is the cause"
+    assert codes[0] == "Altered", "the model is no longer the one that was compiled"
+    assert codes[1] == "Contact", "the shutter falls onto the belt"
     assert {"Stalled", "Timeout"} & {*codes}
     assert record.figures["product_error_max_mm"] is None
 
