@@ -324,4 +324,5 @@ def test_a_stranger_s_log_reads_no_file(
     xml = model["xml"].tobytes().decode()
     told = planted("</worldbody>", f'<include file="{tmp_path / "secret.xml"}"/>')(xml)
     bad = [(kind, {**model, "xml": np.frombuffer(told.encode(), np.uint8)}), *ticks]
-    assert tried(put_together(tmp_path / "bad.log", header, bad))[:3] == [2, 2, 2]
+    # the monitor compares the model with that of the PAG, and compiles it no more than the others
+    assert tried(put_together(tmp_path / "bad.log", header, bad))[:3] == [1, 2, 2]

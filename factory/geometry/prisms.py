@@ -174,11 +174,11 @@ def _open(stack: Sequence[tuple[Array, float, float]]) -> Array:
         [(low, *u, *v) for u, v in zip(base.tolist(), np.roll(base, -1, 0).tolist(), strict=True)]
         for base, low, _ in stack
     ]
-    known = {key for rim in keys for key in rim}
+    sides = {key for rim in keys for key in rim}
     shares = []
     for rim in keys:
         lengths = np.array([np.hypot(u - x, v - y) for _, x, y, u, v in rim])
-        alone = [(low, u, v, x, y) not in known for low, x, y, u, v in rim]
+        alone = [(low, u, v, x, y) not in sides for low, x, y, u, v in rim]
         shares.append(lengths[alone].sum() / lengths.sum())
     return np.array(shares)
 
