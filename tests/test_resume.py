@@ -38,9 +38,10 @@ EXAMPLES = ROOT / "examples"
 
 
 def ticks_of(path: Path) -> bytes:
-    """All of a log but its header, which has the command line."""
+    """All of a log but its header, which has the command line, and its end, which has a digest of
+    that."""
     data = path.read_bytes()
-    return data[header_in(data)[1] :]
+    return data[header_in(data)[1] : block_ends(data)[-2]]
 
 
 def cut(whole: Path, path: Path, size: int) -> Path:
