@@ -47,7 +47,7 @@ def meshes(folder: Path) -> list[str]:
 def pag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("warned")
     parts = [
-        f'p{n} = atomic ( mesh = "{name}", pos = ({0.06 * n}, 0, 0) );'
+        f'p{n} = atomic ( mesh = "{name}", pos = ({0.05 * n:.2f}, 0, 0) );'
         for n, name in enumerate(meshes(folder))
     ]
     names = ", ".join(f"p{n}" for n in range(len(parts)))
@@ -91,7 +91,7 @@ def test_the_list_is_shown_if_asked_for(run: Terminal, pag: Path, tmp_path: Path
 
 def test_import_counts_what_build_will_say(run: Terminal, tmp_path: Path) -> None:
     children = ", ".join(
-        f'{{"part": "{name}", "at": [{0.06 * n}, 0, 0]}}' for n, name in enumerate(meshes(tmp_path))
+        f'{{"part": "{name}", "at": [{0.05 * n:.2f}, 0, 0]}}' for n, name in enumerate(meshes(tmp_path))
     )
     (tmp_path / "t.json").write_text(f'{{"children": [{children}]}}')
     assert run("import", tmp_path / "t.json", "-o", tmp_path / "a").err.splitlines() == LINES
