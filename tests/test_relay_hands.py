@@ -131,12 +131,12 @@ def test_a_slower_cycle_takes_fewer_relays() -> None:
 
 
 def test_no_more_relays_than_the_outfeed_has_use_for() -> None:
-    """A second relay would make the gears faster, but the outfeed takes as long as they do."""
+    """A third relay would make the gears faster, but the outfeed takes as long as they do."""
     layout = with_relays(6)
-    assert len(hand_overs(layout)) == 1
+    assert len(hand_overs(layout)) == 2
     found, _ = pace(layout, SETTINGS)
     assert found.bottleneck == "outfeed"
-    assert found.seconds == pytest.approx(max(gear_times(layout, Pace.of(SETTINGS))), rel=0.01)
+    assert found.seconds > max(gear_times(layout, Pace.of(SETTINGS)))
 
 
 def test_a_chain_of_relays_goes_through_nothing() -> None:

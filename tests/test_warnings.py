@@ -91,7 +91,8 @@ def test_the_list_is_shown_if_asked_for(run: Terminal, pag: Path, tmp_path: Path
 
 def test_import_counts_what_build_will_say(run: Terminal, tmp_path: Path) -> None:
     children = ", ".join(
-        f'{{"part": "{name}", "at": [{0.05 * n:.2f}, 0, 0]}}' for n, name in enumerate(meshes(tmp_path))
+        f'{{"part": "{name}", "at": [{0.05 * n:.2f}, 0, 0]}}'
+        for n, name in enumerate(meshes(tmp_path))
     )
     (tmp_path / "t.json").write_text(f'{{"children": [{children}]}}')
     assert run("import", tmp_path / "t.json", "-o", tmp_path / "a").err.splitlines() == LINES
