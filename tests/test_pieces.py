@@ -66,6 +66,9 @@ def ring(sides: int = 24, inner: float = 0.005, outer: float = 0.01) -> list[tri
 
 
 def solid_of(folder: Path, mesh: trimesh.Trimesh, kind: str = "obj", **given: object) -> Solid:
+    """The solid of a mesh that stands upright; in a GLB file y is up."""
+    if kind == "glb":
+        mesh = mesh.copy().apply_transform(np.linalg.inv(UPRIGHT))
     mesh.export(folder / f"m.{kind}")
     parameters = {"mesh": f"m.{kind}", **given}
     pag = table_pag("p", ("p", "atomic", "", parameters))  # type: ignore[arg-type]

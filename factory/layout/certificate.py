@@ -148,18 +148,16 @@ class Excluded:
 @dataclass(frozen=True, slots=True)
 class Precedence:
     """An order place by `name` that keeps machines apart: `start` fires at most `tokens` times more
-    often than `before` (names of transitions of the coordinated net). `kept`: whether a run has to
-    enforce it; what a magazine has to do before comes long before."""
+    often than `before` (names of transitions of the coordinated net)."""
 
     name: str
     before: str
     start: str
     tokens: int
-    kept: bool = True
 
     def as_json(self) -> dict[str, object]:
         """The order place as the certificate's document lists it."""
-        return {"place": self.name, "tokens": self.tokens, "kept": self.kept}
+        return {"place": self.name, "tokens": self.tokens}
 
 
 @dataclass(frozen=True, slots=True)

@@ -170,23 +170,21 @@ def _orders(
     net: CoordinatedNet, factory: Factory, sequence: Sequence[int], pairs: Collection[Near]
 ) -> tuple[tuple[Precedence, ...], MarkedNet]:
     """The order places that exclude pairs that come near, and the net with them; those of
-    magazines, which no run has to enforce, come first."""
+    magazines come first."""
     whole, orders, when = net.net, list[Precedence](), times(net.net, sequence)
     for by_magazine, starts in ((True, {}), (False, _starts(net, factory))):
         asked = (pair for pair in pairs if (pair.one.bears or pair.other.bears) == by_magazine)
         apart = (_orderable(net.net, when, pair) for pair in asked)
         wanted = [both for both in apart if both is not None]
         count, whole = len(whole.tokens), ordered(whole, sequence, wanted, starts).net
-        orders += (
-            _precedence(whole, place, not by_magazine) for place in range(count, len(whole.tokens))
-        )
+        orders += (_precedence(whole, place) for place in range(count, len(whole.tokens)))
     return tuple(orders), whole
 
 
-def _precedence(net: MarkedNet, place: int, kept: bool) -> Precedence:
+def _precedence(net: MarkedNet, place: int) -> Precedence:
     """An order place of a net, by names."""
     before, start = (net.net.transitions[side[place]].name for side in (net.left, net.right))
-    return Precedence(net.net.places[place].name, before, start, net.tokens[place], kept)
+    return Precedence(net.net.places[place].name, before, start, net.tokens[place])
 
 
 def _circuits(net: MarkedNet, pairs: Mapping[int, Near]) -> dict[int, Circuit]:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from factory.control.mode import Index
+from factory.layout.exclusions import coordinated
 from factory.layout.feeding import Outlet, outlets_of
 from factory.layout.layout import Layout
 from factory.mjcf.masks import feeder_codes
@@ -62,6 +63,11 @@ class Feeders:
         self.lacking = set[str]()
         self.due = NEVER
         self._spent = dict[int, int]()
+        operations = model.factory.operations
+        self._rising = {
+            waits: [operations[number].label for number in numbers]
+            for waits, numbers in coordinated(model.layout).rising.items()
+        }
         self._serve(model.layout)
 
     def _serve(self, layout: Layout) -> None:
@@ -132,6 +138,15 @@ class Feeders:
             self.due = min(self.due, enough)
             return False
         return True
+
+    def finds_risen(self, operation: Operation) -> bool:
+        """Whether the sliders that an operation waits for are up after their parts, or already come
+        down with the next."""
+        ready = True
+        for number in (self._number[label] for label in self._rising.get(operation.index, ())):
+            if self._sliders.rises(number):
+                self.due, ready = min(self.due, float(self._sliders.ends[number])), False
+        return ready
 
     def taken(self, label: str) -> None:
         """The robot takes the presented part."""

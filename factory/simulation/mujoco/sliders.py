@@ -131,6 +131,10 @@ class Sliders:
         low, high = self._strokes.low[number], self._strokes.high[number]
         return bool(self._d.qpos[self._address[number]] > (low + high) / 2)
 
+    def rises(self, number: int) -> bool:
+        """Whether a slider is on its way up."""
+        return bool(self.ends[number] < NEVER and not self._down[number])
+
     def send(self, chosen: Index, down: bool, loaded: bool = False) -> None:
         """Start strokes: down with loads, up empty, or up with a withdrawn part."""
         if not len(chosen):
