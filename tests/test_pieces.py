@@ -22,6 +22,7 @@ from manifold3d import Manifold, OpType
 
 import factory
 from factory.geometry import decomposition
+from factory.geometry.glb_reader import UPRIGHT
 from factory.geometry.meshes import Array, Indices, Mesh, is_closed
 from factory.geometry.overlap import drawn
 from factory.geometry.pieces import (

@@ -393,8 +393,10 @@ def test_an_open_mesh_is_mended_and_that_is_said(run: Terminal, tmp_path: Path) 
 def test_a_hull_that_stands_for_a_mesh_is_told(
     run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """A tapered bore: bodies of prisms need no library."""
     monkeypatch.setattr("factory.geometry.decomposition.release", lambda package: "")
-    ring = trimesh.creation.annulus(20, 40, 30)
+    profile = [(20, -15), (40, -15), (40, 15), (30, 15), (20, -15)]
+    ring = trimesh.creation.revolve(np.array(profile))
     ring.apply_translation((300, 200, 440))
     parts = folder_of(tmp_path / "parts", {"top": table()["top"], "ring": ring})
     done = run("plan", parts, "-o", tmp_path / "out", "--no-look", "--json")

@@ -69,8 +69,16 @@ class StoredRows:
     def __len__(self) -> int:
         return len(self.numbers)
 
-    def __getitem__(self, row: int) -> NDArray[np.float64]:
-        return self.unpacking.row(self.name, int(self.numbers[row]))
+    def __getitem__(self, rows: int | slice | NDArray[Any]) -> NDArray[np.float64]:
+        """A row (width,), or an array of several (n, width), as of an array."""
+        numbers = self.numbers[rows]
+        if np.ndim(numbers) == 0:
+            return self.unpacking.row(self.name, int(numbers))
+        chosen = [self.unpacking.row(self.name, number) for number in numbers.tolist()]
+        return np.array(chosen).reshape(len(chosen), self.width)
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[np.float64]:
+        return self[:].astype(dtype or np.float64, copy=bool(copy))
 
 
 StateRows = NDArray[np.float64] | StoredRows
