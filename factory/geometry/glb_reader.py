@@ -129,6 +129,12 @@ def _name(entry: Object) -> str:
     return name if isinstance(name, str) else ""
 
 
+def _kind(entry: Object) -> str | None:
+    """The number type of an accessor; None where it names none."""
+    number = entry.get("componentType")
+    return TYPES.get(number) if isinstance(number, int) else None
+
+
 def _whole(value: object, what: str, most: int = MOST) -> int:
     """A whole number from 0."""
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= most:
@@ -256,7 +262,7 @@ class _Glb:
     def accessor(self, number: object, width: int) -> NDArray[Any]:
         """The numbers (n, width) of an accessor."""
         entry = self.entry("accessors", number)
-        kind = TYPES.get(entry.get("componentType", 0))
+        kind = _kind(entry)
         if kind is None or WIDTHS.get(str(entry.get("type"))) != width:
             raise _broken("an accessor has a type that it may not have here")
         count = _whole(entry.get("count"), "the count of an accessor", MOST // width)
@@ -277,7 +283,7 @@ class _Glb:
             raise _broken("a sparse accessor has no indices, or no values")
         count = _whole(entry.get("count"), "the count of a sparse accessor", len(numbers))
         at, values = parts
-        kind = TYPES.get(at.get("componentType", 0))  # type: ignore[union-attr]
+        kind = _kind(at)  # type: ignore[arg-type]
         if kind is None or "u" not in kind:
             raise _broken("the indices of a sparse accessor are not whole numbers")
         rows = self._viewed(at, count, np.dtype(kind), 1).ravel()  # type: ignore[arg-type]
