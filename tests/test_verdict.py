@@ -18,11 +18,11 @@ from factory.layout.request import Ground
 from factory.mjcf import loading, names
 from factory.mjcf.model import Model
 from factory.pipeline import read
+from factory.record.findings import Report, Violation
 from factory.record.log import read_log
 from factory.record.log.writer import LogWriter
 from factory.record.monitor import beside
 from factory.record.monitor.record import verdict_on, watch_log
-from factory.record.monitor.report import Report, Violation
 from factory.record.verdict import LIMITS, RunVerdict, check_figures, judged
 from factory.simulation.disturbance import Gain, Mass, Noise, disturb
 from factory.simulation.mujoco import world as mujoco_world

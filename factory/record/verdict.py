@@ -14,7 +14,7 @@ from math import inf
 from typing import Any
 
 from factory.mjcf import names
-from factory.record.monitor.report import Report
+from factory.record.findings import Report
 from factory.support.errors import Diagnostic
 
 SHOWN = 4

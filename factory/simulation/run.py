@@ -12,7 +12,7 @@ from factory.plant.factory import Factory
 from factory.record.ending import CutOff
 from factory.record.failures import Exchange, Failures
 from factory.record.figures import PhysicsFigures
-from factory.record.monitor.report import Report
+from factory.record.findings import Report
 from factory.record.state import Event
 from factory.record.verdict import RunVerdict, judged, kept_figures
 from factory.support.errors import Diagnostic, RunError

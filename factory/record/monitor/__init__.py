@@ -5,9 +5,9 @@ net.
 It observes positions, speeds, setpoints and active constraints, and never reads the supervisor, its
 events or its marking. It works beside a run, or on a log (`factory.record.monitor.record`)."""
 
+from factory.record.findings import Report
 from factory.record.monitor.anatomy import Anatomy
 from factory.record.monitor.engine import EngineMonitor
-from factory.record.monitor.report import Report
 from factory.record.monitor.subject import MonitorSubject, subject_of, subject_of_run
 from factory.record.state import Recordable
 

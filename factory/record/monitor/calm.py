@@ -21,10 +21,11 @@ from factory.mjcf import names
 from factory.nets.petri import Marking
 from factory.nets.undone import exchanges
 from factory.plant.factory import Factory
+from factory.record.findings import Firing, Report
 from factory.record.log.reader import Log
+from factory.record.monitor.agreement import ROUNDING
 from factory.record.monitor.anatomy import Anatomy
 from factory.record.monitor.monitor import MOST, Monitor
-from factory.record.monitor.report import ROUNDING, Firing, Report
 from factory.record.monitor.subject import MonitorSubject
 from factory.record.state import Observation
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from time import perf_counter
 
+from factory.record.findings import Report
+from factory.record.monitor.agreement import Recorded
 from factory.record.monitor.anatomy import Anatomy
 from factory.record.monitor.monitor import KEPT, Monitor
-from factory.record.monitor.report import Recorded, Report
 from factory.record.monitor.subject import MonitorSubject
 from factory.record.state import Observation, State
 from factory.support.collector import collector_paused

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from math import inf
 
 from factory.nets.marked import marked, token_free
-from factory.record.monitor.report import Firing, Violation
+from factory.record.findings import Firing, Violation
 from factory.record.monitor.subject import MonitorSubject
 from factory.timing.pool import with_wip
 

@@ -10,11 +10,12 @@ from time import perf_counter
 import numpy as np
 
 from factory.plant.factory import Factory, Operation
+from factory.record.findings import Report, Violation
+from factory.record.monitor.agreement import Recorded, disagreements
 from factory.record.monitor.anatomy import Anatomy
 from factory.record.monitor.explanation import SeenFirings
 from factory.record.monitor.grips import Grips, misplaced
 from factory.record.monitor.motion import AxisMotion, Lags
-from factory.record.monitor.report import Recorded, Report, Violation, disagreements
 from factory.record.monitor.subject import MonitorSubject
 from factory.record.monitor.transfers import Transfers
 from factory.record.state import Observation

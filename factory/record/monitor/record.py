@@ -15,13 +15,14 @@ from factory.nets.replay import replay
 from factory.plant.demand import Demand, Word
 from factory.plant.factory import Factory
 from factory.record.failures import Failures
+from factory.record.findings import Report, Violation
 from factory.record.log.model import model_of
 from factory.record.log.reader import Ends, Log
+from factory.record.monitor.agreement import contradictions
 from factory.record.monitor.anatomy import Anatomy
 from factory.record.monitor.calm import judge_calm
 from factory.record.monitor.monitor import Monitor
 from factory.record.monitor.recount import differences, recounted, worst
-from factory.record.monitor.report import Report, Violation, contradictions
 from factory.record.monitor.subject import MonitorSubject, MonitorTable
 from factory.record.project_table import factory_of, of_its_factory, settings_of
 from factory.record.state import Observation

@@ -19,9 +19,9 @@ from factory.mjcf.masks import NOBODY, loose_code, masks_of, robot_code
 from factory.mjcf.pads import Pads, trunks
 from factory.mjcf.replica import Replica
 from factory.mjcf.weld_frames import GRIP, HOLD, PARK
+from factory.record.findings import Violation
 from factory.record.log.reader import Log
 from factory.record.monitor.anatomy import Anatomy
-from factory.record.monitor.report import Violation
 from factory.record.monitor.subject import MonitorSubject
 from factory.record.state import Array, Index, Observation
 from factory.support.engine import mujoco
