@@ -234,7 +234,7 @@ def run(
     is told the simulated time [s] and the units made, after some ticks. Raises RunError for a run
     that stalls or takes longer, InputError for a wrong value and where the engine refuses a mesh.
     """
-    from factory.simulation.executing import run_project
+    from factory.commands.running import run_project
     from factory.simulation.options import RunOptions, check_ideal
     from factory.simulation.run import require
 

@@ -14,7 +14,7 @@ from factory.support.settings import Settings
 if TYPE_CHECKING:
     from factory.planning.plan import Planned
     from factory.problem.pag import PAG
-    from factory.rendering.film import Rendered
+    from factory.record.log.pictures import Rendered
     from factory.rendering.picture import PanelName
     from factory.show.report.page import RunReport
     from factory.simulation.executing import Tell
@@ -60,8 +60,8 @@ def render(
     The others are those of `run`. Raises InputError, MissingError without GL, RunError.
     """
     from factory.record.log import read_log
-    from factory.rendering.film import Shot
-    from factory.rendering.film import render as taken
+    from factory.record.log.pictures import Shot
+    from factory.record.log.pictures import render as taken
     from factory.rendering.picture import Picture
     from factory.simulation.options import RunOptions
 

@@ -24,6 +24,7 @@ from factory.record.log import Log, read_log
 from factory.record.log.reader import digest_of
 from factory.record.log.writer import LogWriter
 from factory.record.monitor.record import recorded_subject, verdict_on, watch_log
+from factory.record.monitor.watched import watched
 from factory.record.verdict import RunVerdict
 from factory.simulation.mujoco import world as mujoco_world
 from factory.simulation.mujoco.interference import Interference
@@ -31,7 +32,6 @@ from factory.simulation.mujoco.parts import Parts
 from factory.simulation.remade import forged, model_faults
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
-from factory.simulation.watched import watched
 from factory.support.engine import mujoco
 from factory.support.errors import InputError
 from factory.support.settings import Settings

@@ -24,6 +24,7 @@ from factory.plant.factory import Factory, Operation
 from factory.record.log import read_log
 from factory.record.monitor import beside
 from factory.record.monitor.record import watch_log, word_of
+from factory.record.monitor.watched import watched
 from factory.simulation.demand_file import demand_of, read_demand
 from factory.simulation.mujoco.supply import Supply
 from factory.simulation.recovery import recover
@@ -32,7 +33,6 @@ from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from factory.simulation.supervisor import Supervisor
-from factory.simulation.watched import watched
 from factory.support.errors import InputError
 from tests.command_line import Terminal
 from tests.mix_values import LITTLE, mixed_factory, random_family

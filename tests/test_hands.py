@@ -24,9 +24,9 @@ from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.mjcf.pads import Pads
 from factory.pipeline import read
+from factory.record.monitor.watched import watched
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
-from factory.simulation.watched import watched
 from factory.study.fidelity.hidden import HiddenPenetrations
 
 EXAMPLES = Path(factory.__file__).parent.parent / "examples"

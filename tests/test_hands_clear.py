@@ -23,9 +23,9 @@ from factory.layout.hands.surfaces import Body
 from factory.layout.homeward import Homeward
 from factory.layout.layout import Layout
 from factory.pipeline import read
+from factory.record.monitor.watched import watched
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
-from factory.simulation.watched import watched
 from factory.study.fidelity.hidden import HiddenPenetrations
 from factory.support.errors import RunError
 

@@ -14,9 +14,9 @@ from factory.layout.embedding import certified
 from factory.layout.shapes import is_tool
 from factory.pipeline import Project, read
 from factory.problem.plan import Plan
+from factory.record.monitor.watched import watched
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
-from factory.simulation.watched import watched
 from factory.study.allocation.aim import Aim
 from factory.study.allocation.search import allocated
 from factory.study.fidelity.hidden import HiddenPenetrations

@@ -25,10 +25,10 @@ from factory.layout.hands.places import places as found_places
 from factory.layout.hanging import Hanging
 from factory.layout.layout import Layout
 from factory.pipeline import Project, read
+from factory.record.monitor.watched import watched
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
-from factory.simulation.watched import watched
 from factory.study.fidelity.hidden import HiddenPenetrations
 from tests.layout_values import with_visits
 

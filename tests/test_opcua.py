@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from factory.record.monitor.watched import watched
 from factory.record.state import State
 from factory.simulation.driven import DrivenSupervisor
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
 from factory.simulation.signals import Sensed
 from factory.simulation.simulation import Simulation
-from factory.simulation.watched import watched
 from tests.command_line import PAPER, ROOT, Terminal, started
 from tests.examples import with_hands
 from tests.structured_text import Plc

@@ -31,11 +31,11 @@ from factory.plant.fused_bodies import repeated
 from factory.plant.programs import program_of, write_program
 from factory.problem.pag import PAG, Parameter
 from factory.problem.robot_types import load_catalogue
+from factory.record.monitor.watched import watched
 from factory.show.report.drawings import about, labels_of, links
 from factory.simulation.request import RunRequest, WorldName
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
-from factory.simulation.watched import watched
 from factory.study.analysis.analysing import least_wip
 from factory.study.analysis.timed import flow, timed_net
 from factory.support.errors import InputError
@@ -234,7 +234,7 @@ def carried_out(k: int, world: WorldName, units: int, **more: Any) -> Run:
     made = project(k)
     request = RunRequest(world, units, settings=made.settings, **more)
     simulation = Simulation(made.layout, request)
-    return simulation.run() if world == "ideal" else watched(simulation, [], None, [], True)
+    return simulation.run() if world == "ideal" else watched(simulation, every_tick=True)
 
 
 def made_in_order(run: Run, k: int) -> bool:
@@ -312,7 +312,7 @@ def test_a_part_in_the_wrong_branch_is_found() -> None:
     parts = simulation.physical.parts
     welds, one, other = parts.holdings.weld, (2, "part1"), (3, "part1@2")
     welds[one], welds[other] = welds[other], welds[one]
-    run = watched(simulation, [], 15.0, [], True)
+    run = watched(simulation, max_time=15.0, every_tick=True)
     assert not run.succeeded and not run.refines_net
 
 

@@ -15,12 +15,12 @@ from lark.exceptions import LarkError
 
 from factory.exporting.iec.cell import cell, scan_time
 from factory.exporting.iec.structured_text import write
+from factory.record.monitor.watched import watched
 from factory.simulation.driven import DrivenSupervisor
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
 from factory.simulation.signals import Commands, Sensed
 from factory.simulation.simulation import Simulation
-from factory.simulation.watched import watched
 from factory.support.errors import InputError
 from factory.support.settings import Settings
 from tests.examples import with_hands

@@ -19,6 +19,7 @@ from factory.layout.machines import presences
 from factory.layout.presence import Presence
 from factory.layout.request import Ground
 from factory.pipeline import read
+from factory.record.monitor.watched import watched
 from factory.record.state import Event, State
 from factory.simulation.mujoco.passing import Passing
 from factory.simulation.mujoco.sliders import NEVER
@@ -26,7 +27,6 @@ from factory.simulation.ordering import Ordering
 from factory.simulation.recovery import Campaign, WorldFault, recover
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
-from factory.simulation.watched import watched
 from factory.study.allocation.aim import Aim
 from factory.study.allocation.search import allocated
 from factory.support.settings import LEAST

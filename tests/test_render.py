@@ -25,9 +25,10 @@ from factory.geometry.meshes import Mesh
 from factory.geometry.sight import Framing, fit, towards
 from factory.mjcf.mesh_files import corner_normals, face_normals, mesh_file
 from factory.record.log import LogWriter, read_log
+from factory.record.log.pictures import render_log
 from factory.record.monitor.subject import subject_of_run
 from factory.record.state import State
-from factory.rendering import Film, Picture, Still, check_output, render_log
+from factory.rendering import Film, Picture, Still, check_output
 from factory.rendering.action import Snapshot
 from factory.rendering.caption import Caption
 from factory.rendering.painter import Painter, Renderer

@@ -15,10 +15,10 @@ from factory.nets.undone import Undone
 from factory.record.failures import Death, Failing
 from factory.record.log import Log
 from factory.record.log.model import model_of
+from factory.record.log.pictures import moment_of
 from factory.record.monitor.record import recorded_subject
 from factory.record.monitor.subject import subject_of
 from factory.rendering.caption import TOLD, Caption, draw_notices
-from factory.rendering.film import moment_of
 from factory.rendering.gantt_panel import GanttPanel
 from factory.rendering.history import History
 from factory.rendering.ink import AMBER, DEAD, FLASH, Ink

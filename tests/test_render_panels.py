@@ -13,14 +13,14 @@ import factory
 from factory.lang import read_pag
 from factory.pipeline import all_templates
 from factory.record.log import Log, LogWriter, read_log
+from factory.record.log.pictures import moment_of, render_log, take_of
 from factory.record.monitor.record import recorded_subject
 from factory.record.monitor.subject import subject_of_run
 from factory.record.state import State
-from factory.rendering import Film, Picture, Still, camera_named, panels_named, render_log
+from factory.rendering import Film, Picture, Still, camera_named, panels_named
 from factory.rendering.action import Snapshot
 from factory.rendering.camerawork import Moment
 from factory.rendering.caption import FADES, SHOWN, draw_title, strength
-from factory.rendering.film import moment_of, take_of
 from factory.rendering.following import Followed
 from factory.rendering.gantt_panel import GanttPanel
 from factory.rendering.history import History, OperationProgress, depths, followed

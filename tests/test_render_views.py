@@ -12,9 +12,9 @@ from factory.mjcf import names
 from factory.mjcf.replica import Replica
 from factory.problem.pag import NOPART
 from factory.record.log import Log, LogWriter, read_log
+from factory.record.log.pictures import moment_of, take_of
 from factory.rendering.action import FAINT, Action, Fading, action_of, placed, shape_of
 from factory.rendering.camerawork import Take
-from factory.rendering.film import moment_of, take_of
 from factory.rendering.following import Viewpoint
 from factory.rendering.junction import handover_view
 from factory.rendering.picture import Picture, orbit, overview

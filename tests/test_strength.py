@@ -25,6 +25,7 @@ from factory.layout.request import Ground
 from factory.mjcf import names
 from factory.record.log import read_log
 from factory.record.monitor.record import verdict_on, watch_log
+from factory.record.monitor.watched import watched
 from factory.record.state import State
 from factory.show.live import Session
 from factory.show.live.commands import Command
@@ -33,7 +34,6 @@ from factory.simulation.mujoco import strength
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
 from factory.simulation.simulation import FALL, Simulation
-from factory.simulation.watched import watched
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
 from tests.command_line import ROOT, Terminal

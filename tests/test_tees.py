@@ -19,10 +19,10 @@ from factory.pipeline import Project, all_templates, read
 from factory.problem.pag import PAG, Parameter
 from factory.problem.robot_types import load_catalogue
 from factory.problem.template import Template
+from factory.record.monitor.watched import watched
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
-from factory.simulation.watched import watched
 from factory.support.errors import InputError
 from factory.support.settings import Settings
 from tests.command_line import Terminal
@@ -72,7 +72,7 @@ def project(branches: int, label: str = "part3", rows: tuple[object, ...] = FED)
 def carried_out(layout: Layout, units: int = 10, **more: object) -> Run:
     """A run in the engine, with its monitor."""
     request = RunRequest("mujoco", units, **more)  # type: ignore[arg-type]
-    return watched(Simulation(layout, request), [], None, [], True)
+    return watched(Simulation(layout, request), every_tick=True)
 
 
 # --- which robots share a stem -------------------------------------------------------------------

@@ -23,13 +23,13 @@ from factory.record.log import read_log
 from factory.record.log.writer import LogWriter
 from factory.record.monitor import beside
 from factory.record.monitor.record import verdict_on, watch_log
+from factory.record.monitor.watched import watched
 from factory.record.verdict import LIMITS, RunVerdict, check_figures, judged
 from factory.simulation.disturbance import Gain, Mass, Noise, disturb
 from factory.simulation.mujoco import world as mujoco_world
 from factory.simulation.mujoco.interference import Interference
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
-from factory.simulation.watched import watched
 from factory.support.errors import Diagnostic
 from factory.support.settings import Settings
 from tests.command_line import PAPER, ROOT, Terminal

@@ -147,12 +147,13 @@ def _run(
     project: Project, timing: Timing, asked: RunOptions, silent: bool
 ) -> tuple[RunRecord, int]:
     """A run without fused parts, and its exit status."""
+    from factory.record.monitor.watched import watched
     from factory.simulation.executing import carry_out
     from factory.simulation.simulation import Simulation
     from factory.study.analysis.measured import record_of
 
     request = replace(asked, fuse=False).request(project, shown=False)
-    run = carry_out(Simulation(timing.layout, request), silent)
+    run = carry_out(Simulation(timing.layout, request), silent, go=watched)
     for failure in run.verdict.failures:
         print(failure, file=sys.stderr)
     return record_of(run), 0 if run.succeeded else 1

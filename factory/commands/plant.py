@@ -55,9 +55,9 @@ def plant(
     The controller writes targets, grips, jobs and a heartbeat, without which all axes stand. What
     the net or the reach of a grip does not allow is refused by name. `export --format st` writes
     a controller."""
+    from factory.commands.running import carry_on
     from factory.nets.verify import proved
     from factory.show.opcua import OpcuaPlant, check_plant
-    from factory.simulation.executing import carry_on
     from factory.simulation.simulation import Simulation
 
     check_plant(host, expose)

@@ -46,8 +46,8 @@ def render(
 ) -> int:
     """Film FILE.pag, or the run in a LOG written by `run --log`, headless through EGL."""
     from factory.record.log import is_log
-    from factory.rendering.film import Shot
-    from factory.rendering.film import render as taken
+    from factory.record.log.pictures import Shot
+    from factory.record.log.pictures import render as taken
 
     file = options.file
     if is_log(file):

@@ -27,9 +27,9 @@ from factory.support.guard import reading
 from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
+    from factory.commands.running import Filming
     from factory.pipeline import Project
     from factory.plant.factory import Factory
-    from factory.simulation.executing import Filming
     from factory.simulation.resuming import Resumed
     from factory.simulation.run import Run
 
@@ -99,7 +99,7 @@ def run(
     warnings = announced(project.warnings, out)
     if not out.silent:
         say_allowed(project)
-    from factory.simulation.executing import run_project
+    from factory.commands.running import run_project
 
     film = _film(project, asked, video, shown)
     record = run_project(project, asked, out.silent, log, film, monitor)
@@ -111,7 +111,7 @@ def run(
 
 def _continue(going: Resumed, asked: RunOptions, monitor: bool | None, out: OutputOptions) -> int:
     """Continue the run in a log to its end; returns the exit status."""
-    from factory.simulation.executing import carry_on
+    from factory.commands.running import carry_on
 
     made = going.simulation
     record = carry_on(made, asked, out.silent, going.path, [going.recorder], monitor)

@@ -1,6 +1,6 @@
-"""Pictures without a screen: films and stills of a run, or of its log."""
+"""Pictures without a screen: films and stills of a run."""
 
-from factory.rendering.film import Film, Still, render_log
+from factory.rendering.film import Film, Still
 from factory.rendering.picture import Picture, camera_named, panels_named
 from factory.rendering.video import check_output
 
@@ -11,5 +11,4 @@ __all__ = [
     "camera_named",
     "check_output",
     "panels_named",
-    "render_log",
 ]

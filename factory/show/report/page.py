@@ -14,6 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from factory.commands.running import run_project
 from factory.pipeline import Project
 from factory.plant.factory import Factory
 from factory.show.report.approaches import approaches_section
@@ -34,7 +35,7 @@ from factory.show.report.sections import (
     utilisation,
 )
 from factory.show.report.words import proof
-from factory.simulation.executing import Tell, run_project
+from factory.simulation.executing import Tell
 from factory.simulation.options import RunOptions
 from factory.simulation.run import Run
 

@@ -15,12 +15,12 @@ from factory.importing.mesh_files import MeshStore
 from factory.lang.writer import write_pag
 from factory.pipeline import Project
 from factory.plant.fused_bodies import fusing_pays
+from factory.record.monitor.watched import watched
 from factory.record.plan_file import PLAN_NAME, plan_files
 from factory.record.state import Observer
 from factory.simulation.request import RunRequest
 from factory.simulation.run import steady_from
 from factory.simulation.simulation import Simulation
-from factory.simulation.watched import watched
 from factory.study.allocation.aim import Least
 from factory.study.allocation.candidate import Candidate
 from factory.study.allocation.estimating import Estimate

@@ -16,11 +16,11 @@ from factory.layout.saved import LAID_FOR
 from factory.mjcf.timestep import timed
 from factory.nets.verify import proved
 from factory.plant.fused_bodies import fusing_pays
+from factory.record.monitor.watched import watched
 from factory.simulation.recovery import Campaign, WorldFault, recover
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
 from factory.simulation.simulation import Compiled, Simulation, compiled
-from factory.simulation.watched import watched
 from factory.study.sweep.grid import FAULT_RATE, SETTINGS, Point
 from factory.study.sweep.recipe import Recipe
 from factory.support.errors import Diagnostic, FactoryError

@@ -16,8 +16,8 @@ def watched(
     observers: Sequence[Observer] = (),
     max_time: float | None = None,
     glances: Sequence[Observer] = (),
-    every_tick: bool = False,
     since: float = 0.0,
+    every_tick: bool = False,
 ) -> Run:
     """`simulation.run`, with a monitor where there are bodies. It looks where operations end, where
     a weld is switched, and at times; with `every_tick` after every tick, and so it does where

@@ -1,0 +1,84 @@
+"""One run of a project as asked for: logged, filmed, recovering, watched by a monitor, judged."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from factory.nets.verify import proved
+from factory.record.monitor.watched import watched
+from factory.simulation.executing import Go, Opening, Tell, carry_out
+from factory.simulation.options import RunOptions
+from factory.simulation.run import Run
+from factory.simulation.simulation import Simulation
+from factory.support.progress import Waiting
+
+if TYPE_CHECKING:
+    from factory.pipeline import Project
+    from factory.record.state import Recorder
+
+Filming = Callable[[Simulation], "Recorder"]
+"""Opens the film of a simulation."""
+
+
+def run_project(
+    project: Project,
+    asked: RunOptions,
+    silent: bool,
+    log: Path | None = None,
+    film: Filming | None = None,
+    monitor: bool | None = None,
+    progress: Tell | None = None,
+) -> Run:
+    """One run of a project as `asked`, with a `log` and a `film` where given. `silent`: no progress
+    bar; `monitor`: True to observe every tick, False for none, None to observe events; `progress`
+    is called from time to time. Raises InputError, RunError (NotProved), and StoppedError as
+    `carry_out`."""
+    proved(project.factory.net)
+    seen = log is not None or film is not None
+    with Waiting("compiling the model", silent):
+        made = Simulation(project.layout, asked.request(project, seen))
+        if asked.recovers:
+            from factory.simulation.recovery import recover
+
+            recover(made, asked.campaign(project.layout.factory))
+    recorders: list[Opening] = []
+    if log is not None:
+        from factory.record.log import LogWriter
+
+        recorders.append(lambda: LogWriter(log, made, project))
+    if film is not None:
+        recorders.append(lambda: film(made))
+    return carry_on(made, asked, silent, log, recorders, monitor, progress)
+
+
+def carry_on(
+    made: Simulation,
+    asked: RunOptions,
+    silent: bool,
+    log: Path | None,
+    recorders: Sequence[Opening],
+    monitor: bool | None,
+    progress: Tell | None = None,
+) -> Run:
+    """Carry a simulation out from its present state, as `run_project` does, and judge it; a run
+    with recovery is judged from its log."""
+    record = carry_out(made, silent, asked.max_time, recorders, _going(monitor), log, progress)
+    account = made.world.hooks.account
+    failures = None if account is None else account.report()
+    if failures is not None and log is not None and monitor is not False and made.model is not None:
+        from factory.record.log import read_log
+        from factory.record.monitor.record import watch_log
+
+        with Waiting("judging the run between failures", silent):
+            record = replace(record, monitor=watch_log(read_log(log))[0])
+    record = replace(record, lenient=asked.lenient, strict=asked.strict)
+    return replace(record, failures=failures, log=log)
+
+
+def _going(monitor: bool | None) -> Go:
+    """How a run goes with a monitor of every tick, of events where None, or with none."""
+    return Simulation.run if monitor is False else partial(watched, every_tick=bool(monitor))
