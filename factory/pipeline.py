@@ -98,30 +98,6 @@ class Project:
         kept = {"product", "matings", "compiled", "approached", "planned", "plain", "_hands"}
         return self._changed(kept, ground=ground)
 
-    def with_lines(self, lines: Sequence[Sequence[str]]) -> Project:
-        """The project in which the robots that bring the labels of a line are one robot. Raises
-        InputError (BadLine)."""
-        from factory.compiler.folding import fold, lines_of_labels
-
-        if not lines:
-            return self
-        factory = self.planned
-        return self.with_plan(fold(factory, lines_of_labels(factory, lines), self.catalogue))
-
-    def with_branches(self, branches: Sequence[tuple[str, int]]) -> Project:
-        """The project in which the branches that bring some labels are there several times. Raises
-        InputError (Parallel)."""
-        from factory.compiler.parallel import in_parallel
-
-        return self.with_plan(in_parallel(self.planned, branches))
-
-    def with_tees(self, stems: Sequence[Sequence[str]]) -> Project:
-        """The project in which two robots share a stem, by the labels that they bring. Raises
-        InputError (BadTee)."""
-        from factory.compiler.tees import with_tees
-
-        return self.with_plan(with_tees(self.planned, stems, self.catalogue))
-
     def _changed(self, kept: Collection[str], **values: Any) -> Project:
         """With other values, and what is `kept` of it already."""
         made = replace(self, **values, laid=None)

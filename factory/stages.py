@@ -115,13 +115,14 @@ def compile(
     out at most so many factories (`effort`), none after so many `seconds`. `parallel`: for each of
     some labels how often the branch that brings it is there. Raises InputError.
     """
+    from factory.compiler.parallel import with_branches
     from factory.study.allocation.aim import Aim
     from factory.study.allocation.search import allocated
 
     project, branches = project_of(product, settings, templates), tuple((parallel or {}).items())
     aim = Aim(robots, cycle, effort, inf if seconds is None else seconds, branches)
     if branches and not aim.asks:
-        return project.with_branches(branches).plain
+        return with_branches(project, branches).plain
     return allocated(project, aim).plain
 
 
@@ -234,7 +235,7 @@ def run(
     is told the simulated time [s] and the units made, after some ticks. Raises RunError for a run
     that stalls or takes longer, InputError for a wrong value and where the engine refuses a mesh.
     """
-    from factory.commands.running import run_project
+    from factory.commands.running import check_run, run_project
     from factory.simulation.options import RunOptions, check_ideal
     from factory.simulation.run import require
 
@@ -245,7 +246,7 @@ def run(
         check_ideal(fuse, bool(monitor))
     will_write(maybe(log))
     project = project_of(product, settings)
-    asked.check(project)
+    check_run(project, asked)
     return require(run_project(project, asked, True, maybe(log), None, monitor, progress))
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from benches.speed.factories import balanced
 from benches.speed.factories import laid_out as floor_of
+from factory.compiler.parallel import with_branches
 from factory.lang import read_pag
 from factory.layout.layout import Layout
 from factory.pipeline import Project, all_templates, read
@@ -50,7 +51,7 @@ def layout_of(name: str) -> Layout:
     if name == "bar":
         return laid_out_with_lifts(BAR)
     if name == "tee":
-        return read(ROOT / "examples" / "paper.pag").with_branches([("part3", 2)]).layout
+        return with_branches(read(ROOT / "examples" / "paper.pag"), [("part3", 2)]).layout
     return without_hands(name)
 
 

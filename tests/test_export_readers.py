@@ -20,6 +20,7 @@ from factory.mjcf.stock import written as stock
 from factory.nets.marked import MarkedNet, marked
 from factory.record.log import read_log
 from factory.record.log.model import model_of
+from factory.simulation.driven import drive
 from factory.simulation.modelling import physical_model
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
@@ -214,7 +215,7 @@ def st_by_an_interpreter(folder: Path) -> None:
     for file in (small(folder), LAMP, MESHES):
         plc, layout = Plc(made("st", file)), project(file).layout
         simulation = Simulation(layout, RunRequest(units=3))
-        supervisor = simulation.drive(plc, plc.interval)
+        supervisor = drive(simulation, plc, plc.interval)
         run = simulation.run()
         assert (run.products, supervisor.refusals) == (3, [])
         assert_good(run)

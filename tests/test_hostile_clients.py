@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from factory.simulation.corridors import Corridors
-from factory.simulation.driven import DrivenSupervisor
+from factory.simulation.driven import DrivenSupervisor, drive
 from factory.simulation.request import RunRequest
 from factory.simulation.signals import NOBODY, Commands, Sensed
 from factory.simulation.simulation import Simulation, compiled
@@ -200,7 +200,7 @@ def driven(
     controller: Any, name: str = "paper", busy: float = float("inf"), most: float = 6.0
 ) -> tuple[Simulation, DrivenSupervisor]:
     simulation = Simulation(with_hands(name), RunRequest(units=5))
-    supervisor = simulation.drive(controller, 0.01)
+    supervisor = drive(simulation, controller, 0.01)
     simulation.world.hooks.busy = busy
     simulation.run(max_time=most)
     return simulation, supervisor
@@ -254,7 +254,7 @@ def test_parts_change_hands_at_rest_only() -> None:
     assert moving != program
     simulation = Simulation(with_hands("paper"), RunRequest(units=2))
     plc = Plc(moving.replace("< 0.0002", "< 0.0009"))
-    supervisor = simulation.drive(plc, plc.interval)
+    supervisor = drive(simulation, plc, plc.interval)
     simulation.run(max_time=10.0)
     messages = [refusal.message for refusal in supervisor.refusals]
     assert any("still moves at " in message for message in messages), messages
@@ -282,7 +282,7 @@ def harmed_by(name: str, seeds: Iterable[int], most: float) -> dict[int, bool]:
     for seed in seeds:
         simulation = Simulation(layout, request, shared)
         under = Plc(program) if seed % 2 else None
-        supervisor = simulation.drive(HostileController(layout, seed, under), 0.01)
+        supervisor = drive(simulation, HostileController(layout, seed, under), 0.01)
         simulation.world.hooks.busy = float("inf")
         simulation.run(max_time=most)
         if simulation.world.collision or simulation.world.dropped:

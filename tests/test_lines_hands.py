@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from factory.compiler.folding import with_lines
 from factory.geometry.solids import Product
 from factory.layout import hanging
 from factory.layout.clearance import certify
@@ -107,7 +108,7 @@ def planned(text: str, line: tuple[str, ...], shared: bool = True) -> Project:
         file = Path(folder) / "product.pag"
         file.write_text(text)
         found = read(file)
-        found = found.with_lines([line]) if shared else found
+        found = with_lines(found, [line]) if shared else found
         assert found.layout
         return found
 
@@ -247,7 +248,7 @@ def test_places_of_hands_are_found_once_for_all_plans(monkeypatch: pytest.Monkey
         return found_places(product, *of)
 
     monkeypatch.setattr(holding, "places", places)
-    shared = planned(*PRODUCTS["shelf"], shared=False).with_lines([PRODUCTS["shelf"][1]])
+    shared = with_lines(planned(*PRODUCTS["shelf"], shared=False), [PRODUCTS["shelf"][1]])
     visits = shared.layout.visits
     assert looked and len(looked) == len({*looked})
     assert visits == planned(*PRODUCTS["shelf"]).layout.visits, "whatever was looked at before"

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from factory.compiler.folding import with_lines
 from factory.compiler.mixing import even, orders
 from factory.exporting.certificate.check import check_certificate
 from factory.exporting.certificate.writer import certificate
@@ -564,12 +565,12 @@ def test_labels_of_a_mix_share_a_robot_where_asked(tmp_path: Path) -> None:
     file = tmp_path / "family.pag"
     file.write_text(LITTLE.replace("x, y )", "x, y, w )") + "; w = atomic()")
     project = read(file)
-    made = project.with_lines([["y", "w"]])
+    made = with_lines(project, [["y", "w"]])
     assert len(made.planned.robots) == len(project.planned.robots) - 1
     done = Simulation(made.layout, RunRequest(units=6, jitter=0.3)).run()
     assert done.succeeded and done.by_product == {"a": 4, "b": 2}
     with pytest.raises(InputError, match="'y' and 'base' cannot share a robot: they begin or end"):
-        project.with_lines([["y", "base"]])
+        with_lines(project, [["y", "base"]])
 
 
 def test_branches_of_a_mix_may_be_parallel(file: Path, run: Terminal) -> None:

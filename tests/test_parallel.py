@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from factory.compiler.mating.mating import judged
-from factory.compiler.parallel import in_parallel
+from factory.compiler.parallel import in_parallel, with_branches
 from factory.exporting.certificate.check import check_certificate
 from factory.exporting.certificate.writer import certificate
 from factory.layout.bounds import cycle_time_bound
@@ -226,7 +226,7 @@ def test_a_mate_has_room_for_two_on_a_side() -> None:
 def project(k: int) -> Project:
     """That product with so many branches."""
     made = Project(slow(), all_templates(), load_catalogue())
-    return made.with_branches([("sub2", k)])
+    return with_branches(made, [("sub2", k)])
 
 
 def carried_out(k: int, world: WorldName, units: int, **more: Any) -> Run:
@@ -342,7 +342,7 @@ def test_a_report_links_what_belongs_together() -> None:
 def hands_of(name: str, *branches: tuple[str, int]) -> dict[tuple[object, ...], list[Hand | None]]:
     """The hands that the robots of an example have, by what they take first, however they lie."""
     example = read(f"examples/{name}.pag")
-    plain = (example.with_branches(branches) if branches else example).plain
+    plain = (with_branches(example, branches) if branches else example).plain
     factory = judged(plain, example.product)
     hands = Hands(factory, repeated(example.product, factory))
     found: dict[tuple[object, ...], list[Hand | None]] = {}
@@ -371,7 +371,7 @@ def test_a_second_branch_is_placed_for_all_units_together(
 ) -> None:
     """The carrier stops at one of the branches in each unit, and goes past the other."""
     project = read(f"examples/{name}.pag")
-    once, twice = project.draft, project.with_branches([(label, 2)]).draft
+    once, twice = project.draft, with_branches(project, [(label, 2)]).draft
     assert cycle_of(twice, Pace()) <= most * cycle_of(once, Pace())
 
 
@@ -441,7 +441,7 @@ def test_a_branch_that_gains_nothing_is_named(run: Terminal, file: Path) -> None
 def test_a_unit_waits_for_none_that_comes_after_it() -> None:
     """Units are made one after the other in the order by which machines are kept apart: the last
     unit that is asked for does not wait for a part of a unit that nobody asks for."""
-    layout = read("examples/truck.pag").with_branches([("log2", 2)]).layout
+    layout = with_branches(read("examples/truck.pag"), [("log2", 2)]).layout
     turns = [layout.factory.operations[number].turn for number in layout.factory.order]
     assert turns == sorted(turns)
     assert watched(Simulation(layout, RunRequest(units=1)), max_time=120.0).succeeded

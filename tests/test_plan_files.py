@@ -16,6 +16,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from factory.compiler.folding import with_lines
+from factory.compiler.parallel import with_branches
 from factory.layout import request
 from factory.layout.layout import Layout
 from factory.layout.request import Ground
@@ -83,13 +85,13 @@ def test_a_layout_is_read_as_it_was_written(drawn: Drawn) -> None:
 VARIANTS: dict[str, Callable[[Path], Project]] = {
     "written": lambda folder: read(PAPER),
     "lamp": lambda folder: read(EXAMPLES / "lamp.pag"),
-    "lines": lambda folder: with_text(ON_ONE, folder).with_lines([["part2", "part3"]]),
+    "lines": lambda folder: with_lines(with_text(ON_ONE, folder), [["part2", "part3"]]),
     "forms": lambda folder: read(PAPER).with_plan(Plan({"sub3": 0, "sub1": 1})),
-    "branches": lambda folder: with_text(BESIDE, folder).with_branches([("sub2", 3)]),
+    "branches": lambda folder: with_branches(with_text(BESIDE, folder), [("sub2", 3)]),
     "relays": lambda folder: with_text(sawn(1), folder, relay=True),
     "deputies": lambda folder: with_text(BESIDE, folder, deputies=True),
-    "branches with deputies": lambda folder: with_text(BESIDE, folder, deputies=True).with_branches(
-        [("sub2", 2)]
+    "branches with deputies": lambda folder: with_branches(
+        with_text(BESIDE, folder, deputies=True), [("sub2", 2)]
     ),
 }
 

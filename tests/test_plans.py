@@ -13,6 +13,7 @@ import pytest
 from factory.compiler.assigning import shared
 from factory.compiler.expanding import joins
 from factory.compiler.mating.mating import judged
+from factory.compiler.parallel import with_branches
 from factory.layout.clearance import certify
 from factory.layout.durations import Pace
 from factory.layout.saved import LayoutTable
@@ -57,7 +58,7 @@ def random_plan(project: Project, rng: random.Random) -> Project:
     ]
     for label in rng.sample(labels, min(2, len(labels))):
         try:
-            return project.with_branches([(label, rng.choice((2, 3)))])
+            return with_branches(project, [(label, rng.choice((2, 3)))])
         except InputError:
             continue
     return project

@@ -16,7 +16,7 @@ from lark.exceptions import LarkError
 from factory.exporting.iec.cell import cell, scan_time
 from factory.exporting.iec.structured_text import write
 from factory.record.monitor.watched import watched
-from factory.simulation.driven import DrivenSupervisor
+from factory.simulation.driven import DrivenSupervisor, drive
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
 from factory.simulation.signals import Commands, Sensed
@@ -39,7 +39,7 @@ def driven(
 ) -> tuple[Run, DrivenSupervisor]:
     """A run of the plant that a program drives, and what supervised it."""
     simulation, plc = Simulation(with_hands(name), RunRequest(**asked)), Plc(program)
-    supervisor = simulation.drive(plc, plc.interval)
+    supervisor = drive(simulation, plc, plc.interval)
     run = watched(simulation, every_tick=True) if monitor else simulation.run()
     return run, supervisor
 
@@ -200,7 +200,7 @@ def test_the_interpreter_is_strict(mistake: str) -> None:
 def test_whole_numbers_overflow() -> None:
     plc = Plc(text("paper").replace("Finished + 1", "Finished + 4294967296"))
     simulation = Simulation(with_hands("paper"), RunRequest(units=2, world="ideal"))
-    simulation.drive(plc, plc.interval)
+    drive(simulation, plc, plc.interval)
     with pytest.raises(OverflowError, match="no UDINT"):
         simulation.run()
 
@@ -268,7 +268,7 @@ def test_what_is_refused_can_be_withdrawn(case: str) -> None:
     change, message = MEDDLED[case]
     simulation = Simulation(with_hands("paper"), RunRequest(units=2))
     plc = Plc(text("paper"))
-    supervisor = simulation.drive(Meddler(plc, change, 0.2), plc.interval)
+    supervisor = drive(simulation, Meddler(plc, change, 0.2), plc.interval)
     run = simulation.run()
     assert message in {refusal.message for refusal in supervisor.refusals}
     assert (run.trouble, run.products) == (None, 2)
@@ -284,7 +284,7 @@ def test_a_plant_that_is_told_to_stop_stands() -> None:
         seen.append((sensed.time, sensed.position))
         return replace(now, stop=2.0 <= sensed.time < 3.0)
 
-    simulation.drive(Meddler(plc, stop, 4.0), plc.interval)
+    drive(simulation, Meddler(plc, stop, 4.0), plc.interval)
     run = simulation.run()
     stood = np.array([x for time, x in seen if 2.4 < time < 3.0])
     assert np.ptp(stood, axis=0).max() < 1e-5

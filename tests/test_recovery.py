@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 import factory.simulation.recovery.responding as responding
+from factory.compiler.folding import with_lines
 from factory.layout.layout import Layout
 from factory.nets.replay import replay
 from factory.nets.undo import undo
@@ -251,7 +252,7 @@ def test_scrap_goes_back_as_high_as_it_came(tmp_path: Path) -> None:
 post = atomic ( box = ( 0.06, 0.04, 0.12 ), pos = ( 0, 0, 0.06 ) );
 high = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( 0, 0.03, 0.1 ) );
 low = atomic ( box = ( 0.02, 0.02, 0.08 ), pos = ( 0, 0.03, 0.04 ) )""")
-    layout = read(file).with_lines([("high", "low")]).layout
+    layout = with_lines(read(file), [("high", "low")]).layout
     assert layout.factory.adjusted
     run, failures = run_with(WorldFault("drop", label="s1", unit=1), layout=layout, units=1)
     assert_recovered(run, failures, {"drop": 1})

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from factory.compiler.folding import with_lines
 from factory.lang import read_pag, write_pag
 from factory.lang.pag_reader import load_pag
 from factory.layout.certificate import Fault
@@ -243,7 +244,7 @@ def test_what_no_pinned_layout_is_found_for_is_laid_out_with_less(
 
 
 def test_shared_robots_are_refused() -> None:
-    old = project(example("truck")).with_lines([["log1", "log2"]])
+    old = with_lines(project(example("truck")), [["log1", "log2"]])
     with pytest.raises(InputError, match="shared robots"):
         revised(old, project(van()))
 

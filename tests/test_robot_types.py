@@ -15,6 +15,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from factory.compiler.parallel import with_branches
 from factory.lang.pag_reader import load_pag
 from factory.layout.certificate import CARRIAGE_BODY
 from factory.mjcf.driving import RESERVE
@@ -177,7 +178,7 @@ def test_the_certificate_has_the_carriage_of_the_type(tmp_path: Path) -> None:
 def test_a_tee_of_wide_robots_has_arms_clear_of_each_other(tmp_path: Path) -> None:
     """Where a robot stands at home the other goes round its corner."""
     wide = with_type(DOT.replace(BOX, BOX.replace("0.03 0.03", "0.044 0.044")), tmp_path)
-    layout = wide.with_branches([("part3", 2)]).layout
+    layout = with_branches(wide, [("part3", 2)]).layout
     assert layout.certificate is not None and layout.certificate.holds
 
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from factory.compiler.parallel import in_parallel
-from factory.compiler.tees import heads, on_stems
+from factory.compiler.parallel import in_parallel, with_branches
+from factory.compiler.tees import heads, on_stems, with_tees
 from factory.layout.clearance import certify
 from factory.layout.fork import Fork
 from factory.layout.layout import Layout
@@ -66,7 +66,7 @@ def project(branches: int, label: str = "part3", rows: tuple[object, ...] = FED)
     )
     templates = {**all_templates(), "feed": feed()}
     made = Project(replace(pag, nodes=nodes), templates, load_catalogue(), Settings())
-    return made.with_branches([(label, branches)])
+    return with_branches(made, [(label, branches)])
 
 
 def carried_out(layout: Layout, units: int = 10, **more: object) -> Run:
@@ -201,7 +201,7 @@ def test_logs_and_plans_keep_bends(run: Terminal, tmp_path: Path) -> None:
 
 def test_both_inputs_of_a_mate_may_come_over_tees() -> None:
     """From either side, each with a branch of its own."""
-    layout = read("examples/paper.pag").with_branches([("part3", 2), ("sub2", 2)]).layout
+    layout = with_branches(read("examples/paper.pag"), [("part3", 2), ("sub2", 2)]).layout
     assert len(layout.stems) == 4
     assert carried_out(layout, 2).succeeded
 
@@ -227,7 +227,7 @@ def inserted() -> Project:
 
 def test_two_labels_share_a_stem() -> None:
     """With a robot each, whose guidepaths end as one."""
-    made = inserted().with_tees([("part2", "part3")])
+    made = with_tees(inserted(), [("part2", "part3")])
     assert len(made.plain.robots) == len(inserted().plain.robots)
     layout = made.layout
     assert len(layout.stems) == 2
@@ -245,7 +245,7 @@ def test_two_labels_share_a_stem() -> None:
 def test_bad_tees(labels: tuple[str, ...], words: str) -> None:
     made = Project(paper(), all_templates(), load_catalogue(), Settings())
     with pytest.raises(InputError, match=words) as error:
-        made.with_tees([labels])
+        with_tees(made, [labels])
     assert error.value.diagnostics[0].code == "BadTee"
 
 

@@ -103,6 +103,7 @@ def plan(
     write the assembly tree as a PAG with its meshes. SOURCE is a folder of meshes, a file with
     named bodies (.glb, .3mf, .step), an LDraw model (.ldr, .mpd), or a PAG whose assembly tree is
     to be ignored."""
+    from factory.compiler.folding import with_lines
     from factory.importing.draft import file_stem
     from factory.lang.overlaps import overlaps_in
     from factory.pipeline import all_templates, read
@@ -138,7 +139,7 @@ def plan(
     if isinstance(planned, CannotAssemble):
         return refuse(placed, planned, folder, look, out)
     files = write_planned(placed, planned, folder, source, allow, templates)
-    project = read(files[0], folders).with_lines(planned.lines)
+    project = with_lines(read(files[0], folders), planned.lines)
     if stopped and not out.silent:
         say("  stopped: the best tree so far, without pictures")
     announced_before = set(map(id, project.product.warnings))

@@ -131,10 +131,18 @@ class ProjectOptions:
         if self.robots is not None or self.cycle is not None:
             return self._with_few_robots(project, silent)
         if lines := kept.lines():
-            project = project.with_lines(lines)
+            from factory.compiler.folding import with_lines
+
+            project = with_lines(project, lines)
         if several := self.branches():
-            project = project.with_branches(several)
-        return project.with_tees(kept.tees()) if kept.tees() else project
+            from factory.compiler.parallel import with_branches
+
+            project = with_branches(project, several)
+        if stems := kept.tees():
+            from factory.compiler.tees import with_tees
+
+            project = with_tees(project, stems)
+        return project
 
     def branches(self) -> tuple[tuple[str, int], ...]:
         """The labels that are made in parallel branches, with the number of branches."""

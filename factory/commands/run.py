@@ -93,13 +93,14 @@ def run(
     if video is not None:
         shown.area()
     project = options.project(out.silent)
-    asked.check(project)
+    from factory.commands.running import check_run, run_project
+
+    check_run(project, asked)
     with Waiting("reading the shapes and laying out", out.silent):
         layout = project.layout
     warnings = announced(project.warnings, out)
     if not out.silent:
         say_allowed(project)
-    from factory.commands.running import run_project
 
     film = _film(project, asked, video, shown)
     record = run_project(project, asked, out.silent, log, film, monitor)

@@ -24,6 +24,16 @@ Filming = Callable[[Simulation], "Recorder"]
 """Opens the film of a simulation."""
 
 
+def check_run(project: Project, asked: RunOptions) -> None:
+    """Raises InputError where a run cannot be made of a project as `asked`; nothing is laid out for
+    that. Files are read, but for pipes, which are read once."""
+    asked.check(project)
+    if asked.faults is not None and not asked.faults.is_fifo():
+        from factory.simulation.recovery.fault_file import read_campaign
+
+        read_campaign(asked.faults)
+
+
 def run_project(
     project: Project,
     asked: RunOptions,
@@ -43,8 +53,9 @@ def run_project(
         made = Simulation(project.layout, asked.request(project, seen))
         if asked.recovers:
             from factory.simulation.recovery import recover
+            from factory.simulation.recovery.fault_file import campaign_of
 
-            recover(made, asked.campaign(project.layout.factory))
+            recover(made, campaign_of(asked, project.layout.factory))
     recorders: list[Opening] = []
     if log is not None:
         from factory.record.log import LogWriter

@@ -52,6 +52,7 @@ def view(
     from factory.show.live import Server, Session
     from factory.show.live.page import page
     from factory.show.live.server import check_server
+    from factory.simulation.recovery.fault_file import campaign_of
     from factory.simulation.simulation import Simulation
     from factory.support.interruption import Interruption
 
@@ -64,7 +65,7 @@ def view(
     fails = asked.recovers or options.deputies
     endless = replace(asked, units=FOR_EVER, fuse=False).request(project)
     request = replace(endless, recovers=fails)
-    campaign = asked.campaign(layout.factory) if fails else None
+    campaign = campaign_of(asked, layout.factory) if fails else None
     session = Session(lambda: Simulation(layout, request), not paused, campaign)
     shown = page(session, shlex.join(["factory", *sys.argv[1:]]))
     with Interruption() as stop, Server(session, shown, host, port, expose) as server:

@@ -10,7 +10,7 @@ import numpy as np
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
 from factory.layout.guidepath import Point2
-from factory.layout.hands.hand import Hand, Point3
+from factory.layout.hands.hand import Hand
 from factory.layout.layout import Layout, carriers
 from factory.layout.stops import carried
 from factory.plant.pairing import Pairing
@@ -105,14 +105,3 @@ def framed(product: Product, old: Product) -> Product:
     low, high = middle - reach, middle + reach
     low[2], high[2] = min(old.low[2], product.low[2]), max(old.high[2], product.high[2])
     return replace(product, low=low, high=high)
-
-
-def frame_of(product: Product) -> tuple[Point3, Point3] | None:
-    """The box (low, high) of a product that is in the frame of another [m]; None for its own."""
-    solids = product.solids.values()
-    low = np.min([solid.low for solid in solids], axis=0)
-    high = np.max([solid.high for solid in solids], axis=0)
-    if np.array_equal(low, product.low) and np.array_equal(high, product.high):
-        return None
-    (x, y, z), (u, v, w) = product.low.tolist(), product.high.tolist()
-    return (x, y, z), (u, v, w)

@@ -12,7 +12,6 @@ from factory.layout.embedding import certified
 from factory.layout.guidepath import Box, Guidepath
 from factory.layout.hands.hand import Hand, Point3
 from factory.layout.layout import Layout
-from factory.layout.pins import frame_of
 from factory.layout.shapes import payload_boxes
 from factory.layout.standby import part_of
 from factory.layout.visits import Visit
@@ -76,7 +75,7 @@ class LayoutTable:
             whole.hands,
             _turns(layout.factory, whole.factory) if layout.standby else (),
             None if layout.plain is None else cls.of(layout.plain),
-            frame_of(layout.product),
+            _frame_of(layout.product),
             whole.tile,
         )
 
@@ -165,3 +164,14 @@ def _turns(factory: Factory, whole: Factory) -> tuple[tuple[int, ...], ...]:
         for robot, does in zip(first.robots, o.robots, strict=True):
             turns[o.turn // factory.period][robot] = does
     return tuple(map(tuple, turns))
+
+
+def _frame_of(product: Product) -> tuple[Point3, Point3] | None:
+    """The box (low, high) of a product that is in the frame of another [m]; None for its own."""
+    solids = product.solids.values()
+    low = np.min([solid.low for solid in solids], axis=0)
+    high = np.max([solid.high for solid in solids], axis=0)
+    if np.array_equal(low, product.low) and np.array_equal(high, product.high):
+        return None
+    (x, y, z), (u, v, w) = product.low.tolist(), product.high.tolist()
+    return (x, y, z), (u, v, w)

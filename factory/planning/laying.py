@@ -10,6 +10,7 @@ from time import perf_counter
 
 import numpy as np
 
+from factory.compiler.folding import with_lines
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import Product
 from factory.lang.pag_reader import read_pag
@@ -116,7 +117,7 @@ class Layouts:
         laid = LaidOut(judged, tree, project, self.kinds(judged.tree))
         lines = [one for line in screw_lines(tree, self._kinds) for one in _lines(project, line)]
         why = self._spread(screws_in(tree), lines)
-        shared = project.with_lines(lines)
+        shared = with_lines(project, lines)
         return replace(laid, project=shared, lines=tuple(lines), apart=why)
 
     def _spread(self, screws: Sequence[str], lines: Sequence[Sequence[str]]) -> tuple[str, ...]:
@@ -209,7 +210,7 @@ def _lines(project: Project, screws: Sequence[str]) -> list[tuple[str, ...]]:
     for screw in screws:
         for line in lines:
             try:
-                project.with_lines([[*line, screw]])
+                with_lines(project, [[*line, screw]])
             except InputError:
                 continue
             line.append(screw)

@@ -21,7 +21,7 @@ from factory.plant.factory import Factory
 from factory.show.live.server import check_host
 from factory.show.opcua_server import OpcuaServer
 from factory.show.written import WrittenCommands
-from factory.simulation.driven import DrivenSupervisor
+from factory.simulation.driven import DrivenSupervisor, drive
 from factory.simulation.signals import Commands, Refusal, Sensed
 from factory.simulation.simulation import Simulation
 from factory.support.errors import Diagnostic, InputError
@@ -62,7 +62,7 @@ class OpcuaPlant:
         pace: float = 1.0,
     ) -> None:
         self._ua, self._where, self._pace = check_plant(host, exposed), (host, port), pace
-        self._plant: DrivenSupervisor = simulation.drive(self, scan)
+        self._plant: DrivenSupervisor = drive(simulation, self, scan)
         simulation.world.hooks.busy = float("inf")
         self._written = WrittenCommands(self._ua, self._plant.interlock.commands)
         self._nodes = dict[str, Any]()

@@ -4,6 +4,9 @@ refuses forbidden commands."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from factory.control.mode import Array, Limits
@@ -15,6 +18,10 @@ from factory.simulation.ordering import Ordering
 from factory.simulation.signals import NOBODY, AxisDrives, Commands, Controller, Refusal, Sensed
 from factory.simulation.supervisor import Active
 from factory.support.settings import Settings
+from factory.timing.distributed import Scan
+
+if TYPE_CHECKING:
+    from factory.simulation.simulation import Simulation
 
 
 class DrivenSupervisor:
@@ -103,6 +110,11 @@ class DrivenSupervisor:
         """Refuse what concerns no single robot."""
         self.refusals.append(Refusal(self.interlock.world.time, NOBODY, message))
 
+    @property
+    def scans(self) -> Sequence[Scan]:
+        """None: what the controller does is not known before."""
+        return ()
+
     def _scan(self) -> None:
         """Scan the controller, carry out its permitted commands, and move the drives; robots that
         the interlock holds stand."""
@@ -143,3 +155,12 @@ class DrivenSupervisor:
             self.refusals.append(Refusal(interlock.world.time, robot, message))
         self._astray = astray
         return confined
+
+
+def drive(simulation: Simulation, controller: Controller, scan: float) -> DrivenSupervisor:
+    """Let a controller drive the plant of a simulation from the start, asked every `scan` [s]."""
+    net, settings = simulation.timing.coordinated, simulation.request.settings
+    interlock = PlantInterlock(simulation.layout, simulation.modes, simulation.world, net)
+    driven = DrivenSupervisor(interlock, simulation.limits, settings, controller, scan)
+    simulation.supervisor = driven
+    return driven

@@ -13,8 +13,6 @@ from factory.support.errors import Diagnostic, InputError, usage_error
 if TYPE_CHECKING:
     from factory.nets.petri import Marking
     from factory.pipeline import Project
-    from factory.plant.factory import Factory
-    from factory.simulation.recovery.faults import Campaign
     from factory.simulation.request import RunRequest
 
 APART = (
@@ -107,29 +105,13 @@ class RunOptions:
         )
 
     def check(self, project: Project) -> None:
-        """The same, before a project is laid out; files are read, but for pipes, which are read
-        once. Raises InputError."""
+        """The same, before a project is laid out; the file of a demand is read, but for a pipe,
+        which is read once. Raises InputError."""
         from factory.simulation.demand_file import demand_of
 
         self.check_with(project.ground)
         if self.demand is not None and not Path(self.demand).is_fifo():
             demand_of(self.demand, project.pag, self.units)
-        if self.faults is not None and not self.faults.is_fifo():
-            from factory.simulation.recovery.fault_file import read_campaign
-
-            read_campaign(self.faults)
-
-    def campaign(self, factory: Factory) -> Campaign:
-        """The faults of the run, and its spares. Raises InputError."""
-        from factory.simulation.recovery.fault_file import check_names, read_campaign
-        from factory.simulation.recovery.faults import SWAP, Campaign
-
-        swap = SWAP if self.swap is None else self.swap
-        if self.faults is None:
-            return Campaign(seed=self.seed, spares=self.spares, swap=swap)
-        campaign = read_campaign(self.faults, self.spares, swap)
-        check_names(campaign, factory)
-        return campaign
 
     def request(self, project: Project, shown: bool = True) -> RunRequest:
         """The request of a run; `shown`: whether it is filmed or logged. Raises InputError."""

@@ -22,14 +22,12 @@ from factory.plant.demand import Word
 from factory.record.figures import PhysicsFigures
 from factory.record.state import Observer, State
 from factory.simulation.distributed import DistributedSupervisor
-from factory.simulation.driven import DrivenSupervisor
 from factory.simulation.ideal import IdealWorld
-from factory.simulation.interlock import PlantInterlock
 from factory.simulation.modelling import modelled
 from factory.simulation.ordering import Ordering
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run, busy_times, entries_of
-from factory.simulation.signals import Controller
+from factory.simulation.run_supervisor import RunSupervisor
 from factory.simulation.supervisor import Supervisor
 from factory.simulation.world import World
 from factory.support.errors import Diagnostic, InputError
@@ -110,10 +108,11 @@ class Simulation:
         self.world.hooks.state = self.state
         self.before = self.world.delivered()
         supervised = self._distributed if request.distributed else self._central
-        self.supervisor: Supervisor | DistributedSupervisor | DrivenSupervisor = supervised(stages)
-        self.supervisor.ordering = Ordering(self.timing.coordinated.orders)
+        supervisor = supervised(stages)
+        supervisor.ordering = Ordering(self.timing.coordinated.orders)
         if self.start != net.initial_marking:
-            self.supervisor.ordering.keep_passes()
+            supervisor.ordering.keep_passes()
+        self.supervisor: RunSupervisor = supervisor
 
     @cached_property
     def patience(self) -> float:
@@ -129,8 +128,7 @@ class Simulation:
     @cached_property
     def cycle(self) -> CycleTime:
         """The predicted cycle time, and what bounds it."""
-        scans = self.supervisor.scans if isinstance(self.supervisor, DistributedSupervisor) else ()
-        return cycle_of(self.timing, self.word, self.request.wip, scans)
+        return cycle_of(self.timing, self.word, self.request.wip, self.supervisor.scans)
 
     @property
     def duration(self) -> float:
@@ -170,13 +168,6 @@ class Simulation:
             self.request.seed,
             stages,
         )
-
-    def drive(self, controller: Controller, scan: float) -> DrivenSupervisor:
-        """Let a controller drive the plant from the start, asked every `scan` [s]."""
-        net, settings = self.timing.coordinated, self.request.settings
-        interlock = PlantInterlock(self.layout, self.modes, self.world, net)
-        self.supervisor = DrivenSupervisor(interlock, self.limits, settings, controller, scan)
-        return self.supervisor
 
     @property
     def physical(self) -> MujocoWorld:

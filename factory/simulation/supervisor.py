@@ -26,6 +26,7 @@ from factory.simulation.ahead import Ahead
 from factory.simulation.bundles import Bundles
 from factory.simulation.ordering import Ordering
 from factory.simulation.world import World
+from factory.timing.distributed import Scan
 
 
 @dataclass(slots=True)
@@ -77,6 +78,11 @@ class Supervisor:
             [o.index for o in factory.operations if marked[o.place]],
             self.ahead.waiting(marked, self.world.sense()[0]),
         )
+
+    @property
+    def scans(self) -> Sequence[Scan]:
+        """None: no robot ticks by itself."""
+        return ()
 
     @property
     def limits(self) -> Limits:

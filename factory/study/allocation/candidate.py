@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from factory.compiler.parallel import Branches
+from factory.compiler.parallel import Branches, with_branches
 from factory.layout.durations import Pace, cycle_of
 from factory.pipeline import Project
 from factory.study.allocation.bundles import Filling
@@ -37,7 +37,7 @@ class Candidate:
     def project(self) -> Project:
         """The project with all its branches. Raises InputError (Parallel) where one is
         impossible."""
-        return self.single.with_branches(self.branches) if self.branches else self.single
+        return with_branches(self.single, self.branches) if self.branches else self.single
 
     @cached_property
     def robots(self) -> int:
