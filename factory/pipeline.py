@@ -294,7 +294,7 @@ class Project:
 
     def _laid_out(self, laid: LayoutTable) -> Layout:
         from factory.compiler.mating.mating import judged
-        from factory.layout.relaying.splitting import with_relays
+        from factory.compiler.relays import with_relays
 
         factory = plain = judged(self.plain, self.product)
         if relays := self.plan.relays:

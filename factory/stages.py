@@ -115,7 +115,7 @@ def compile(
     out at most so many factories (`effort`), none after so many `seconds`. `parallel`: for each of
     some labels how often the branch that brings it is there. Raises InputError.
     """
-    from factory.compiler.parallel import with_branches
+    from factory.sharing import with_branches
     from factory.study.allocation.aim import Aim
     from factory.study.allocation.search import allocated
 

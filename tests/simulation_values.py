@@ -12,10 +12,10 @@ import numpy as np
 
 from benches.speed.factories import balanced
 from benches.speed.factories import laid_out as floor_of
-from factory.compiler.parallel import with_branches
 from factory.lang import read_pag
 from factory.layout.layout import Layout
 from factory.pipeline import Project, all_templates, read
+from factory.sharing import with_branches
 from factory.simulation.mujoco.stepping import SingleSteps
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation

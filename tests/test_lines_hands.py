@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.compiler.folding import with_lines
 from factory.geometry.solids import Product
 from factory.layout import hanging
 from factory.layout.clearance import certify
@@ -27,6 +26,7 @@ from factory.layout.hanging import Hanging
 from factory.layout.layout import Layout
 from factory.pipeline import Project, read
 from factory.record.monitor.watched import watched
+from factory.sharing import with_lines
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 
-from factory.compiler.folding import with_lines
 from factory.compiler.mixing import even, orders
 from factory.exporting.certificate.check import check_certificate
 from factory.exporting.certificate.writer import certificate
@@ -26,6 +25,7 @@ from factory.pipeline import Project, all_templates, read
 from factory.plant.fused_bodies import repeated
 from factory.problem.pag import PAG, Mix
 from factory.problem.plan import NOBODY, Plan
+from factory.sharing import with_lines
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError

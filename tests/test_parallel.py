@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from factory.compiler.mating.mating import judged
-from factory.compiler.parallel import in_parallel, with_branches
+from factory.compiler.parallel import in_parallel
 from factory.exporting.certificate.check import check_certificate
 from factory.exporting.certificate.writer import certificate
 from factory.layout.bounds import cycle_time_bound
@@ -32,6 +32,7 @@ from factory.plant.programs import program_of, write_program
 from factory.problem.pag import PAG, Parameter
 from factory.problem.robot_types import load_catalogue
 from factory.record.monitor.watched import watched
+from factory.sharing import with_branches
 from factory.show.report.drawings import about, labels_of, links
 from factory.simulation.request import RunRequest, WorldName
 from factory.simulation.run import Run

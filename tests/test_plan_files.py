@@ -16,8 +16,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.compiler.folding import with_lines
-from factory.compiler.parallel import with_branches
 from factory.layout import request
 from factory.layout.layout import Layout
 from factory.layout.request import Ground
@@ -25,6 +23,7 @@ from factory.layout.saved import LayoutTable
 from factory.pipeline import Project, read
 from factory.problem.plan import Plan
 from factory.record.plan_file import plan_files, read_plan
+from factory.sharing import with_branches, with_lines
 from factory.show.report import page, recording_of
 from factory.simulation.modelling import physical_model
 from factory.study.analysis import Timing, analyse

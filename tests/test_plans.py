@@ -13,7 +13,6 @@ import pytest
 from factory.compiler.assigning import shared
 from factory.compiler.expanding import joins
 from factory.compiler.mating.mating import judged
-from factory.compiler.parallel import with_branches
 from factory.layout.clearance import certify
 from factory.layout.durations import Pace
 from factory.layout.saved import LayoutTable
@@ -23,6 +22,7 @@ from factory.nets.verify import verify
 from factory.pipeline import Project, read
 from factory.problem.plan import THIRD, Plan
 from factory.record.plan_file import PLAN_NAME, plan_files, read_plan
+from factory.sharing import with_branches
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.study.allocation.lines import Shift

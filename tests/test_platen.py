@@ -17,9 +17,10 @@ from factory.layout.compacting import compacted
 from factory.layout.durations import Pace, cycle_of
 from factory.layout.layout import Layout
 from factory.layout.placing import Floor, Placing
-from factory.layout.platen import fill_of, on_platen, tiles_of
+from factory.layout.platen import on_platen
 from factory.layout.saved import LayoutTable
 from factory.layout.sweeps import piles, regions
+from factory.layout.tiles import fill_of, tiles_of
 from factory.layout.way import Bend
 from factory.support.errors import InputError, RunError
 from factory.support.tables import table_of, value_of

@@ -12,7 +12,6 @@ from typing import Any
 import pytest
 
 import factory.simulation.recovery.responding as responding
-from factory.compiler.folding import with_lines
 from factory.layout.layout import Layout
 from factory.nets.replay import replay
 from factory.nets.undo import undo
@@ -21,6 +20,7 @@ from factory.pipeline import read
 from factory.plant.factory import Factory
 from factory.problem.template import Failure
 from factory.record.failures import Failures
+from factory.sharing import with_lines
 from factory.simulation.mujoco.failing.plant import MujocoPlant, Senses
 from factory.simulation.recovery import Campaign, WorldFault, recover
 from factory.simulation.recovery.faults import ASKEW, KINDS, SLIPPED

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from factory.compiler.folding import with_lines
 from factory.lang import read_pag, write_pag
 from factory.lang.pag_reader import load_pag
 from factory.layout.certificate import Fault
@@ -20,6 +19,7 @@ from factory.plant.family import family
 from factory.plant.matching import below, label_digests, matching, shifted
 from factory.problem.pag import PAG, Mix, Parameter
 from factory.problem.plan import Plan
+from factory.sharing import with_lines
 from factory.study.revision import Revision, revised
 from factory.support.errors import Diagnostic, InputError, RunError
 from tests.command_line import spawn

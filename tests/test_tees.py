@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from factory.compiler.parallel import in_parallel, with_branches
-from factory.compiler.tees import heads, on_stems, with_tees
+from factory.compiler.parallel import in_parallel
+from factory.compiler.tees import heads, on_stems
 from factory.layout.clearance import certify
 from factory.layout.fork import Fork
 from factory.layout.layout import Layout
@@ -20,6 +20,7 @@ from factory.problem.pag import PAG, Parameter
 from factory.problem.robot_types import load_catalogue
 from factory.problem.template import Template
 from factory.record.monitor.watched import watched
+from factory.sharing import with_branches, with_tees
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation

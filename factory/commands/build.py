@@ -108,7 +108,7 @@ def _printed(project: Project, built: Built, spent: float, wip: int | None) -> d
     from factory.layout.durations import Pace
     from factory.layout.gain import gain
     from factory.layout.hands.bores import bores
-    from factory.layout.platen import fill_of, tiles_of
+    from factory.layout.tiles import fill_of, tiles_of
     from factory.support.settings import AUTO
 
     layout, settings, model = project.layout, project.settings, built.model

@@ -103,13 +103,13 @@ def plan(
     write the assembly tree as a PAG with its meshes. SOURCE is a folder of meshes, a file with
     named bodies (.glb, .3mf, .step), an LDraw model (.ldr, .mpd), or a PAG whose assembly tree is
     to be ignored."""
-    from factory.compiler.folding import with_lines
     from factory.importing.draft import file_stem
     from factory.lang.overlaps import overlaps_in
     from factory.pipeline import all_templates, read
     from factory.planning.outcome import write_planned
     from factory.planning.plan import CannotAssemble, PlanOptions
     from factory.planning.source import SourceOptions, read_source
+    from factory.sharing import with_lines
     from factory.support.files import own_names
 
     templates = all_templates(folders)

@@ -130,17 +130,13 @@ class ProjectOptions:
         kept = defaults_for(self.file)
         if self.robots is not None or self.cycle is not None:
             return self._with_few_robots(project, silent)
-        if lines := kept.lines():
-            from factory.compiler.folding import with_lines
+        from factory.sharing import with_branches, with_lines, with_tees
 
+        if lines := kept.lines():
             project = with_lines(project, lines)
         if several := self.branches():
-            from factory.compiler.parallel import with_branches
-
             project = with_branches(project, several)
         if stems := kept.tees():
-            from factory.compiler.tees import with_tees
-
             project = with_tees(project, stems)
         return project
 

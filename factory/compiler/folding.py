@@ -21,7 +21,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 from factory.compiler.assigning import with_crew
 from factory.plant.factory import Factory, Operation
@@ -29,9 +28,6 @@ from factory.problem.pag import NOPART
 from factory.problem.plan import NOBODY, Plan
 from factory.problem.robot_types import Catalogue
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
-
-if TYPE_CHECKING:
-    from factory.pipeline import Project
 
 Line = tuple[int, ...]
 """The tours of a line, as the robots of the factory that is folded."""
@@ -47,16 +43,6 @@ def fold(factory: Factory, lines: Iterable[Line], catalogue: Catalogue) -> Plan:
     if shared:
         shared += _tool_lines(factory, shared)
     return factory.plan.then([_turn(factory, shared)])
-
-
-def with_lines(project: Project, lines: Sequence[Sequence[str]]) -> Project:
-    """The project in which the robots that bring the labels of a line are one robot. Raises
-    InputError (BadLine)."""
-    if not lines:
-        return project
-    factory = project.planned
-    sides = lines_of_labels(factory, lines)
-    return project.with_plan(fold(factory, sides, project.catalogue))
 
 
 def folded(factory: Factory, lines: Iterable[Line], catalogue: Catalogue) -> Factory:

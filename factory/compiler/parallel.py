@@ -19,7 +19,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import accumulate
 from math import lcm
-from typing import TYPE_CHECKING
 
 from factory.compiler.tees import ROOM
 from factory.plant.factory import Factory
@@ -27,9 +26,6 @@ from factory.problem.pag import NOPART
 from factory.problem.plan import Plan
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 from factory.support.settings import MOST_BRANCHES
-
-if TYPE_CHECKING:
-    from factory.pipeline import Project
 
 Branches = Sequence[tuple[str, int]]
 """Labels, and how often the branch that brings each is to be there."""
@@ -57,12 +53,6 @@ def in_parallel(factory: Factory, branches: Branches) -> Plan:
     return factory.plan.then(
         [[first[r] + t % count for r, count in enumerate(lines)] for t in range(period)]
     )
-
-
-def with_branches(project: Project, branches: Branches) -> Project:
-    """The project in which the branches that bring some labels are there several times. Raises
-    InputError (Parallel)."""
-    return project.with_plan(in_parallel(project.planned, branches))
 
 
 def _brings(factory: Factory, label: str) -> int:

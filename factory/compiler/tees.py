@@ -16,7 +16,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from factory.compiler.assigning import assigned
 from factory.compiler.folding import Line, line_faults, lines_of_labels
@@ -25,9 +24,6 @@ from factory.problem.pag import NOPART
 from factory.problem.plan import Plan
 from factory.problem.robot_types import Catalogue
 from factory.support.errors import Diagnostic, InputError
-
-if TYPE_CHECKING:
-    from factory.pipeline import Project
 
 ROOM = 2
 """Robots that share a stem."""
@@ -54,13 +50,7 @@ def heads(factory: Factory) -> tuple[int, ...]:
     return tuple(head)
 
 
-def with_tees(project: Project, stems: Sequence[Sequence[str]]) -> Project:
-    """The project in which two robots share a stem, by the labels that they bring. Raises
-    InputError (BadTee)."""
-    return project.with_plan(plan_with_tees(project.planned, stems, project.catalogue))
-
-
-def plan_with_tees(factory: Factory, stems: Sequence[Sequence[str]], catalogue: Catalogue) -> Plan:
+def with_tees(factory: Factory, stems: Sequence[Sequence[str]], catalogue: Catalogue) -> Plan:
     """The plan in which the two robots that bring the labels of each of `stems` share one. Raises
     InputError (BadTee) with every reason why they cannot."""
     lines = lines_of_labels(factory, stems)

@@ -13,8 +13,8 @@ from factory.layout.certificate import ALWAYS, PAYLOAD_BODY
 from factory.layout.feeding import feeder_of
 from factory.layout.hands.limbs import limbs
 from factory.layout.layout import Box, Extent, Layout, Point2
-from factory.layout.platen import tiles_of
 from factory.layout.sweeps import piles, regions
+from factory.layout.tiles import tiles_of
 from factory.problem.robot_bodies import ARM_WIDTH
 from factory.support.canvas import hexadecimal, hull
 

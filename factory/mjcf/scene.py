@@ -12,7 +12,7 @@ from factory.geometry.sight import Array, Framing, View, fit, towards
 from factory.layout.dimensions import PAYLOAD, Clearance
 from factory.layout.guidepath import Guidepath
 from factory.layout.layout import Layout
-from factory.layout.platen import tiles_of
+from factory.layout.tiles import tiles_of
 from factory.mjcf.elements import add, add_shown, add_station, fill, numbers
 from factory.mjcf.names import COMPASS
 from factory.mjcf.robots import heading_quaternion

@@ -10,7 +10,6 @@ from time import perf_counter
 
 import numpy as np
 
-from factory.compiler.folding import with_lines
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import Product
 from factory.lang.pag_reader import read_pag
@@ -27,6 +26,7 @@ from factory.planning.writing import Tree as LabelTree
 from factory.problem.plan import Plan
 from factory.problem.robot_types import load_catalogue
 from factory.problem.template import Template
+from factory.sharing import with_lines
 from factory.support.bounds import Allowance
 from factory.support.errors import FactoryError, InputError
 from factory.support.settings import Settings

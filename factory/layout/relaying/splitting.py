@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from factory.compiler.compiler import compile_nodes
-from factory.compiler.expanding import delivered, handed_over, nodes_of, origin_of, relay_label
+from factory.compiler.expanding import origin_of, relay_label
+from factory.compiler.relays import with_relays
 from factory.layout.dimensions import Clearance
 from factory.layout.layout import Guidepath, Layout
 from factory.layout.relaying.in_line import InLine, hands_in_line
@@ -69,23 +69,6 @@ def split(
         payloads=payload_boxes(factory, layout.product),
         certificate=None,
     )
-
-
-def with_relays(
-    before: Factory,
-    numbers: Mapping[str, int],
-    templates: Mapping[str, Template],
-    catalogue: Catalogue,
-) -> Factory:
-    """The factory with a given number of additional robots on the way of each label. Linear."""
-    plan = replace(before.plan, relays={label: n for label, n in numbers.items() if n})
-    nodes = handed_over(nodes_of(before), plan.relays, templates)
-    approaches = {  # a relay turns nothing
-        o.label: replace(o.approach, lowered=delivered(o.approach.lowered, plan))
-        for o in before.operations
-        if o.approach is not None
-    }
-    return compile_nodes(before.pag, nodes, templates, catalogue, approaches, plan)
 
 
 def _hands(layout: Layout, factory: Factory, cut: Mapping[int, Sequence[Piece]]) -> InLine:

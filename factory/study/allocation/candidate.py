@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from factory.compiler.parallel import Branches, with_branches
+from factory.compiler.parallel import Branches
 from factory.layout.durations import Pace, cycle_of
 from factory.pipeline import Project
+from factory.sharing import with_branches
 from factory.study.allocation.bundles import Filling
 from factory.support.errors import FactoryError
 from factory.timing.cycle_time import CycleTime
