@@ -67,7 +67,7 @@ ENGINE_FIELDS = frozenset(
 )
 """Fields of MjModel and MjData that a run may write."""
 
-VARIANTS = re.compile(r"(^|_)(fold(s|ed|ing)?|relay(s|ed|ing)?|deput\w*|parallel|forms?)(_|$)")
+VARIANTS = re.compile(r"(^|_)(fold(s|ed|ing)?|relay(s|ed|ing)?|parallel|forms?)(_|$)")
 """What variants of a factory are called, in identifiers of small letters."""
 
 VARIANT_ROOMS = ("compiler", "layout/relaying", "problem/plan")

@@ -14,7 +14,6 @@ from factory.show.live.page import page
 from factory.simulation.recovery import Campaign, WorldFault
 from tests import failing_runs
 from tests.live_sessions import Running, a_session
-from tests.test_takeovers import laid_out
 from tests.waiting import until
 
 LONG = 20.0
@@ -208,32 +207,6 @@ def test_a_robot_is_paused_and_other_faults_are_shown(browser: Any) -> None:
     messages = watched.page.locator("#said .failed span").all_inner_texts()
     words = ["sub1 does not fit", "part1 lies askew in its feeder", "part1 is no good"]
     assert [message.partition(":")[0] for message in messages] == words
-    watched.close()
-    assert watched.trouble == []
-
-
-def test_a_robot_whose_deputy_took_over_is_not_drawn(browser: Any) -> None:
-    watched = Watched(browser, Campaign(swap=2.0), laid_out())
-    watched.page.locator("#speed").select_option("0")
-    watched.until("f.products > 1")
-    assert watched.page.evaluate("factoryView.isDrawn(3)")
-    watched.page.locator("#gantt button[data-robot='3']").click()
-    watched.press("Kill")
-    watched.until("f.outages.gone.length")
-    watched.seen("drawn => !drawn", "factoryView.isDrawn(3)")
-    assert watched.page.evaluate("factoryView.isDrawn(1)")
-    plan = watched.page.locator(".floor [data-robot='3'][data-body]")
-    assert plan.count() == 1 and plan.is_hidden()
-    assert watched.page.locator("#outages").inner_text() == "r4 is gone: r2 does its tours"
-    watched.page.locator("#speed").select_option("5")
-    made = watched.page.evaluate("factoryView.frame.products")
-    watched.until(f"f.products > {made + 2}")
-    bars = "document.querySelectorAll('.rolling .row')[{}].querySelectorAll('.op').length"
-    watched.seen("n => n === 0", bars.format(4))
-    assert watched.page.evaluate(bars.format(2)) > 0
-    watched.press("Restart")
-    watched.until("f.run === 1")
-    watched.seen("drawn => drawn", "factoryView.isDrawn(3)")
     watched.close()
     assert watched.trouble == []
 
