@@ -8,11 +8,9 @@ from typing import Any
 
 import pytest
 
-from factory.layout.layout import Layout
 from factory.show.live import Server
 from factory.show.live.page import page
 from factory.simulation.recovery import Campaign, WorldFault
-from tests import failing_runs
 from tests.live_sessions import Running, a_session
 from tests.waiting import until
 
@@ -23,15 +21,9 @@ LONG = 20.0
 class Watched:
     """A running factory with a page open on it."""
 
-    def __init__(
-        self,
-        browser: Any,
-        campaign: Campaign | None = None,
-        layout: Layout | None = None,
-        **options: Any,
-    ) -> None:
-        self.running = Running(True, campaign, layout)
-        self.server = Server(self.running.session, page(a_session(False, campaign, layout)))
+    def __init__(self, browser: Any, campaign: Campaign | None = None, **options: Any) -> None:
+        self.running = Running(True, campaign)
+        self.server = Server(self.running.session, page(a_session(False, campaign)))
         self.context = browser.new_context(viewport={"width": 1400, "height": 900}, **options)
         self.page = self.context.new_page()
         self.trouble: list[str] = []
@@ -194,7 +186,7 @@ def test_a_robot_is_paused_and_other_faults_are_shown(browser: Any) -> None:
         WorldFault("bad_joint", label="sub1", at=40.0),
     )
     campaign = Campaign(faults, clear=1.0, spares=1, swap=2.0)
-    watched = Watched(browser, campaign, failing_runs.paper_layout())
+    watched = Watched(browser, campaign)
     watched.until("f.outages.told.some(([mark]) => mark === 'dark')")
     watched.until("f.outages.told.some(([mark]) => mark === 'empty')")
     assert "part1 is empty" in watched.page.locator("#outages .empty").inner_text()
