@@ -69,7 +69,7 @@ class Project:
         ground, stages = Ground(), dict[str, Any](plain=plain, planned=plain)
         if layout is not None:
             settings = settings or Settings(clearance=layout.clearance)
-            ground = Ground(relay=layout.plain is not None, deputies=layout.standby is not None)
+            ground = Ground(relay=layout.plain is not None)
             stages["layout"] = layout
             if plain.period == 1:
                 stages["product"] = layout.product
@@ -281,7 +281,7 @@ class Project:
         if self.laid is not None:
             laid = self._laid_out(self.laid)
         else:
-            inputs = self.plain, self.product, self.settings, self._hands, self.catalogue
+            inputs = self.plain, self.product, self.settings, self._hands
             draft = [self.draft] if "draft" in self.__dict__ else []
             laid = self.ground.lay_out(*inputs, *draft)
         check_drives(laid, self.settings)

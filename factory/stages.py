@@ -166,7 +166,6 @@ def lay_out(
     relay: bool = False,
     cycle: float | None = None,
     *,
-    deputies: bool = False,
     tile: float | None = None,
     settings: Settings | None = None,
 ) -> Layout:
@@ -175,16 +174,16 @@ def lay_out(
     `clearance` and `floor` (width, depth) in [m]; a floor also as a command takes it, "4x3".
     `relay`: several robots share guidepaths that set the pace, to reach a `cycle` time [s] or the
     least there can be; the layout's factory has
-    more robots then. `deputies`: robots can take over for others where there is room. `tile`: they
-    go over a platen of tiles of this size [m], on guidepaths that may bend. With none of these the
-    layout is that of the product's plan.json, or the layout itself. Raises InputError for a mesh
-    that cannot be read, RunError where the factory does not fit the floor.
+    more robots then. `tile`: they go over a platen of tiles of this size [m], on guidepaths that
+    may bend. With none of these the layout is that of the product's plan.json, or the layout
+    itself. Raises InputError for a mesh that cannot be read, RunError where the factory does not
+    fit the floor.
     """
     from factory.layout.request import WIDEST, Ground
     from factory.simulation.options import check_together
     from factory.support.bounds import pair
 
-    check_together({"--relay": relay, "--deputies": deputies, "--platen": tile is not None})
+    check_together({"--relay": relay, "--platen": tile is not None})
     project = project_of(product, settings)
     if clearance is not None:
         project = project.with_settings(replace(project.settings, clearance=clearance))
@@ -192,7 +191,7 @@ def lay_out(
         floor = pair(floor, "floor", "4x3", float, WIDEST)
     elif isinstance(floor, list):
         floor = tuple(floor)
-    ground = Ground(floor, relay, cycle if relay else None, deputies, tile)
+    ground = Ground(floor, relay, cycle if relay else None, tile)
     if ground != Ground() or settings is not None:
         project = project.with_ground(ground if ground != Ground() else project.ground)
     return project.layout

@@ -61,11 +61,10 @@ def failing(
     world: WorldName = "mujoco",
     units: int = 4,
     campaign: Campaign = CAMPAIGN,
-    layout: Layout | None = None,
 ) -> Log:
     """The log of a run in which all of a campaign happens."""
     request = RunRequest(world, units=units, recovers=True)
-    made = Simulation(layout or paper_layout(), request)
+    made = Simulation(paper_layout(), request)
     recover(made, campaign)
     with LogWriter(path, made) as log:
         made.run([log.observe])

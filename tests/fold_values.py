@@ -101,18 +101,6 @@ def random_lines(factory: Factory, rng: random.Random) -> list[Line]:
     return lines
 
 
-def deputies(factory: Factory, lines: list[Line]) -> list[tuple[Line, Line]]:
-    """The pairs of lines that one robot could serve: they deliver to one line, never in the same
-    operation."""
-    on = line_of(len(factory.robots), lines)
-    to = {line: on[factory.last(line[0]).carrier] for line in lines if line[0]}
-    return [
-        (one, other)
-        for one, other in combinations(to, 2)
-        if to[one] == to[other] and all(_fits(factory, [*one], kid) for kid in other)
-    ]
-
-
 def _fits(factory: Factory, group: list[int], kid: int) -> bool:
     robots = factory.robots
     return all(

@@ -12,7 +12,6 @@ from types import MappingProxyType
 
 from hypothesis import strategies as st
 
-from factory.compiler import taking_over
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import Product, Solid
 from factory.layout.embedding import lay_out
@@ -196,17 +195,6 @@ def with_visits(
     return replace(
         layout, visits=visits_of(factory, paths, at, () if plain else held), certificate=None
     )
-
-
-def without_gone(layout: Layout) -> Layout:
-    """The layout of a crew without the robots that are gone, which have no operations."""
-    stay = layout.factory.present
-    factory = taking_over.without_gone(layout.factory)
-    visits = {(number, stay.index(robot)): v for (number, robot), v in layout.visits.items()}
-    paths = tuple(layout.guidepaths[robot] for robot in stay)
-    hands = tuple(layout.hands[robot] for robot in stay) if layout.hands else ()
-    made = replace(layout, factory=factory, guidepaths=paths, visits=visits, hands=hands)
-    return replace(made, standby=None, certificate=None)
 
 
 def stations_of(layout: Layout) -> dict[int, float]:

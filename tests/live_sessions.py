@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 
-from factory.layout.layout import Layout
 from factory.record.state import State
 from factory.show.live import LiveFrame, Session
 from factory.simulation.recovery import Campaign
@@ -21,25 +20,18 @@ class Stopped(Exception):
     """Ends a session."""
 
 
-def a_session(
-    playing: bool, campaign: Campaign | None = None, layout: Layout | None = None
-) -> Session:
-    """A session of the paper's example, or of another layout, without end; it does not run yet."""
+def a_session(playing: bool, campaign: Campaign | None = None) -> Session:
+    """A session of the paper's example without end; it does not run yet."""
     request = RunRequest(units=10**9, recovers=campaign is not None)
-    found = layout or paper_layout()
-    return Session(lambda: Simulation(found, request), playing, campaign)
+    layout = paper_layout()
+    return Session(lambda: Simulation(layout, request), playing, campaign)
 
 
 class Running:
     """A session that runs in a thread of its own."""
 
-    def __init__(
-        self,
-        playing: bool = True,
-        campaign: Campaign | None = None,
-        layout: Layout | None = None,
-    ) -> None:
-        self.session = a_session(playing, campaign, layout)
+    def __init__(self, playing: bool = True, campaign: Campaign | None = None) -> None:
+        self.session = a_session(playing, campaign)
         self.over = False
         self.thread = Thread(target=self._run, daemon=True)
         self.thread.start()

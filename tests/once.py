@@ -101,15 +101,15 @@ def stages_once(folder: Path) -> Iterator[Stages]:
     apart = stages.once(clearance.exclusions)
 
     @stages.once
-    def laid_out(ground, factory, product, settings, chosen, catalogue):
-        return lay_out(ground, factory, product, settings, None, catalogue)
+    def laid_out(ground, factory, product, settings, chosen):
+        return lay_out(ground, factory, product, settings)
 
-    def of_ground(ground, factory, product, settings, hands=None, catalogue=None, draft=None):
+    def of_ground(ground, factory, product, settings, hands=None, draft=None):
         """Hands are those of the factory, unless layouts have made them others, or a draft has."""
         others = hands is not None and (hands.factory.robots != factory.robots or hands.travels)
         if draft is not None or others:
-            return lay_out(ground, factory, product, settings, hands, catalogue, draft)
-        return laid_out(ground, factory, product, settings, hands is not None, catalogue)
+            return lay_out(ground, factory, product, settings, hands, draft)
+        return laid_out(ground, factory, product, settings, hands is not None)
 
     def of_nodes(nodes, product, lifts=True, lowered=MappingProxyType({})):
         return judged(nodes, product, lifts, lowered)

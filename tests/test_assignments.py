@@ -10,25 +10,22 @@ from pathlib import Path
 import pytest
 
 from factory.compiler.assigning import shared
-from factory.compiler.deputies import chosen_pairs, deputies, standing_by
 from factory.compiler.folding import fold
 from factory.compiler.mating.mating import judged
 from factory.compiler.parallel import in_parallel
-from factory.compiler.taking_over import Takeover
 from factory.compiler.tees import on_stems
 from factory.layout.durations import Pace
 from factory.layout.shapes import payload_boxes
 from factory.nets.verify import verify
 from factory.pipeline import read
 from factory.plant.factory import Factory
-from factory.problem.robot_types import Catalogue
 from factory.study.allocation.lines import Shift
 from factory.support.errors import InputError
 
 PRODUCTS = ("truck", "lamp", "stool", "shelf")
 LONG = ("chair", "gearbox", "chest")
-FILLINGS, TAKEOVERS = 12, 2
-"""So many ways to fill lines are looked at, and so many deputies of each robot."""
+FILLINGS = 12
+"""So many ways to fill lines are looked at."""
 
 
 def digest(factory: Factory) -> str:
@@ -67,19 +64,6 @@ def variants(file: Path) -> Iterator[tuple[str, Factory]]:
                     if on_stems(made)[0] is not made:  # tees have tests of their own
                         continue
                     yield f"{name}, {label} = {k}", made
-                    yield from takeovers(f"{name}, {label} = {k}", made, catalogue)
-        if pairs := chosen_pairs(deputies(factory, catalogue)):
-            yield f"{name}, deputies stand by", standing_by(factory, pairs)
-        yield from takeovers(name, factory, catalogue)
-
-
-def takeovers(name: str, factory: Factory, catalogue: Catalogue) -> Iterator[tuple[str, Factory]]:
-    """The factories in which deputies have taken over, with those that are gone and without."""
-    for dead, row in enumerate(deputies(factory, catalogue)):
-        for deputy in row[:TAKEOVERS]:
-            over = Takeover(factory, dead, deputy)
-            yield f"{name}, r{deputy + 1} for r{dead + 1}", over.crew
-            yield f"{name}, without r{dead + 1}, r{deputy + 1}", over.after
 
 
 @pytest.mark.parametrize(
@@ -92,5 +76,5 @@ def test_every_variant_is_as_it_was(product: str, golden: Callable[[str, str], N
 
 def test_variants_are_live_trains() -> None:
     for _, made in variants(Path("examples/truck.pag")):
-        if all(robot.operations for robot in made.robots):
-            assert verify(made.net).holds
+        assert all(robot.operations for robot in made.robots)
+        assert verify(made.net).holds

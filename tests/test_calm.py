@@ -10,7 +10,7 @@ import pytest
 from factory.nets.undone import Undone
 from factory.record.log import Log
 from factory.record.log.model import model_of
-from factory.record.monitor.calm import Crews, spells
+from factory.record.monitor.calm import spells
 from factory.record.monitor.record import recorded_subject, verdict_on, watch_log
 from factory.simulation.recovery import Campaign, WorldFault
 from tests.failing_runs import CAMPAIGN, failing
@@ -45,8 +45,8 @@ def test_states_between_failures_are_judged(log: Log) -> None:
 
 def test_spells_have_no_failure(log: Log) -> None:
     assert log.failures is not None
-    crews = Crews(log, recorded_subject(log.header))
-    found, last = [*spells(log, crews, model_of(log))], 0.0
+    factory = recorded_subject(log.header).factory
+    found, last = [*spells(log, factory, model_of(log))], 0.0
     for begin, end in found:
         assert last <= begin < end
         assert not any(begin <= one.t <= end for one in log.failures.found)
@@ -56,8 +56,8 @@ def test_spells_have_no_failure(log: Log) -> None:
 
 def longest(log: Log) -> tuple[int, int]:
     """The rows of the longest spell."""
-    crews = Crews(log, recorded_subject(log.header))
-    begin, end = max(spells(log, crews, model_of(log)), key=lambda span: span[1] - span[0])
+    factory = recorded_subject(log.header).factory
+    begin, end = max(spells(log, factory, model_of(log)), key=lambda span: span[1] - span[0])
     return log.row_at(begin), log.row_at(end)
 
 

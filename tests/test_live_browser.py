@@ -8,13 +8,10 @@ from typing import Any
 
 import pytest
 
-from factory.layout.layout import Layout
 from factory.show.live import Server
 from factory.show.live.page import page
 from factory.simulation.recovery import Campaign, WorldFault
-from tests import failing_runs
 from tests.live_sessions import Running, a_session
-from tests.test_takeovers import laid_out
 from tests.waiting import until
 
 LONG = 20.0
@@ -24,15 +21,9 @@ LONG = 20.0
 class Watched:
     """A running factory with a page open on it."""
 
-    def __init__(
-        self,
-        browser: Any,
-        campaign: Campaign | None = None,
-        layout: Layout | None = None,
-        **options: Any,
-    ) -> None:
-        self.running = Running(True, campaign, layout)
-        self.server = Server(self.running.session, page(a_session(False, campaign, layout)))
+    def __init__(self, browser: Any, campaign: Campaign | None = None, **options: Any) -> None:
+        self.running = Running(True, campaign)
+        self.server = Server(self.running.session, page(a_session(False, campaign)))
         self.context = browser.new_context(viewport={"width": 1400, "height": 900}, **options)
         self.page = self.context.new_page()
         self.trouble: list[str] = []
@@ -195,7 +186,7 @@ def test_a_robot_is_paused_and_other_faults_are_shown(browser: Any) -> None:
         WorldFault("bad_joint", label="sub1", at=40.0),
     )
     campaign = Campaign(faults, clear=1.0, spares=1, swap=2.0)
-    watched = Watched(browser, campaign, failing_runs.paper_layout())
+    watched = Watched(browser, campaign)
     watched.until("f.outages.told.some(([mark]) => mark === 'dark')")
     watched.until("f.outages.told.some(([mark]) => mark === 'empty')")
     assert "part1 is empty" in watched.page.locator("#outages .empty").inner_text()
@@ -208,32 +199,6 @@ def test_a_robot_is_paused_and_other_faults_are_shown(browser: Any) -> None:
     messages = watched.page.locator("#said .failed span").all_inner_texts()
     words = ["sub1 does not fit", "part1 lies askew in its feeder", "part1 is no good"]
     assert [message.partition(":")[0] for message in messages] == words
-    watched.close()
-    assert watched.trouble == []
-
-
-def test_a_robot_whose_deputy_took_over_is_not_drawn(browser: Any) -> None:
-    watched = Watched(browser, Campaign(swap=2.0), laid_out())
-    watched.page.locator("#speed").select_option("0")
-    watched.until("f.products > 1")
-    assert watched.page.evaluate("factoryView.isDrawn(3)")
-    watched.page.locator("#gantt button[data-robot='3']").click()
-    watched.press("Kill")
-    watched.until("f.outages.gone.length")
-    watched.seen("drawn => !drawn", "factoryView.isDrawn(3)")
-    assert watched.page.evaluate("factoryView.isDrawn(1)")
-    plan = watched.page.locator(".floor [data-robot='3'][data-body]")
-    assert plan.count() == 1 and plan.is_hidden()
-    assert watched.page.locator("#outages").inner_text() == "r4 is gone: r2 does its tours"
-    watched.page.locator("#speed").select_option("5")
-    made = watched.page.evaluate("factoryView.frame.products")
-    watched.until(f"f.products > {made + 2}")
-    bars = "document.querySelectorAll('.rolling .row')[{}].querySelectorAll('.op').length"
-    watched.seen("n => n === 0", bars.format(4))
-    assert watched.page.evaluate(bars.format(2)) > 0
-    watched.press("Restart")
-    watched.until("f.run === 1")
-    watched.seen("drawn => drawn", "factoryView.isDrawn(3)")
     watched.close()
     assert watched.trouble == []
 

@@ -9,14 +9,12 @@ from collections.abc import Iterator
 from dataclasses import replace
 from importlib import resources
 from math import inf
-from pathlib import Path
 from subprocess import PIPE
 from typing import Any
 
 import numpy as np
 import pytest
 
-from benches.faults.takeovers import PAPER as INSERTS
 from factory.nets.replay import replay
 from factory.nets.undone import Undone
 from factory.record.state import State
@@ -32,10 +30,9 @@ from factory.simulation.run import entries_of
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
 from tests import failing_runs
-from tests.command_line import started
+from tests.command_line import PAPER, started
 from tests.layout_values import paper_layout
 from tests.live_sessions import Running, a_session
-from tests.test_takeovers import laid_out
 
 WATCHED = 4.0
 """So many times as fast as real time a session runs in which what lasts a second is to be seen."""
@@ -250,30 +247,8 @@ def test_a_session_tells_what_is_out_of_order(running: Running) -> None:
     assert (stands.standing, stands.dead) == (("r2",), {}), "nothing has told of it"
     dead = running.until(lambda f: bool(f.outages.dead)).outages
     assert [*dead.dead] == ["r2"] and dead.standing == ()
-    left, deputy = dead.dead["r2"]
-    assert 0.0 < left <= CAMPAIGN.swap and deputy == ""
+    assert 0.0 < dead.dead["r2"] <= CAMPAIGN.swap
     running.until(lambda f: f.outages == Outages())
-
-
-def test_a_robot_whose_deputy_took_over_is_gone() -> None:
-    running = Running(campaign=Campaign(swap=2.0), layout=laid_out())
-    try:
-        running.session.send(Command("speed", factor=WATCHED))
-        running.until(lambda f: f.products > 1)
-        running.session.send(Command("dead", robot=3))
-        dead = running.until(lambda f: bool(f.outages.dead)).outages.dead
-        assert dead["r4"][1] == "r2"
-        frame = running.until(lambda f: bool(f.outages.gone))
-        ((deputy, since),) = frame.outages.gone.values()
-        assert deputy == "r2" and since <= frame.time + 1e-4 and not frame.outages.dead
-        later = running.until(lambda f: f.products > frame.products + 2)
-        net = running.session.simulation.layout.factory.net
-        for gear in net.gears:
-            assert sum(place in later.marked for place in gear.places) == 1
-        running.session.send(Command("restart"))
-        running.until(lambda f: f.run == 1 and f.outages == Outages() and f.products > 0)
-    finally:
-        running.close()
 
 
 @pytest.mark.parametrize(
@@ -281,10 +256,9 @@ def test_a_robot_whose_deputy_took_over_is_gone() -> None:
     [
         (Outages(), []),
         (
-            Outages(dead={"r1": (6.2, ""), "r2": (1.0, "r3"), "r4": (inf, "")}),
+            Outages(dead={"r1": 6.2, "r4": inf}),
             [
                 ("dead", "r1 is dead: a spare replaces it in 7 s"),
-                ("dead", "r2 is dead: r3 does its tours in 1 s"),
                 ("dead", "r4 is dead: nothing replaces it"),
             ],
         ),
@@ -306,7 +280,6 @@ def test_a_robot_whose_deputy_took_over_is_gone() -> None:
                 ("empty", "the feeder of part1 is empty: it is refilled in 3 s"),
             ],
         ),
-        (Outages(gone={"r1": ("r2", 7.0)}), [("gone", "r1 is gone: r2 does its tours")]),
     ],
 )
 def test_what_is_out_of_order_in_words(outages: Outages, told: list[tuple[str, str]]) -> None:
@@ -350,18 +323,18 @@ def test_watchers_make_it_fail(running: Running) -> None:
             assert [t for t, _ in told[-1]] == sorted(t for t, _ in told[-1])
 
 
-def test_with_deputies_robots_can_die(tmp_path: Path) -> None:
-    file = tmp_path / "inserts.pag"
-    file.write_text(INSERTS)
-    words = ("view", file, "--deputies", "--swap", 1, "--port", 0, "--json")
+def test_with_spares_robots_can_die() -> None:
+    words = ("view", PAPER, "--spares", 1, "--swap", 1, "--port", 0, "--json")
     with started(*words, stdout=PIPE, stderr=PIPE, text=True) as process:
         address = json.loads(process.stdout.readline())["address"].replace("http", "ws") + "live"
         with websockets.connect(address, proxy=None) as watcher:
             watcher.send('{"do": "speed", "factor": 0}')
             watcher.send('{"do": "dead", "robot": 3}')
-            while not (gone := received(watcher)["outages"]["gone"]):
+            while not (dead := received(watcher)["outages"]["dead"]):
                 pass
-            assert [(dead, deputy) for dead, _, deputy in gone] == [("r4", "r2")]
+            assert dead == ["r4"]
+            while received(watcher)["outages"]["dead"]:
+                pass
         process.send_signal(signal.SIGINT)
         assert process.wait(20) == 130
 

@@ -24,7 +24,7 @@ from tests.layout_values import paper_layout
 OF_A_PROJECT = (
     *("product", "pag", "pag.file", "pag.sha256", "plan", "plan.forms", "plan.turns", "settings"),
     *("layout.clearance", "layout.guidepaths", "layout.visits", "layout.outfeed"),
-    *("layout.hands", "layout.standby", "layout.plain"),
+    *("layout.hands", "layout.plain"),
 )
 """What a header has of a project and its layout, but for texts that are read later."""
 

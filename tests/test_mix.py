@@ -521,9 +521,8 @@ def test_few_robots_make_a_mix(tmp_path: Path, run: Terminal) -> None:
     assert done.json["units_by_product"] == {"a": 4, "b": 2}
     refused = run("check", file, "--robots", 1, "--json")
     assert (refused.status, refused.codes) == (2, ["TooFewRobots"])
-    for words in (("--relay",), ("--deputies", "--demand", "7")):
-        refused = run("run", file, *words, "--json")
-        assert (refused.status, refused.codes) == (2, ["BadValue"])
+    refused = run("run", file, "--relay", "--json")
+    assert (refused.status, refused.codes) == (2, ["BadValue"])
 
 
 def test_a_search_says_what_keeps_robots_of_a_mix_apart(tmp_path: Path, run: Terminal) -> None:
@@ -549,15 +548,17 @@ def test_a_mix_has_a_pareto_front(tmp_path: Path, run: Terminal) -> None:
         assert 0 < point["bound_s"] <= point["predicted_cycle_time_s"]
 
 
-def test_a_deputy_takes_over_in_a_mix(tmp_path: Path, run: Terminal) -> None:
+def test_a_spare_replaces_a_robot_of_a_mix(tmp_path: Path, run: Terminal) -> None:
     file, faults = tmp_path / "family.pag", tmp_path / "dead.toml"
     file.write_text(LITTLE.replace("x, y )", "x, y, w )") + "; w = atomic()")
     faults.write_text('[[fault]]\nkind = "dead"\nrobot = "r2"\nat = 6')
-    options = "--deputies", "--faults", faults, "--swap", 3, "--units", 9, "--jitter", 0.3
+    options = "--spares", 1, "--faults", faults, "--swap", 3, "--units", 9, "--jitter", 0.3
     done = run("run", file, *options, "--json")
     assert (done.status, done.json["unintended_contacts"]) == (0, 0)
     assert done.json["units_by_product"] == {"a": 6, "b": 3}
-    assert [(x["dead"], x["deputy"]) for x in done.json["exchanges"]] == [("r2", "r3")]
+    assert [(x["robot"], x["response"]) for x in done.json["failures"]["failures"]] == [
+        ("r2", "spare")
+    ]
 
 
 def test_labels_of_a_mix_share_a_robot_where_asked(tmp_path: Path) -> None:

@@ -47,8 +47,8 @@ WRONG: tuple[tuple[Callable[[Any], object], tuple[object, ...]], ...] = (
     ),
     (lambda p: factory.lay_out(p, floor=(0.3, 0.3)), ("build", PAPER, "--floor", "0.3x0.3")),
     (
-        lambda p: factory.lay_out(p, relay=True, deputies=True),
-        ("build", PAPER, "--relay", "--deputies"),
+        lambda p: factory.lay_out(p, relay=True, tile=0.24),
+        ("build", PAPER, "--relay", "--tile", 0.24),
     ),
     (lambda p: factory.compile(p, robots=0), ("check", PAPER, "--robots", 0)),
     (lambda p: factory.compile(p, robots=2), ("check", PAPER, "--robots", 2)),

@@ -47,7 +47,7 @@ UNFIT = (
     (PAPER, "--relay", "--robots", "least"),
     (FAMILY, "--relay"),
     (FAMILY, "--relay", "--parallel", "body=2"),
-    (FAMILY, "--demand", 3, "--deputies"),
+    (FAMILY, "--demand", 3, "--distributed"),
     (PAPER, "--demand", 3, "--world", "ideal"),
     (PAPER, "--fuse", "--world", "ideal"),
 )

@@ -57,10 +57,9 @@ def assert_same(made: Layout, layout: Layout) -> None:
         assert getattr(made, name) == getattr(layout, name), name
     assert dict(made.payloads) == dict(layout.payloads)
     assert made.certificate == layout.certificate
-    for one, other in ((made.plain, layout.plain), (made.standby, layout.standby)):
-        assert (one is None) == (other is None)
-        if one is not None and other is not None:
-            assert_same(one, other)
+    assert (made.plain is None) == (layout.plain is None)
+    if made.plain is not None and layout.plain is not None:
+        assert_same(made.plain, layout.plain)
 
 
 def with_text(text: str, folder: Path, **ground: Any) -> Project:
@@ -88,10 +87,6 @@ VARIANTS: dict[str, Callable[[Path], Project]] = {
     "forms": lambda folder: read(PAPER).with_plan(Plan({"sub3": 0, "sub1": 1})),
     "branches": lambda folder: with_branches(with_text(BESIDE, folder), [("sub2", 3)]),
     "relays": lambda folder: with_text(sawn(1), folder, relay=True),
-    "deputies": lambda folder: with_text(BESIDE, folder, deputies=True),
-    "branches with deputies": lambda folder: with_branches(
-        with_text(BESIDE, folder, deputies=True), [("sub2", 2)]
-    ),
 }
 
 
@@ -127,7 +122,7 @@ LESSONS: list[tuple[str, Any, str]] = [
     ("guidepaths", [{**GUIDEPATH, "reach": 0}], "guidepaths[0] must have a travel from 0 and"),
     ("hands", [{"kind": "glue", "places": []}], "'hands[0].kind' must be one of below, behind,"),
     ("hands", [{"kind": "below", "places": []}], "hands[0] must have places"),
-    ("standby", [[0.5]], "'standby[0][0]' must be a whole number within ±2^63, not 0.5"),
+    ("standby", [[0]], "the table has no key 'standby'"),
 ]
 
 
@@ -227,7 +222,6 @@ def test_a_plan_is_read_in_place_of_its_pag(name: str, tmp_path: Path) -> None:
     again = plan.project(plan.settings, plan.ground, said.append)
     assert not said and again.settings == project.settings and again.ground == project.ground
     assert bool(project.layout.factory.plan.relays) == name.startswith("relays")
-    assert bool(project.layout.standby) == name.endswith("deputies")
     assert again.layout.factory.plan == project.layout.factory.plan
     assert_same(again.layout, project.layout)
     one, other = (physical_model(p.layout, 2, p.settings, p.catalogue) for p in (project, again))
@@ -280,7 +274,6 @@ def test_what_does_not_go_with_a_plan(run: Terminal, built: Path, tmp_path: Path
         ("--cycle", 3.0),
         ("--relay",),
         ("--parallel", "sub2=2"),
-        ("--deputies",),
         ("--templates", tmp_path),
         ("--effort", 3),
     ):

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from factory.mjcf.replica import Replica
 from factory.nets.undo import marking_after, undo
 from factory.nets.undone import Undone
-from factory.record.failures import Death, Failing
+from factory.record.failures import Death, Failing, deaths
 from factory.record.log import Log
 from factory.record.log.model import model_of
 from factory.record.log.pictures import moment_of
@@ -256,10 +256,19 @@ def test_a_run_in_which_nothing_failed_has_no_marks(log: Log) -> None:
     assert not marks_at(log, 3.0, fresh)
 
 
-# Robots that are exchanged.
+# Robots that are replaced.
 
 
-def test_a_history_tells_which_robots_were_exchanged(log: Log) -> None:
+def test_a_death_ends_when_a_spare_takes_the_robots_place() -> None:
+    spare = Failing(1.0, "jammed", "a", "r1", "spare", (), 11.0)
+    alone = Failing(3.0, "jammed", "a", "r5", "no spare")
+    other = Failing(4.0, "lost", "a", "r1", "scrap", ("a",))
+    found = deaths([spare, alone, other])
+    assert found == [Death("r1", 1.0, 11.0), Death("r5", 3.0, np.inf)]
+    assert found[0].then == "a spare is in the place of r1"
+
+
+def test_a_history_tells_which_robots_were_replaced(log: Log) -> None:
     history = told(log)
     death = next(one for one in history.failings if one.test == "jammed")
     assert history.deaths() == [Death("r2", death.t, death.until)]

@@ -13,16 +13,28 @@ from factory.nets.undone import Undone
 from factory.pipeline import read
 from factory.record.failures import Failing
 from factory.record.state import State
+from factory.simulation.mujoco.feeders import Feeders
 from factory.simulation.recovery import Campaign, Recovery, WorldFault, recover
 from factory.simulation.recovery.recovery import summed
 from factory.simulation.request import RunRequest, WorldName
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from tests.command_line import PAPER, ROOT
-from tests.test_takeovers_mujoco import STEPS
-from tests.test_takeovers_mujoco import laid_out as with_lifts
 
 WORLDS = "ideal", "mujoco"
+
+STEPS = """root = s2; s1 = insert ( base, a ); s2 = insert ( s1, b );
+base = atomic ( box = ( 0.16, 0.1, 0.02 ), pos = ( 0, 0, 0.01 ) );
+a = atomic ( box = ( 0.03, 0.03, 0.02 ), pos = ( -0.04, 0, 0.03 ) );
+b = atomic ( box = ( 0.03, 0.03, 0.03 ), pos = ( 0.04, 0, 0.035 ) )"""
+"""Two robots with lifts put parts of two heights onto a base."""
+
+
+@pytest.fixture
+def steps(tmp_path: Path) -> Layout:
+    """Their layout."""
+    (tmp_path / "steps.pag").write_text(STEPS)
+    return read(tmp_path / "steps.pag").layout
 
 
 def laid_out(folder: Path, template: str, failure: str) -> Layout:
@@ -98,9 +110,9 @@ def test_robots_that_are_stuck_together_fail_once(tmp_path: Path, world: WorldNa
     assert {robots for _, robots in recovery.stood} >= {("r5", "r6")}
 
 
-def test_a_robot_whose_lift_still_waits_has_left() -> None:
+def test_a_robot_whose_lift_still_waits_has_left(steps: Layout) -> None:
     """One of its axes on its way is enough: it is stuck, and not dead."""
-    run, recovery = stopped(with_lifts(STEPS), "ideal", replace(STANDS, robot="r2"), label="s2")
+    run, recovery = stopped(steps, "ideal", replace(STANDS, robot="r2"), label="s2")
     assert (run.products, run.trouble) == (4, None)
     assert [(one.robot, one.response) for one in recovery.found] == [("", "again")]
 
@@ -193,3 +205,44 @@ def test_an_input_that_slipped_may_be_found_as_it_jams() -> None:
     ):
         report = summed(found, struck, 0, 0, 0, ())
         assert (report.missed, report.false_alarms) == counts
+
+
+def test_a_robot_that_dies_where_it_went_ahead(steps: Layout) -> None:
+    """No operation waits for it that is under way: it is late all the same, and the spare comes to
+    where the lift was to go."""
+    simulation = Simulation(steps, RunRequest("mujoco", 6, recovers=True))
+    recovery = recover(simulation, Campaign(spares=1, swap=4.0))
+
+    def strike(_: State) -> None:
+        world = simulation.physical
+        if not recovery.found and world.parts.holdings.hand(2) and world.sense()[0][4] < 0.01:
+            recovery.strike(WorldFault("dead", robot="r3", at=0.0))
+
+    run = simulation.run([strike], max_time=60.0)
+    assert (run.products, run.trouble, run.refines_net) == (6, None, True)
+    assert run.physics is not None and not run.physics.unintended_contacts
+    assert [(one.robot, one.response) for one in recovery.found] == [("r3", "spare")]
+
+
+def test_a_part_that_comes_late_waits_for_its_robot(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The last product is lost when feeders have nothing to show any more, and a robot whose hand
+    holds from above has gone where its next part would come down: it makes way. Planted: it does
+    not."""
+    layout = read(ROOT / "examples" / "truck.pag").layout
+    robot = layout.factory.by_label["roof"].carrier
+    lift = len(layout.guidepaths) + [*layout.strokes].index(robot)
+    for is_kept in (True, False):
+        if not is_kept:
+            monkeypatch.setattr(Feeders, "_obstructed", lambda feeders: [])
+        simulation = Simulation(layout, RunRequest("mujoco", 1, recovers=True))
+        recovery = recover(simulation, Campaign())
+
+        def lose(_: State, made: Simulation = simulation, by: Recovery = recovery) -> None:
+            if not by.found and made.supervisor.fired[layout.factory.dropoff.start] == 1:
+                made.physical.motion.put({robot: 0.144, lift: layout.strokes[robot]})
+                by.plant.lose(0)
+
+        run = simulation.run([lose], max_time=120.0)
+        assert run.products == 1 and {one.test for one in recovery.found} == {"lost"}
+        assert run.physics is not None
+        assert (run.physics.unintended_contacts == 0) == is_kept

@@ -10,18 +10,17 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from factory.compiler.folding import folded
 from factory.foreign_nets.behaviour import play
 from factory.nets.history import firings
 from factory.nets.marked import MarkedNet, marked, token_free
 from factory.nets.petri import Marking
-from factory.nets.undo import exchange, marking_after, tokens_after, undo
+from factory.nets.undo import marking_after, tokens_after, undo
 from factory.nets.undone import Joins, Undone
 from factory.plant.factory import Factory
 from factory.problem.pag import NOPART
-from tests.fold_values import deputies, inserted, plain, random_fold, random_lines, three_robots
+from tests.fold_values import inserted, plain, random_fold, three_robots
 from tests.net_values import fair_run, random_marked_net
-from tests.pag_values import SHAPES, catalogue, factory_of, paper, random_pag
+from tests.pag_values import factory_of, paper
 from tests.token_game import enabled, follower
 
 Counts = tuple[int, ...]
@@ -70,7 +69,6 @@ def test_it_is_the_greatest(seed: int, rng: random.Random) -> None:
     fired = fired_by(factory, rng.randint(1, 14 if size > 6 else 20), rng)
     net, made, asked = marked(factory.net), factory.joins, some_asked(fired, rng)
     assert undo(net, fired, asked, made) == brute(net, fired, asked, made)
-    assert exchange(net, fired, asked, made) == brute(net, fired, asked, made)
 
 
 @given(randoms)
@@ -100,7 +98,6 @@ def test_what_cannot_be_undone() -> None:
         undo(factory.net, nothing, (factory.by_label["part2"].start,), factory.joins)
     with pytest.raises(ValueError, match="no transition is asked"):
         undo(factory.net, nothing, (), factory.joins)
-    assert exchange(factory.net, nothing, (), factory.joins) == tuple(nothing)
 
 
 # --- Theorem 5, at every marking -----------------------------------------------------------------
@@ -209,55 +206,3 @@ def test_how_often_each() -> None:
     after = undo(factory.net, fired, (factory.by_label["sub1"].end,), factory.joins)
     undone = Undone.between(factory.net, (1.0, "sub1", "lost"), (), fired, after)
     assert sorted(undone.transitions) == sorted(twice | once)
-
-
-# --- Theorem 8 -----------------------------------------------------------------------------------
-
-
-@given(st.integers(0, 10**6), randoms)
-def test_exchanges(seed: int, rng: random.Random) -> None:
-    """Between two folds of a product: the marking is one of the new net, and all that is there then
-    was there before."""
-    pag = random_pag(rng.randint(1, 16), seed, rng.choice(SHAPES), rng.randint(2, 5))
-    base = plain(inserted(pag, rng.choice((0.0, 0.5, 1.0)), seed))
-    old, new = (folded(base, random_lines(base, rng), catalogue()) for _ in range(2))
-    fired = fired_by(old, rng.randint(1, 8 * len(old.operations)), rng)
-    every: list[tuple[int, ...]] = [(), *failures(old, fired)]
-    asked = rng.choice(every)
-    made = new.joins
-    assert made == old.joins
-    after = exchange(new.net, fired, asked, made)
-    check_reached(marked(new.net), after)
-    assert all(after[event] < fired[event] for event in asked)
-    for o in new.making:
-        end = new.operations[new.parents[o.index]].end
-        assert after[o.end] - after[end] <= fired[o.end] - fired[end]
-    if tokens_after(new.net, fired) == tokens_after(new.net, after):
-        assert after == fired
-
-
-@given(st.integers(0, 10**6), randoms)
-def test_deputies(seed: int, rng: random.Random) -> None:
-    """A robot dies, with what it holds, and a sibling takes its tours: no other loses what it holds
-    to a robot that has not had it."""
-    pag = random_pag(rng.randint(3, 14), seed, rng.choice(SHAPES), rng.randint(2, 5))
-    base = plain(inserted(pag, rng.choice((0.5, 1.0)), seed))
-    lines = random_lines(base, rng)
-    pairs = deputies(base, lines)
-    assume(pairs)
-    dead, deputy = rng.choice(pairs)
-    rest = [line for line in lines if line not in (dead, deputy)]
-    old = folded(base, lines, catalogue())
-    new = folded(base, [*rest, tuple(sorted((*dead, *deputy)))], catalogue())
-    fired = fired_by(old, rng.randint(1, 8 * len(old.operations)), rng)
-    had = held(old, marking_after(old.net, fired))
-    brought = {label for tour in dead for label in base.deliveries(tour)}
-    gone = next(r.index for r in old.robots if {*old.deliveries(r.index)} == brought)
-    asked = [old.by_label[had[gone]].end] if had[gone] != NOPART else []
-    after = exchange(new.net, fired, asked, new.joins)
-    check_reached(marked(new.net), after)
-    for robot, label in held(new, marking_after(new.net, after)).items():
-        if label != NOPART:
-            before = next(r for r, other in had.items() if other == label)
-            assert before != gone
-            assert {*old.deliveries(before)} <= {*new.deliveries(robot)}

@@ -1,4 +1,4 @@
-"""Records with failures and exchanged robots: what a replay accepts, and what it refuses."""
+"""Records with failures: what a replay accepts, and what it refuses."""
 
 from __future__ import annotations
 
@@ -8,16 +8,14 @@ from dataclasses import dataclass, field, replace
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from factory.compiler.folding import folded
-from factory.nets.gears import GearNet
 from factory.nets.history import firings
 from factory.nets.replay import ReplayVerdict, replay
-from factory.nets.undo import exchange, marking_after, tokens_after, undo
+from factory.nets.undo import marking_after, tokens_after, undo
 from factory.nets.undone import Entry, Joins, Undone, lasting
 from factory.plant.factory import Factory
-from tests.fold_values import inserted, plain, random_fold, random_lines, three_robots
+from tests.fold_values import inserted, plain, random_fold, three_robots
 from tests.net_values import random_legal_marking
-from tests.pag_values import SHAPES, catalogue, factory_of, paper, random_pag
+from tests.pag_values import SHAPES, factory_of, paper, random_pag
 from tests.test_undo import failures
 
 seeds = st.integers(0, 10**6)
@@ -26,13 +24,12 @@ randoms = st.randoms(use_true_random=False)
 
 @dataclass
 class Story:
-    """A run that is written as it goes: firings at random, failures, exchanges."""
+    """A run that is written as it goes: firings at random, and failures."""
 
     factory: Factory
     rng: random.Random
     fired: list[int] = field(default_factory=list)
     entries: list[Entry] = field(default_factory=list)
-    nets: list[GearNet] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.fired = [0] * len(self.factory.net.threaded.transitions)
@@ -53,26 +50,14 @@ class Story:
         if every:
             asked = self.rng.choice(every)
             after = undo(self.factory.net, self.fired, asked, self.factory.joins)
-            self._note(asked, after, False)
+            what = 0.0, "x", "lost"
+            self.entries.append(Undone.between(self.factory.net, what, asked, self.fired, after))
+            self.fired = [*after]
         return bool(every)
-
-    def exchange(self, factory: Factory) -> None:
-        every: list[tuple[int, ...]] = [(), *failures(self.factory, self.fired)]
-        asked = self.rng.choice(every)
-        self.factory = factory
-        self.nets.append(factory.net)
-        self._note(asked, exchange(factory.net, self.fired, asked, factory.joins), True)
-
-    def _note(self, asked: tuple[int, ...], after: tuple[int, ...], exchanged: bool) -> None:
-        what = 0.0, "x", "lost"
-        self.entries.append(
-            Undone.between(self.factory.net, what, asked, self.fired, after, exchanged)
-        )
-        self.fired = [*after]
 
 
 def judged(story: Story, first: Factory) -> ReplayVerdict:
-    return replay(first.net, story.entries, None, first.joins, story.nets)
+    return replay(first.net, story.entries, None, first.joins)
 
 
 def story_of(factory: Factory, rng: random.Random) -> Story:
@@ -112,22 +97,6 @@ def test_a_run_that_began_elsewhere(seed: int, rng: random.Random) -> None:
     found = replay(factory.net, story.entries, start, factory.joins)
     assert (found.refines, found.reason) == (True, "")
     assert found.marking == marking_after(factory.net, story.fired)
-
-
-@given(seeds, randoms)
-def test_a_run_with_exchanges_replays(seed: int, rng: random.Random) -> None:
-    pag = random_pag(rng.randint(1, 12), seed, rng.choice(SHAPES), rng.randint(2, 5))
-    base = plain(inserted(pag, rng.choice((0.0, 0.5, 1.0)), seed))
-    first = folded(base, random_lines(base, rng), catalogue())
-    story = story_of(first, rng)
-    for _ in range(2):
-        story.exchange(folded(base, random_lines(base, rng), catalogue()))
-        story.run(len(first.operations))
-        story.fail()
-        story.run(5)
-    found = judged(story, first)
-    assert (found.refines, found.reason) == (True, "")
-    assert found.marking == marking_after(story.factory.net, story.fired)
 
 
 @given(seeds, randoms, st.integers(0, 4))
@@ -176,8 +145,8 @@ def test_the_reasons() -> None:
     made = factory.joins
     undone = Undone(0.0, "part1", "lost", ("part1_s",), ("part1_s",))
 
-    def reason(entry: Undone, material: Joins | None = made, nets: tuple[GearNet, ...] = ()) -> str:
-        found = replay(factory.net, [entry], None, material, nets)
+    def reason(entry: Undone, material: Joins | None = made) -> str:
+        found = replay(factory.net, [entry], None, material)
         assert not found.refines and found.marking == factory.net.initial_marking
         return found.reason
 
@@ -185,10 +154,6 @@ def test_the_reasons() -> None:
     assert "no material is known" in reason(undone, None)
     assert "no transition 'y_s'" in reason(replace(undone, asked=("y_s",)))
     assert "asks for nothing" in reason(replace(undone, asked=()))
-    swap = replace(undone, asked=(), transitions=(), exchanged=True)
-    assert "there is no further net" in reason(swap)
-    assert "other transitions" in reason(swap, made, (plain(random_pag(1, 0)).net,))
-    assert replay(factory.net, [swap], None, made, [factory.net]).refines
 
 
 def test_the_latest_firings_are_undone() -> None:

@@ -96,7 +96,7 @@ def rewritten(path: Path, to: Path, change: Callable[[list[Any]], Any]) -> Path:
         ("operation", None, "'undone[0][1].operation' must be a text"),
         ("asked", "x", "'undone[0][1].asked' must be a list"),
         ("transitions", ["y_s"], "'y_s' is undone, which is no transition"),
-        ("exchanged", 1, "exchanged' must be true or false"),
+        ("robots", ["r4", "r2"], "'undone[0][1]' has no key 'robots'"),
     ],
 )
 def test_damaged_entries(kept: Path, tmp_path: Path, key: str, value: object, words: str) -> None:

@@ -20,7 +20,6 @@ VARIANTS = {
     "as written": (PAPER.read_text(), ()),
     "fewer robots": (PAPER.read_text(), ("--robots", "least")),
     "branches": (SLOW, ("--parallel", "b=2")),
-    "deputies": (SLOW, ("--deputies",)),
     "relays": (sawn(4), ("--relay",)),
 }
 """A product's text and options."""

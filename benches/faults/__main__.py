@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from benches.reporting import DOCS, Report
 
-RUNS = ("campaigns", "deaths", "takeovers", "production")
+RUNS = ("campaigns", "deaths", "production")
 """The sections that are many runs, of which those that are kept need not be done again."""
 
 REPORT = Report(

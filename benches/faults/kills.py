@@ -13,10 +13,11 @@ from factory.record.log.reader import read_log
 from tests.command_line import spawn
 from tests.test_resume import FACTORIES, killed_and_gone_on, ticks_of
 from tests.test_resume_faults import FACTORIES as FAILING
+from tests.test_resume_faults import FAULTS
 
 KILLS = 5
 
-RUNS = (*((words, "") for words in FACTORIES), *FAILING)
+RUNS = (*((words, "") for words in FACTORIES), *((words, FAULTS) for words in FAILING))
 """The words of each run, and the file of its faults, "" for none."""
 
 

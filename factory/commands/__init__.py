@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 from warnings import simplefilter
@@ -204,8 +205,10 @@ def _usage(error: click.ClickException) -> Diagnostic:
         hint = f"{error.param.opts[0]}: {error.param.help} ({hint})"
     if isinstance(error, click.exceptions.NoSuchOption):
         message = f"there is no option '{error.option_name}'"
-        if error.possibilities:
-            hint = did_you_mean(error.option_name, sorted(error.possibilities), "options")
+        words = {option.lstrip("-"): option for option in error.possibilities or ()}
+        # dashes, which all options have, do not make two alike
+        if near := get_close_matches(error.option_name.lstrip("-"), words, n=1):
+            hint = f"did you mean '{words[near[0]]}'?"
     return Diagnostic("Usage", message, None, hint)
 
 

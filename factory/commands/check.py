@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from factory.compiler.mating.findings import Matings
     from factory.nets.coordinated import CoordinatedNet
     from factory.nets.verdict import Witness
-    from factory.pipeline import Project
     from factory.problem.pag import AllowedOverlap
     from factory.study.checking import Checked
 
@@ -58,7 +57,7 @@ AGAINST = 3
 """The most that is printed against one property, unless `-v` asks for all."""
 
 POOLED = 8
-"""The most parts whose copies are printed, and robots that need spares."""
+"""The most parts whose copies are printed."""
 
 
 @click.command(cls=Grouped)
@@ -97,12 +96,7 @@ def check(
     writable_folder(clashes)
     project = None if is_net(file) else options.project(out.silent)
     with Waiting("reading the shapes and proving", out.silent):
-        asked = (
-            out.verbose
-            or options.deputies
-            or (out.as_json and project is not None and _has_places(project))
-        )
-        checked = check_project(project, wip, asked, out.verbose) if project else check_net(file)
+        checked = check_project(project, wip, out.verbose) if project else check_net(file)
     announced(checked.warnings, out)
     if project is not None and not out.silent:
         say_allowed(project)
@@ -227,8 +221,6 @@ def _describe(checked: Checked, verbose: bool, allowed: Sequence[AllowedOverlap]
         say(f"copies of each part inside at once: {listed}{more}")
     if checked.matings is not None:
         _describe_approaches(checked.matings, allowed)
-    if "deputies" in document:
-        _describe_deputies(document["deputies"])
 
 
 def _describe_coordinated(coordinated: CoordinatedNet) -> None:
@@ -252,11 +244,6 @@ def _by_property(faults: Sequence[Witness]) -> list[list[Witness]]:
     return [grouped[name] for name in sorted(grouped, key=lambda name: name.startswith("gear"))]
 
 
-def _has_places(project: Project) -> bool:
-    """Whether the layout matters for the check: parts have shapes, or robots have several tours."""
-    return project.pag.is_shaped or bool(project.plan.turns)
-
-
 def _describe_approaches(matings: Matings, allowed: Sequence[AllowedOverlap]) -> None:
     """Print how many operations can be approached, and how; those whose parts are allowed to pass
     through each other are not blocked."""
@@ -271,14 +258,4 @@ def _describe_approaches(matings: Matings, allowed: Sequence[AllowedOverlap]) ->
         f"approach: {clear}; {lowered} lowered"
         f"{f', {passing} allowed to pass through each other' if passing else ''},"
         f" {blocked} blocked{' (--clashes DIR draws each)' if blocked else ''}"
-    )
-
-
-def _describe_deputies(deputies: Mapping[str, Sequence[str]]) -> None:
-    """Print the number of robots with a deputy, and the robots that need spares."""
-    alone = [robot for robot, of_robot in deputies.items() if not of_robot]
-    listed = f"{', '.join(alone[:POOLED])}{', ...' if len(alone) > POOLED else ''}"
-    say(
-        f"deputies: another robot could take over for {len(deputies) - len(alone)} of"
-        f" {len(deputies)}; spares are needed for {listed}"
     )

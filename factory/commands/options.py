@@ -219,9 +219,6 @@ RELAY = options(
     ),
     click.option("--order", metavar="PRODUCT,...", help="Sequence of a mix: truck,truck,van."),
     click.option(
-        "--deputies", is_flag=True, help="Let robots take over for others where there is room."
-    ),
-    click.option(
         "--effort",
         type=bounded("effort"),
         help="Number of factories to lay out in the search for few robots (default: 8 to 100).",

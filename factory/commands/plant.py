@@ -64,7 +64,7 @@ def plant(
     if asked.start is not None:
         message = "a plant starts where every robot waits with no part"
         raise usage_error(message, "leave out --from")
-    asked.check_with(options)
+    asked.check_combination()
     project = options.project(out.silent)
     layout = project.layout
     proved(layout.factory.net)

@@ -61,7 +61,7 @@ def render(
         log = read_partly(file, out.silent)
         frames, _ = taken(log, shot)
     else:
-        asked.check_with(options)
+        asked.check_combination()
         project = options.project(out.silent)
         warnings = announced(project.layout.product.warnings, out)
         frames, run = taken(project, shot, asked, out.silent)

@@ -54,7 +54,7 @@ def report(options: ProjectOptions, asked: RunOptions, out: OutputOptions, outpu
         for_a_pag(file, "a log", "output", "lenient", "strict")
         made = report_on(file)
     else:
-        asked.check_with(options)
+        asked.check_combination()
         project = options.project(out.silent)
         warnings = announced(project.layout.product.warnings, out)
         made = report_on(project, asked, out.silent)

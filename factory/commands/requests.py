@@ -60,7 +60,6 @@ class ProjectOptions:
     effort: int | None = None
     limit: float | None = None
     parallel: tuple[tuple[str, int], ...] = ()
-    deputies: bool = False
     order: str | None = None
     allow: tuple[AllowedOverlap, ...] = ()
 
@@ -89,7 +88,6 @@ class ProjectOptions:
                 "--relay": self.relay,
                 "--cycle": self.cycle is not None,
                 "--robots": self.robots is not None,
-                "--deputies": self.deputies,
                 "--platen": self.platen or self.tile is not None,
                 "--parallel": bool(self.branches()),
                 "[lines]": bool(kept.lines()),
@@ -97,7 +95,7 @@ class ProjectOptions:
             }
         )
         tile = self.tile or (TILE if self.platen else None)
-        return Ground(floor, self.relay, self.cycle, self.deputies, tile)
+        return Ground(floor, self.relay, self.cycle, tile)
 
     def _allowing(self, pag: PAG) -> PAG:
         """The PAG with the overlaps of --allow. Raises InputError (Usage) for unknown parts."""
@@ -225,7 +223,6 @@ PLANNED = {
     "effort": "--effort",
     "limit": "--seconds",
     "parallel": "--parallel",
-    "deputies": "--deputies",
     "order": "--order",
     "platen": "--platen",
     "tile": "--tile",

@@ -87,7 +87,7 @@ def run(
     if asked.demand is not None:
         reading(Path(asked.demand))
     writable(video, log, shown.poster)
-    asked.check_with(options)
+    asked.check_combination()
     if asked.world == "ideal":
         check_ideal(asked.fuse, bool(monitor))
     if video is not None:
@@ -172,8 +172,6 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
         say(line)
     if record.failures is not None:
         say_failures(record.failures, verbose)
-    for exchange in record.exchanges:
-        say(f"{exchange.t:.2f} s: {exchange}")
     if record.monitor is not None:
         say(found_by(record.monitor, record.cut_off))
     if record.succeeded:

@@ -46,8 +46,7 @@ def view(
 ) -> int:
     """Run FILE.pag endlessly in a browser, where you can pause it, push robots and block feeders.
 
-    With --spares, --deputies or --faults the run recovers from failures: you can pause or kill
-    robots."""
+    With --spares or --faults the run recovers from failures: you can pause or kill robots."""
     from factory.nets.verify import proved
     from factory.show.live import Server, Session
     from factory.show.live.page import page
@@ -57,15 +56,13 @@ def view(
     from factory.support.interruption import Interruption
 
     check_server(host, expose)
-    asked.check_with(options)
+    asked.check_combination()
     project = options.project(out.silent)
     layout = project.layout
     proved(layout.factory.net)
     warnings = announced(layout.product.warnings, out)
-    fails = asked.recovers or options.deputies
-    endless = replace(asked, units=FOR_EVER, fuse=False).request(project)
-    request = replace(endless, recovers=fails)
-    campaign = campaign_of(asked, layout.factory) if fails else None
+    request = replace(asked, units=FOR_EVER, fuse=False).request(project)
+    campaign = campaign_of(asked, layout.factory) if asked.recovers else None
     session = Session(lambda: Simulation(layout, request), not paused, campaign)
     shown = page(session, shlex.join(["factory", *sys.argv[1:]]))
     with Interruption() as stop, Server(session, shown, host, port, expose) as server:

@@ -7,7 +7,7 @@ robot of that factory the robot that does its tours. Each robot does what it has
 the *postorder* of the operations, the pile first. That order depends on what is made, not on the
 robots that make it, and is a witness (Theorem 1): every program ascends in it, so the net is live
 whatever is assigned (Theorem 2). Which assignments robots can do, where they stand, is what
-`folding`, `parallel` and `deputies` say.
+`folding` and `parallel` say.
 """
 
 from __future__ import annotations
@@ -32,8 +32,7 @@ def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> Ge
 
     Operation i has transitions 2i and 2i + 1 and place i; the wait places follow, robot by robot,
     as `r2:part1`. The empty-handed waits of a robot with several tours are told apart by the
-    operation to come, `r2:nopart/part3`. A removed robot has no operations, and a gear without
-    places.
+    operation to come, `r2:nopart/part3`.
     """
     transitions = tuple(
         Transition(f"{o.label}_{end}", o.position) for o in operations for end in ("s", "e")
@@ -85,7 +84,7 @@ def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> Ge
         gears.append(Gear(robot.name, robot.type, tuple(gear_places), tuple(gear_events)))
     redistribution: tuple[Redistribution, ...] = tuple(tuple(sorted(p)) for p in pairs)
     net = ThreadedNet(PetriNet(transitions, tuple(places)), redistribution)
-    return GearNet(net, tuple(gears), tuple(g.places[0] for g in gears if g.places), tuple(slots))
+    return GearNet(net, tuple(gears), tuple(g.places[0] for g in gears), tuple(slots))
 
 
 def beside(pag: PAG, factories: Sequence[Factory]) -> Factory:

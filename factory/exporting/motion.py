@@ -11,7 +11,6 @@ import numpy as np
 from factory.control.mode import Truth
 from factory.geometry.meshes import Array, Indices
 from factory.mjcf.parts import HIDDEN
-from factory.nets.undone import exchanges
 from factory.record.log import Log
 
 if TYPE_CHECKING:
@@ -31,14 +30,12 @@ body that counts as stationary."""
 @dataclass(frozen=True)
 class BodyMotion:
     """A log's motion: `rows` of the log that are frames; for each its bodies' positions (n, bodies,
-    3) [m] and quaternions (n, bodies, 4), each relative to its parent. `gone` (n, bodies): which
-    belong to robots that a deputy has replaced."""
+    3) [m] and quaternions (n, bodies, 4), each relative to its parent."""
 
     m: mujoco.MjModel
     rows: Indices
     position: Array = field(repr=False)
     quaternion: Array = field(repr=False)
-    gone: Truth = field(repr=False)
 
     def name(self, body: int) -> str:
         """The name of a body."""
@@ -60,14 +57,13 @@ class BodyMotion:
             yield [int(body) for body in np.flatnonzero(frame) if body]
 
     def unseen(self) -> Truth:
-        """Whether a body is invisible in a frame (n, bodies): a spare one below the floor, or one
-        of a robot that was replaced."""
-        return np.asarray((self.position[:, :, 2] < HIDDEN) | self.gone)
+        """Whether a body is invisible in a frame (n, bodies): a spare one below the floor."""
+        return np.asarray(self.position[:, :, 2] < HIDDEN)
 
 
 def motion_of(log: Log) -> BodyMotion:
     """The motion of a log. Raises InputError for a log of the ideal world or one without a tick."""
-    from factory.mjcf.replica import Replica, bodies_of
+    from factory.mjcf.replica import Replica
     from factory.record.log.model import model_of
 
     m = model_of(log)
@@ -81,10 +77,7 @@ def motion_of(log: Log) -> BodyMotion:
         for body in np.flatnonzero(m.body_parentid):
             place = position[frame, body], quaternion[frame, body]
             _relative(d, int(m.body_parentid[body]), int(body), *place)
-    gone = np.zeros((len(rows), m.nbody), bool)
-    for entry in exchanges(log.entries):
-        gone |= np.outer(log.time[rows] >= entry.t, bodies_of(m, entry.robots[:1]))
-    return BodyMotion(m, rows, position, quaternion, gone)
+    return BodyMotion(m, rows, position, quaternion)
 
 
 def _relative(d: mujoco.MjData, parent: int, body: int, position: Array, turn: Array) -> None:

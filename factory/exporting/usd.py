@@ -43,7 +43,7 @@ def export(subject: Subject) -> Mapping[str, bytes]:
 
 def _record(motion: BodyMotion, log: Log, folder: str, encoding: str) -> None:
     """Write every frame with MuJoCo's exporter, in text (usda) or binary (usdc)."""
-    from factory.mjcf.replica import SHOWN, Replica
+    from factory.mjcf.replica import Replica
     from factory.support.engine import mujoco
 
     exporter = optional("mujoco.usd.exporter", "usd-core", "USD", "usd")
@@ -52,10 +52,8 @@ def _record(motion: BodyMotion, log: Log, folder: str, encoding: str) -> None:
     scene = exporter.USDExporter(
         model=m, output_directory=NAME, output_directory_root=folder, verbose=False
     )
-    groups = m.geom_group.copy()
-    for row, gone in zip(motion.rows, motion.gone, strict=True):
+    for row in motion.rows:
         replica.place(log.qpos[row])
-        m.geom_group[:] = np.where(gone[m.geom_bodyid], SHOWN, groups)
         mujoco.mj_comPos(m, d)
         mujoco.mj_camlight(m, d)
         scene.update_scene(d)

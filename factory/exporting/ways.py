@@ -13,7 +13,6 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from factory.layout.exclusions import awaited_positions, coordinated
-from factory.layout.feeding import outlets_of
 from factory.layout.hanging import Hanging
 from factory.layout.machines import presences
 from factory.layout.presence import Presence, Span
@@ -53,7 +52,6 @@ class _Writer:
 
     def __init__(self, model: Model) -> None:
         self._model, self._hanging = model, Hanging.of(model.layout)
-        self._outlets = {(o.label, o.robot): o.name for o in outlets_of(model.layout)}
         self._scales = scales_of(model.layout)
 
     def way(self, one: Presence) -> Json:
@@ -72,15 +70,14 @@ class _Writer:
         if name == "tray":
             bodies, joints = [names.OUTFEED_TRAY], [names.OUTFEED_SLIDE]
             return _way(one, bodies, joints, [names.hold(label) for label in held], [Scale()])
-        outlet = self._outlets[one.label, one.robot]
         slider = self._slider(one)
-        hangs = [names.feed(outlet)] * (len(one.bodies.names) > 1)
-        raised = Scale(zero=-self._hanging.raised[outlet])
+        hangs = [names.feed(one.label)] * (len(one.bodies.names) > 1)
+        raised = Scale(zero=-self._hanging.raised[one.label])
         return _way(one, [slider], [slider], hangs, [raised]) | {"machine": slider}
 
     def _slider(self, one: Presence) -> str:
         """The slider of a magazine's presence."""
-        return names.slider(self._hanging.slider[self._outlets[one.label, one.robot]])
+        return names.slider(self._hanging.slider[one.label])
 
     def standing(self, moving: Sequence[tuple[Presence, list[str]]]) -> Iterator[Json]:
         """The ways of machines that come near nothing: the sliders of a magazine that stand up,

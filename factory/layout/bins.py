@@ -9,7 +9,7 @@ the clearance certificate. Where there is no room there is no bin.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -66,7 +66,6 @@ class Bin:
 def bins_of(layout: Layout) -> tuple[Bin, ...]:
     """The bins for which there is room, at most one for each robot: wide enough for everything that
     it can carry back to B, else for the smallest."""
-    named, layout = layout.named, layout.whole
     by_label = piles(layout.factory, layout.product)
     taken, added = regions(layout, by_label), list[Region]()
     corners = np.array([region.box for region in taken])
@@ -84,7 +83,7 @@ def bins_of(layout: Layout) -> tuple[Bin, ...]:
         if held and bin_:
             made.append(bin_)
             added += _stands(bin_)
-    return tuple(replace(one, labels=frozenset(map(named, one.labels))) for one in made)
+    return tuple(made)
 
 
 Held = list[tuple[str, Pile]]

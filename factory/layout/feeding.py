@@ -25,20 +25,26 @@ from factory.plant.factory import Operation
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Outlet:
-    """Where the feeder of a robot (index) shows the parts of a `label`: its `name` in a model, that
-    of the label where the robot takes it unless another dies; the operation in which it is taken
-    (`leaf`) in a `layout` that has it."""
+    """Where the feeder of a robot shows a part in a `layout`: the operation in which it is taken
+    (`leaf`)."""
 
-    name: str
-    label: str
-    robot: int
     layout: Layout
     leaf: Operation
 
     @property
+    def label(self) -> str:
+        """The label of the part."""
+        return self.leaf.label
+
+    @property
+    def robot(self) -> int:
+        """The robot (index) that takes it."""
+        return self.leaf.carrier
+
+    @property
     def feeder(self) -> Feeder:
         """Its feeder."""
-        return feeder_of(self.layout, self.leaf.label)
+        return feeder_of(self.layout, self.label)
 
     @property
     def elevation(self) -> float:
@@ -47,23 +53,16 @@ class Outlet:
 
 
 def outlets_of(layout: Layout) -> tuple[Outlet, ...]:
-    """The outlets of a layout's feeders: of its parts, in the order of the factory's labels, and
-    then of those that deputies may have to take."""
-    whole, factory = layout.whole, layout.factory
-    outlets: dict[tuple[str, int], Outlet] = {}
-    for leaf in whole.factory.leaves:
-        label, robot = leaf.within(factory.period), leaf.carrier
-        is_carriers = factory.by_label[label].carrier == robot
-        name = label if is_carriers else f"{label}@{factory.robots[robot].name}"
-        outlets.setdefault((label, robot), Outlet(name, label, robot, whole, leaf))
-    return tuple(outlets.values())
+    """The outlets of a layout's feeders, one for each part, in the order of the factory's
+    labels."""
+    return tuple(Outlet(layout, leaf) for leaf in layout.factory.leaves)
 
 
 def lines_of(layout: Layout) -> tuple[tuple[Outlet, ...], ...]:
-    """The outlets of each robot's feeder (by index), in the order of all that it may do."""
-    by_leaf = {outlet.leaf.label: outlet for outlet in outlets_of(layout)}
+    """The outlets of each robot's feeder (by index), in the order of its program."""
+    by_label = {outlet.label: outlet for outlet in outlets_of(layout)}
     return tuple(
-        tuple(by_leaf[label] for label in layout.whole.magazine(robot) if label in by_leaf)
+        tuple(by_label[label] for label in layout.magazine(robot))
         for robot in range(len(layout.factory.robots))
     )
 
@@ -71,11 +70,10 @@ def lines_of(layout: Layout) -> tuple[tuple[Outlet, ...], ...]:
 def feeder_of(layout: Layout, label: str) -> Feeder:
     """The feeder of a part: a housing over the place where the part is presented, and the post that
     carries it, behind the rear stop of the robot that it serves. Parts of one line share a housing,
-    in which they hang with their tops at one height, as do those that the robot takes as a
-    deputy."""
-    layout, operation = _with_all(layout, layout.factory.by_label[label])
-    label, room = operation.label, Clearance(layout.clearance).room
-    robot, by_label = operation.carrier, layout.factory.by_label
+    in which they hang with their tops at one height."""
+    by_label, room = layout.factory.by_label, Clearance(layout.clearance).room
+    operation = by_label[label]
+    robot = operation.carrier
     path, shown = layout.guidepaths[robot], layout.magazine(robot)
     visit = layout.visits[operation.index, robot]
     middle, elevation = path.middle(visit.at), visit.elevation
@@ -121,7 +119,6 @@ def feeder_of(layout: Layout, label: str) -> Feeder:
 def passing(layout: Layout, leaf: Operation) -> float:
     """How far a feeder's robot goes until all its payloads are clear of any part that comes down
     next [m]."""
-    layout, leaf = _with_all(layout, leaf)
     return cleared(layout, leaf.carrier, layout.guidepaths[leaf.carrier].sideways)
 
 
@@ -139,13 +136,6 @@ def cleared(layout: Layout, robot: int, sideways: float) -> float:
     shown = _shown(layout, robot)
     ways = {0.0: shown[1] - rear, 1.0: shown[3] - low, -1.0: high - shown[2]}
     return ways[sideways] + layout.clearance
-
-
-def _with_all(layout: Layout, leaf: Operation) -> tuple[Layout, Operation]:
-    """An operation in which a part is taken, in the layout of all that its robot may do."""
-    if layout.whole is layout:
-        return layout, leaf
-    return layout.whole, layout.whole.fed[leaf.written, layout.factory.robots[leaf.carrier].name]
 
 
 def _shown(layout: Layout, robot: int) -> Extent:

@@ -30,7 +30,7 @@ class Hanging:
     """The sliders of a layout's feeders, each named after the first of the outlets whose parts hang
     from it by turns.
 
-    `slider`: the name of that of each outlet; `places`: by that name, where its pad is in the frame
+    `slider`: the name of that of each label; `places`: by that name, where its pad is in the frame
     of the named outlet's feeder when the slider presents the part of that; `raised`: how much
     higher the slider is when it presents each of its parts, negative for lower [m].
     """
@@ -52,15 +52,15 @@ class Hanging:
         for line in lines_of(layout):
             common = pads.common(line) if line[1:] else {}
             for outlet in line:
-                named, place = common.get(outlet.name) or (outlet.name, pads.of(outlet))
-                slider[outlet.name] = named
+                named, place = common.get(outlet.label) or (outlet.label, pads.of(outlet))
+                slider[outlet.label] = named
                 places.setdefault(named, place)
-        outlets = {outlet.name: outlet for outlet in outlets_of(layout)}
+        outlets = {outlet.label: outlet for outlet in outlets_of(layout)}
         for named, place in places.items():
             foot = np.array([0.0, 0.0, PAYLOAD + outlets[named].elevation])
             places[named] = PadPlace(place.at + foot, place.radius)
-        strokes = {name: outlets[name].feeder.stroke for name in slider}
-        raised = {name: strokes[named] - strokes[name] for name, named in slider.items()}
+        strokes = {label: outlets[label].feeder.stroke for label in slider}
+        raised = {label: strokes[named] - strokes[label] for label, named in slider.items()}
         return cls(slider, places, raised)
 
     def lowest(self, slider: str) -> float:
@@ -103,7 +103,7 @@ class _FeederPads:
             at = place.at + meeting[0] - meeting[named]
             above = _solid(line[named]).high[2] + GAP
             pad = _seen(line[0], np.array([*at, above]), place.radius)
-            pads.update({line[number].name: (line[named].name, pad) for number in place.parts})
+            pads.update({line[number].label: (line[named].label, pad) for number in place.parts})
         return pads
 
 
@@ -135,4 +135,4 @@ def _path(outlet: Outlet) -> Guidepath:
 
 
 def _solid(outlet: Outlet) -> Solid:
-    return presented(outlet.layout.product.solids[outlet.leaf.label])
+    return presented(outlet.layout.product.solids[outlet.label])

@@ -41,9 +41,8 @@ class Layout(Keeping, Pictured):
 
     `payloads[label]`: the box of a sub-assembly about the product's middle; `outfeed`: the box of
     the conveyor in the world; `hands`: those of the robots, None for tools, nothing where they are
-    not chosen; `plain`: the layout without relays, None where this is one; `standby`: that of all
-    tours that its robots may do, of which this is a part, None where this is all; `tile`: the size
-    of the tiles of the platen over which robots go [m], 0 where they go on rails.
+    not chosen; `plain`: the layout without relays, None where this is one; `tile`: the size of the
+    tiles of the platen over which robots go [m], 0 where they go on rails.
     """
 
     factory: Factory
@@ -57,21 +56,11 @@ class Layout(Keeping, Pictured):
     floor: Box = (0.0, 0.0, 0.0, 0.0)
     certificate: Certificate | None = field(default=None, repr=False, compare=False)
     plain: Layout | None = field(default=None, repr=False, compare=False)
-    standby: Layout | None = field(default=None, repr=False, compare=False)
     tile: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("visits", "payloads"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
-
-    @property
-    def whole(self) -> Layout:
-        """The layout of all tours that its robots may do, itself unless deputies may take over."""
-        return self.standby or self
-
-    def named(self, label: str) -> str:
-        """The name in the factory of a label of the whole."""
-        return self.whole.factory.by_label[label].within(self.factory.period)
 
     def __repr__(self) -> str:
         return f"<Layout of {self.factory}: {self.area:.2f} m²>"
@@ -227,13 +216,6 @@ class Layout(Keeping, Pictured):
             return self.guidepaths[robot].length
         return self.ways[operation, robot][0].at
 
-    @cached_property
-    def fed(self) -> Mapping[tuple[str, str], Operation]:
-        """The first operation in which each robot takes each part from its feeder, by what the part
-        is written as and the robot's name."""
-        robots, leaves = self.factory.robots, reversed(self.factory.leaves)
-        return {(leaf.written, robots[leaf.carrier].name): leaf for leaf in leaves}
-
     def magazine(self, robot: int) -> tuple[str, ...]:
         """The parts that a robot's feeder presents, in the order of its program; empty without
         one."""
@@ -321,9 +303,9 @@ class Layout(Keeping, Pictured):
 
 def carriers(factory: Factory) -> list[int]:
     """For each robot the carrier on whose guidepath its own ends: the one it delivers to, or that
-    of a fixed robot which takes what it brings; -1 for the output robot, and one that is gone."""
+    of a fixed robot which takes what it brings; -1 for the output robot."""
     ends = (delivery(factory, robot.index) for robot in factory.robots)
-    return [-1 if o is None or factory.drops(o.index) else o.carrier for o in ends]
+    return [-1 if factory.drops(o.index) else o.carrier for o in ends]
 
 
 def branch_of(on: Sequence[int], robot: int) -> list[int]:
@@ -336,13 +318,12 @@ def branch_of(on: Sequence[int], robot: int) -> list[int]:
     return branch
 
 
-def delivery(factory: Factory, robot: int) -> Operation | None:
+def delivery(factory: Factory, robot: int) -> Operation:
     """The operation at whose station the guidepath of a robot (index) ends: its last, or that of a
-    fixed robot which takes what it brings; None for one that is gone."""
+    fixed robot which takes what it brings."""
     while True:
-        operations = factory.robots[robot].operations
-        last = factory.operations[operations[-1]] if operations else None
-        if last is None or last.carrier == robot or not factory.robots[last.carrier].fixed:
+        last = factory.last(robot)
+        if last.carrier == robot or not factory.robots[last.carrier].fixed:
             return last
         robot = last.carrier
 

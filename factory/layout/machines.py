@@ -42,15 +42,14 @@ def magazines(
     """The sliders of feeders, with the parts that hang from them, and the housings; or, instead,
     each slider with every part of its feeder, wherever it has one or comes down with one."""
     hanging, housed = Hanging.of(layout), set[int]()
-    outlets = {(outlet.label, outlet.robot): outlet for outlet in outlets_of(layout)}
-    named = {outlet.name: outlet for outlet in outlets.values()}
+    outlets = {outlet.label: outlet for outlet in outlets_of(layout)}
     carrier = [o.carrier for o in layout.factory.operations]
     follows = {served.before: served for served in coordinated.served.values()}
     for number, served in coordinated.served.items():
         leaf = layout.factory.operations[number]
-        outlet, robot = outlets[leaf.label, leaf.carrier], leaf.carrier
-        slider = hanging.slider[outlet.name]
-        pad = _pad(hanging, named[slider], slider, hanging.raised[outlet.name])
+        outlet, robot = outlets[leaf.label], leaf.carrier
+        slider = hanging.slider[leaf.label]
+        pad = _pad(hanging, outlets[slider], slider, hanging.raised[leaf.label])
         part = robots.held(robot, number, leaf.label)
         visit, partners = layout.visits[number, robot], robots.partners[robot]
         hung = pad + part.at(visit.at, visit.lift).going(UP)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from numbers import Real
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from factory.geometry.solids import Product
     from factory.layout.hands.choosing import Hands
     from factory.layout.layout import Layout
-    from factory.problem.robot_types import Catalogue
 
 
 TILE = 0.24
@@ -34,14 +33,13 @@ def is_side(length: object) -> bool:
 class Ground:
     """What a layout is made for, beside settings: width and depth of the floor [m], None for as
     much as it takes; whether guidepaths are shared among `relay` robots, or the `cycle` time [s]
-    that those are to reach, None for the shortest; `deputies`: whether robots can take over for
-    others; `tile`: the size of the tiles of a platen [m], None for rails. Raises InputError:
-    BadValue for a wrong floor, Usage for a wrong time or tile."""
+    that those are to reach, None for the shortest; `tile`: the size of the tiles of a platen [m],
+    None for rails. Raises InputError: BadValue for a wrong floor, Usage for a wrong time or
+    tile."""
 
     floor: tuple[float, float] | None = None
     relay: bool = False
     cycle: float | None = None
-    deputies: bool = False
     tile: float | None = None
 
     def __post_init__(self) -> None:
@@ -72,12 +70,11 @@ class Ground:
         product: Product,
         settings: Settings,
         hands: Hands | None = None,
-        catalogue: Catalogue | None = None,
         draft: Layout | None = None,
     ) -> Layout:
         """The layout of a compiled factory; `hands`: those to choose from, where they are known;
-        `catalogue`: of the types of robots, the shipped one where None; `draft`: what was drafted
-        for it with these hands. Raises RunError (Layout) where there is no room."""
+        `draft`: what was drafted for it with these hands. Raises RunError (Layout) where there is
+        no room."""
         from factory.compiler.mating.mating import judged
         from factory.layout.durations import Pace
         from factory.layout.embedding import lay_out
@@ -86,8 +83,6 @@ class Ground:
         self.check(factory.folded)
         pace = Pace.of(settings)
         factory, product = judged(factory, product), repeated(product, factory)
-        if self.deputies:
-            return self._with_deputies(factory, product, settings, hands, catalogue)
         hands = hands or hands_of(factory, product, settings)
         floor = None if self.tile else self.floor
         layout = lay_out(factory, product, settings.clearance, floor, pace, hands, draft)
@@ -115,31 +110,6 @@ class Ground:
         factory, product = judged(factory, product), repeated(product, factory)
         c, pace = Clearance(settings.clearance, factory.carriage), Pace.of(settings)
         return drafted(factory, product, c, pace, self.floor, hands)
-
-    def _with_deputies(
-        self,
-        factory: Factory,
-        product: Product,
-        settings: Settings,
-        hands: Hands | None,
-        catalogue: Catalogue | None,
-    ) -> Layout:
-        """The layout of a factory, of all whose deputies as many as possible can take over."""
-        from factory.compiler.deputies import Pair, chosen_pairs, deputies, standing_by
-        from factory.layout.standby import laid_out_for, part_of
-        from factory.problem.robot_types import load_catalogue
-
-        plain = replace(self, deputies=False)
-
-        def lay_out(pairs: tuple[Pair, ...]) -> Layout:
-            whole = standing_by(factory, pairs)
-            return plain.lay_out(whole, product, settings, None if pairs else hands)
-
-        standby = chosen_pairs(deputies(factory, catalogue or load_catalogue()))
-        whole = laid_out_for(standby, lay_out)
-        layout = part_of(replace(whole, product=product, standby=whole), factory)
-        assert layout is not None, "its robots have their own tours"
-        return layout
 
 
 def hands_of(factory: Factory, product: Product, settings: Settings) -> Hands:

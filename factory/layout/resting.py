@@ -55,7 +55,7 @@ def resting(layout: Layout, coordinated: Coordinated, awaited: Mapping[int, floa
     robots = Staying(layout, coordinated, awaited)
     made = [*magazines(layout, coordinated, robots, every_part=True)]
     unmade = {one: _turn(layout, one) for one in made}
-    for robot in layout.factory.present:
+    for robot in range(len(layout.factory.robots)):
         unmade |= dict(_robot(layout, robots, robot))
 
     def counts(pair: Near) -> bool:

@@ -6,14 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from factory.compiler.assigning import assigned
 from factory.geometry.solids import Product
 from factory.layout.embedding import certified
 from factory.layout.guidepath import Box, Guidepath
 from factory.layout.hands.hand import Hand, Point3
 from factory.layout.layout import Layout
 from factory.layout.shapes import payload_boxes
-from factory.layout.standby import part_of
 from factory.layout.visits import Visit
 from factory.plant.factory import Factory
 from factory.plant.fused_bodies import repeated
@@ -29,18 +27,15 @@ AXES = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
 @dataclass(frozen=True, slots=True)
 class LayoutTable:
     """What is kept of a layout, by the names that `Layout` has; `visits`: for each operation those
-    of its robots. `standby`: where deputies can take over, who does the tours of each robot in each
-    turn of the layout of all that robots may do (`Layout.standby`), whose values the others are;
-    nothing where none may. `plain`: the layout without relays, None where this is one. `frame`: the
-    box (low, high) about the product's middle, None where that is the product's own; `tile`: the
-    size of the tiles of a platen [m], 0 without one."""
+    of its robots. `plain`: the layout without relays, None where this is one. `frame`: the box
+    (low, high) about the product's middle, None where that is the product's own; `tile`: the size
+    of the tiles of a platen [m], 0 without one."""
 
     clearance: float
     guidepaths: tuple[Guidepath, ...]
     visits: tuple[tuple[Visit, ...], ...]
     outfeed: Box
     hands: tuple[Hand | None, ...] = ()
-    standby: tuple[tuple[int, ...], ...] = ()
     plain: LayoutTable | None = None
     frame: tuple[Point3, Point3] | None = None
     tile: float = 0.0
@@ -62,38 +57,35 @@ class LayoutTable:
     @classmethod
     def of(cls, layout: Layout) -> LayoutTable:
         """The table of a layout."""
-        whole = layout.whole
         visits = (
-            tuple(whole.visits[o.index, robot] for robot in o.robots)
-            for o in whole.factory.operations
+            tuple(layout.visits[o.index, robot] for robot in o.robots)
+            for o in layout.factory.operations
         )
         return cls(
-            whole.clearance,
-            whole.guidepaths,
+            layout.clearance,
+            layout.guidepaths,
             tuple(visits),
-            whole.outfeed,
-            whole.hands,
-            _turns(layout.factory, whole.factory) if layout.standby else (),
+            layout.outfeed,
+            layout.hands,
             None if layout.plain is None else cls.of(layout.plain),
             _frame_of(layout.product),
-            whole.tile,
+            layout.tile,
         )
 
     def laid_out(self, factory: Factory, product: Product, plain: Factory) -> Layout:
         """The layout of a factory, which without relays is `plain`, and its product, certified
         anew. Raises ValueError where the table is not of that factory, or things are not clear."""
-        whole = self._whole(factory)
         if self.frame is not None:
             low, high = map(np.array, self.frame)
             product = replace(product, low=low, high=high)
-        self._check(whole)
+        self._check(factory)
         laid = Layout(
-            whole,
-            solids := repeated(product, whole),
+            factory,
+            solids := repeated(product, factory),
             self.clearance,
             self.guidepaths,
-            self._visits(whole),
-            payload_boxes(whole, solids),
+            self._visits(factory),
+            payload_boxes(factory, solids),
             self.outfeed,
             self.hands,
             tile=self.tile,
@@ -104,23 +96,7 @@ class LayoutTable:
             raise ValueError(f"it is not clear: {error.diagnostics[0].message}") from error
         if self.plain:
             return replace(laid, plain=self.plain.laid_out(plain, product, plain))
-        if not self.standby:
-            return laid
-        standing = replace(laid, product=repeated(product, factory), standby=laid)
-        made = part_of(standing, factory)
-        assert made is not None, "its robots have their own tours"
-        return made
-
-    def _whole(self, factory: Factory) -> Factory:
-        """The factory in which robots do all that they may do."""
-        if not self.standby:
-            return factory
-        robots = range(len(factory.robots))
-        rows = [len(row) == len(robots) and {*row} <= {*robots} for row in self.standby]
-        if not all(rows) or self.standby[0] != (*robots,):
-            words = f"lists of {len(robots)} numbers of robots, the first in their order"
-            raise ValueError(f"standby must be {words}")
-        return assigned(factory, factory.robots, self.standby)
+        return laid
 
     def _check(self, factory: Factory) -> None:
         """Raises ValueError if the numbers of values do not fit a factory."""
@@ -152,18 +128,6 @@ class LayoutTable:
                     words = f"visits of {factory.robots[robot].name} for one payload"
                     raise ValueError(f"{words} must have the same up, elevation and shift")
         return visit_of
-
-
-def _turns(factory: Factory, whole: Factory) -> tuple[tuple[int, ...], ...]:
-    """Who does the tours of each robot of a factory, for each turn of that in which deputies do
-    some."""
-    count = whole.period // factory.period
-    turns = [[*range(len(factory.robots))] for _ in range(count)]
-    for o in whole.operations:
-        first = factory.by_label[o.within(factory.period)]
-        for robot, does in zip(first.robots, o.robots, strict=True):
-            turns[o.turn // factory.period][robot] = does
-    return tuple(map(tuple, turns))
 
 
 def _frame_of(product: Product) -> tuple[Point3, Point3] | None:

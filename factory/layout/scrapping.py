@@ -20,7 +20,8 @@ from factory.problem.pag import NOPART
 def not_carried_back(layout: Layout) -> frozenset[tuple[int, str]]:
     """The pairs (robot index, label) that the robot cannot carry back to B. Near linear."""
     by_label = piles(layout.factory, layout.product)
-    ways = [way for r in layout.factory.present for way in _ways_back(layout, r, by_label)]
+    robots = range(len(layout.factory.robots))
+    ways = [way for robot in robots for way in _ways_back(layout, robot, by_label)]
     here = [region for region in regions(layout, by_label) if region.layer == PAYLOADS]
     search, back = ClearanceSearch(layout, [*here, *ways]), {id(way) for way in ways}
     barred = set[tuple[int, str]]()

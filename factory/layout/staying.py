@@ -75,7 +75,7 @@ class Staying:
 
     def __init__(self, layout: Layout, net: Coordinated, awaited: Mapping[int, float]) -> None:
         self.layout, self.net, self._awaited = layout, net, awaited
-        self._own = {robot: _own(layout, robot) for robot in layout.factory.present}
+        self._own = [_own(layout, robot.index) for robot in layout.factory.robots]
         self.partners = _partners(layout)
 
     def presences(self) -> Iterator[Presence]:

@@ -24,8 +24,7 @@ class SweptFloor:
 
     @classmethod
     def of(cls, layout: Layout) -> SweptFloor:
-        """The swept floor of a layout, with everything that deputies may do."""
-        layout = layout.whole
+        """The swept floor of a layout."""
         occupied = regions(layout, piles(layout.factory, layout.product))
         robots = np.array([region.robot for region in occupied], np.intp)
         return cls(np.array([region.box for region in occupied]), robots)

@@ -89,10 +89,9 @@ def _pile(product: Product, low: Array, high: Array) -> Pile:
 
 
 def regions(layout: Layout, by_label: Mapping[str, Pile]) -> list[Region]:
-    """Every region of a layout, robot by robot, without those that are gone. Linear in the sum of
-    the gears' lengths."""
+    """Every region of a layout, robot by robot. Linear in the sum of the gears' lengths."""
     result: list[Region] = []
-    for robot in layout.factory.present:
+    for robot in range(len(layout.factory.robots)):
         result.extend(_bodies(layout, robot))
         result.extend(_payloads(layout, robot, by_label))
     for leaf in layout.factory.leaves:

@@ -194,7 +194,7 @@ def first_axis(
 ) -> DrivenAxis:
     """A robot's first axis: along its guidepath; of one that is fixed the one that turns. Raises
     InputError (NoGrip) where that has no hand."""
-    axis = layout.whole.factory.robots[robot].body.first
+    axis = layout.factory.robots[robot].body.first
     if not layout.guidepaths[robot].fixed:
         return along(axis, load, settings)
     return turning(axis, load * gyration(layout, robot) ** 2, settings)
@@ -202,13 +202,10 @@ def first_axis(
 
 def heaviest(layout: Layout, masses: Mapping[str, float]) -> list[float]:
     """The heaviest load that each robot carries [kg], by what labels weigh."""
-    factory = layout.whole.factory
-    names = {o.label: layout.named(o.label) for o in factory.making}
-    weights = {label: masses[name] for label, name in names.items() if name in masses}
-    operations, robots = factory.operations, factory.robots
+    operations, robots = layout.factory.operations, layout.factory.robots
     return [
         max(
-            weights.get(o.after[o.robots.index(robot.index)], 0.0)
+            masses.get(o.after[o.robots.index(robot.index)], 0.0)
             for o in (operations[number] for number in robot.operations)
         )
         for robot in robots
@@ -217,9 +214,9 @@ def heaviest(layout: Layout, masses: Mapping[str, float]) -> list[float]:
 
 def lifted(layout: Layout, masses: Mapping[str, float]) -> dict[int, float]:
     """The heaviest load that each robot with a lift delivers [kg], by what labels weigh."""
-    factory = layout.whole.factory
+    factory = layout.factory
     return {
-        robot: max(masses[layout.named(label)] for label in factory.deliveries(robot))
+        robot: max(masses[label] for label in factory.deliveries(robot))
         for robot in factory.strokes
     }
 
@@ -237,7 +234,7 @@ def weights_of(layout: Layout) -> dict[str, float]:
 def check_drives(layout: Layout, settings: Settings) -> None:
     """Raises InputError (BadRobot) where the motor of a robot type is too weak for what a robot
     carries, or gains that the type has of its own do not keep a robot on its reference."""
-    motors = {axis for robot in layout.whole.factory.robots for axis in robot.body.axes}
+    motors = {axis for robot in layout.factory.robots for axis in robot.body.axes}
     if all(motor.usual and motor.force == inf for motor in motors):
         return
     axes = _axes(layout, settings)
@@ -248,7 +245,7 @@ def check_drives(layout: Layout, settings: Settings) -> None:
 
 def _axes(layout: Layout, settings: Settings) -> Iterator[tuple[str, DrivenAxis, float]]:
     """The axes of all robots, with the robot's name and how far each goes along for a unit."""
-    robots, masses = layout.whole.factory.robots, weights_of(layout)
+    robots, masses = layout.factory.robots, weights_of(layout)
     for robot, load in zip(robots, heaviest(layout, masses), strict=True):
         lever = layout.guidepaths[robot.index].lever
         yield robot.name, first_axis(layout, robot.index, load, settings), lever

@@ -41,17 +41,17 @@ def add_feeders(
     hanging: Hanging,
     drives: Mapping[str, Drive],
 ) -> None:
-    """The feeders of a layout, with their sliders and the drives of these, by the names of outlets.
-    Sliders of one line share the housing of its first part."""
+    """The feeders of a layout, with their sliders and the drives of these, by labels. Sliders of
+    one line share the housing of its first part."""
     outlets = outlets_of(layout)
     codes = feeder_codes(layout.factory, outlets)
-    housed = {line[0].name for line in lines_of(layout) if line}
+    housed = {line[0].label for line in lines_of(layout) if line}
     for outlet in outlets:
-        at, feeder = outlet.name, outlet.feeder
+        at, feeder = outlet.label, outlet.feeder
         if not (at in housed or at in hanging.places):
             continue
         path = layout.guidepaths[outlet.robot]
-        x, y = outlet.layout.meeting(outlet.leaf)
+        x, y = layout.meeting(outlet.leaf)
         body = add(
             world,
             "body",

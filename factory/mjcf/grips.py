@@ -12,7 +12,7 @@ from factory.layout.layout import Layout
 from factory.layout.visits import Visit
 from factory.mjcf.parts import place_in
 from factory.mjcf.robots import heading_quaternion
-from factory.plant.fused_bodies import FusedBodies, bodies_of
+from factory.plant.fused_bodies import FusedBodies
 
 Point3 = tuple[float, float, float]
 
@@ -53,21 +53,16 @@ class Grip:
 
 
 def grips_of(layout: Layout, bodies: FusedBodies) -> Iterator[Grip]:
-    """All grips of a layout's robots on its bodies, robot by robot, with those of deputies."""
-    every, factory = layout.whole, layout.whole.factory
-    if every is not layout:
-        bodies = bodies_of(factory, every.product, bool(bodies.wholes))
+    """All grips of a layout's robots on its bodies, robot by robot."""
+    factory, product = layout.factory, layout.product
     for robot in range(len(factory.robots)):
-        label_of = dict[str, str]()
-        for label in bodies.handled(factory, robot):
-            label_of.setdefault(layout.named(label), label)
-        for name, label in label_of.items():
+        for label in dict.fromkeys(bodies.handled(factory, robot)):
             turn = factory.tour_with(robot, label)
             begins, *_ = factory.tours[robot][turn]
             brought = factory.deliveries(robot)[turn : turn + 1]
-            fed = next((fed_of(every.product, factory.contents[x]) for x in brought), 0.0)
-            centre = presented(every.product.solids[label]).centre if fed else bodies.centre[label]
-            yield Grip(robot, name, centre, every, begins, fed)
+            fed = next((fed_of(product, factory.contents[x]) for x in brought), 0.0)
+            centre = presented(product.solids[label]).centre if fed else bodies.centre[label]
+            yield Grip(robot, label, centre, layout, begins, fed)
 
 
 def seen_from(path: Guidepath, turn: float) -> tuple[float, float, float, float]:

@@ -173,7 +173,7 @@ def build_model(
     files = add_meshes(section["asset"], product, insets)
     add_scene(world, section["statistic"], layout)
     hoists = _hoists(layout, masses, settings)
-    add_robots(layout.whole, catalogue, drives, hoists, section)
+    add_robots(layout, catalogue, drives, hoists, section)
     load = max(masses[product] for product in factory.products)
     fast = settings.outfeed_acceleration
     tray = drive_for(TRAY_MASS, load, fast, settings)
@@ -224,8 +224,8 @@ def model_files(model: Model, path: Path) -> dict[Path, bytes]:
 
 def _hoists(layout: Layout, masses: Mapping[str, float], settings: Settings) -> dict[int, Hoist]:
     """The lifts, for the heaviest load of each: what it delivers."""
-    robots, loads, hoists = layout.whole.factory.robots, lifted(layout, masses), {}
-    for robot, stroke in layout.whole.strokes.items():
+    robots, loads, hoists = layout.factory.robots, lifted(layout, masses), {}
+    for robot, stroke in layout.strokes.items():
         drive = up(robots[robot].body.axis(LIFT_JOINT), loads[robot], settings).drive(settings)
         hoists[robot] = Hoist(stroke, drive, stops_of(0.0, stroke, layout.clearance))
     return hoists
@@ -241,7 +241,7 @@ def _sliders(
     samples = (stroke_ticks(layout, settings) + 2 * settings.stride) * settings.steps + 2
     loads: dict[str, float] = {}
     for outlet in outlets_of(layout):
-        slider = hanging.slider[outlet.name]
+        slider = hanging.slider[outlet.label]
         loads[slider] = max(loads.get(slider, 0.0), masses[outlet.label])
     return {
         slider: replace(

@@ -103,13 +103,6 @@ def feeder(label: str) -> str:
     return f"feeder/{label}"
 
 
-def shown(outlet: str) -> str:
-    """The label of what an outlet shows, by its name: `log2` of `log2`, and of `log2@r3`, where a
-    deputy takes it."""
-    label, _, robot = outlet.rpartition("@")
-    return label if label and kind(robot) == "robot" else outlet
-
-
 def slider(label: str) -> str:
     """The body in a feeder's housing that brings parts down, its joint and its actuator,
     `feeder/part1/slider`."""

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from copy import copy
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.mjcf import names
 from factory.support.engine import mujoco
 
 Floats = NDArray[np.float64]
@@ -63,13 +62,6 @@ def shown(m: mujoco.MjModel, body: int) -> Iterator[int]:
         plane = m.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE
         if m.geom_group[geom] < SHOWN and not plane:
             yield geom
-
-
-def bodies_of(m: mujoco.MjModel, robots: Iterable[str]) -> NDArray[np.bool_]:
-    """Which bodies (nbody,) are of these robots, by name: carriages and what is on them. Rails and
-    feeders are not."""
-    carriages = [m.body(names.carriage(robot)).id for robot in robots]
-    return np.asarray(np.isin(m.body_rootid, carriages))
 
 
 def paint(m: mujoco.MjModel, geom: int) -> Floats:

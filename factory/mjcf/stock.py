@@ -88,7 +88,7 @@ def _weights(model: Model) -> dict[str, float]:
     lifts = [robots[number] for number in model.factory.strokes]
     masses = {names.lift(r.name): r.body.axis(LIFT_JOINT).mass for r in lifts}
     for outlet in outlets_of(model.layout):
-        masses[names.slider(outlet.name)] = SLIDER_MASS + model.masses[outlet.label]
+        masses[names.slider(outlet.label)] = SLIDER_MASS + model.masses[outlet.label]
     masses[names.SHUTTER] = SHUTTER_MASS
     return {joint: mass * GRAVITY for joint, mass in masses.items()}
 

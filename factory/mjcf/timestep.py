@@ -96,7 +96,7 @@ def _dip(settings: Settings, load: float) -> float:
 def _axes(settings: Settings, layout: Layout, jitter: float) -> Iterator[DrivenAxis]:
     """Every robot, lift and the tray with the heaviest that it carries, and the shutter."""
     room, far = layout.clearance, tray_clearance(layout)
-    robots, masses = layout.whole.factory.robots, weights_of(layout)
+    robots, masses = layout.factory.robots, weights_of(layout)
     for robot, load in zip(robots, heaviest(layout, masses), strict=True):
         yield replace(_carried(robot, load, settings), gain=1 - jitter, room=room)
     for number, load in lifted(layout, masses).items():

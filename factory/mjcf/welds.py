@@ -33,19 +33,18 @@ def add_welds(
         name, body = names.grip(robot.name, grip.label), names.part(grip.label, 1)
         turn = seen_from(layout.guidepaths[grip.robot], grip.fed)
         _weld(equality, name, holder(robot.name), body, (*grip.position, *turn))
-    outlets = {outlet.name: outlet for outlet in outlets_of(layout)}
-    for outlet in outlets.values():
-        path, slider = layout.guidepaths[outlet.robot], hanging.slider[outlet.name]
+    outlets = {outlet.label: outlet for outlet in outlets_of(layout)}
+    for label, outlet in outlets.items():
+        path, slider = layout.guidepaths[outlet.robot], hanging.slider[label]
         (x, y), (u, v) = (o.layout.meeting(o.leaf) for o in (outlet, outlets[slider]))
-        height = outlet.elevation - hanging.raised[outlet.name]
-        solid, shown = layout.product.solids[outlet.label], outlet.name == slider == outlet.label
-        centre = presented(solid).centre if solid.fed else bodies.centre[outlet.label]
+        height = outlet.elevation - hanging.raised[label]
+        solid, shown = layout.product.solids[label], slider == label
+        centre = presented(solid).centre if solid.fed else bodies.centre[label]
         offset = place_in(layout.product, centre, (x - u, y - v), height)
         pose = *turned(offset, path.heading), *seen_from(path, solid.fed)
-        body = names.part(outlet.label, 1)
-        _weld(equality, names.feed(outlet.name), names.slider(slider), body, pose, shown)
-        if outlet.name == outlet.label:
-            _park(equality, layout, outlet.label, copies[outlet.label], int(shown))
+        body = names.part(label, 1)
+        _weld(equality, names.feed(label), names.slider(slider), body, pose, shown)
+        _park(equality, layout, label, copies[label], int(shown))
     for label in bodies.wholes:
         _park(equality, layout, label, copies[label], 0)
     for label in (body for product in factory.products for body in bodies.carried[product]):

@@ -7,7 +7,7 @@ undone is taken back firing by firing, without `factory.nets.undo`.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from factory.nets.gears import GearNet
@@ -38,15 +38,11 @@ class _Game:
         self.number = {t.name: i for i, t in enumerate(net.threaded.transitions)}
         self.fired = [0] * len(self.number)
         self.start: Marking | None = initial
-        self._play_on(net)
-        self.fault = self._set_up(initial)
-
-    def _play_on(self, net: GearNet) -> None:
-        """Go on in a net, with no tokens."""
         self.net = net
         self.tokens = [0] * len(net.threaded.places)
         self.at = [-1] * len(net.gears)
         self.needs, self.gives = net.threaded.net.preset, net.threaded.net.postset
+        self.fault = self._set_up(initial)
 
     def _set_up(self, initial: Marking) -> str:
         for place in sorted(initial):
@@ -108,9 +104,9 @@ class _Game:
                 return f"after {name} the marking is not legal at {place_name}"
         return ""
 
-    def take_back(self, entry: Undone, joins: Joins, after: GearNet | None) -> str:
-        """Undo the transitions of an entry, and go on in the net `after` if there is one. Returns
-        the reason for which they are not the least that had to be undone, "" where they are."""
+    def take_back(self, entry: Undone, joins: Joins) -> str:
+        """Undo the transitions of an entry. Returns the reason for which they are not the least
+        that had to be undone, "" where they are."""
         unknown = next(
             (x for x in (*entry.asked, *entry.transitions) if x not in self.number), None
         )
@@ -119,17 +115,12 @@ class _Game:
         fault = self._count_from_the_first() or self._asked_too_much(entry)
         if fault:
             return fault
-        if after is not None:
-            self._play_on(after)
-            self.tokens = self._counted(after)
-        asked = Counter(self.number[name] for name in entry.asked)
-        begin = asked if after is None else range(len(self.fired))
-        taken = self._taken_back(asked, joins, begin)
+        taken = self._taken_back(Counter(self.number[name] for name in entry.asked), joins)
         names = [t.name for t in self.net.threaded.transitions]
         least = Counter({names[event]: times for event, times in taken.items()})
         if least != Counter(entry.transitions):
             return _differs(entry, least)
-        return self._find_robots(taken if after is None else begin)
+        return self._find_robots(taken)
 
     def _count_from_the_first(self) -> str:
         """Count what had fired when the run began, if that has not been done."""
@@ -143,29 +134,19 @@ class _Game:
         return ""
 
     def _asked_too_much(self, entry: Undone) -> str:
-        if not entry.asked and not entry.exchanged:
+        if not entry.asked:
             return f"the undo of {entry.operation} asks for nothing"
         for name, times in Counter(entry.asked).items():
             if times > self.fired[self.number[name]]:
                 return f"{name} is to be undone, and has not fired so often"
         return ""
 
-    def _counted(self, net: GearNet) -> list[int]:
-        """The tokens that the counts give in a net, where some may be missing (negative)."""
-        tokens = [int(place in net.initial_marking) for place in range(len(net.threaded.places))]
-        for event, times in enumerate(self.fired):
-            for place in self.gives[event]:
-                tokens[place] += times
-            for place in self.needs[event]:
-                tokens[place] -= times
-        return tokens
-
-    def _taken_back(self, asked: Counter[int], joins: Joins, begin: Iterable[int]) -> Counter[int]:
+    def _taken_back(self, asked: Counter[int], joins: Joins) -> Counter[int]:
         """Fire transitions backwards, one by one, that must be undone: those that are asked for,
         whose token is missing, or whose result is used by one that is undone oftener."""
         back = Counter[int]()
         made_into = _turned(joins)
-        todo = list(begin)
+        todo = list(asked)
         while todo:
             event = todo.pop()
             due = (
@@ -225,40 +206,31 @@ def replay(
     events: Iterable[Entry],
     initial: Marking | None = None,
     joins: Joins | None = None,
-    after: Sequence[GearNet] = (),
 ) -> ReplayVerdict:
     """Fire the events, by name and one by one, from `initial` (m_0 where None).
 
     Linear: each event costs time in its own places only. The events of a detached set that fired
     in one tick may come in any order. What is undone must be exactly the least that had to be, by
-    `joins`, the material rule; without that nothing may be. `after`: the nets in which the run went
-    on where robots were exchanged, in their order, with the transitions of `net` in its order.
+    `joins`, the material rule; without that nothing may be.
     """
     game = _Game(net, net.initial_marking if initial is None else initial)
     if game.fault:
         return ReplayVerdict(False, -1, game.fault, game.marking, 0)
-    count, nets = 0, list(after)
+    count = 0
     for entry in events:
         if isinstance(entry, str):
             fault, marking = game.fire(entry), None
         else:
             marking = game.marking
-            fault = _take_back(game, entry, joins, nets)
+            fault = _take_back(game, entry, joins)
         if fault:
             return ReplayVerdict(False, count, fault, marking or game.marking, count)
         count += 1
     return ReplayVerdict(True, None, "", game.marking, count)
 
 
-def _take_back(game: _Game, entry: Undone, joins: Joins | None, nets: list[GearNet]) -> str:
+def _take_back(game: _Game, entry: Undone, joins: Joins | None) -> str:
     """Undo an entry. Returns the reason for which that is impossible, "" where it is not."""
     if joins is None:
         return f"the undo of {entry.operation} cannot be judged: no material is known"
-    if not entry.exchanged:
-        return game.take_back(entry, joins, None)
-    if not nets:
-        return f"at {entry.operation} robots are exchanged, and there is no further net"
-    onward = nets.pop(0)
-    if [t.name for t in onward.threaded.transitions] != list(game.number):
-        return f"the net after {entry.operation} has other transitions"
-    return game.take_back(entry, joins, onward)
+    return game.take_back(entry, joins)

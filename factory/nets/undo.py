@@ -1,4 +1,4 @@
-"""Failures and exchanged robots: the marking of how often each transition still has fired.
+"""Failures: the marking of how often each transition still has fired.
 
 The state of a live gear train is n, how often each transition has fired; its marking is
 m = m_0 + C n. To undo a set D of transitions is to go on from the greatest n' <= n with
@@ -9,9 +9,7 @@ Each condition bounds one count by another plus a constant that is not negative,
 is unique, and one search finds it, least counts first.
 
 Theorem 5 (return). m_0 + C n' >= 0 is reachable from m_0, as it is in any live marked graph (Murata
-1989, Theorem 21), so the net is as live, safe and reversible as before. Theorem 8 (exchange): the
-same search, with the places of another live gear train N' that has the same transitions, gives a
-marking that is reachable in N'.
+1989, Theorem 21), so the net is as live, safe and reversible as before.
 """
 
 from __future__ import annotations
@@ -39,18 +37,7 @@ def undo(
     least = Counter(asked)
     if not least:
         raise ValueError("no transition is asked to be undone")
-    return _greatest(marked(net), fired, least, joins, least)
-
-
-def exchange(
-    net: GearNet | MarkedNet, fired: Sequence[int], asked: Iterable[int], joins: Joins
-) -> tuple[int, ...]:
-    """n', where robots are exchanged while the factory runs: `net` is N', whose transitions are
-    those of the net N in which `fired` was counted, in the same order; `asked` may be empty.
-
-    Nothing need be undone. Linear in the net, but for the order. Raises ValueError as `undo`.
-    """
-    return _greatest(marked(net), fired, Counter(asked), joins, range(len(fired)))
+    return _greatest(marked(net), fired, least, joins)
 
 
 def tokens_after(net: GearNet | MarkedNet, fired: Sequence[int]) -> tuple[int, ...]:
@@ -69,11 +56,7 @@ def marking_after(net: GearNet, fired: Sequence[int]) -> Marking:
 
 
 def _greatest(
-    net: MarkedNet,
-    fired: Sequence[int],
-    asked: Counter[int],
-    joins: Joins,
-    begin: Iterable[int],
+    net: MarkedNet, fired: Sequence[int], asked: Counter[int], joins: Joins
 ) -> tuple[int, ...]:
     """The greatest counts that meet the conditions. Each is settled when it comes off the heap,
     since no condition bounds a count by less than another."""
@@ -83,7 +66,7 @@ def _greatest(
         if counts[event] < 0:
             name = net.net.transitions[event].name
             raise ValueError(f"{name} is to be undone {times} times, and has fired {fired[event]}")
-    heap = [(counts[event], event) for event in begin]
+    heap = [(counts[event], event) for event in asked]
     heapify(heap)
     right, postset = net.right, net.net.postset
     while heap:

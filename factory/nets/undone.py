@@ -1,9 +1,8 @@
-"""Entries of a run's record: firings, and transitions that were undone after a failure or where
-robots were exchanged."""
+"""Entries of a run's record: firings, and transitions that were undone after a failure."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 
@@ -20,9 +19,7 @@ class Undone:
 
     `operation`: label of the operation that failed; `reason`: cause, in words; `asked`: the
     transitions that had to be undone; `transitions`: all that were undone, by number. Names are
-    repeated for each time that they are undone. `exchanged`: whether the run went on in the next of
-    its nets, where both may be empty; `robots`: the dead robot and its deputy.
-    `factory.nets.undo` has the definition.
+    repeated for each time that they are undone. `factory.nets.undo` has the definition.
     """
 
     t: float
@@ -30,8 +27,6 @@ class Undone:
     reason: str
     asked: tuple[str, ...]
     transitions: tuple[str, ...]
-    exchanged: bool = False
-    robots: tuple[str, ...] = ()
 
     @classmethod
     def between(
@@ -41,13 +36,12 @@ class Undone:
         asked: Iterable[int],
         before: Sequence[int],
         after: Sequence[int],
-        exchanged: bool = False,
     ) -> Undone:
         """The difference between two counts of firings; `what`: time, operation and reason."""
         names = [transition.name for transition in net.threaded.transitions]
         triples = zip(names, before, after, strict=True)
         undone = (name for name, was, now in triples for _ in range(was - now))
-        return cls(*what, tuple(names[event] for event in asked), tuple(undone), exchanged)
+        return cls(*what, tuple(names[event] for event in asked), tuple(undone))
 
     def as_json(self) -> dict[str, object]:
         """As `run --json` prints it."""
@@ -57,8 +51,6 @@ class Undone:
             "asked": list(self.asked),
             "operation": self.operation,
             "reason": self.reason,
-            **({"exchanged": True} if self.exchanged else {}),
-            **({"robots": list(self.robots)} if self.robots else {}),
         }
 
 
@@ -66,16 +58,11 @@ Entry = str | Undone
 """A transition that fired, by its name, or what was undone."""
 
 
-def exchanges(entries: Iterable[Entry]) -> Iterator[Undone]:
-    """The entries in which a dead robot was exchanged for its deputy."""
-    return (e for e in entries if isinstance(e, Undone) and len(e.robots) == 2)
-
-
 def lasting(entries: Iterable[Entry]) -> list[int]:
     """Indices of the firings that are not undone: an undo takes back the latest of its transitions.
 
-    They too are a firing sequence of the net, to the same marking, unless robots are exchanged:
-    counts with m_0 + C n >= 0 are closed under the lesser of two.
+    They too are a firing sequence of the net, to the same marking: counts with m_0 + C n >= 0 are
+    closed under the lesser of two.
     """
     left: dict[str, list[int]] = {}
     for number, entry in enumerate(entries):

@@ -16,7 +16,7 @@ from factory.nets.undone import Joins
 from factory.plant.approaches import Approach
 from factory.plant.robot import Robot
 from factory.problem.pag import NOPART, PAG
-from factory.problem.plan import Plan, in_turn, out_of_turn
+from factory.problem.plan import Plan, out_of_turn
 from factory.problem.template import Template
 from factory.support.errors import Position
 from factory.support.showing import Pictured
@@ -47,11 +47,6 @@ class Operation:
     def written(self) -> str:
         """The label without its turn: as the PAG has it, or one pile of such a label."""
         return out_of_turn(self.label, self.turn)
-
-    def within(self, period: int) -> str:
-        """The label in a factory whose period has so many units, where this one's has several times
-        as many."""
-        return in_turn(self.written, self.turn % period)
 
     @property
     def carrier(self) -> int:
@@ -136,11 +131,6 @@ class Factory(Pictured):
         return max(robot.body.carriage for robot in self.robots)
 
     @cached_property
-    def present(self) -> tuple[int, ...]:
-        """The robots (index) that are not gone: those that have operations."""
-        return tuple(robot.index for robot in self.robots if robot.operations)
-
-    @cached_property
     def leaves(self) -> tuple[Operation, ...]:
         """The operations that make a part out of nothing, in the order of their numbers."""
         return tuple(operation for operation in self.making if not operation.inputs)
@@ -215,7 +205,7 @@ class Factory(Pictured):
         if not self.folded:
             return (*reversed(range(len(self.operations) - 1)), len(self.operations) - 1)
         turns = [operation.turn for operation in self.operations]
-        return ascending([self.robots[robot].operations for robot in self.present], turns)
+        return ascending([robot.operations for robot in self.robots], turns)
 
     @cached_property
     def postorder(self) -> tuple[int, ...]:

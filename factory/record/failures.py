@@ -1,4 +1,4 @@
-"""What failed in a run, what was done about it, and the robots that died or were exchanged."""
+"""What failed in a run, what was done about it, and the robots that died."""
 
 from __future__ import annotations
 
@@ -7,52 +7,12 @@ from dataclasses import dataclass, field
 from math import inf, isfinite
 from typing import Protocol
 
-from factory.nets.gears import GearNet
-from factory.nets.undone import Entry, exchanges
-from factory.plant.factory import Factory
-
-
-@dataclass(frozen=True, slots=True)
-class Exchange:
-    """A `deputy` that took over the tours of a robot that is `dead`, by their names, at time t [s].
-
-    `fired`: n', the counts from which the run went on in another `net`, which was proved before;
-    `crew`: its factory, in which all robots keep their numbers; `cycle_time`: what is predicted for
-    it [s].
-    """
-
-    t: float
-    dead: str
-    deputy: str
-    fired: tuple[int, ...] = field(repr=False)
-    net: GearNet = field(repr=False)
-    crew: Factory = field(repr=False)
-    cycle_time: float
-
-    def __str__(self) -> str:
-        return (
-            f"{self.deputy} takes over the tours of {self.dead} (deputy);"
-            f" predicted from then on: {self.cycle_time:.3f} s"
-        )
-
-    def as_json(self) -> dict[str, object]:
-        """As `run --json` prints it, the counts by the names of transitions."""
-        names = (transition.name for transition in self.net.threaded.transitions)
-        return {
-            "t": round(self.t, 6),
-            "dead": self.dead,
-            "deputy": self.deputy,
-            "predicted_cycle_time_s": self.cycle_time,
-            "fired": dict(zip(names, self.fired, strict=True)),
-        }
-
 
 @dataclass(frozen=True, slots=True)
 class Failing:
     """A failure detected at `t` [s]: the failed `test`, the `operation` (its label), the `robot`,
     "" for none; the `response`, and the labels that were `scrapped`. `until`: when a dead robot is
-    replaced [s], None where it is not; `deputy`: the robot that takes over its tours, "" for
-    none."""
+    replaced [s], None where it is not."""
 
     t: float
     test: str
@@ -61,7 +21,6 @@ class Failing:
     response: str
     scrapped: tuple[str, ...] = ()
     until: float | None = None
-    deputy: str = ""
 
     def as_json(self) -> dict[str, object]:
         """As `run --json` prints it."""
@@ -73,7 +32,6 @@ class Failing:
             "response": self.response,
             "scrapped": list(self.scrapped),
             **({"until": round(self.until, 6)} if self.until is not None else {}),
-            **({"deputy": self.deputy} if self.deputy else {}),
         }
 
     @property
@@ -105,10 +63,7 @@ class Failing:
         if self.is_death:
             if self.until is None or not isfinite(self.until):
                 return "a spare comes" if self.response == "spare" else "there is no spare"
-            after = f"in {self.until - self.t:.0f} s"
-            if self.deputy:
-                return f"{self.deputy} takes over the tours of {self.robot} (deputy) {after}"
-            return f"a spare comes {after}"
+            return f"a spare comes in {self.until - self.t:.0f} s"
         if self.response in ("again", "stop"):
             return "done again" if self.response == "again" else "the run ends"
         if self.scrapped == (self.operation,) and self.test in ("rejected", "misplaced"):
@@ -171,7 +126,7 @@ class Failures:
 
 class Account(Protocol):
     """The failures of a run that recovers from them: those `found` so far, the robots that `stood`
-    still or were exchanged, and the `report` of all; `given`: the requested faults, as JSON."""
+    still, and the `report` of all; `given`: the requested faults, as JSON."""
 
     @property
     def given(self) -> Mapping[str, object]: ...
@@ -180,47 +135,28 @@ class Account(Protocol):
     def found(self) -> Sequence[Failing]: ...
     @property
     def stood(self) -> Sequence[Stood]: ...
-    @property
-    def exchanges(self) -> Sequence[Exchange]: ...
     def report(self) -> Failures: ...
 
 
 @dataclass(frozen=True, slots=True)
 class Death:
-    """Outage of a `robot` from its detection at `start` to `end` [s], inf where nothing replaces
-    it; from then on its `deputy` does its tours or, where that is "", a spare replaces it."""
+    """Outage of a `robot` from its detection at `start` to `end` [s], when a spare replaces it; inf
+    where none does."""
 
     robot: str
     start: float
     end: float
-    deputy: str = ""
 
     @property
     def then(self) -> str:
         """The situation after its end, in words."""
-        if self.deputy:
-            return f"{self.robot} is gone: {self.deputy} does its tours"
         return f"a spare is in the place of {self.robot}"
 
 
-def gone(entries: Iterable[Entry], time: float = inf) -> dict[str, str]:
-    """The robots removed for good up to a time [s], each with the deputy that does its tours, by
-    name: those exchanged by the entries of a record."""
-    return {undone.robots[0]: undone.robots[1] for undone in exchanges(entries) if undone.t <= time}
-
-
-def deaths(failings: Iterable[Failing], entries: Iterable[Entry]) -> list[Death]:
-    """The deaths among the failures of a record. One with a deputy ends when an entry exchanges
-    the two: a deputy that dies before that never takes over."""
-    exchanged = {undone.robots: undone.t for undone in exchanges(entries)}
+def deaths(failings: Iterable[Failing]) -> list[Death]:
+    """The deaths among the failures of a run."""
     return [
-        Death(failing.robot, failing.t, _end(failing, exchanged), failing.deputy)
-        for failing in failings
-        if failing.is_death
+        Death(one.robot, one.t, inf if one.until is None else one.until)
+        for one in failings
+        if one.is_death
     ]
-
-
-def _end(death: Failing, exchanged: dict[tuple[str, ...], float]) -> float:
-    if death.deputy:
-        return exchanged.get((death.robot, death.deputy), inf)
-    return inf if death.until is None else death.until

@@ -17,7 +17,7 @@ from factory.rendering.caption import Caption, draw_notices, draw_title
 from factory.rendering.gantt_panel import GanttPanel
 from factory.rendering.history import History
 from factory.rendering.ink import Pixels
-from factory.rendering.marks import LeftOut, Marks
+from factory.rendering.marks import Marks
 from factory.rendering.net_panel import NetPanel
 from factory.rendering.painter import Painter
 from factory.rendering.picture import Area, PanelName, Picture, Size, shared
@@ -83,12 +83,10 @@ class Camerawork(Closing):
         share = self.caption.share if self.caption else 0.0
         self.painter = Painter(take.m, size, picture.camera, take.subject, share, samples)
         self.marks = Marks(self.painter.replica, take.history)
-        self.left_out = LeftOut(self.painter.replica, take.history)
 
     def picture(self, moment: Moment, elapsed: float = 0.0) -> Pixels:
         """One picture; `elapsed` [s] since the last."""
         take, time = self.take, moment.time
-        self.left_out.at(time)
         pixels = self.painter.paint(moment.shown, elapsed, time, self.marks)
         if self.caption is not None:
             pixels = self.caption.draw(pixels, take.product, moment.made, take.units, time)

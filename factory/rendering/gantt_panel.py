@@ -60,11 +60,11 @@ class GanttPanel:
         self._lines(ink, time, bottom)
         for row in self.rows.shown:
             self._stands(ink, row, time)
-            for tour, spell in self.history.done(row.robot, time - self.window):
-                self._spell(ink, row, spell, tour, time)
+            for spell in self.history.since(row.robot, time - self.window):
+                self._spell(ink, row, spell, time)
         thin = self.sheet.scale
         ink.box(self.right - thin, self.sheet.top, self.right + thin, bottom, FLASH)
-        self.sheet.names(ink, self.history.stands(time), self.history.gone(time))
+        self.sheet.names(ink, self.history.stands(time))
         return ink.pixels
 
     def at(self, time: float, now: float) -> float:
@@ -99,7 +99,7 @@ class GanttPanel:
         ink.words(self.right, y, "now", small, FLASH, "r")
 
     def _stands(self, ink: Ink, row: PanelRow, now: float) -> None:
-        """A band where a robot stood, a dark one where it was dead, to where another took its
+        """A band where a robot stood, a dark one where it was dead, to where a spare took its
         place."""
         y, half = self.sheet.height(row), 0.5 * self.sheet.pitch
         for start, end in self.history.stood(row.robot, now - self.window, now):
@@ -112,18 +112,18 @@ class GanttPanel:
             left = max(self.at(death.start, now), self.left)
             right = self.at(min(death.end, now), now)
             ink.box(left, y - half, right, y + half, DEAD, 0.45 * row.alpha)
-            if death.end <= now:  # another robot goes on from here
+            if death.end <= now:  # a spare goes on from here
                 ink.box(right - self.sheet.scale, y - half, right, y + half, DEAD, row.alpha)
 
-    def _spell(self, ink: Ink, row: PanelRow, spell: Spell, tour: int, now: float) -> None:
-        """A bar for an operation of a robot's tour, hatched where that was undone, a thin one
-        where it waits with a part; empty-handed it has none."""
+    def _spell(self, ink: Ink, row: PanelRow, spell: Spell, now: float) -> None:
+        """A bar for an operation of a robot, hatched where that was undone, a thin one where it
+        waits with a part; empty-handed it has none."""
         if spell.start > now or not spell.step:
             return
         is_undone = spell.undone < now - TIE
         left = max(self.at(spell.start, now), self.left)
         right = self.at(min(spell.end, now), now)
-        y, gear = self.sheet.height(row), self.factory.robots[tour].operations
+        y, gear = self.sheet.height(row), self.factory.robots[row.robot].operations
         if not spell.operation:
             before = FLASH if is_undone else self.colours[gear[spell.step // 2 - 1]]
             thin = 1.6 * self.sheet.scale

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
@@ -13,7 +13,7 @@ from factory.control.mode import Array
 from factory.layout.durations import Pace
 from factory.nets.undone import Entry, Undone
 from factory.plant.factory import Factory, Operation
-from factory.record.failures import Death, Failing, Stood, deaths, gone
+from factory.record.failures import Death, Failing, Stood, deaths
 from factory.record.monitor.subject import MonitorSubject
 
 TIE = 1e-9
@@ -44,8 +44,8 @@ class History:
     fires at a time shows after it, as in a log, whose state at a time is before what fires then.
 
     `events`: what has fired, each at one of `times` [s]; `undone`: what of that was undone, and
-    when; `taken`: how many entries. `exchanges`: those that exchange robots; `failings`: what
-    failed; `standing`: from when on [s] which robots (index) stand.
+    when; `taken`: how many entries. `failings`: what failed; `standing`: from when on [s] which
+    robots (index) stand.
     """
 
     def __init__(self, subject: MonitorSubject) -> None:
@@ -60,7 +60,6 @@ class History:
         self.undone: list[tuple[float, int]] = []
         self.fired = Counter(subject.counts)
         self.taken = 0
-        self.exchanges: list[Undone] = []
         self.failings: list[Failing] = []
         self.standing: list[tuple[float, frozenset[int]]] = []
 
@@ -70,7 +69,6 @@ class History:
         number = self.factory.net.threaded.net.transition_index
         if isinstance(entry, Undone):
             self.undo(time - 2 * TIE, [number[name] for name in entry.transitions])
-            self.exchanges += [entry] if entry.robots else []
         else:
             self.fire(time, number[entry])
 
@@ -129,33 +127,13 @@ class History:
 
     def deaths(self) -> list[Death]:
         """All known deaths."""
-        return deaths(self.failings, self.exchanges)
+        return deaths(self.failings)
 
     def dead(self, time: float) -> frozenset[int]:
         """The robots that are known to be dead at a time, and not yet replaced."""
         return frozenset(
             self.index[one.robot] for one in self.deaths() if one.start < time - TIE < one.end
         )
-
-    def gone(self, time: float) -> frozenset[int]:
-        """The robots that have been removed by a time."""
-        return frozenset(self.index[robot] for robot in gone(self.exchanges, time + TIE))
-
-    def doer(self, robot: int, time: float) -> int:
-        """The robot that does the tours of a robot at a time: itself, or its deputy."""
-        for entry in self.exchanges:
-            dead, deputy = (self.index[name] for name in entry.robots)
-            if robot == dead and entry.t <= time + 3 * TIE:  # it is undone a little before
-                robot = deputy
-        return robot
-
-    def done(self, robot: int, since: float) -> Iterator[tuple[int, Spell]]:
-        """The spells in which a robot did tours, and had not ended by a time [s], each with the
-        robot whose tours they are."""
-        for tour in range(len(self.spells)) if self.exchanges else (robot,):
-            for spell in self.since(tour, since):
-                if self.doer(tour, spell.start) == robot:
-                    yield tour, spell
 
     def failed(self, since: float, time: float) -> list[Failing]:
         """The failures from one time until before another."""
@@ -210,15 +188,11 @@ class OperationProgress:
         self.subject, self.factory = subject, subject.factory
         self.pace = Pace.of(subject.settings)
 
-    def of(
-        self, operation: Operation, x: Array, elapsed: float, robots: tuple[int, ...] = ()
-    ) -> float:
+    def of(self, operation: Operation, x: Array, elapsed: float) -> float:
         """The share of an operation that is done, with robots at `x` [m] so long after its start
-        [s]; `robots`: those that take part in it, where deputies do."""
-        way, robots = self.ways[operation.index], robots or operation.robots
-        usual = self.subject.goals[operation.index]
-        goals = self.subject.others.get((operation.index, robots), usual)
-        left = max(abs(goal - x[r]) for goal, r in zip(goals, robots, strict=True))
+        [s]."""
+        way, goals = self.ways[operation.index], self.subject.goals[operation.index]
+        left = max(abs(goal - x[r]) for goal, r in zip(goals, operation.robots, strict=True))
         gone = 1.0 - min(left / way, 1.0) if way else 1.0
         travel = self.pace.rest(way)
         if not operation.dwell:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from factory.layout.sweeping import APART
 from factory.mjcf import names
-from factory.mjcf.replica import SHOWN, Replica, bodies_of
+from factory.mjcf.replica import Replica
 from factory.rendering.action import Snapshot
 from factory.rendering.history import History
 from factory.rendering.ink import AMBER, DEAD, FLASH, Colour
@@ -98,20 +98,3 @@ class Marks:
             yield Mark((x, y), ROBOT, DEAD if robot in dead else AMBER, 1.0)
         for x, y, radius in self.zones.at(self.replica.d, shown.body2):
             yield Mark((x, y), radius, FLASH, 0.35)
-
-
-class LeftOut:
-    """Hides the removed robots of a history in pictures of a replica's model; rails stay."""
-
-    def __init__(self, replica: Replica, history: History) -> None:
-        self.m, self.history = replica.m, history
-        self.groups, self.now = replica.m.geom_group.copy(), frozenset[int]()
-
-    def at(self, time: float) -> None:
-        """Hide exactly the robots that are gone at a time [s]."""
-        gone = self.history.gone(time)
-        if gone == self.now:
-            return
-        self.now, m, every = gone, self.m, self.history.factory.robots
-        theirs = bodies_of(m, (every[robot].name for robot in gone))[m.geom_bodyid]
-        m.geom_group[:] = np.where(theirs, np.maximum(self.groups, SHOWN), self.groups)

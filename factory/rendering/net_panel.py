@@ -177,8 +177,7 @@ class NetPanel:
             if spell.operation:
                 operation = self.factory.operations[self._operation(row.robot, spell)]
                 age = time - spell.start
-                robots = tuple(self.history.doer(robot, time) for robot in operation.robots)
-                yield operation.index, (self.progress.of(operation, x, age, robots), age)
+                yield operation.index, (self.progress.of(operation, x, age), age)
 
     def _ground(self) -> Pixels:
         rows = self.rows

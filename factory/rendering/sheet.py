@@ -207,11 +207,8 @@ class PanelSheet:
         ink.words(self.size[0] - self.edge, y, detail, self.points - 1, FAINT, "r")
         return ink
 
-    def names(
-        self, ink: Ink, standing: frozenset[int] = frozenset(), gone: frozenset[int] = frozenset()
-    ) -> None:
-        """The robots' names, each with a spot of its paint; those of robots that stand on amber,
-        those of robots that are gone faint."""
+    def names(self, ink: Ink, standing: frozenset[int] = frozenset()) -> None:
+        """The robots' names, each with a spot of its paint; those of robots that stand on amber."""
         for row in self.rows.shown:
             y, colour = self.height(row), robot_colours(self.rows.factory)[row.robot]
             if row.robot in standing:
@@ -222,8 +219,7 @@ class PanelSheet:
             ink.disc(self.edge + radius, y, radius, colour, row.alpha)
             name = self.rows.factory.robots[row.robot].name
             left = self.edge + self.points * 1.1
-            paint = FAINT if row.robot in gone else INK
-            ink.words(left, y, name, self.name_points, paint, "l", row.alpha)
+            ink.words(left, y, name, self.name_points, INK, "l", row.alpha)
 
 
 def robots_shown(rows: Rows) -> str:

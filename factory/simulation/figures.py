@@ -22,7 +22,6 @@ def figures(record: Run, verbose: bool = False) -> Iterator[str]:
         cycle = f"{record.cycle_time_s:.3f} s"
     elif (least := steady_from(record.period)) > STEADY:
         cycle = f"measured from {least} units on (two periods of {record.period})"
-    of_all = " with all robots" if record.exchanges else ""
     each = [f"{count} {product}" for product, count in record.by_product.items()]
     yield (
         f"{record.products} of {record.units} products in {record.sim_time_s:.2f} s "
@@ -30,7 +29,7 @@ def figures(record: Run, verbose: bool = False) -> Iterator[str]:
         + (f": {', '.join(each)}" if len(each) > 1 else "")
     )
     yield (
-        f"cycle time {cycle}, predicted {record.predicted_cycle_time_s:.3f} s{of_all}; "
+        f"cycle time {cycle}, predicted {record.predicted_cycle_time_s:.3f} s; "
         f"bottleneck {record.bottleneck}"
     )
     yield (

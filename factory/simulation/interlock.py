@@ -69,7 +69,7 @@ class PlantInterlock:
         """Apply the changes between the last commands and these: jobs given up, grips opened, jobs
         taken up (carriers first), grips closed. A controller may scan more often."""
         before, self.commands = self.commands, now
-        robots = self.factory.present
+        robots = range(len(self.factory.robots))
         jobs = [robot for robot in robots if now.job[robot] != before.job[robot]]
         grips = [robot for robot in robots if now.grip[robot] != before.grip[robot]]
         self.held_back.difference_update(jobs, grips)

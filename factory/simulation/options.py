@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from factory.support.bounds import WORLDS, WorldName, check_choice, check_values
 from factory.support.errors import Diagnostic, InputError, usage_error
@@ -21,23 +21,18 @@ APART = (
         ("--robots", "--parallel", "[lines]"),
         "a relay cuts the way of one tour, and a robot has several then",
     ),
-    ("--deputies", ("--relay", "--cycle"), "no robot can take over for one that relays"),
     ("[tees]", ("--robots", "--cycle", "--relay"), "they change the robots that share a stem"),
     (
         "--demand",
-        ("--distributed", "--from", "--deputies"),
-        "one supervisor skips what nobody has ordered, from the beginning on, in one net",
+        ("--distributed", "--from"),
+        "one supervisor skips what nobody has ordered, from the beginning on",
     ),
     (
         "--distributed",
-        ("--faults", "--spares", "--deputies"),
+        ("--faults", "--spares"),
         "robots that run their own programs do not recover",
     ),
-    (
-        "--platen",
-        ("--relay", "--cycle", "--deputies"),
-        "what they change has no room on guidepaths that bend",
-    ),
+    ("--platen", ("--relay", "--cycle"), "what they change has no room on guidepaths that bend"),
 )
 """Options that exclude others, with the reason. All other pairs can be combined; of a product,
 --relay goes with none of a mix, and with no plan whose robots have several tours (`Project`)."""
@@ -90,9 +85,9 @@ class RunOptions:
         """Whether the run recovers from failures."""
         return self.faults is not None or self.spares > 0
 
-    def check_with(self, ground: Any) -> None:
-        """Raises InputError (BadValue) where options of the run do not go together, or not with
-        those of a `ground` or of a command that has these. Nothing is laid out for that."""
+    def check_combination(self) -> None:
+        """Raises InputError (BadValue) where options of the run do not go together. Nothing is laid
+        out for that."""
         check_together(
             {
                 "--demand": self.demand is not None,
@@ -100,7 +95,6 @@ class RunOptions:
                 "--distributed": self.distributed,
                 "--faults": self.faults is not None,
                 "--spares": self.spares > 0,
-                "--deputies": ground.deputies,
             }
         )
 
@@ -109,7 +103,7 @@ class RunOptions:
         which is read once. Raises InputError."""
         from factory.simulation.demand_file import demand_of
 
-        self.check_with(project.ground)
+        self.check_combination()
         if self.demand is not None and not Path(self.demand).is_fifo():
             demand_of(self.demand, project.pag, self.units)
 
@@ -120,7 +114,7 @@ class RunOptions:
         from factory.simulation.demand_file import demand_of
         from factory.simulation.request import RunRequest
 
-        self.check_with(project.ground)
+        self.check_combination()
         layout, start, units, demand = project.layout, self.start, self.units, None
         if self.demand is not None:
             demand = demand_of(self.demand, project.pag, units)

@@ -10,7 +10,7 @@ from pathlib import Path
 from factory.nets.undone import Entry, Undone, lasting
 from factory.plant.factory import Factory
 from factory.record.ending import CutOff
-from factory.record.failures import Exchange, Failures
+from factory.record.failures import Failures
 from factory.record.figures import PhysicsFigures
 from factory.record.findings import Report
 from factory.record.state import Event
@@ -45,19 +45,12 @@ def mean_interval(left: Sequence[float], period: int = 1) -> float | None:
     return (tail[-1] - tail[-1 - count]) / count
 
 
-def busy_times(
-    factory: Factory, events: Iterable[Event | Undone], after: Iterable[Factory] = ()
-) -> tuple[float, ...]:
+def busy_times(factory: Factory, events: Iterable[Event | Undone]) -> tuple[float, ...]:
     """Time that each robot spent in completed operations [s]. An operation without a start event
-    was under way at time 0. `after`: the factories that took over when robots were exchanged."""
+    was under way at time 0."""
     numbers = {t.name: number for number, t in enumerate(factory.net.threaded.transitions)}
     begun, spent = dict[int, float](), [0.0] * len(factory.robots)
-    onward = iter(after)
-    for event in events:
-        if isinstance(event, Undone):
-            factory = next(onward) if event.exchanged else factory
-            continue
-        t, transition = event
+    for t, transition in (event for event in events if isinstance(event, Event)):
         operation, is_end = divmod(numbers[transition], 2)
         if not is_end:
             begun[operation] = t
@@ -75,8 +68,8 @@ class Run:
     reports that watched it, if one did. `lenient`: what is wrong with the bodies does not count;
     `strict`: a qualified success is a failure; `period`: how many units come in a cycle of the net;
     `by_product`: how many units of each product were made; `word`: on demand, the products in the
-    order in which they left; `failures`: what went wrong, in a run that goes on then; `exchanges`:
-    the nets that it went on in; `log`: its log."""
+    order in which they left; `failures`: what went wrong, in a run that goes on then; `log`: its
+    log."""
 
     world: str
     units: int
@@ -103,7 +96,6 @@ class Run:
     by_product: Mapping[str, int] = field(default_factory=dict)
     word: tuple[str, ...] = field(default=(), repr=False)
     failures: Failures | None = None
-    exchanges: tuple[Exchange, ...] = ()
     log: Path | None = field(default=None, repr=False, compare=False)
 
     def __repr__(self) -> str:
@@ -232,7 +224,6 @@ class Run:
             "excluded": [list(pair) for pair in physics.excluded] if physics else None,
             **watched,
             **({"failures": self.failures.as_json()} if self.failures else {}),
-            **({"exchanges": [x.as_json() for x in self.exchanges]} if self.exchanges else {}),
             "verdict": self.verdict.as_json(),
             "qualified": [*self.verdict.qualified],
             "events": [event.as_json() for event in self.events],

@@ -277,9 +277,7 @@ class Simulation:
         supervisor, world, factory = self.supervisor, self.world, self.layout.factory
         request, physics, figures = self.request, world.physics_time, self.figures()
         entries = entries_of(supervisor.events)
-        exchanges = tuple(world.hooks.account.exchanges) if world.hooks.account else ()
-        nets = [exchange.net for exchange in exchanges]
-        verdict = replay(factory.net, entries, self.start, factory.joins, nets)
+        verdict = replay(factory.net, entries, self.start, factory.joins)
         return Run(
             request.world,
             request.units,
@@ -294,7 +292,7 @@ class Simulation:
             verdict.refines,
             tuple(supervisor.events),
             tuple(world.dropoffs),
-            busy_times(factory, supervisor.events, [exchange.crew for exchange in exchanges]),
+            busy_times(factory, supervisor.events),
             figures
             and replace(
                 figures,
@@ -307,7 +305,6 @@ class Simulation:
             period=1 if request.demand else factory.period,
             by_product=self.word.counts(self.before, world.delivered()),
             word=tuple(self.word.products(0, world.delivered())) if request.demand else (),
-            exchanges=exchanges,
         )
 
     def _trouble(self, code: str, what: str, hint: str) -> Diagnostic:

@@ -17,7 +17,6 @@ from factory.control.navigation import Bundle
 from factory.modes.staging import HeadStart
 from factory.nets.petri import Marking
 from factory.nets.threaded import Threads
-from factory.nets.undo import marking_after
 from factory.nets.undone import Undone
 from factory.plant.demand import Word
 from factory.plant.factory import Factory, Operation
@@ -136,28 +135,6 @@ class Supervisor:
         self.enabled = True
         self._activate([n for n in active.operations if self.marked[n]], active.ahead)
         self.recall(free)
-
-    def exchange(
-        self,
-        factory: Factory,
-        modes: Sequence[Mode],
-        stages: Sequence[HeadStart],
-        undone: Undone,
-        fired: Sequence[int],
-        ordering: Ordering,
-    ) -> None:
-        """Continue in another factory with the same operations, robots by number and axes, from
-        firing counts `fired`. Operations under way go on; waiting robots start their stages
-        again."""
-        axes_of = [*factory.axes, *((stage.axis,) for stage in stages)]
-        self.factory, self.ordering = factory, ordering
-        self.bundles = Bundles([*modes, *(stage.mode for stage in stages)], axes_of, self.limits)
-        self._activate(self.active.operations, ())
-        self.ahead, marking = Ahead(factory, stages), marking_after(factory.net, fired)
-        self.undo(undone, fired, marking, ())
-        self._activate(
-            self.active.operations, self.ahead.waiting(self.marked, self.world.sense()[0])
-        )
 
     def _mark(self, marking: Marking) -> None:
         net, starts = self.factory.net, [operation.start for operation in self.factory.operations]

@@ -32,8 +32,8 @@ class Checked:
     each part inside at once; `matings`: how inputs come together, None if no part has its own
     shape; `product`: None if every part is a default box; `no_grips`: what no hand can hold, None
     for a net from PNML; `factory` and the `least` number of robots for its product, None for a
-    net from PNML; the `deputies` of each robot, and the `coordinated` net with hands, magazines and
-    the tray, None if not requested; the number of robots for each product of a mix `alone`."""
+    net from PNML; the `coordinated` net with hands, magazines and the tray, None if not requested;
+    the number of robots for each product of a mix `alone`."""
 
     name: str
     net: GearNet | MarkedNet
@@ -46,7 +46,6 @@ class Checked:
     no_grips: tuple[NoGrip, ...] | None = None
     factory: Factory | None = None
     least: Least | None = None
-    deputies: tuple[tuple[int, ...], ...] | None = None
     coordinated: CoordinatedNet | None = None
     alone: tuple[int, ...] = ()
 
@@ -105,7 +104,6 @@ class Checked:
             **({"least_robots": self.least.total} if self.least else self._mix(factory)),
             "lines": [{"robot": n, "labels": list(x)} for n, x in lines if len(x) > 1],
             "order": [factory.operations[number].label for number in factory.order],
-            **self._deputies(factory),
         }
 
     def _mix(self, factory: Factory) -> dict[str, Any]:
@@ -126,14 +124,6 @@ class Checked:
             "common": [label for label in pag.by_label if label in common],
         }
 
-    def _deputies(self, factory: Factory) -> dict[str, Any]:
-        """The robots that could take over for each, none for a robot that needs a spare."""
-        if self.deputies is None:
-            return {}
-        names = [robot.name for robot in factory.robots]
-        rows = zip(names, self.deputies, strict=True)
-        return {"deputies": {name: [names[deputy] for deputy in row] for name, row in rows}}
-
 
 def _gear_json(gear: Gear, places: Sequence[Place]) -> dict[str, Any]:
     """One robot's gear as `check --json` lists it."""
@@ -147,12 +137,9 @@ def _gear_json(gear: Gear, places: Sequence[Place]) -> dict[str, Any]:
     }
 
 
-def check_project(
-    project: Project, wip: int | None = None, deputies: bool = False, laid_out: bool = False
-) -> Checked:
-    """Check a PAG, with at most `wip` units inside at once, and find `deputies`, for which matings
-    of boxes are needed too; if the project is laid out for deputies, only those of the layout.
-    `laid_out`: include the coordinated net, which needs a layout. Raises InputError."""
+def check_project(project: Project, wip: int | None = None, laid_out: bool = False) -> Checked:
+    """Check a PAG, with at most `wip` units inside at once. `laid_out`: include the coordinated
+    net, which needs a layout. Raises InputError."""
     factory = project.factory
     sources = {r.name: r.position for r in factory.robots if r.position}
     verdict = verify(factory.net, sources)
@@ -168,7 +155,6 @@ def check_project(
         project.no_grips,
         factory,
         None if project.pag.mix else least_robots(project.pag, project.templates),
-        _deputies(project, factory) if deputies else None,
         _coordinated(project) if laid_out else None,
         tuple(len(one.compiled.robots) for one in project.each),
     )
@@ -178,18 +164,6 @@ def _coordinated(project: Project) -> CoordinatedNet:
     from factory.layout.exclusions import coordinated
 
     return coordinated(project.layout)
-
-
-def _deputies(project: Project, factory: Factory) -> tuple[tuple[int, ...], ...]:
-    from factory.compiler.deputies import deputies
-    from factory.compiler.mating.mating import judged
-
-    if project.ground.deputies:
-        from factory.layout.standby import deputies_in
-
-        chosen = deputies_in(project.layout)
-        return tuple((chosen[r],) if r in chosen else () for r in range(len(factory.robots)))
-    return deputies(judged(factory, project.product), project.catalogue)
 
 
 def check_net(file: Path) -> Checked:

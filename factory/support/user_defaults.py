@@ -27,7 +27,6 @@ OPTIONS: Mapping[str, object] = {
     "floor": "4x3",
     "robots": 12,
     "cycle": 4.0,
-    "deputies": True,
     "platen": True,
     "tile": 0.24,
     "templates": ["mine"],

@@ -66,7 +66,7 @@ def cell(layout: Layout, settings: Settings, name: str, scan: int = SCAN) -> iec
         coordinated(layout).orders,
         stations(factory),
     )
-    units = [blocks.block(robot) for robot in factory.present]
+    units = [blocks.block(robot.index) for robot in factory.robots]
     return iec.Declarations(
         f"{name}: the programs of {len(units)} robots",
         tuple(_operations(factory)),
@@ -151,7 +151,7 @@ def _program(layout: Layout) -> iec.OrganizationUnit:
         iec.Variable("Job", "JOB_LIST", "operation that a robot is in, 0 for none"),
         iec.Variable("Carries", "JOB_LIST", "operation that made what a robot brings"),
     )
-    robots = [factory.robots[robot] for robot in factory.present]
+    robots = factory.robots
     inside = (
         iec.Variable("Cells", "CELL_LIST"),
         iec.Variable("Axes", "AXIS_LIST"),

@@ -24,7 +24,7 @@ def homes(layout: Layout) -> dict[int, float]:
     operations, ways = layout.factory.operations, dict[int, float]()
     for robot in layout.factory.robots:
         hand = layout.hand(robot.index)
-        if hand is None or not hand.first or not robot.operations:
+        if hand is None or not hand.first:
             continue
         if not (operations[robot.operations[0]].inputs and hand.tall):
             ways[robot.index] = layout.guidepaths[robot.index].length

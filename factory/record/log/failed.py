@@ -77,18 +77,16 @@ Placed = tuple[int, Undone]
 
 def undone_in(ticks: Sequence[Arrays], header: Mapping[str, Any]) -> tuple[Placed, ...]:
     """The undos in the blocks of a log. Raises ValueError for an entry that is not one, that names
-    an unknown transition or robot, or that is out of order."""
+    an unknown transition, or that is out of order."""
     tables = [json.loads(arrays["undone"].tobytes()) for arrays in ticks if "undone" in arrays]
     kind: Any = tuple[Placed, ...]
     entries = tuple(entry for table in tables for entry in value_of(kind, table, "undone"))
     fired = sum(len(arrays["fired"]) for arrays in ticks)
-    transitions, robots, last = {*header["transitions"]}, {*header["robots"]}, 0
+    transitions, last = {*header["transitions"]}, 0
     for after, undone in entries:
         unknown = {*undone.asked, *undone.transitions} - transitions
         if unknown:
             raise ValueError(f"'{min(unknown)}' is undone, which is no transition")
-        if strange := {*undone.robots} - robots:
-            raise ValueError(f"'{min(strange)}' is exchanged, which is no robot")
         if not last <= after <= fired:
             raise ValueError(f"something is undone after {after} firings, not {last} to {fired}")
         if undone.t < 0:

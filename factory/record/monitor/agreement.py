@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 
-from factory.compiler.taking_over import nets_after
 from factory.nets.petri import PetriNet
-from factory.nets.undo import tokens_after
 from factory.nets.undone import Entry, Undone
 from factory.record.findings import Firing, Violation
 from factory.record.monitor.subject import MonitorSubject
@@ -55,22 +53,16 @@ def contradictions(
     markings: Iterable[tuple[float, Sequence[int]]],
 ) -> Iterator[Violation]:
     """The first marking in a log that does not follow from its entries, firings and undos. Each
-    marking has the time [s] of its tick, and includes the undos after that tick. An exchange of
-    robots changes the net."""
+    marking has the time [s] of its tick, and includes the undos after that tick."""
     left, gears = deque(entries), subject.factory.net
-    nets = nets_after(subject.factory, [entry for _, entry in left])
     tokens = [int(place in subject.start) for place in range(len(gears.threaded.places))]
-    fired = [subject.counts.get(event, 0) for event in range(len(gears.threaded.transitions))]
     for time, marking in markings:
         while left:
             t, entry = left[0]
             if t >= time + (ROUNDING if isinstance(entry, Undone) else -ROUNDING):
                 break
             left.popleft()
-            _play(gears.threaded.net, tokens, fired, entry)
-            if isinstance(entry, Undone) and entry.exchanged:
-                gears = next(nets)
-                tokens = [*tokens_after(gears, fired)]
+            _play(gears.threaded.net, tokens, entry)
         marked = {place for place, count in enumerate(tokens) if count}
         if marked != set(marking):
             places = sorted(marked.symmetric_difference(marking))
@@ -80,12 +72,11 @@ def contradictions(
             return
 
 
-def _play(net: PetriNet, tokens: list[int], fired: list[int], entry: Entry) -> None:
-    """Fire a transition, or the transitions of an undo backwards, and count it."""
+def _play(net: PetriNet, tokens: list[int], entry: Entry) -> None:
+    """Fire a transition, or the transitions of an undo backwards."""
     names, sign = (entry.transitions, -1) if isinstance(entry, Undone) else ((entry,), 1)
     for name in names:
         event = net.transition_index[name]
-        fired[event] += sign
         for place in net.preset[event]:
             tokens[place] -= sign
         for place in net.postset[event]:

@@ -18,7 +18,7 @@ Bent = tuple[tuple[int, ...], Ways]
 """The robots (index) whose guidepaths have bends, and the ways that these are."""
 
 Holder = tuple[int, int]
-"""Kind and, for a grip, the robot's index; -1 for others, and for a robot that is gone."""
+"""Kind and, for a grip, the robot's index; -1 for others."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -133,14 +133,12 @@ class Anatomy:
 
 def _holder(words: list[str], robots: dict[str, int]) -> Holder | None:
     kind = KINDS.get(words[0])
-    if kind is None:
-        return None
-    return (kind, robots.get(words[1], -1)) if kind == GRIP else (kind, -1)
+    if kind != GRIP:
+        return None if kind is None else (kind, -1)
+    return (kind, robots[words[1]]) if words[1] in robots else None
 
 
 def _part(words: list[str]) -> str:
-    """The label in a weld's name: `grip/r3/part1`, `park/part1#2`, `feed/part1@r3`."""
+    """The label in a weld's name: `grip/r3/part1`, `park/part1#2`, `feed/part1`."""
     label = words[-1] if words[0] == "grip" else "/".join(words[1:])
-    if words[0] == "feed":
-        return names.shown(label)
     return label.rpartition("#")[0] if words[0] == "park" else label

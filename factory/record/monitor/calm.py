@@ -16,10 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from factory.compiler.taking_over import crews_after
 from factory.mjcf import names
 from factory.nets.petri import Marking
-from factory.nets.undone import exchanges
 from factory.plant.factory import Factory
 from factory.record.findings import Firing, Report
 from factory.record.log.reader import Log
@@ -39,40 +37,18 @@ earlier."""
 Span = tuple[float, float]
 
 
-class Crews:
-    """The subjects of a run, one from each exchange of robots on, and their factories with all
-    robots."""
-
-    def __init__(self, log: Log, subject: MonitorSubject) -> None:
-        undos = [undo for _, undo in log.undone]
-        crews = [*crews_after(subject.factory, undos)]
-        self._since = [undo.t for undo in exchanges(undos)]
-        self._subjects = [subject, *map(subject.after, crews)]
-        self._factories = [subject.factory, *crews]
-
-    def subject(self, t: float) -> MonitorSubject:
-        """The subject at a time [s]."""
-        return self._subjects[bisect_left(self._since, t + ROUNDING)]
-
-    def factory(self, t: float) -> Factory:
-        """The factory at a time [s], with all robots."""
-        return self._factories[bisect_left(self._since, t + ROUNDING)]
-
-
 Seen = Callable[[int, int], Iterator[Observation]]
 """The observations from one row of a log up to another."""
 
 
 def judge_calm(log: Log, subject: MonitorSubject, m: Any, seen: Seen) -> Report:
     """The combined verdict of monitors on the spells of a run, from its observations."""
-    rows, times = [], log.time
-    crews, units = Crews(log, subject), _Units(log, subject)
-    for begin, end in spells(log, crews, m):
+    rows, times, units = [], log.time, _Units(log, subject)
+    for begin, end in spells(log, subject.factory, m):
         first, last = (int(np.searchsorted(times, t - ROUNDING)) for t in (begin, end))
         if last - first > 1 and times[last - 1] - times[first] >= SHORT:
             rows.append((first, last))
-    at = ((span, crews.subject(float(times[span[0]]))) for span in rows)
-    reports = [_judged(log, subject, m, seen, units, span) for span, subject in at]
+    reports = [_judged(log, subject, m, seen, units, span) for span in rows]
     return Report(
         tuple(firing for report in reports for firing in report.seen),
         tuple(firing for report in reports for firing in report.inferred),
@@ -129,9 +105,9 @@ class _Units:
         return self._begun[at] - subject.counts.get(0, 0)
 
 
-def spells(log: Log, crews: Crews, m: Any) -> Iterator[Span]:
+def spells(log: Log, factory: Factory, m: Any) -> Iterator[Span]:
     """The intervals without failure or recovery [s], in order."""
-    troubles, now = sorted(_troubles(log, crews, m)), 0.0
+    troubles, now = sorted(_troubles(log, factory, m)), 0.0
     for begin, end in troubles:
         if begin > now:
             yield now, begin
@@ -140,29 +116,27 @@ def spells(log: Log, crews: Crews, m: Any) -> Iterator[Span]:
         yield now, float(log.time[-1]) + ROUNDING
 
 
-def _troubles(log: Log, crews: Crews, m: Any) -> Iterator[Span]:
+def _troubles(log: Log, factory: Factory, m: Any) -> Iterator[Span]:
     """The intervals of failures and recoveries [s]."""
-    end, factory = float(log.time[-1]), crews.factory(0.0)
+    end = float(log.time[-1])
     by_robot = {robot.name: robot.index for robot in factory.robots}
     number = factory.net.threaded.net.transition_index
     for _, undone in log.undone:
-        operations = crews.factory(undone.t).operations
-        back = {operations[number[name] // 2] for name in undone.transitions}
+        back = {factory.operations[number[name] // 2] for name in undone.transitions}
         robots = {robot for operation in back for robot in operation.robots}
-        robots |= {by_robot[name] for name in undone.robots}
-        yield _since(log, undone.t, undone.operation), _gone_on(log, crews, robots, undone.t, end)
+        yield _since(log, undone.t, undone.operation), _gone_on(log, factory, robots, undone.t, end)
     failures = log.failures
     for failing in failures.found if failures else ():
         t = failing.t
-        robots = {*crews.factory(t).by_label[failing.operation].robots}
+        robots = {*factory.by_label[failing.operation].robots}
         robots |= {by_robot[failing.robot]} if failing.robot else set()
-        until = _gone_on(log, crews, robots, t, end)
+        until = _gone_on(log, factory, robots, t, end)
         yield _since(log, t, failing.operation), max(until, min(failing.until or 0.0, end))
     stood = failures.stood if failures else ()
     for place, (t, names_) in enumerate(stood):
         if names_:
             until = stood[place + 1][0] if place + 1 < len(stood) else end
-            yield t - FELT, _gone_on(log, crews, {by_robot[r] for r in names_}, until, end)
+            yield t - FELT, _gone_on(log, factory, {by_robot[r] for r in names_}, until, end)
     yield from _lying(log, m)
 
 
@@ -176,13 +150,11 @@ def _since(log: Log, t: float, label: str) -> float:
     )
 
 
-def _gone_on(log: Log, crews: Crews, robots: set[int], t: float, end: float) -> float:
-    """Time at which each of the robots has fired again after t [s], or is gone."""
-    number, left = crews.factory(t).net.threaded.net.transition_index, set(robots)
+def _gone_on(log: Log, factory: Factory, robots: set[int], t: float, end: float) -> float:
+    """Time at which each of the robots has fired again after t [s]."""
+    number, left = factory.net.threaded.net.transition_index, set(robots)
     for when, name in islice(log.events, int(np.searchsorted(log.fired_t, t, "right")), None):
-        factory = crews.factory(when)
         left -= {*factory.operations[number[name] // 2].robots}
-        left = {robot for robot in left if factory.robots[robot].operations}
         if not left:
             return when + FELT
     return end + FELT

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import radians
 
@@ -174,17 +174,14 @@ def misplaced(
 ) -> list[int]:
     """The welds (by number) that turn a part, or hold it out of its place in the product relative
     to the other parts of the same holder, for a robot on the same tour. A part alone is turned by
-    the angle at which it is presented, but where a fixed robot delivers it. Welds that a robot uses
-    only as a deputy are left out."""
-    factory = subject.factory
+    the angle at which it is presented, but where a fixed robot delivers it."""
+    factory, inside = subject.factory, subject.factory.contents
     first: dict[tuple[int, ...], tuple[Array, Array]] = {}
-    inside, robots = factory.contents, range(len(factory.robots))
-    brought = [{part for x in factory.deliveries(r) for part in inside[x]} for r in robots]
     wanted = np.tile(UPRIGHT, (len(anatomy.holder), 1))
     slides = np.zeros((len(anatomy.holder), 2))
     for weld, holder in enumerate(anatomy.holder):
         part = anatomy.part[weld]
-        if holder is None or holder[0] != GRIP or not _brings(brought, holder[1], inside[part]):
+        if holder is None or holder[0] != GRIP:
             continue
         if factory.robots[holder[1]].fixed:
             slides[weld, 0] = subject.gear_goals[holder[1]][-1]
@@ -195,16 +192,9 @@ def misplaced(
     for weld, holder in enumerate(anatomy.holder):
         if holder is None or holder[0] not in (GRIP, HOLD):
             continue
-        if holder[0] == GRIP and not _brings(brought, holder[1], inside[anatomy.part[weld]]):
-            continue
         base, place = anatomy.frames.base[weld], places[anatomy.part[weld]]
         tour = factory.tour_with(holder[1], anatomy.part[weld]) if holder[0] == GRIP else 0
         anchor, middle = first.setdefault((*holder, tour), (base, place))
         if not straight[weld] or np.abs((base - anchor) - (place - middle)).max() > tolerance:
             wrong.append(weld)
     return wrong
-
-
-def _brings(brought: Sequence[set[str]], robot: int, parts: Iterable[str]) -> bool:
-    """Whether a robot, -1 for one that is gone, ever brings parts."""
-    return robot >= 0 and brought[robot].issuperset(parts)

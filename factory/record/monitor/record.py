@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from factory.compiler.taking_over import nets_after
 from factory.mjcf.weld_frames import SLIDE
 from factory.nets.replay import replay
 from factory.plant.demand import Demand, Word
@@ -99,8 +98,7 @@ def verdict_on(
     """The verdict on a recorded run of a factory, from its log, the report of a monitor on it where
     there is one, and the faults of its model."""
     cut, start = log.cut_off, frozenset(log.header["start"])
-    after = [*nets_after(factory, log.entries)]
-    refines = replay(factory.net, log.entries, start, factory.joins, after).refines
+    refines = replay(factory.net, log.entries, start, factory.joins).refines
     trouble = None if cut is None else cut.failure
     counted = report.figures if report else None
     figures = log.figures if counted is None else worst(log.figures, counted)

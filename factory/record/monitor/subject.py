@@ -8,7 +8,6 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
-from factory.compiler.taking_over import without_gone
 from factory.layout.exclusions import goes_early
 from factory.layout.layout import Layout
 from factory.layout.way import Bend, Ways
@@ -27,9 +26,6 @@ PATIENCE = 4.0
 Bent = tuple[tuple[Bend, ...], float]
 """The bends of a guidepath, and their rounding [m]."""
 
-Manned = tuple[int, tuple[int, ...]]
-"""An operation and the robots that take part in it (indices)."""
-
 
 @dataclass(frozen=True)
 class MonitorSubject:
@@ -40,9 +36,8 @@ class MonitorSubject:
     frame of the product [m]; `start`: the marking in which the run begins; `wip`: the bound on
     units inside; `patience` [s]: time without an event until a run counts as stalled; `early`:
     (operation, robot) where a robot goes ahead regardless of the settings, so that its hand is out
-    of the way; `others`: the goals of operations (index) with other robots after a takeover;
-    `bends`: those of guidepaths, and their rounding [m], by robot (index); `word`: which units are
-    made, None for all.
+    of the way; `bends`: those of guidepaths, and their rounding [m], by robot (index); `word`:
+    which units are made, None for all.
     """
 
     factory: Factory
@@ -54,24 +49,12 @@ class MonitorSubject:
     patience: float
     wip: int | None = None
     early: frozenset[tuple[int, int]] = frozenset()
-    others: Mapping[Manned, tuple[float, ...]] = field(default_factory=dict, repr=False)
     bends: Mapping[int, Bent] = field(default_factory=dict, repr=False)
     word: Word | None = None
 
     def __post_init__(self) -> None:
-        for name in ("places", "others", "bends"):
+        for name in ("places", "bends"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
-
-    def after(self, crew: Factory) -> MonitorSubject:
-        """The subject after an exchange of robots: `crew` is the new factory, with the numbers of
-        robots of this one."""
-        number = {robot: n for n, robot in enumerate(crew.present)}
-        before = zip(crew.operations, self.goals, strict=True)
-        goals = tuple(self.others.get((o.index, o.robots), goals) for o, goals in before)
-        early = frozenset((o, number[robot]) for o, robot in self.early if robot in number)
-        bends = {number[robot]: bent for robot, bent in self.bends.items() if robot in number}
-        gone = without_gone(crew)
-        return replace(self, factory=gone, goals=goals, early=early, others={}, bends=bends)
 
     @cached_property
     def bent(self) -> tuple[tuple[int, ...], Ways]:
@@ -162,19 +145,17 @@ class MonitorTable:
     places: Mapping[str, tuple[float, float, float]]
     patience: float
     early: tuple[tuple[int, int], ...]
-    others: tuple[tuple[int, tuple[int, ...], tuple[float, ...]], ...] = ()
     bends: tuple[tuple[int, float, tuple[tuple[float, float], ...]], ...] = ()
 
     @classmethod
     def of(cls, subject: MonitorSubject) -> MonitorTable:
         """The fields of a subject."""
         same = subject.goals, subject.radii, subject.places, subject.patience
-        others = tuple((*manned, goals) for manned, goals in subject.others.items())
         bends = tuple(
             (robot, rounding, tuple((bend.at, bend.across) for bend in row))
             for robot, (row, rounding) in subject.bends.items()
         )
-        return cls(*same, tuple(sorted(subject.early)), others, bends)
+        return cls(*same, tuple(sorted(subject.early)), bends)
 
     def subject(
         self, factory: Factory, settings: Settings, start: Marking, wip: int | None
@@ -184,9 +165,8 @@ class MonitorTable:
         if [*map(len, self.goals)] != slots or len(self.radii) != len(slots):
             raise ValueError("its goals are not those of its PAG")
         same = factory, self.goals, self.radii, self.places, settings, start, self.patience, wip
-        others = {(number, robots): goals for number, robots, goals in self.others}
         bends = {r: (tuple(Bend(*bend) for bend in row), far) for r, far, row in self.bends}
-        return MonitorSubject(*same, frozenset(self.early), others, bends)
+        return MonitorSubject(*same, frozenset(self.early), bends)
 
 
 def subject_of(
@@ -221,20 +201,7 @@ def subject_of(
     if bent:
         bends = {robot: (path.bends, path.rounding) for robot, path in bent.items()}
         subject = replace(subject, bends=bends)
-    return subject if layout.whole is layout else _with_others(subject, layout.whole)
-
-
-def _with_others(subject: MonitorSubject, whole: Layout) -> MonitorSubject:
-    """A subject that knows of deputies: of all that their robots may do."""
-    number = {o.label: o.index for o in subject.factory.operations}
-    present = {(o.index, o.robots) for o in subject.factory.operations}
-    every, others = whole.factory.operations, dict[Manned, tuple[float, ...]]()
-    for o in every:
-        if (key := (number[o.written], o.robots)) not in present:
-            goals = (whole.visits[o.index, robot].at for robot in o.robots)
-            others.setdefault(key, tuple(goals))
-    early = {(number[every[o].written], robot) for o, robot in goes_early(whole)}
-    return replace(subject, others=others, early=subject.early | early)
+    return subject
 
 
 def subject_of_run(simulation: Recordable) -> MonitorSubject:

@@ -14,33 +14,30 @@ from factory.rendering.marks import Zone, Zones
 from factory.simulation.recovery import Recovery
 
 Message = tuple[str, str]
-"""A mark of the page, `dead`, `closed`, `standing`, `gone`, `dark` or `empty`, and its text."""
+"""A mark of the page, `dead`, `closed`, `standing`, `dark` or `empty`, and its text."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outages:
     """Robots, by name: those detected as `dead`, each with its remaining outage [s], inf where
-    nothing replaces it, and the deputy that then does its tours, "" for a spare; `closed`, which
-    must not move while a fallen part lies nearby, for `lying` [s] more; `standing` for another
-    reason; `gone`, removed for good, each with its deputy and the time of the takeover [s].
-    `zones`: around fallen parts, closed to robots. `dark`: remaining time without sensors [s];
-    `empty`: feeders without parts, by label, each with the remaining time [s]."""
+    nothing replaces it; `closed`, which must not move while a fallen part lies nearby, for `lying`
+    [s] more; `standing` for another reason. `zones`: around fallen parts, closed to robots. `dark`:
+    remaining time without sensors [s]; `empty`: feeders without parts, by label, each with the
+    remaining time [s]."""
 
-    dead: Mapping[str, tuple[float, str]] = field(default_factory=dict)
+    dead: Mapping[str, float] = field(default_factory=dict)
     closed: tuple[str, ...] = ()
     lying: float = 0.0
     standing: tuple[str, ...] = ()
-    gone: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     zones: tuple[Zone, ...] = ()
     dark: float = 0.0
     empty: Mapping[str, float] = field(default_factory=dict)
 
     def messages(self) -> Iterator[Message]:
         """One for each outage."""
-        for robot, (left, deputy) in self.dead.items():
-            then = f"{deputy} does its tours" if deputy else "a spare replaces it"
-            when = f"{then} {_in(left)}" if isfinite(left) else "nothing replaces it"
-            yield "dead", f"{robot} is dead: {when}"
+        for robot, left in self.dead.items():
+            then = f"a spare replaces it {_in(left)}" if isfinite(left) else "nothing replaces it"
+            yield "dead", f"{robot} is dead: {then}"
         if self.closed:
             stand = f"{listing(self.closed)} stand{_s(self.closed)} still"
             yield "closed", f"{stand}: a fallen part nearby is cleared away {_in(self.lying)}"
@@ -52,8 +49,6 @@ class Outages:
             yield "dark", f"all sensors are off: they return {_in(self.dark)}"
         for label, left in self.empty.items():
             yield "empty", f"the feeder of {label} is empty: it is refilled {_in(left)}"
-        for robot, (deputy, _) in self.gone.items():
-            yield "gone", f"{robot} is gone: {deputy} does its tours"
 
     def as_json(self) -> dict[str, object]:
         """The key `outages` of a frame for the page."""
@@ -61,7 +56,6 @@ class Outages:
             "dead": [*self.dead],
             "closed": self.closed,
             "standing": self.standing,
-            "gone": [[robot, round(t, 4), deputy] for robot, (deputy, t) in self.gone.items()],
             "zones": [[round(v, 4) for v in zone] for zone in self.zones],
             "told": [*self.messages()],
         }
@@ -78,22 +72,17 @@ class Watch:
         """The present outages."""
         recovery, world = self._recovery, self._world
         dead, closed, lying = recovery.responding.dead, recovery.plant.closed, recovery.plant.lying
-        deputies, time = recovery.responding.deputising.by_robot, world.time
-        striking = recovery.striking
+        striking, time = recovery.striking, world.time
         names = [robot.name for robot in recovery.simulation.layout.factory.robots]
         kept = tuple(names[robot] for robot in sorted(closed - dead.keys()))
         held = world.m.eq_obj2id[np.flatnonzero(world.d.eq_active)]
         stood = recovery.stood[-1][1] if recovery.stood else ()
-        by_name = {
-            names[robot]: (until - time, names[deputies[robot]] if robot in deputies else "")
-            for robot, until in sorted(dead.items())
-        }
+        by_name = {names[robot]: until - time for robot, until in sorted(dead.items())}
         return Outages(
             by_name,
             kept,
             max(lying, default=time) - time,
             tuple(name for name in stood if name not in by_name and name not in kept),
-            {one.dead: (one.deputy, one.t) for one in recovery.exchanges},
             tuple(self._zones.at(world.d, held)) if lying else (),
             max(striking.dark - time, 0.0),
             {label: until - time for label, until in striking.empty.items()},

@@ -12,7 +12,6 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.nets.undo import marking_after
 from factory.nets.undone import Undone
 from factory.record.failures import Failing
 from factory.record.state import Observer
@@ -21,7 +20,6 @@ from factory.show.live.outages import Outages, Watch
 from factory.simulation.disturbance.interventions import Interventions
 from factory.simulation.recovery import Campaign
 from factory.simulation.simulation import FALL, Simulation
-from factory.simulation.supervisor import Supervisor
 
 RATE = 30.0
 """Frames a second."""
@@ -288,14 +286,9 @@ class Session:
             self._changed.notify_all()
 
     def _marked(self) -> tuple[int, ...]:
-        """The marked places of the net that the page draws, that of the start of the run. A deputy
-        does the tours of a removed robot in their order, so the counts of firings lead to a marking
-        of this net, with a token for the tours of either robot."""
-        supervisor, account = self.simulation.supervisor, self.simulation.world.hooks.account
-        if not (account and account.exchanges and isinstance(supervisor, Supervisor)):
-            return tuple(np.flatnonzero(np.frombuffer(supervisor.marked, np.uint8)).tolist())
-        net = self.simulation.layout.factory.net
-        return tuple(sorted(marking_after(net, supervisor.fired)))
+        """The marked places of the net."""
+        marked = np.frombuffer(self.simulation.supervisor.marked, np.uint8)
+        return tuple(np.flatnonzero(marked).tolist())
 
     def _failed(self) -> str:
         """The failures of the last SHOWN seconds, the latest last."""

@@ -13,7 +13,7 @@ from factory.show.report.recording import Recording
 
 LEGEND = (
     "Robots over time: undone operations are hatched; in a band a robot stands still, in a dark one"
-    " it is dead, until a spare replaces it, or another robot does its tours."
+    " it is dead, until a spare replaces it."
 )
 
 COLUMNS = ("Time", "Failure", "Response", "Undone", "Scrapped")
@@ -37,23 +37,18 @@ def failures_section(recording: Recording) -> str:
 
 def failures_data(recording: Recording) -> dict[str, Any]:
     """The data of the page: `undone`: number of firings before, time [s] and transitions; `dead`:
-    robot, start and end [s], null where nothing replaced it, and the situation after it; `gone`:
-    robot removed for good, time [s] and deputy; `stood`: times [s] and the robots that stood still
-    from then on."""
+    robot, start and end [s], null where nothing replaced it, and the situation after it; `stood`:
+    times [s] and the robots that stood still from then on."""
     log, net = recording.log, recording.factory.net.threaded.net.transition_index
     if log.failures is None:
         return {}
     robots = {robot.name: robot.index for robot in recording.factory.robots}
-    entries = [undone for _, undone in log.undone]
     return {
         "undone": [
             [after, round(undone.t, 4), [net[name] for name in undone.transitions]]
             for after, undone in log.undone
         ],
-        "dead": [_dead(robots[one.robot], one) for one in deaths(log.failures.found, entries)],
-        "gone": [
-            [robots[e.robots[0]], round(e.t, 4), robots[e.robots[1]]] for e in entries if e.robots
-        ],
+        "dead": [_dead(robots[one.robot], one) for one in deaths(log.failures.found)],
         "stood": [
             [round(t, 4), [robots[name] for name in names]] for t, names in log.failures.stood
         ],

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.compiler.taking_over import crews_after
 from factory.mjcf import names
 from factory.nets.undone import Undone
 from factory.plant.approaches import Pair
@@ -80,7 +79,7 @@ def measured(recording: Recording) -> MeasuredPace:
     dropoffs = dropoff_times(log.time, log.delivered)
     gears = [sum(durations[o] or 0.0 for o in robot.operations) for robot in factory.robots]
     events = (e if isinstance(e, Undone) else Event(t, e) for t, e in log.timed_entries)
-    busy, total = busy_times(factory, events, crews_after(factory, log.entries)), recording.end
+    busy, total = busy_times(factory, events), recording.end
     return MeasuredPace(
         dropoffs,
         mean_interval(dropoffs, factory.period),

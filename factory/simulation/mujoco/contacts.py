@@ -116,15 +116,6 @@ class ContactMasks:
         self._mask("geom", self.solid[body], masks)
         self._arrays["geom_solref"][self.solid[body], 0] = softness
 
-    def remove(self, bodies: Sequence[int]) -> None:
-        """Let bodies that are not parts collide with nothing."""
-        m = self._arrays.m
-        for body in bodies:
-            geoms = m.body_geomadr[body] + np.arange(m.body_geomnum[body])
-            self._masks[:, body] = 0
-            self._mask("body", np.array([body]), np.zeros(2))
-            self._mask("geom", geoms, np.zeros(2))
-
     def _mask(self, kind: str, at: Index, masks: NDArray[Any]) -> None:
         """Write the contypes and conaffinities (2,) or (2, n) of bodies or geoms."""
         for name, mask in zip(("contype", "conaffinity"), masks, strict=True):

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from factory.control.mode import Index
 from factory.layout.exclusions import coordinated
-from factory.layout.feeding import Outlet, outlets_of
-from factory.layout.layout import Layout
+from factory.layout.feeding import Outlet, lines_of, outlets_of
 from factory.mjcf.masks import feeder_codes
 from factory.mjcf.model import Model
 from factory.mjcf.parts import presented_at
@@ -68,19 +68,13 @@ class Feeders:
             waits: [operations[number].label for number in numbers]
             for waits, numbers in coordinated(model.layout).rising.items()
         }
-        self._serve(model.layout)
-
-    def _serve(self, layout: Layout) -> None:
-        """Let robots take parts as in a layout."""
-        by_label = layout.factory.by_label
-        self._number = {
-            station.label: n
-            for n, station in enumerate(self._stations)
-            if by_label[station.label].carrier == station.robot
-        }
-        robots = range(len(layout.factory.robots))
-        lines = ([self._number[label] for label in layout.magazine(robot)] for robot in robots)
+        lines = ([self._number[outlet.label] for outlet in line] for line in lines_of(model.layout))
         self._lines = {self._stations[line[0]].code: line for line in lines if line}
+
+    @cached_property
+    def _number(self) -> dict[str, int]:
+        """The number of the feeder of each label."""
+        return {station.label: n for n, station in enumerate(self._stations)}
 
     def _turn(self, line: Sequence[int], rounds: Mapping[str, int]) -> int:
         """Whose turn it is in a line after given rounds of each label: the first that is behind."""
@@ -226,20 +220,6 @@ class Feeders:
             if is_shown and number not in turns:
                 self.take_back(label, scrap + number)
 
-    def exchange(self, robot: int, layout: Layout) -> None:
-        """A robot (index) is removed, and the others take parts as in a layout. Parts presented
-        `elsewhere` have been withdrawn."""
-        self._passing.gone(robot)
-        self.lacking.clear()
-        self._spent.clear()
-        self._serve(layout)
-
-    def elsewhere(self, layout: Layout) -> list[str]:
-        """Labels of presented parts that no robot takes there in a layout."""
-        by_label = layout.factory.by_label
-        robots = ((x, self._stations[self._number[x]].robot) for x in self.shown())
-        return [label for label, robot in robots if by_label[label].carrier != robot]
-
     def in_the_way(self) -> set[int]:
         """Robots (index) that stand under a late part that they wait for."""
         vacant = self._vacant()
@@ -304,6 +284,6 @@ class Feeders:
 
 
 def _station(outlet: Outlet, code: int) -> Station:
-    x, y, z = presented_at(outlet.layout, outlet.leaf.label)
+    x, y, z = presented_at(outlet.layout, outlet.label)
     up = x, y, z + outlet.feeder.stroke
     return Station(outlet.label, outlet.robot, code, (x, y, z), up)

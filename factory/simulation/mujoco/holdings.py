@@ -201,7 +201,7 @@ def _welds(m: mujoco.MjModel, model: Model) -> dict[tuple[int, str], int]:
             weld_names[tray_code(factory), label] = names.hold(label)
     codes = feeder_codes(factory, outlets)
     weld_names |= {
-        (codes[outlet.robot], outlet.label): names.feed(outlet.name) for outlet in outlets
+        (codes[outlet.robot], outlet.label): names.feed(outlet.label) for outlet in outlets
     }
     return {part: m.equality(name).id for part, name in weld_names.items()}
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from math import comb, degrees
 
 import numpy as np
 
-from factory.layout.layout import Layout
 from factory.mjcf.model import Model
 from factory.mjcf.reservations import reservations_of
 from factory.mjcf.weld_frames import residuals
@@ -67,10 +65,6 @@ class Inspection:
     def unintended(self) -> list[tuple[str, str]]:
         """The pairs of geoms, by name, of unintended contacts."""
         return self.onsets.pairs
-
-    def exchange(self, layout: Layout) -> None:
-        """Let robots do what a layout says."""
-        self._model = replace(self._model, layout=layout)
 
     def welds(self) -> None:
         """Keep the largest residual of the active welds' positions."""

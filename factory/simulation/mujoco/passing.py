@@ -82,10 +82,6 @@ class Passing:
         """Note that a robot (index) has taken a part from its feeder."""
         self.holds[self._fed[robot]] = True
 
-    def gone(self, robot: int) -> None:
-        """Note that a robot (index) has been removed."""
-        self._clear[self._fed.get(robot, [])] = np.inf
-
     def come_clear(self, robot: int) -> None:
         """A robot (index) holds nothing: the next part comes down once it is out of the way, or at
         home if its hand must be there first."""

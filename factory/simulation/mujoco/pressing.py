@@ -9,7 +9,6 @@ import numpy as np
 from factory.layout.feeding import outlets_of
 from factory.layout.hands.holding import held
 from factory.mjcf import names
-from factory.mjcf.grips import grips_of
 from factory.mjcf.masks import NOBODY
 from factory.mjcf.model import Model
 from factory.simulation.mujoco.contacts import ContactMasks
@@ -36,11 +35,8 @@ class Pressing:
         self.shaken: set[int] = set()
         self.touched: set[tuple[int, int]] = set()
         self._holds = {r.name: {held(factory, r.index, at_last=True)} for r in factory.robots}
-        if layout.whole is not layout:
-            for grip in grips_of(layout, model.carried):
-                self._holds[factory.robots[grip.robot].name].add(grip.label)
         for outlet in outlets_of(layout):
-            slider = m.body(int(m.eq_obj1id[m.equality(names.feed(outlet.name)).id])).name
+            slider = m.body(int(m.eq_obj1id[m.equality(names.feed(outlet.label)).id])).name
             self._holds.setdefault(slider.rpartition("/")[0], set()).add(outlet.label)
 
     def meant(self, one: int, other: int, apart: float) -> bool:

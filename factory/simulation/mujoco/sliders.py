@@ -79,7 +79,7 @@ class Sliders:
 
     def __init__(self, arrays: ModelArrays, d: mujoco.MjData, model: Model, sleep: Sleep) -> None:
         m, outlets = arrays.m, outlets_of(model.layout)
-        feeds = [m.equality(names.feed(outlet.name)).id for outlet in outlets]
+        feeds = [m.equality(names.feed(outlet.label)).id for outlet in outlets]
         self._body, settings = m.eq_obj1id[feeds], model.settings
         sliders = [m.body(body).name for body in self._body.tolist()]
         joint = m.body_jntadr[self._body]
@@ -90,7 +90,7 @@ class Sliders:
         self._drives, self._sleep = Drives(arrays, d, drives, inertia.round(9)), sleep
         self._loads = np.array([model.masses[outlet.label] for outlet in outlets])
         lengths = np.array([outlet.feeder.stroke for outlet in outlets])
-        named = {names.slider(outlet.name): number for number, outlet in enumerate(outlets)}
+        named = {names.slider(outlet.label): number for number, outlet in enumerate(outlets)}
         high = lengths[[named[slider] for slider in sliders]]
         ends = high - lengths, high
         ticks = stroke_ticks(model.layout, settings)

@@ -61,8 +61,8 @@ HARMLESS = int(mujoco.mjtDisableBit.mjDSBL_ISLAND) | int(mujoco.mjtDisableBit.mj
 class Soundness:
     """Compares an engine's model with the factory's, whose parts have `bodies` by label and are in
     the hands that `grips` gives: welds, each with the code of its holder. `mass` (nbody,): what
-    bodies weigh [kg], nan where nothing is asked for; `gone`: bodies that touch or press on nothing
-    any more; `found`: all that was wrong when something first was."""
+    bodies weigh [kg], nan where nothing is asked for; `askew`: bodies that lie askew in a feeder,
+    which press on nothing; `found`: all that was wrong when something first was."""
 
     def __init__(
         self,
@@ -75,10 +75,10 @@ class Soundness:
     ) -> None:
         self.arrays, self._clock, m = arrays, float(d.time), arrays.m
         self._d, self._model, self._of, self._grips = d, model, bodies, grips
-        self.masks, self.gone, self.found = masks, set[int](), tuple[Diagnostic, ...]()
+        self.masks, self.askew, self.found = masks, set[int](), tuple[Diagnostic, ...]()
         self._name = [m.geom(geom).name for geom in range(m.ngeom)]
         called = [m.body(body).name for body in range(m.nbody)]
-        robots = {names.carriage(r.name): r.body.mass for r in model.layout.whole.factory.robots}
+        robots = {names.carriage(r.name): r.body.mass for r in model.layout.factory.robots}
         weights = (robots.get(n, WEIGHTS.get(n.rpartition("/")[2], np.nan)) for n in called)
         self.mass = np.array([*weights])
         for label, ids in bodies.items():
@@ -151,13 +151,12 @@ class Soundness:
         """Geoms that should collide and do not."""
         m, layout = self._m, self._model.layout
         stations = self._stations()
-        at = stations[~np.isin(m.geom_bodyid[stations], [*self.gone])]
-        solid = (m.geom_contype[at] > 0) & (m.geom_conaffinity[at] & STATION > 0)
-        soft = (m.geom_margin < 0) & ~np.isin(m.geom_bodyid, [*self.gone])
-        loose = [self._name[geom] for geom in [*at[~solid], *np.flatnonzero(soft)]]
+        solid = (m.geom_contype[stations] > 0) & (m.geom_conaffinity[stations] & STATION > 0)
+        soft = (m.geom_margin < 0) & ~np.isin(m.geom_bodyid, [*self.askew])
+        loose = [self._name[geom] for geom in [*stations[~solid], *np.flatnonzero(soft)]]
         robots = [robot for robot in layout.factory.robots if layout.hands]
         limbed = {f"{r.name}/{limb.name}" for r in robots for limb in limbs(layout, r.index)}
-        housed = [names.feeder(line[0].name) for line in lines_of(layout) if line]
+        housed = [names.feeder(line[0].label) for line in lines_of(layout) if line]
         wanted = {"ground", names.OUTFEED_TRAY, names.SHUTTER} | limbed
         wanted |= {f"{feeder}/{kind}" for feeder in housed for kind in HOUSING}
         sliders = [n for n in map(self._body, range(m.nbody)) if n.endswith("/slider")]

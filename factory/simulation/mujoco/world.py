@@ -13,11 +13,8 @@ from dataclasses import replace
 from functools import partial
 from math import ceil
 
-import numpy as np
-
 from factory.control.mode import Array, Index
 from factory.control.navigation import Bundle
-from factory.layout.layout import Layout
 from factory.mjcf.loading import compiled, fingerprint, load
 from factory.mjcf.model import Model
 from factory.nets.coordinated import Past
@@ -196,17 +193,6 @@ class MujocoWorld:
     def advance(self, steps: int) -> None:
         """Advance by timesteps, with the axes moving as set by `move`."""
         self.motion.stepping.advance(steps)
-
-    def exchange(self, robot: int, layout: Layout) -> None:
-        """A robot (index) has been taken away for good; the others go on as in a `layout`, where
-        all have their numbers. What it held, and what is shown where nobody takes it now, are put
-        away before."""
-        tree = self.motion.axes.tree[robot]
-        gone = np.flatnonzero(self.m.body_treeid == tree).tolist()
-        self.parts.masks.remove(gone)
-        self.inspection.soundness.gone.update(gone)
-        self.parts.feeders.exchange(robot, layout)
-        self.inspection.exchange(layout)
 
     def in_the_way(self, away: Container[int]) -> set[int]:
         """Robots (index) that block the late part that they wait for, except those with an axis in

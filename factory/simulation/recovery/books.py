@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from factory.layout.layout import Layout
 from factory.nets.petri import Marking
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
@@ -13,16 +12,10 @@ from factory.simulation.supervisor import Supervisor
 
 
 class Books:
-    """Reads the state of a factory from a supervisor's marking, or from another marking, under the
-    current `layout`. A robot that has been removed holds nothing."""
+    """Reads the state of a factory from a supervisor's marking, or from another marking."""
 
-    def __init__(self, layout: Layout, supervisor: Supervisor) -> None:
-        self.layout, self.supervisor = layout, supervisor
-
-    @property
-    def factory(self) -> Factory:
-        """The current factory."""
-        return self.layout.factory
+    def __init__(self, factory: Factory, supervisor: Supervisor) -> None:
+        self.factory, self.supervisor = factory, supervisor
 
     @property
     def marking(self) -> Marking:
@@ -46,17 +39,11 @@ class Books:
     ) -> str:
         """The label that a robot (index) holds, NOPART for none. `fired`: firing counts of the
         transitions, for another marking."""
-        if not self.factory.robots[robot].operations:
-            return NOPART
         operation, is_in_it = self.operation_of(robot, marking), self.step_of(robot, marking) % 2
         counts = self.supervisor.fired if fired is None else fired
         unit = self.factory.unit(operation, counts[operation.start] - is_in_it)
         is_made = self.supervisor.word.is_made(unit)
         return operation.before[operation.robots.index(robot)] if is_made else NOPART
-
-    def place_of(self, robot: int, marking: Marking | None = None) -> tuple[int, bool]:
-        """The operation (index) of a robot, and whether it is under way."""
-        return self.operation_of(robot, marking).index, bool(self.step_of(robot, marking) % 2)
 
     def held(self, marking: Marking | None = None, fired: Sequence[int] | None = None) -> list[str]:
         """The label that each robot holds, NOPART for none."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence, Set
 
-from factory.layout.layout import Layout
 from factory.plant.factory import Operation
 from factory.simulation.recovery.faults import WorldFault
 
@@ -119,13 +118,6 @@ class Plant(ABC):
     @abstractmethod
     def lift_out(self, robot: int, at: Mapping[int, float]) -> None:
         """Replace a dead robot, payload removed, by another with its axes at these places [m]."""
-
-    def clear_out(self, robot: int, layout: Layout) -> None:
-        """Remove a dead robot and its payload for good, and withdraw the presented parts that no
-        robot of a `layout` takes."""
-
-    def exchange(self, robot: int, layout: Layout) -> None:
-        """Go on without a robot, as in a `layout` that keeps the numbers of the others."""
 
     @property
     def binned(self) -> int:

@@ -13,7 +13,7 @@ from factory.control.mode import Array
 from factory.nets.undone import Undone
 from factory.plant.factory import Factory, Operation
 from factory.problem.template import Failure
-from factory.record.failures import Exchange, Failing, Failures, Stood
+from factory.record.failures import Failing, Failures, Stood
 from factory.record.state import Event
 from factory.simulation.recovery.books import Books
 from factory.simulation.recovery.faults import Campaign, WorldFault
@@ -117,11 +117,6 @@ class Recovery:
     def stood(self) -> Sequence[Stood]:
         """For each change of the robots that stand: the time, and which."""
         return self.responding.standing.stood
-
-    @property
-    def exchanges(self) -> Sequence[Exchange]:
-        """The takeovers so far."""
-        return self.responding.deputising.exchanges
 
     @property
     def _factory(self) -> Factory:
@@ -284,7 +279,7 @@ def recover(simulation: Simulation, campaign: Campaign = Campaign()) -> Recovery
     if not isinstance(supervisor, Supervisor):
         message = "robots that run their own programs do not recover"
         raise InputError(Diagnostic("BadFault", message, None, "leave out --distributed"))
-    books = Books(simulation.layout, supervisor)
+    books = Books(simulation.layout.factory, supervisor)
     plant: Plant
     if simulation.model is None:
         from factory.simulation.recovery.ideal import IdealPlant

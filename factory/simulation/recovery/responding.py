@@ -16,7 +16,6 @@ from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
 from factory.record.failures import Failing
 from factory.simulation.recovery.books import Books
-from factory.simulation.recovery.deputising import Deputising, Successors
 from factory.simulation.recovery.faults import Campaign
 from factory.simulation.recovery.plant import Plant
 from factory.simulation.recovery.returning import Goal, Returning, WayBack, order_of
@@ -34,8 +33,8 @@ BINNED = 1.0
 
 class Responding:
     """`found`: all failures. `dead`: for each robot (index) known to be dead the time of its
-    replacement [s], inf without spare or deputy. `returning`, `standing`, `deputising`: robots that
-    return, that stand, and takeovers."""
+    replacement [s], inf without a spare. `returning`, `standing`: robots that return, and that
+    stand."""
 
     def __init__(
         self, simulation: Simulation, books: Books, plant: Plant, campaign: Campaign
@@ -54,7 +53,6 @@ class Responding:
         self.used_spares = 0
         self._on_end = OnEnd()
         self._wasting = Wasting(not_carried_back(simulation.layout))
-        self.deputising = Deputising(simulation, books)
 
     def passed(self, operation: Operation) -> None:
         """Note that an operation has passed its tests."""
@@ -134,78 +132,39 @@ class Responding:
             self.died(robot)
 
     def died(self, robot: int) -> None:
-        """A robot is dead, and its payload lost. It is replaced by a spare after `swap` seconds,
-        else by a deputy."""
+        """A robot is dead, and its payload lost. It is replaced by a spare, if one is left, after
+        `swap` seconds."""
         label, operation = self._books.holds(robot), self._books.operation_of(robot)
-        spare, deputy = self.used_spares < self._campaign.spares, ""
-        if not spare and not (deputy := self.deputising.appoint(robot, self.dead)):
+        if self.used_spares == self._campaign.spares:
             self.dead[robot] = np.inf
             self._note("jammed", operation, robot, "no spare")
             return
-        self.used_spares += spare
+        self.used_spares += 1
         self.dead[robot] = self._now + self._campaign.swap
         held = () if label == NOPART else (label,)
-        response = "spare" if spare else "deputy"
-        self._note("jammed", operation, robot, response, held, self.dead[robot], deputy)
+        self._note("jammed", operation, robot, "spare", held, self.dead[robot])
         ends = tuple(self._books.factory.by_label[label].end for label in held)
         begun = operation.index in self._books.supervisor.active.operations
         if asked := ends or (operation.start,) * begun:
             self._undo(asked, operation, "jammed")
 
     def replaced(self, now: float) -> list[int]:
-        """Replace the robots that are due [s], and return them. A deputy takes over only when no
-        robot is returning."""
-        due, appointed = (r for r, until in self.dead.items() if until <= now), self.deputising
-        settled = self.returning.halted(self.dead)
-        robots = [robot for robot in due if settled or robot not in appointed.by_robot]
+        """Replace the robots that are due [s] by spares, and return them."""
+        robots = [robot for robot, until in self.dead.items() if until <= now]
         for robot in robots:
-            if self._replaced(robot):
-                del self.dead[robot]
-                self._plant.supplied()
+            self._replace(robot)
+            del self.dead[robot]
+            self._plant.supplied()
         return robots
 
-    def _replaced(self, robot: int) -> bool:
-        """Replace a dead robot. Returns False if its deputy is dead too."""
-        if robot in self.deputising.by_robot:
-            return self._take_over(robot)
+    def _replace(self, robot: int) -> None:
+        """Put a spare in the place of a dead robot."""
         self.returning.ways.pop(robot, None)
         supervisor = self._books.supervisor
         stages = supervisor.ahead.going(supervisor.active.ahead).values()
         ahead = {stage.axis: stage.goal for stage in stages if stage.robot == robot}
         at = ahead or dict(self.returning.rest(robot, self._books.marking))
         self._plant.lift_out(robot, at)
-        return True
-
-    def _take_over(self, robot: int) -> bool:
-        """Let the deputy of a dead robot take over its tours: the net is exchanged."""
-        change = self.deputising.take_over(robot, self.dead)
-        if change is None:
-            self.dead[robot] = np.inf
-            return False
-        books, supervisor = self._books, self._books.supervisor
-        fired, undone = change.takeover.exchanged(supervisor.fired, self._now)
-        before, held, under_way = books.marking, books.held(), supervisor.active.operations
-        marking = marking_after(change.layout.factory.net, fired)
-        after = Books(change.layout, supervisor)
-        stay = after.factory.present
-        going = {r for r in stay if books.place_of(r, before) != after.place_of(r, marking)}
-        self._plant.clear_out(robot, change.layout)
-        self._plant.exchange(robot, change.layout)
-        scrap = {*self._plant.undone(after.held(marking, fired), fired, going)}
-        self._exchange(change, fired, undone)
-        over = [books.factory.operations[n] for n in under_way if n not in marking]
-        self._wasting.waste(scrap, {robot: held[robot] for robot in scrap})
-        supervisor.recall(self.standing.axes(going | scrap))
-        self._send_back(sorted(going | scrap), over, marking)
-        return True
-
-    def _exchange(self, change: Successors, fired: tuple[int, ...], undone: Undone) -> None:
-        """Exchange the net and everything derived from it."""
-        self.deputising.exchange(change, fired, undone)
-        eps, books = self._simulation.request.settings.eps, self._books
-        ways = ((r, way) for r, way in self.returning.ways.items() if r not in self.dead)
-        self.returning = Returning(books.layout, books.supervisor, eps, dict(ways))
-        self._wasting.barred = change.barred
 
     def give_up(self) -> None:
         """End the run: all that can be made without the dead robots has been made."""
@@ -222,7 +181,7 @@ class Responding:
         while lacking := self._lacking(held, fired):
             asked += lacking
             fired = undo(factory.net, supervisor.fired, asked, joins)
-        marking, robots = marking_after(factory.net, fired), factory.present
+        marking, robots = marking_after(factory.net, fired), range(len(factory.robots))
         going = {r for r in robots if books.step_of(r, before) != books.step_of(r, marking)}
         what = self._now, operation.label, reason
         undone = Undone.between(factory.net, what, asked, supervisor.fired, fired)
@@ -307,10 +266,9 @@ class Responding:
         response: str,
         scrapped: tuple[str, ...] = (),
         until: float | None = None,
-        deputy: str = "",
     ) -> None:
         name = "" if robot < 0 else self._name(robot)
-        what = self._now, test, operation.label, name, response, scrapped, until, deputy
+        what = self._now, test, operation.label, name, response, scrapped, until
         self.found.append(Failing(*what))
 
     def _name(self, robot: int) -> str:

@@ -6,9 +6,8 @@ other, in the reverse order of their coming, so that each goes back the way it c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 
@@ -48,22 +47,16 @@ class WayBack:
 
 
 class Returning:
-    """The robots (index) that are returning: `ways`. Starts with `ways` that have not begun."""
+    """The robots (index) that are returning: `ways`."""
 
-    def __init__(
-        self,
-        layout: Layout,
-        supervisor: Supervisor,
-        eps: float,
-        ways: Mapping[int, WayBack] = MappingProxyType({}),
-    ) -> None:
+    def __init__(self, layout: Layout, supervisor: Supervisor, eps: float) -> None:
         self._layout, self._supervisor = layout, supervisor
         goals = [*dict.fromkeys(_goals(layout))]
         first = len(supervisor.bundles.modes)
         self._number = {goal: first + n for n, goal in enumerate(goals)}
         modes = [_mode(layout, axis, at, eps) for axis, at in goals]
         supervisor.bundles = supervisor.bundles.with_more(modes, [(axis,) for axis, _ in goals])
-        self.ways = dict(ways)
+        self.ways = dict[int, WayBack]()
 
     def send(self, robot: int, way: WayBack) -> None:
         """Give a robot a way back, replacing any that it has."""
@@ -87,11 +80,6 @@ class Returning:
                 way.done()
         if begun:
             self._supervisor.send(begun)
-
-    def halted(self, dead: Iterable[int]) -> bool:
-        """Whether every returning robot is `dead` or waits for a dead one."""
-        stuck = {*dead}
-        return all(r in stuck or not stuck.isdisjoint(w.after) for r, w in self.ways.items())
 
     def late(self, before: float) -> list[int]:
         """Robots that have been in one stage since before a time [s]."""
@@ -177,7 +165,7 @@ def _goals(layout: Layout) -> Iterable[Goal]:
     """All goals to which a robot can be sent."""
     factory = layout.factory
     lifts = factory.lift_axis
-    for robot in (robot for robot in factory.robots if robot.operations):
+    for robot in factory.robots:
         yield _rounded((robot.index, layout.guidepaths[robot.index].length))
         for step, number in enumerate(robot.operations):
             yield _rounded((robot.index, _waiting(layout, robot.index, step)))

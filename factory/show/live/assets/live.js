@@ -88,10 +88,7 @@ class Acts {
     const { robot, part } = this.meant;
     const made = [];
     const name = DATA.robots[robot];
-    const deputy = robot === undefined ? robot : doer(robot, Infinity);
-    if (deputy !== robot) {
-      made.push(this.words('h3', `Robot ${name}`), this.words('p', `Removed: ${DATA.robots[deputy]} does its tours.`));
-    } else if (robot !== undefined) {
+    if (robot !== undefined) {
       const now = this.slowed[robot] || 1;
       made.push(this.words('h3', `Robot ${name}`));
       made.push(this.group('Push', [
@@ -103,7 +100,7 @@ class Acts {
       made.push(this.group('Speed', [...DATA.factors].reverse().map((factor) =>
         [factor === 1 ? 'full' : `${100 * factor} %`, { do: 'slow', robot, factor }, factor === now])));
     }
-    if (robot !== undefined && deputy === robot && DATA.fails)
+    if (robot !== undefined && DATA.fails)
       made.push(this.group('Failure', [
         ['Pause for 5 s', { do: 'down', robot }],
         ['Kill', { do: 'dead', robot }],
@@ -308,10 +305,7 @@ window.factoryView = (() => {
     ready,
     get frame() { return live.frame; },
     get has3d() { return Boolean(live.views.replay); },
-    // Whether a robot is drawn in the 3-D view, and how many zones are.
-    isDrawn(number) {
-      return live.views.replay.meshes.some((m) => m.userData.robot === number && m.userData.body && m.visible);
-    },
+    // How many zones are drawn in the 3-D view.
     get zones() { return (live.outages.discs || []).length; },
     // Where a robot is in the 3-D view [m].
     robot(number) {

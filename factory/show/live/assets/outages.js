@@ -1,6 +1,6 @@
 'use strict';
-// What is out of order now: robots that stand, are dead or gone, and where none may come; as marks
-// in all views, and in words.
+// What is out of order now: robots that stand or are dead, and where none may come; as marks in all
+// views, and in words.
 
 const STATES = ['standing', 'closed', 'dead'];
 const ZONE = 0xe83c30;
@@ -29,7 +29,7 @@ function round(corners = 48) {
 
 class Outages {
   constructor(list, views) {
-    Object.assign(this, { list, views, now: { dead: [], closed: [], standing: [], gone: [], zones: [], told: [] } });
+    Object.assign(this, { list, views, now: { dead: [], closed: [], standing: [], zones: [], told: [] } });
     this.drawn = '';
     ['failing', 'failing-legend'].forEach((id) => (document.getElementById(id).hidden = !DATA.fails));
   }
@@ -41,8 +41,6 @@ class Outages {
 
   take(now) {
     this.now = now;
-    const number = (name) => DATA.robots.indexOf(name);
-    TAKEOVERS.splice(0, Infinity, ...now.gone.map(([dead, since, deputy]) => [number(dead), since, number(deputy)]));
   }
 
   draw() {
@@ -56,12 +54,10 @@ class Outages {
     if (drawn === this.drawn && replay === this.replay) return;
     if (replay !== this.replay) replay.controls.addEventListener('change', () => this.tag(replay));
     Object.assign(this, { drawn, replay });
-    const [gone, { states }] = [goneBy(Infinity), this];
-    [replay, floor].forEach((view) => view && view.leaveOut(gone));
+    const { states } = this;
     for (const element of document.querySelectorAll('[data-robot]')) {
       const robot = Number(element.dataset.robot);
       STATES.forEach((state) => element.classList.toggle(state, states.get(robot) === state));
-      element.classList.toggle('gone', gone.has(robot));
     }
     this.tell();
     this.onFloor(floor.svg);

@@ -85,8 +85,7 @@ class Rolling {
   begin(operation, time) {
     const { name, robots } = DATA.operations[operation];
     const odd = this.units[operation]++ % 2 ? ' odd' : '';
-    const elements = robots.map((tour) => {
-      const robot = doer(tour, time);
+    const elements = robots.map((robot) => {
       const element = document.createElement('div');
       element.className = `op ${DATA.roles[robot]}${odd}`;
       element.dataset.operation = operation;

@@ -3,19 +3,6 @@
 
 const DATA = JSON.parse(document.getElementById('data').textContent);
 
-// Robots whose deputies took over, in the order of time: [robot, since when, its deputy].
-const TAKEOVERS = DATA.gone || [];
-
-// The robot that does the tours of a robot at a time: itself, or its deputy.
-function doer(robot, time) {
-  return TAKEOVERS.reduce((now, [dead, since, deputy]) => (now === dead && time >= since ? deputy : now), robot);
-}
-
-// The robots that are gone by a time.
-function goneBy(time) {
-  return new Set(TAKEOVERS.filter(([, since]) => since <= time).map(([dead]) => dead));
-}
-
 const KINDS = { robot: 'robots', label: 'labels', transition: 'transitions', place: 'places' };
 
 // The arrays by name. Throws where the browser cannot decompress.

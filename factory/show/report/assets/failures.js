@@ -43,8 +43,7 @@ Gantt.prototype.draw = function drawWithUndone(page) {
   const to = this.from + this.width;
   const next = this.tracks.map(() => 0);
   for (const span of this.spans.filter((s) => s.from < to && s.to > this.from))
-    for (const tour of DATA.operations[span.operation].robots) {
-      const robot = doer(tour, span.from);
+    for (const robot of DATA.operations[span.operation].robots) {
       const bar = this.tracks[robot].children[next[robot]++];
       bar.classList.toggle('undone', span.undone);
       if (span.undone) bar.title += ', undone';
@@ -65,16 +64,6 @@ Gantt.prototype.draw = function drawWithUndone(page) {
   });
   DATA.dead.forEach(([robot, start, end, then]) => band(robot, 'stood dead', `is dead${then}`, start, end ?? DATA.end));
 };
-
-// Robots whose deputies took over are left out from then on.
-if (TAKEOVERS.length)
-  for (const { prototype } of [Replay, Floor]) {
-    const plainShow = prototype.show;
-    prototype.show = function showWhoIsThere(time) {
-      this.leaveOut(goneBy(time));
-      plainShow.call(this, time);
-    };
-  }
 
 Game.prototype.rewind = function rewind() {
   this.next = 0;

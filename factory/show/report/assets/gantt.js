@@ -90,8 +90,7 @@ class Gantt {
       if (span.to <= this.from) continue;
       const [left, right] = [Math.max(span.from, this.from), Math.min(span.to, to)];
       const { name, robots } = DATA.operations[span.operation];
-      for (const tour of robots) {
-        const robot = doer(tour, span.from);
+      for (const robot of robots) {
         const bar = document.createElement('div');
         bar.className = `op ${DATA.roles[robot]}${span.unit % 2 ? ' odd' : ''}`;
         bar.dataset.operation = span.operation;

@@ -255,12 +255,6 @@ class Replay {
     this.draw();
   }
 
-  // Robots that are gone are not drawn, but for what of them stands on the floor.
-  leaveOut(robots) {
-    for (const mesh of this.meshes) mesh.visible = !(mesh.userData.body && robots.has(mesh.userData.robot));
-    this.draw();
-  }
-
   select(lit) {
     for (const mesh of this.meshes) {
       const { shape, robot, label, copy } = mesh.userData;

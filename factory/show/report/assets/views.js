@@ -5,21 +5,14 @@ class Floor {
   constructor(svg, motion) {
     this.svg = svg;
     this.motion = motion;
-    this.gone = new Set();
     this.groups = [...svg.querySelectorAll('[data-body]')].map((group) => [group, Number(group.dataset.body)]);
-  }
-
-  // Robots that are gone are not drawn, but for their rails.
-  leaveOut(robots) {
-    const own = this.groups.filter(([group]) => robots.has(Number(group.dataset.robot)));
-    this.gone = new Set(own.map(([, body]) => body));
   }
 
   show(time) {
     const frame = this.motion.frame(time);
     for (const [group, body] of this.groups) {
       const { x, y, shown } = this.motion.position(body, frame);
-      group.toggleAttribute('hidden', !shown || this.gone.has(body));
+      group.toggleAttribute('hidden', !shown);
       if (shown) group.setAttribute('transform', `translate(${(1000 * x).toFixed(1)} ${(-1000 * y).toFixed(1)})`);
     }
   }

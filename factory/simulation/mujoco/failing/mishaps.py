@@ -119,7 +119,7 @@ class Mishaps:
         gap, margin = arrays["geom_gap"], arrays["geom_margin"]
         gap[geoms], margin[geoms] = (0.0, 0.0) if presses else (FAR, -FAR)
         inspection = self._world.inspection
-        for ghosts in (inspection.pressing.askew, inspection.soundness.gone):
+        for ghosts in (inspection.pressing.askew, inspection.soundness.askew):
             (ghosts.discard if presses else ghosts.add)(body)
 
     def _touches(self, body: int, pad: int) -> None:

@@ -8,7 +8,6 @@ import numpy as np
 
 from factory.control.mode import Array, Index
 from factory.layout.bins import Bin
-from factory.layout.layout import Layout
 from factory.mjcf.masks import robot_code
 from factory.mjcf.weld_frames import WeldFrames
 from factory.plant.factory import Factory, Operation
@@ -309,27 +308,13 @@ class MujocoPlant(Plant):
         return len(self._world.inspection.pressing.touched)
 
     def lift_out(self, robot: int, at: Mapping[int, float]) -> None:
-        self._empty(robot)
-        self._world.motion.put(at)
+        parts, motion = self._world.parts, self._world.motion
+        parts.holdings.put_away(self._holdings.hand(robot).values())
+        parts.welds.write()
+        motion.load([robot], [0.0])
+        motion.put(at)
         self.came_back(robot)
-        self._world.parts.feeders.stay_clear(robot)
-
-    def _empty(self, robot: int) -> None:
-        """Put the payload of a robot that is removed out of sight."""
-        world = self._world
-        world.parts.holdings.put_away(self._holdings.hand(robot).values())
-        world.parts.welds.write()
-        world.motion.load([robot], [0.0])
-
-    def clear_out(self, robot: int, layout: Layout) -> None:
-        self._empty(robot)
-        self.came_back(robot)
-        for label in self._world.parts.feeders.elsewhere(layout):
-            self._take_back(label)
-
-    def exchange(self, robot: int, layout: Layout) -> None:
-        self._world.exchange(robot, layout)
-        self._layout = layout
+        parts.feeders.stay_clear(robot)
 
     def _take_back(self, label: str) -> None:
         """Withdraw the presented part of a label into its feeder."""
