@@ -100,7 +100,7 @@ def section(results: dict) -> str:
             f"{p['where']}{', benign' if p['benign'] else ''}",
             p["status"],
             _detector(p["codes"]),
-            p["said"].replace("|", "\\|") or None,
+            p["said"].replace("|", "\\|").replace("<", "&lt;") or None,
             ", ".join(p["codes"]) or None,
         )
         for p in plants
