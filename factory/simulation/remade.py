@@ -143,7 +143,9 @@ def _unsaid(log: Log, made: Simulation) -> list[Diagnostic]:
         if code in OF_MODEL and (code, words) not in right
     ]
     if kept.get(RESERVATIONS, []) != doubts:
-        unlike.append(f"the log does not say what its run leaves open: {'; '.join(doubts) or 'no'}")
+        unlike.append(
+            f"the log does not say what its run leaves open: {'; '.join(doubts) or 'nothing'}"
+        )
     return [*(Diagnostic("Record", words) for words in unlike), *faults]
 
 
