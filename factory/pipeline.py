@@ -95,7 +95,7 @@ class Project:
 
     def with_ground(self, ground: Ground) -> Project:
         """The same factory on another ground."""
-        kept = {"product", "matings", "compiled", "approached", "planned", "plain", "_hands"}
+        kept = {"product", "matings", "compiled", "approached", "planned", "plain", "hands"}
         return self._changed(kept, ground=ground)
 
     def _changed(self, kept: Collection[str], **values: Any) -> Project:
@@ -188,7 +188,7 @@ class Project:
         return (*product, *apart, *overlaps, *blocked, *grips)
 
     @cached_property
-    def _hands(self) -> Hands:
+    def hands(self) -> Hands:
         """The hands to choose from."""
         unlifted = not self.plain.adjusted and "_unlifted" in self.__dict__
         return self._unlifted if unlifted else hands_of(self.plain, self.product, self.settings)
@@ -205,7 +205,7 @@ class Project:
             return ()
         from factory.layout.hands.nearest import no_grips
 
-        return no_grips(self._hands)
+        return no_grips(self.hands)
 
     @cached_property
     def plain(self) -> Factory:
@@ -281,7 +281,7 @@ class Project:
         if self.laid is not None:
             laid = self._laid_out(self.laid)
         else:
-            inputs = self.plain, self.product, self.settings, self._hands
+            inputs = self.plain, self.product, self.settings, self.hands
             draft = [self.draft] if "draft" in self.__dict__ else []
             laid = self.ground.lay_out(*inputs, *draft)
         check_drives(laid, self.settings)
@@ -290,7 +290,7 @@ class Project:
     @cached_property
     def draft(self) -> Layout:
         """The layout of `plain` before it is certified, which may move it."""
-        return self.ground.drafted(self.plain, self.product, self.settings, self._hands)
+        return self.ground.drafted(self.plain, self.product, self.settings, self.hands)
 
     def _laid_out(self, laid: LayoutTable) -> Layout:
         from factory.compiler.mating.mating import judged

@@ -17,7 +17,6 @@ from factory.layout.bounds import cycle_time_bound
 from factory.layout.dimensions import LAYERS, Clearance
 from factory.layout.durations import Pace, gear_times, operation_times
 from factory.layout.embedding import lay_out
-from factory.layout.gain import gain
 from factory.layout.layout import Layout
 from factory.layout.optimising import first_feasible
 from factory.layout.outline import Choice, Outline
@@ -27,6 +26,8 @@ from factory.layout.skyline import Skyline
 from factory.pipeline import read
 from factory.support.errors import RunError
 from factory.support.settings import Settings
+from factory.timing.gain import gain, soonest
+from factory.timing.timed import pace as paced
 from factory.timing.timing import Timing
 from tests.command_line import ROOT, Terminal
 from tests.layout_values import (
@@ -76,21 +77,37 @@ def test_times_are_those_of_the_modes(drawn: Drawn) -> None:
 @pytest.mark.parametrize(
     ("name", "figures"),
     [
-        ("paper", (2.548, 2.548, 2.541)),
-        ("lamp", (3.776, 3.776, 2.923)),
-        ("stool", (5.030, 4.542, 3.323)),
-        ("shelf", (6.095, 5.738, 3.205)),
-        ("gearbox", (10.168, 8.727, 6.499)),
-        ("chest", (7.692, 6.136, 3.222)),
-        ("balanced", (2.524, 2.164, 1.355)),
+        ("paper", (2.53, 2.53, 2.481)),
+        ("lamp", (3.88, 3.88, 2.863)),
+        ("stool", (6.11, 5.53, 3.223)),
+        ("shelf", (6.22, 6.22, 3.105)),
+        ("balanced", (2.93, 2.97, 1.315)),
     ],
 )
 def test_what_the_examples_gain(name: str, figures: tuple[float, float, float]) -> None:
-    """Cycle times [s] of the first layout and the one found, and the bound."""
+    """Cycle times [s] of the first layout and the one found, as runs are predicted, and the bound.
+    The search does not know which hands wait for others: of the balanced tree's first layout, by
+    its estimate slower, fewer do."""
     project = read(EXAMPLES / f"{name}.pag")
-    found = gain(lay_out(project.plain, project.product), PACE)
+    found = gain(project.layout, project.settings, project.hands)
     first, chosen = found.first.predicted_cycle_time_s, found.chosen.predicted_cycle_time_s
     assert (first, chosen, found.bound) == pytest.approx(figures, abs=6e-4)
+    assert chosen == pytest.approx(paced(project.layout, project.settings)[0].seconds, abs=1e-6)
+
+
+@given(drawn_layouts)
+@settings(max_examples=20)
+def test_no_run_is_faster_than_the_bound(drawn: Drawn) -> None:
+    """A run counts an operation as ended a little before its robots rest, and knows it in a whole
+    tick; at any speed and however rough its ticks are."""
+    seed = drawn[1]
+    ticks = {"timestep": 0.002 * (1 + seed % 4), "substeps": 1 + seed % 3}
+    asked = Settings(
+        **(ticks if seed % 2 else {}), stage=seed // 2 % 2, eps=10.0 ** (-4 + seed % 3 / 2)
+    )
+    layout = random_layout(*drawn)
+    bound = cycle_time_bound(layout.factory, layout.product, layout.clearance, soonest(asked))
+    assert bound <= paced(layout, asked)[0].seconds + 1e-9
 
 
 def test_the_search_and_the_bound_agree_where_the_paper_s_robots_are_close() -> None:
@@ -216,14 +233,37 @@ def test_build_tells_what_was_gained(run: Terminal, stages: Stages) -> None:
     chest = EXAMPLES / "chest.pag"
     told = run("build", chest)
     assert told.status == 0
-    words = "cycle 6.29 s (r12); first feasible layout 7.69 s, 2.65 m², 7.34 m;"
-    assert f"{words} no layout below 3.22 s" in told.out
+    words = "cycle 6.30 s (r12); first feasible layout 8.11 s, 2.85 m², 7.72 m;"
+    assert f"{words} no layout below 3.12 s" in told.out
     found = run("build", chest, "--json").json["layout"]
-    assert found["predicted_cycle_time_s"] == pytest.approx(6.288, abs=1e-3)
+    assert found["predicted_cycle_time_s"] == pytest.approx(6.30, abs=1e-3)
     assert found["bottleneck"] == "r12"
-    assert found["first_feasible"]["predicted_cycle_time_s"] == pytest.approx(7.692, abs=1e-3)
-    assert found["cycle_time_bound_s"] == pytest.approx(3.222, abs=1e-3)
+    assert found["first_feasible"]["predicted_cycle_time_s"] == pytest.approx(8.11, abs=1e-3)
+    assert found["cycle_time_bound_s"] == pytest.approx(3.122, abs=1e-3)
     assert found["area_m2"] < found["first_feasible"]["area_m2"]
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("paper", ()),
+        ("paper", ("--wip", 1)),
+        ("paper", ("--parallel", "sub2=2")),
+        ("paper", ("--robots", 4)),
+        ("balanced", ()),
+    ],
+)
+def test_build_and_run_tell_one_cycle_time(
+    run: Terminal, stages: Stages, name: str, options: tuple[object, ...]
+) -> None:
+    """The balanced tree's robots wait for each other's hands, which the search does not know."""
+    stages.on = True
+    file = EXAMPLES / f"{name}.pag"
+    told = run("build", file, *options, "--json").json["layout"]
+    made = run("run", file, *options, "--world", "mujoco", "--units", 1, "--json").json
+    assert told["predicted_cycle_time_s"] == pytest.approx(made["predicted_cycle_time_s"], abs=1e-6)
+    assert told["bottleneck"] == made["bottleneck"]
+    assert told["cycle_time_bound_s"] < told["predicted_cycle_time_s"]
 
 
 def test_a_factory_is_laid_out_at_the_pace_of_its_settings(stages: Stages) -> None:

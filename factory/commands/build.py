@@ -105,15 +105,14 @@ def _listed(files: list[str], verbose: bool) -> list[str]:
 
 def _printed(project: Project, built: Built, spent: float, wip: int | None) -> dict[str, Any]:
     """What a build prints: the document of `--json`, the lines for people, the warnings."""
-    from factory.layout.durations import Pace
-    from factory.layout.gain import gain
     from factory.layout.hands.bores import bores
     from factory.layout.tiles import fill_of, tiles_of
     from factory.support.settings import AUTO
+    from factory.timing.gain import gain
 
     layout, settings, model = project.layout, project.settings, built.model
     root, robots = layout.factory.pag.root, len(layout.factory.robots)
-    gained, drilled = gain(layout, Pace.of(settings)), list(bores(layout))
+    gained, drilled = gain(layout, settings, project.hands, wip), list(bores(layout))
     document: dict[str, Any] = {
         "product": root,
         "mjcf": str(built.mjcf) if built.mjcf else None,

@@ -1,6 +1,7 @@
 """Durations of operations from lengths alone: the objective of the layout search.
 
-`timing/timed.py` predicts the run itself, from the modes; tests compare the two.
+`timing/timed.py` predicts the run itself, from the modes, and is what users are told; tests compare
+the two.
 """
 
 from __future__ import annotations

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from factory.compiler.parallel import Branches
-from factory.layout.durations import Pace, cycle_of
 from factory.pipeline import Project
 from factory.sharing import with_branches
 from factory.study.allocation.bundles import Filling
 from factory.support.errors import FactoryError
-from factory.timing.cycle_time import CycleTime
+from factory.timing.cycle_time import CycleTime, cycle_time
 from factory.timing.timed import pace
+from factory.timing.timing import Timing
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,8 @@ class Candidate:
     def least(self) -> float:
         """Lower bound on its cycle time: that of its draft, in which no hand waits for another
         [s]."""
-        return cycle_of(self.project.draft, Pace.of(self.project.settings))
+        timing = Timing(self.project.draft, self.project.settings)
+        return cycle_time(timing.factory, timing.delays, timing.ways()).seconds
 
     @cached_property
     def has_layout(self) -> bool:

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from math import floor, sqrt
 
 from factory.layout.bounds import cycle_time_bound
 from factory.layout.dimensions import Clearance
-from factory.layout.durations import Pace, cycle_of, slowest
+from factory.layout.durations import Pace
+from factory.layout.hands.choosing import Hands
 from factory.layout.layout import Layout
 from factory.layout.optimising import first_feasible, floor_of
+from factory.support.settings import Settings
+from factory.timing.cycle_time import CycleTime
+from factory.timing.timed import timed
+from factory.timing.timing import Timing
 
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """The objectives: cycle time [s] of the net from rest to rest, total length of the guidepaths
-    [m], floor [m²]."""
+    """The objectives: the cycle time that a run is predicted to have [s], total length of the
+    guidepaths [m], floor [m²]."""
 
     predicted_cycle_time_s: float
     guidepath_length_m: float
@@ -61,23 +67,43 @@ class LayoutGain:
         )
 
 
-def gain(layout: Layout, pace: Pace) -> LayoutGain:
-    """Compare a layout for robots of a pace."""
+def gain(layout: Layout, settings: Settings, hands: Hands, wip: int | None = None) -> LayoutGain:
+    """Compare a layout with others for the same settings, `hands` to choose from, and bound on
+    units inside; where robots are on tees, with a first one of robots that have no hands."""
     plain = layout.plain or layout
     factory, product, c = plain.factory, layout.product, layout.clearance
-    _, (bottleneck, *_) = slowest(layout, pace)
+    size, chosen = Clearance(c, factory.carriage), None if layout.stems else hands
+    first = first_feasible(factory, product, size, (), chosen)
+    cycle = _cycle(layout, settings, wip)
     return LayoutGain(
-        _figures(layout, pace),
-        _figures(first_feasible(factory, product, Clearance(c, factory.carriage)), pace),
-        layout.factory.robots[bottleneck].name,
-        cycle_time_bound(factory, product, c, pace),
-        _figures(plain, pace) if layout.plain else None,
+        _figures(layout, cycle),
+        _figures(first, _cycle(first, settings, wip)),
+        cycle.bottleneck,
+        cycle_time_bound(factory, product, c, soonest(settings)),
+        _figures(plain, _cycle(plain, settings, wip)) if layout.plain else None,
         len(layout.factory.robots) - len(factory.robots),
     )
 
 
-def _figures(layout: Layout, pace: Pace) -> Figures:
+def soonest(settings: Settings) -> Pace:
+    """The pace of a run whose operations all end as soon as they can: in the tick in which its
+    robots come into their goal balls, less the tick that a dwell begins before.
+
+    A robot whose reference brakes by a·dt a tick, over c·n(n + 1) in n ticks, c = a·dt²/2, rests
+    n + 1 ticks after it is nearer to its goal than c·(n + 1)(n + 2).
+    """
+    pace, tick = Pace.of(settings), settings.tick
+    balls = 2 * settings.eps / (settings.acceleration * tick * tick)
+    early = tick * (2 + floor(sqrt(balls + 0.25) - 0.5 - 1e-9))
+    ahead = None if pace.ahead is None else pace.ahead - early
+    return replace(pace, lost=pace.lost - early, ahead=ahead)
+
+
+def _cycle(layout: Layout, settings: Settings, wip: int | None) -> CycleTime:
+    return timed(Timing(layout, settings), wip=wip).cycle
+
+
+def _figures(layout: Layout, cycle: CycleTime) -> Figures:
     xlo, xhi, ylo, yhi = floor_of(layout)
-    cycle = cycle_of(layout, pace)
     area = (xhi - xlo) * (yhi - ylo)
-    return Figures(round(cycle, 6), round(layout.guidepath_length, 6), round(area, 6))
+    return Figures(round(cycle.seconds, 6), round(layout.guidepath_length, 6), round(area, 6))
