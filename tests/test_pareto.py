@@ -15,8 +15,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from factory.pipeline import Project, read
-from factory.show.pareto import floor_plans, front_page
 from factory.show.pareto.chart import ChartAxis, cycle_chart
+from factory.show.pareto.page import floor_plans, front_page
 from factory.study.allocation.aim import least_robots
 from factory.study.pareto import Effort, FrontPoint, FrontSweep, ParetoFront, pareto, sweeping
 from factory.study.pareto.front import Trial, commands_of, point_files, tried, undominated

@@ -133,7 +133,7 @@ def _written(
 ) -> tuple[Sequence[str | None], list[Path]]:
     """Write the page and the files of the points into a folder, if there is one. Returns the
     commands that build the points, and the files."""
-    from factory.show.pareto import floor_plans, front_page
+    from factory.show.pareto.page import floor_plans, front_page
     from factory.study.pareto.front import commands_of, point_files
     from factory.support.files import own_names, write_all
 

@@ -9,9 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from factory.nets.verify import proved
+from factory.plant.factory import Factory
 from factory.record.monitor.watched import watched
 from factory.simulation.executing import Go, Opening, Tell, carry_out
 from factory.simulation.options import RunOptions
+from factory.simulation.recovery.fault_file import check_names, read_campaign
+from factory.simulation.recovery.faults import SWAP, Campaign
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from factory.support.progress import Waiting
@@ -29,9 +32,17 @@ def check_run(project: Project, asked: RunOptions) -> None:
     that. Files are read, but for pipes, which are read once."""
     asked.check(project)
     if asked.faults is not None and not asked.faults.is_fifo():
-        from factory.simulation.recovery.fault_file import read_campaign
-
         read_campaign(asked.faults)
+
+
+def campaign_of(asked: RunOptions, factory: Factory) -> Campaign:
+    """The faults and the spares of a run of a factory. Raises InputError."""
+    swap = SWAP if asked.swap is None else asked.swap
+    if asked.faults is None:
+        return Campaign(seed=asked.seed, spares=asked.spares, swap=swap)
+    campaign = read_campaign(asked.faults, asked.spares, swap)
+    check_names(campaign, factory)
+    return campaign
 
 
 def run_project(
@@ -53,7 +64,6 @@ def run_project(
         made = Simulation(project.layout, asked.request(project, seen))
         if asked.recovers:
             from factory.simulation.recovery import recover
-            from factory.simulation.recovery.fault_file import campaign_of
 
             recover(made, campaign_of(asked, project.layout.factory))
     recorders: list[Opening] = []

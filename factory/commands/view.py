@@ -47,11 +47,11 @@ def view(
     """Run FILE.pag endlessly in a browser, where you can pause it, push robots and block feeders.
 
     With --spares or --faults the run recovers from failures: you can pause or kill robots."""
+    from factory.commands.running import campaign_of
     from factory.nets.verify import proved
     from factory.show.live import Server, Session
     from factory.show.live.page import page
     from factory.show.live.server import check_server
-    from factory.simulation.recovery.fault_file import campaign_of
     from factory.simulation.simulation import Simulation
     from factory.support.interruption import Interruption
 

@@ -9,8 +9,11 @@ from factory.layout.compacting import compacted
 from factory.layout.durations import Pace
 from factory.layout.embedding import certified
 from factory.layout.guidepath import Point2
+from factory.layout.hands.choosing import Hands
 from factory.layout.layout import Layout
+from factory.layout.request import Ground
 from factory.support.errors import RunError
+from factory.support.settings import Settings
 
 
 def on_platen(layout: Layout, pace: Pace, tile: float, wanted: Point2 | None = None) -> Layout:
@@ -24,3 +27,9 @@ def on_platen(layout: Layout, pace: Pace, tile: float, wanted: Point2 | None = N
         except RunError:  # the search knows regions only; the one before takes a little more
             continue
     return certified(replace(layout, tile=tile), wanted)
+
+
+def platen(layout: Layout, ground: Ground, settings: Settings, hands: Hands) -> Layout:
+    """The variant of a layout on the tiles that a ground asks for. Raises RunError (Layout)."""
+    assert ground.tile is not None
+    return on_platen(layout, Pace.of(settings), ground.tile, ground.floor)

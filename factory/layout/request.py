@@ -7,6 +7,7 @@ from numbers import Real
 from typing import TYPE_CHECKING
 
 from factory.plant.factory import Factory
+from factory.support.apps import layout_variant
 from factory.support.bounds import check_values
 from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import Settings
@@ -55,6 +56,12 @@ class Ground:
         """Whether relays are asked for: a cycle time asks for them too."""
         return self.relay or self.cycle is not None
 
+    @property
+    def variants(self) -> tuple[str, ...]:
+        """The variants of a layout that are asked for, which apps give."""
+        asked = {"platen": self.tile is not None, "relay": self.relays and self.tile is None}
+        return tuple(name for name, is_asked in asked.items() if is_asked)
+
     def check(self, shared: bool) -> None:
         """Raises InputError (BadValue) where relays are asked for of robots with several tours
         (`shared`)."""
@@ -86,14 +93,8 @@ class Ground:
         hands = hands or hands_of(factory, product, settings)
         floor = None if self.tile else self.floor
         layout = lay_out(factory, product, settings.clearance, floor, pace, hands, draft)
-        if self.tile:
-            from factory.layout.platen import on_platen
-
-            return on_platen(layout, pace, self.tile, self.floor)
-        if self.relays:
-            from factory.layout.relaying import relayed
-
-            layout = relayed(layout, settings, self.cycle, self.floor, hands)
+        for variant in self.variants:
+            layout = layout_variant(variant)(layout, self, settings, hands)
         return layout
 
     def drafted(

@@ -22,6 +22,7 @@ from factory.layout.optimising import optimised
 from factory.layout.outfeed import away
 from factory.layout.relaying.splitting import split
 from factory.layout.relaying.ways import Way, ways
+from factory.layout.request import Ground
 from factory.plant.robot import Robot
 from factory.problem.pag import NOPART
 from factory.problem.robot_types import load_catalogue
@@ -40,6 +41,11 @@ WIDENED = 3
 
 
 @collector_paused()
+def relay(layout: Layout, ground: Ground, settings: Settings, hands: Hands) -> Layout:
+    """The variant of a layout with relays that a ground asks for. Raises RunError (Layout)."""
+    return relayed(layout, settings, ground.cycle, ground.floor, hands)
+
+
 def relayed(
     plain: Layout,
     settings: Settings,

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from factory.plant.factory import Factory
-from factory.simulation.options import RunOptions
 from factory.simulation.recovery.faults import (
     CLEAR,
     KINDS,
@@ -43,16 +42,6 @@ MOST = 1e9
 
 WORDS = {int: "a whole number", float: "a number", str: "a text", bool: "true or false"}
 WORDS |= {dict: "a table", list: "a list of tables [[fault]]"}
-
-
-def campaign_of(asked: RunOptions, factory: Factory) -> Campaign:
-    """The faults and the spares of a run of a factory. Raises InputError."""
-    swap = SWAP if asked.swap is None else asked.swap
-    if asked.faults is None:
-        return Campaign(seed=asked.seed, spares=asked.spares, swap=swap)
-    campaign = read_campaign(asked.faults, asked.spares, swap)
-    check_names(campaign, factory)
-    return campaign
 
 
 def read_campaign(path: Path, spares: int = 0, swap: float = SWAP) -> Campaign:

@@ -1,0 +1,1 @@
+"""Apps: each uses the core, and the core knows none."""

@@ -1,0 +1,1 @@
+"""Platens: movers on tiles in place of carriages on rails."""

@@ -1,0 +1,5 @@
+"""What the app for platens gives."""
+
+from factory.support.apps import App
+
+APP = App("platen", layouts={"platen": "factory.layout.platen:platen"})

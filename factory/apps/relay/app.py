@@ -1,0 +1,5 @@
+"""What the app for relays gives."""
+
+from factory.support.apps import App
+
+APP = App("relay", layouts={"relay": "factory.layout.relaying.relaying:relay"})
