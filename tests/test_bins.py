@@ -24,12 +24,11 @@ from tests.test_recovery import assert_recovered, run_with
 
 def bin_regions(layout: Layout, made: tuple[Bin, ...]) -> list[Region]:
     """The floor that bins take, and the ways of things into them."""
-    whole = layout.whole
-    by_label = piles(whole.factory, whole.product)
+    by_label = piles(layout.factory, layout.product)
     result = list[Region]()
     for one in made:
-        held = bins._held(whole, one.robot, by_label, frozenset())
-        flown = [each for each in held if layout.named(each[0]) in one.labels]
+        held = bins._held(layout, one.robot, by_label, frozenset())
+        flown = [each for each in held if each[0] in one.labels]
         result += [*bins._stands(one), *bins._flights(one, flown)]
     return result
 

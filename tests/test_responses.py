@@ -208,8 +208,7 @@ def test_an_input_that_slipped_may_be_found_as_it_jams() -> None:
 
 
 def test_a_robot_that_dies_where_it_went_ahead(steps: Layout) -> None:
-    """No operation waits for it that is under way: it is late all the same, and the spare comes to
-    where the lift was to go."""
+    """No operation waits for it that is under way: it is late all the same, and replaced."""
     simulation = Simulation(steps, RunRequest("mujoco", 6, recovers=True))
     recovery = recover(simulation, Campaign(spares=1, swap=4.0))
 
