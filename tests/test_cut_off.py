@@ -164,6 +164,9 @@ def test_a_stall(run: Terminal, out: Path) -> None:
     assert run("report", log, "-o", out / "a.html").status == 1
     words = Page((out / "a.html").read_text("utf-8")).words
     assert f"C{cut_off(log).with_cause[1:]}." in words
+    # what was fired is a beginning of what the net allows: it is the machine that is another
+    assert "✗ bodies differ" in words
+    assert any(one.startswith("The record of firings refines the net.") for one in words)
 
 
 def test_an_error_of_another_observer(out: Path) -> None:

@@ -120,8 +120,8 @@ def test_relays_with_hands_are_faster_and_go_through_nothing() -> None:
 
 
 def test_a_slower_cycle_takes_fewer_relays() -> None:
-    before, fast = plain(sawn(0)), with_relays(0)
-    slow, pace = relayed(before, SETTINGS, 4.2), Pace.of(SETTINGS)
+    before, pace = plain(sawn(0)), Pace.of(SETTINGS)
+    fast, slow = (relayed(before, SETTINGS, wanted) for wanted in (4.0, 4.2))
     assert 0 < len(hand_overs(slow)) < len(hand_overs(fast))
     cycles = [max(gear_times(layout, pace)) for layout in (fast, slow, before)]
     assert cycles[0] < cycles[1] <= 4.2 < cycles[2]
@@ -131,12 +131,15 @@ def test_a_slower_cycle_takes_fewer_relays() -> None:
 
 
 def test_no_more_relays_than_the_outfeed_has_use_for() -> None:
-    """A third relay would make the gears faster, but the outfeed takes as long as they do."""
+    """With all relays that there can be the outfeed would allow no less than 3.86 s. A second one
+    is not worth the 40 ms until then: 1 %, of 5 % that are allowed."""
     layout = with_relays(6)
-    assert len(hand_overs(layout)) == 2
+    assert len(hand_overs(layout)) == 1
     found, _ = pace(layout, SETTINGS)
-    assert found.bottleneck == "outfeed"
-    assert found.seconds > max(gear_times(layout, Pace.of(SETTINGS)))
+    assert found.bottleneck == "r2"
+    most, _ = pace(relayed(plain(sawn(6)), SETTINGS, 0.1), SETTINGS)
+    assert most.bottleneck == "outfeed"
+    assert most.seconds < found.seconds < 1.05 * most.seconds
 
 
 def test_a_chain_of_relays_goes_through_nothing() -> None:

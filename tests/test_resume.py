@@ -3,6 +3,7 @@ come again as it is logged is refused with a diagnostic."""
 
 from __future__ import annotations
 
+import json
 import signal
 import sys
 from collections.abc import Callable
@@ -17,9 +18,10 @@ import pytest
 from factory.record.log import LogWriter, read_log
 from factory.record.log.blocks import Arrays, pack_rows, unpack_rows
 from factory.record.log.continued import Continued, last_full
-from factory.record.log.reader import header_in
+from factory.record.log.reader import digest_of, header_in
 from factory.record.log.writer import rows_of_a_block
 from factory.record.state import State
+from factory.record.verdict import HEADER
 from factory.simulation.request import RunRequest
 from factory.simulation.resuming import Resumed
 from factory.simulation.simulation import Compiled, Simulation, compiled
@@ -37,11 +39,15 @@ JITTER = "--seed", 7, "--jitter", 0.2
 EXAMPLES = ROOT / "examples"
 
 
-def ticks_of(path: Path) -> bytes:
-    """All of a log but its header, which has the command line, and its end, which has a digest of
-    that."""
-    data = path.read_bytes()
-    return data[header_in(data)[1] : block_ends(data)[-2]]
+def ticks_of(path: Path) -> tuple[bytes, dict[str, object]]:
+    """All of a log but its header, which has the command line: its ticks, and what ended it with
+    the figures of its bodies, less the digest of the header."""
+    data, (_, end) = path.read_bytes(), taken_apart(path)[1][-1]
+    told = {name: bytes(values).decode() for name, values in end.items()}
+    header, first = header_in(data)
+    figures = json.loads(told.pop("figures", "{}"))
+    assert figures.pop(HEADER, None) == (digest_of(header) if figures else None)
+    return data[first : block_ends(data)[-2]], {**told, **figures}
 
 
 def cut(whole: Path, path: Path, size: int) -> Path:

@@ -23,6 +23,7 @@ from factory.support.settings import Settings
 from factory.timing.timed import timed
 from factory.timing.timing import Timing
 from tests.good_runs import assert_good, random_marking
+from tests.layout_values import Drawn, random_layout
 from tests.pag_texts import LONE, PAPER, PRODUCTS, laid_out
 from tests.simulation_values import ready
 
@@ -73,6 +74,19 @@ def test_the_cycle_of_robots_that_run_their_own_programs_is_predicted(
     run = factory.run(paper, units=12, seed=seed, distributed=True)
     assert run.succeeded and run.cycle_time_s > 1.01 * timed(Timing(paper)).pace
     assert run.cycle_time_s == pytest.approx(run.predicted_cycle_time_s, rel=0.015)
+
+
+@pytest.mark.parametrize(
+    ("drawn", "jitter"), [((4, 1, "chain", "small"), 0.0), ((6, 8, "any", "mixed"), 0.3)]
+)
+def test_robots_with_their_own_programs_have_any_speed_at_once_in_the_ideal_world(
+    drawn: Drawn, jitter: float
+) -> None:
+    """ẋ = F_p(x) there, too: governed by their accelerations they were 15 % slower."""
+    request = RunRequest("ideal", 16, seed=drawn[1], jitter=jitter, distributed=True)
+    run = Simulation(random_layout(*drawn), request).run()
+    assert run.refines_net and run.cycle_time_s is not None
+    assert run.cycle_time_s == pytest.approx(run.predicted_cycle_time_s, rel=0.005)
 
 
 def test_a_cycle_time_is_one_of_whole_periods() -> None:

@@ -25,6 +25,7 @@ class IdealWorld:
 
     lacking: Container[str] = ()
     collision = ""
+    instant = True
     _nothing = np.empty(0), np.empty((0, 3), np.intp)
 
     def __init__(

@@ -88,11 +88,12 @@ class World(Protocol):
     """The surroundings of a run: the ideal world or MuJoCo.
 
     A supervisor calls `step`; robots with programs of their own are driven by `move`, `advance` and
-    `settle`. `supplied`: an operation may have become prepared; reset by the reader. `dropoffs`:
-    time at which each product left the factory [s].
+    `settle`. `supplied`: an operation may have become prepared; reset by the reader. `instant`:
+    whether robots have any speed at once, so that none is governed (ẋ = F_p(x)).
     """
 
     supplied: bool
+    instant: bool
 
     @property
     def time(self) -> float:

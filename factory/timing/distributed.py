@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import ceil, inf, sqrt
+from math import ceil, sqrt
 from random import Random
 
 import numpy as np
@@ -215,10 +215,11 @@ class ScannedTimes:
 
     def _rests(self, way: Trajectory, eps: float) -> float:
         """After how many ticks an axis is nearer to its goal than eps, and STILL: within the last
-        tick, in which it brakes."""
-        still = inf if self.timing.world == "ideal" else STILL
-        last = way.rests(eps, min(still, 1e-6))
+        tick, in which it brakes; in the ideal world it is always STILL."""
+        if self.timing.world == "ideal":
+            return self._opens(way, eps)
+        last = way.rests(eps, 1e-6)
         if not last:
             return 0.0
         speed = abs(way.speed[last - 1])
-        return last - min(1.0, still / speed if speed else 0.0)
+        return last - min(1.0, STILL / speed if speed else 0.0)

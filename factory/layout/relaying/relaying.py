@@ -143,7 +143,7 @@ class _Search:
         """Find few relays with which the factory is as fast as wanted, or as possible."""
         if cycle is None:
             most = self._split({label: way.most for label, way in self.ways.items()})
-            cycle = max(WITHIN * cycle_of(most, self.pace), self.seconds(most))
+            cycle = WITHIN * self.seconds(most)
         times = self._times(self.layout)
         late = {label: way for label, way in self.ways.items() if times[way.robot] > cycle}
         self.cycle, self.numbers = cycle, dict.fromkeys(self.ways, 0)

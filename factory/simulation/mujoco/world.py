@@ -51,6 +51,8 @@ class MujocoWorld:
     engine refuses the model, with the engine's own words.
     """
 
+    instant = False
+
     def __init__(
         self,
         model: Model,
