@@ -234,7 +234,7 @@ b = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( 0, 0.0602, 0.01 ) )"""
     layout = planned(text, ("a", "b")).layout
     assert layout.factory.adjusted == {1} and layout.certificate is not None
     (order,) = layout.certificate.apart.orders
-    assert order.before.startswith("past:r2:") and order.start == "b_s" and order.kept
+    assert order.before.startswith("past:r2:") and order.start == "b_s"
     run = run_of(layout)
     assert run.succeeded, run.verdict.failures
     assert run.physics is not None and run.physics.unintended_contacts == 0
