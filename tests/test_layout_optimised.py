@@ -96,7 +96,7 @@ def test_what_the_examples_gain(name: str, figures: tuple[float, float, float]) 
 
 
 @given(drawn_layouts)
-@settings(max_examples=20)
+@settings(max_examples=8)
 def test_no_run_is_faster_than_the_bound(drawn: Drawn) -> None:
     """A run counts an operation as ended a little before its robots rest, and knows it in a whole
     tick; at any speed and however rough its ticks are."""
