@@ -359,6 +359,7 @@ def test_a_run_says_how_many_pairs_it_did_not_test(run: Terminal, tmp_path: Path
     document = run("run", file, "--json").json
     assert (document["pairs_tested"], document["pairs_excluded"]) == (5, 1)
     assert document["excluded"] == [["a", "b"]]
+    # a and c, b and d are 10 mm apart, a and b 2 mm inside each other
     assert [one["code"] for one in document["warnings"]] == ["Apart", "Overlap"]
     whole = run("run", file, "--overlap", 0.003).out
     assert "0 unintended contacts, 0 engine warnings" in whole and "not checked" not in whole

@@ -96,15 +96,14 @@ def test_what_the_examples_gain(name: str, figures: tuple[float, float, float]) 
 
 
 @given(drawn_layouts)
-@settings(max_examples=20)
+@settings(max_examples=8)
 def test_no_run_is_faster_than_the_bound(drawn: Drawn) -> None:
     """A run counts an operation as ended a little before its robots rest, and knows it in a whole
     tick; at any speed and however rough its ticks are."""
     seed = drawn[1]
-    ticks = {"timestep": 0.002 * (1 + seed % 4), "substeps": 1 + seed % 3}
-    asked = Settings(
-        **(ticks if seed % 2 else {}), stage=seed // 2 % 2, eps=10.0 ** (-4 + seed % 3 / 2)
-    )
+    asked = Settings(stage=seed // 2 % 2, eps=10.0 ** (-4 + seed % 3 / 2))
+    if seed % 2:
+        asked = replace(asked, timestep=0.002 * (1 + seed % 4), substeps=1 + seed % 3)
     layout = random_layout(*drawn)
     bound = cycle_time_bound(layout.factory, layout.product, layout.clearance, soonest(asked))
     assert bound <= paced(layout, asked)[0].seconds + 1e-9
