@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 DOCS = ROOT / "docs"
 
-PHYSICS = ("factory/layout", "factory/mjcf", "factory/simulation", "mjcf")
+PHYSICS = ("factory/floor/layout", "factory/engine/mjcf", "factory/engine/simulation", "mjcf")
 """The folders on which what is measured depends."""
 
 

@@ -12,12 +12,12 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
-from factory.lang.pag_reader import load_pag
-from factory.layout.pins import StayingRobot
+from factory.apps.revise.pins import StayingRobot
+from factory.apps.revise.revision import revised
+from factory.engine.timing.timed import pace
 from factory.pipeline import all_templates, read
-from factory.study.revision import revised
 from factory.support.errors import RunError
-from factory.timing.timed import pace
+from factory.theory.lang.pag_reader import load_pag
 from tests.revisions import KINDS, edited, kept_share, shuffled
 
 

@@ -8,26 +8,26 @@ from typing import TYPE_CHECKING
 from factory.support.showing import DRAWINGS
 
 if TYPE_CHECKING:
-    from factory.layout.layout import Layout
-    from factory.nets.gears import GearNet
-    from factory.nets.marked import MarkedNet
-    from factory.plant.factory import Factory
-    from factory.problem.pag import PAG
-    from factory.simulation.run import Run
+    from factory.engine.simulation.run import Run
+    from factory.floor.layout.layout import Layout
+    from factory.theory.nets.gears import GearNet
+    from factory.theory.nets.marked import MarkedNet
+    from factory.theory.plant.factory import Factory
+    from factory.theory.problem.pag import PAG
 
 LARGE = 400
 """The most nodes of a tree, places of a net or robots of a layout that are drawn."""
 
 
 def _tree(pag: PAG) -> str | None:
-    from factory.exporting.svg import draw_tree
+    from factory.apps.exports.svg import draw_tree
 
     return draw_tree(pag) if len(pag) <= LARGE else None
 
 
 def _net(net: GearNet | MarkedNet, title: str = "net") -> str | None:
-    from factory.exporting.svg import draw_net
-    from factory.nets.marked import marked
+    from factory.apps.exports.svg import draw_net
+    from factory.theory.nets.marked import marked
 
     made = marked(net)
     return draw_net(made, title) if len(made.tokens) <= LARGE else None
@@ -38,15 +38,15 @@ def _factory(factory: Factory) -> str | None:
 
 
 def _floor(layout: Layout) -> str | None:
-    from factory.exporting.floor_sheet import write_svg
+    from factory.apps.exports.floor_sheet import write_svg
 
     return write_svg(layout) if len(layout.factory.robots) <= LARGE else None
 
 
 def _run(run: Run) -> str:
     """The report of a run that was logged; of another its figures."""
-    from factory.show.report.page import inline, report_on
-    from factory.simulation.figures import figures
+    from factory.apps.report.page import inline, report_on
+    from factory.engine.simulation.figures import figures
 
     if run.log is not None and run.world == "mujoco" and run.log.is_file():
         return inline(report_on(run.log).text)

@@ -13,31 +13,31 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from factory.compiler.compiler import compile_pag
-from factory.compiler.expanding import expand
-from factory.compiler.turning import check_shapes, placed
-from factory.lang.pag_reader import load_pag
-from factory.lang.template_reader import all_templates as all_templates
-from factory.lang.template_reader import is_shipped
-from factory.layout.request import Ground, hands_of
-from factory.plant.approaches import Approach
-from factory.plant.factory import Factory
-from factory.problem.pag import PAG
-from factory.problem.plan import Plan
-from factory.problem.robot_types import Catalogue, load_catalogue
-from factory.problem.template import Template
+from factory.floor.layout.request import Ground, hands_of
 from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import Settings
 from factory.support.tables import MISFITS, misfit
+from factory.theory.compiler.compiler import compile_pag
+from factory.theory.compiler.expanding import expand
+from factory.theory.compiler.turning import check_shapes, placed
+from factory.theory.lang.pag_reader import load_pag
+from factory.theory.lang.template_reader import all_templates as all_templates
+from factory.theory.lang.template_reader import is_shipped
+from factory.theory.plant.approaches import Approach
+from factory.theory.plant.factory import Factory
+from factory.theory.problem.pag import PAG
+from factory.theory.problem.plan import Plan
+from factory.theory.problem.robot_types import Catalogue, load_catalogue
+from factory.theory.problem.template import Template
 
 if TYPE_CHECKING:
-    from factory.compiler.mating.findings import Matings
-    from factory.geometry.overlapping import DrawnOverlaps
-    from factory.geometry.solids import Product
-    from factory.layout.hands.choosing import Hands
-    from factory.layout.hands.misses import NoGrip
-    from factory.layout.layout import Layout
-    from factory.layout.saved import LayoutTable
+    from factory.floor.geometry.overlapping import DrawnOverlaps
+    from factory.floor.geometry.solids import Product
+    from factory.floor.layout.hands.choosing import Hands
+    from factory.floor.layout.hands.misses import NoGrip
+    from factory.floor.layout.layout import Layout
+    from factory.floor.layout.saved import LayoutTable
+    from factory.floor.mating.findings import Matings
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ class Project:
     @cached_property
     def product(self) -> Product:
         """The solids of its parts. Raises InputError where a mesh cannot be read."""
-        from factory.geometry.product import product_geometry
+        from factory.floor.geometry.product import product_geometry
 
         return product_geometry(self.pag)
 
@@ -126,7 +126,7 @@ class Project:
         """A project for each product of a mix, alone; itself for one product."""
         if self.pag.mix is None:
             return (self,)
-        from factory.compiler.mixing import lowered_alike
+        from factory.theory.compiler.mixing import lowered_alike
 
         made = self.with_plan(self._single)
         alone = [made.with_pag(self.pag.product(x)) for x in self.pag.products]
@@ -153,10 +153,10 @@ class Project:
         if not self.pag.is_shaped:
             return None
         if self.pag.mix is not None:
-            from factory.compiler.mating.findings import together
+            from factory.floor.mating.findings import together
 
             return together(filter(None, (one.matings for one in self.each)))
-        from factory.compiler.mating.mating import matings
+        from factory.floor.mating.mating import matings
 
         nodes = expand(self.pag, self.templates, self._single)
         lowered = {**placed(nodes, self.catalogue), **self.lowered}
@@ -165,7 +165,7 @@ class Project:
     @property
     def overlaps(self) -> DrawnOverlaps:
         """Which parts overlap in the finished product; none of default boxes."""
-        from factory.geometry.overlapping import DrawnOverlaps, overlaps_of
+        from factory.floor.geometry.overlapping import DrawnOverlaps, overlaps_of
 
         if not self.pag.is_shaped:
             return DrawnOverlaps()
@@ -177,7 +177,7 @@ class Project:
         is blocked, and what no hand can hold, unless the product is of an unlikely size."""
         apart: tuple[Diagnostic, ...] = ()
         if self.pag.is_shaped:
-            from factory.geometry.touching_groups import apart_in
+            from factory.floor.geometry.touching_groups import apart_in
 
             apart = apart_in(self.product, *(self.pag.insides if self.pag.mix else ()))
         product = () if self.pag.is_plain else self.product.warnings
@@ -203,7 +203,7 @@ class Project:
         """What no hand can hold; nothing for a product of default boxes."""
         if not self.pag.is_shaped:
             return ()
-        from factory.layout.hands.nearest import no_grips
+        from factory.floor.layout.hands.nearest import no_grips
 
         return no_grips(self.hands)
 
@@ -213,7 +213,7 @@ class Project:
         factory, plan = self.planned, self.planned.plan
         if not plan.turns or plan.lifts is not None:
             return factory
-        from factory.layout.hands.adjusting import lifts_for
+        from factory.floor.layout.hands.adjusting import lifts_for
 
         plan = replace(plan, lifts=lifts_for(self._unlifted, self.catalogue))
         return self._shared(plan) if plan.lifts else replace(factory, plan=plan)
@@ -225,21 +225,21 @@ class Project:
             return self._shared(self.plan)
         if self.pag.mix is None:
             return self.compiled
-        from factory.layout.sequencing import sequenced
+        from factory.floor.layout.sequencing import sequenced
 
         inputs = self.pag.mix, self.product, self.catalogue, self.settings
         return self._shared(sequenced(self.approached, *inputs))
 
     def _shared(self, plan: Plan) -> Factory:
-        from factory.compiler.assigning import shared
+        from factory.theory.compiler.assigning import shared
 
         return shared(self.approached, plan, self.catalogue)
 
     @cached_property
     def approached(self) -> Factory:
         """`compiled`, with how inputs come together where that is free: in default boxes."""
-        from factory.compiler.assigning import beside
-        from factory.compiler.mating.mating import judged
+        from factory.floor.mating.mating import judged
+        from factory.theory.compiler.assigning import beside
 
         if self.pag.mix is not None:
             return beside(self.pag, [one.approached for one in self.each])
@@ -255,7 +255,7 @@ class Project:
         """The factory of the plan, with a robot for each tour and without relays. Raises InputError
         where there is no such factory."""
         if self.pag.mix is not None:
-            from factory.compiler.assigning import beside
+            from factory.theory.compiler.assigning import beside
 
             return beside(self.pag, [one.compiled for one in self.each])
         factory = compile_pag(
@@ -265,7 +265,7 @@ class Project:
         users = {name for name, template in self.templates.items() if not is_shipped(template)}
         tried = users and users & {operation.template.name for operation in factory.operations}
         if tried:
-            from factory.modes.modes import check_modes
+            from factory.floor.modes.modes import check_modes
 
             check_modes(factory, [self.templates[name] for name in sorted(tried)], self.product)
         return factory
@@ -276,7 +276,7 @@ class Project:
         ground asks for them. Raises InputError, as BadPlan where what is kept is of another
         factory, and as BadRobot where a drive is too weak; RunError (Layout) where there is no
         room."""
-        from factory.mjcf.driving import check_drives
+        from factory.engine.mjcf.driving import check_drives
 
         if self.laid is not None:
             laid = self._laid_out(self.laid)
@@ -293,8 +293,8 @@ class Project:
         return self.ground.drafted(self.plain, self.product, self.settings, self.hands)
 
     def _laid_out(self, laid: LayoutTable) -> Layout:
-        from factory.compiler.mating.mating import judged
-        from factory.compiler.relays import with_relays
+        from factory.floor.mating.mating import judged
+        from factory.theory.compiler.relays import with_relays
 
         factory = plain = judged(self.plain, self.product)
         if relays := self.plan.relays:

@@ -21,18 +21,18 @@ from factory.support.settings import Settings
 if TYPE_CHECKING:
     import networkx as nx
 
-    from factory.exporting import Made
-    from factory.exporting.build import Built
-    from factory.exporting.subject import Source
-    from factory.layout.layout import Layout
-    from factory.nets.petri import Marking
-    from factory.nets.verdict import Verdict
+    from factory.apps.exports import Made
+    from factory.apps.exports.build import Built
+    from factory.apps.exports.subject import Source
+    from factory.engine.simulation.executing import Tell
+    from factory.engine.simulation.run import Run
+    from factory.floor.layout.layout import Layout
     from factory.pipeline import Project
-    from factory.plant.factory import Factory
-    from factory.problem.pag import PAG
-    from factory.simulation.executing import Tell
-    from factory.simulation.run import Run
     from factory.support.bounds import WorldName
+    from factory.theory.nets.petri import Marking
+    from factory.theory.nets.verdict import Verdict
+    from factory.theory.plant.factory import Factory
+    from factory.theory.problem.pag import PAG
 
 AnyPath: TypeAlias = "str | PathLike[str]"
 Stage: TypeAlias = "AnyPath | PAG | Factory | Layout | Project"
@@ -44,12 +44,12 @@ def project_of(
 ) -> Project:
     """The project of a product at any stage. A plan that is laid out again is a warning of Python.
     Raises InputError, of code Usage for what is no product."""
-    from factory.layout.layout import Layout
+    from factory.apps.log.plan_file import read_plan
+    from factory.floor.layout.layout import Layout
     from factory.pipeline import Project, all_templates, read
-    from factory.plant.factory import Factory
-    from factory.problem.pag import PAG
-    from factory.record.plan_file import read_plan
     from factory.support.files import is_plan
+    from factory.theory.plant.factory import Factory
+    from factory.theory.problem.pag import PAG
 
     pag = product.factory.pag if isinstance(product, Layout) else getattr(product, "pag", product)
     if isinstance(pag, PAG):
@@ -115,9 +115,9 @@ def compile(
     out at most so many factories (`effort`), none after so many `seconds`. `parallel`: for each of
     some labels how often the branch that brings it is there. Raises InputError.
     """
+    from factory.apps.few_robots.aim import Aim
+    from factory.apps.few_robots.search import allocated
     from factory.sharing import with_branches
-    from factory.study.allocation.aim import Aim
-    from factory.study.allocation.search import allocated
 
     project, branches = project_of(product, settings, templates), tuple((parallel or {}).items())
     aim = Aim(robots, cycle, effort, inf if seconds is None else seconds, branches)
@@ -129,7 +129,7 @@ def compile(
 def verify(product: Stage) -> Verdict:
     """The proof that a factory's net is a gear net, live, safe, reversible and legally marked, or
     witnesses of what fails."""
-    from factory.nets.verify import verify as prove
+    from factory.theory.nets.verify import verify as prove
 
     return prove(project_of(product).plain.net)
 
@@ -149,9 +149,9 @@ def to_networkx(product: Stage) -> nx.DiGraph:
     >>> [net.nodes[p]["name"] for p in net.predecessors("t0")]
     ['r1:nopart', 'r2:part3', 'r3:sub2']
     """
-    from factory.plant.factory import Factory
-    from factory.plant.graphs import to_networkx as graph_of
-    from factory.problem.pag import PAG
+    from factory.apps.exports.graphs import to_networkx as graph_of
+    from factory.theory.plant.factory import Factory
+    from factory.theory.problem.pag import PAG
 
     if isinstance(product, PAG | Factory):
         return graph_of(product)
@@ -179,8 +179,8 @@ def lay_out(
     itself. Raises InputError for a mesh that cannot be read, RunError where the factory does not
     fit the floor.
     """
-    from factory.layout.request import WIDEST, Ground
-    from factory.simulation.options import check_together
+    from factory.apps.runs.options import check_together
+    from factory.floor.layout.request import WIDEST, Ground
     from factory.support.bounds import pair
 
     check_together({"--relay": relay, "--platen": tile is not None})
@@ -234,9 +234,9 @@ def run(
     is told the simulated time [s] and the units made, after some ticks. Raises RunError for a run
     that stalls or takes longer, InputError for a wrong value and where the engine refuses a mesh.
     """
-    from factory.commands.running import check_run, run_project
-    from factory.simulation.options import RunOptions, check_ideal
-    from factory.simulation.run import require
+    from factory.apps.runs.options import RunOptions, check_ideal
+    from factory.apps.runs.running import check_run, run_project
+    from factory.engine.simulation.run import require
 
     asked = RunOptions(world, units, seed, jitter, wip, start, fuse, max_time, distributed, lenient)
     asked = replace(asked, faults=maybe(faults), spares=spares, swap=swap, strict=strict)
@@ -268,10 +268,10 @@ def build(
     >>> built.model.bodies, built.files
     (11, ())
     """
-    from factory.exporting.build import BuildRequest
-    from factory.exporting.build import build as build_files
-    from factory.nets.verify import proved
+    from factory.apps.exports.build import BuildRequest
+    from factory.apps.exports.build import build as build_files
     from factory.support.bounds import check_values
+    from factory.theory.nets.verify import proved
 
     check_values({"units": units, "wip": wip})
     request = BuildRequest(maybe(mjcf), maybe(output), units, wip)
@@ -300,8 +300,8 @@ def export(
     >>> factory.export("examples/paper.pag", "dot").splitlines()[0]
     'digraph factory {'
     """
-    from factory.exporting.writing import export as exported
-    from factory.exporting.writing import exporter, read_source
+    from factory.apps.exports.writing import export as exported
+    from factory.apps.exports.writing import exporter, read_source
     from factory.support.files import write_all
 
     chosen = exporter(form, of, [*map(path_of, exporters)])

@@ -12,21 +12,21 @@ from factory.support.guard import guarding, will_write
 from factory.support.settings import Settings
 
 if TYPE_CHECKING:
-    from factory.planning.plan import Planned
-    from factory.problem.pag import PAG
-    from factory.record.log.pictures import Rendered
-    from factory.rendering.picture import PanelName
-    from factory.show.report.page import RunReport
-    from factory.simulation.executing import Tell
-    from factory.simulation.run import Run
-    from factory.study.analysis import Analysis
-    from factory.study.sweep.summary import Summary
+    from factory.apps.analyze import Analysis
+    from factory.apps.planning.plan import Planned
+    from factory.apps.report.page import RunReport
+    from factory.apps.runs.pictures import Rendered
+    from factory.apps.sweep.summary import Summary
+    from factory.engine.simulation.executing import Tell
+    from factory.engine.simulation.run import Run
+    from factory.film.picture import PanelName
     from factory.support.bounds import WorldName
+    from factory.theory.problem.pag import PAG
 
 
 def _logged(product: Stage) -> Path | None:
     """The path of the log of a run; None where a product is given."""
-    from factory.record.log import is_log
+    from factory.apps.log import is_log
 
     path = named(product)
     return path if path is not None and is_log(path) else None
@@ -59,11 +59,11 @@ def render(
     handover:LABEL; `panels` beside the 3-D: net, gantt; `poster`: a still of a film's best moment.
     The others are those of `run`. Raises InputError, MissingError without GL, RunError.
     """
-    from factory.record.log import read_log
-    from factory.record.log.pictures import Shot
-    from factory.record.log.pictures import render as taken
-    from factory.rendering.picture import Picture
-    from factory.simulation.options import RunOptions
+    from factory.apps.log import read_log
+    from factory.apps.runs.options import RunOptions
+    from factory.apps.runs.pictures import Shot
+    from factory.apps.runs.pictures import render as taken
+    from factory.film.picture import Picture
 
     asked = RunOptions("mujoco", units, seed, jitter, wip, max_time=max_time)
     picture = Picture(size, camera, panels=tuple(panels), title=title)
@@ -89,8 +89,8 @@ def report(
 ) -> RunReport:
     """The page about a run of a product, or about the run in a log; a notebook shows it. Written to
     `output` where that is given. The others are those of `run`. Raises InputError, RunError."""
-    from factory.show.report.page import report_on
-    from factory.simulation.options import RunOptions
+    from factory.apps.report.page import report_on
+    from factory.apps.runs.options import RunOptions
     from factory.support.files import write_text
 
     asked = RunOptions("mujoco", units, seed, jitter, wip, max_time=max_time)
@@ -125,13 +125,13 @@ def analyze(
     >>> factory.analyze("examples/paper.pag").bottlenecks
     ('r3',)
     """
-    from factory.nets.verify import proved
-    from factory.record.log import read_log
-    from factory.simulation.options import RunOptions
-    from factory.simulation.run import Run
-    from factory.study.analysis import Timing, analyse
-    from factory.study.analysis.analysing import change_of
-    from factory.study.analysis.measured import Conditions, conditions, logged_record, record_of
+    from factory.apps.analyze import Timing, analyse
+    from factory.apps.analyze.analysing import change_of
+    from factory.apps.analyze.measured import Conditions, conditions, logged_record, record_of
+    from factory.apps.log import read_log
+    from factory.apps.runs.options import RunOptions
+    from factory.engine.simulation.run import Run
+    from factory.theory.nets.verify import proved
 
     asked = RunOptions(world, units, seed, jitter, wip)
     run = measured if isinstance(measured, Run) else None
@@ -176,11 +176,11 @@ def sweep(
     `jobs`: processes, one per core by default; `retry`: failed runs are repeated. The others are
     those of `run`. Raises InputError, RunError.
     """
-    from factory.study.pool import cores
-    from factory.study.sweep.grid import read_axes
-    from factory.study.sweep.recipe import recipe_of
-    from factory.study.sweep.summary import summarise
-    from factory.study.sweep.sweeping import sweep as swept
+    from factory.apps.sweep.grid import read_axes
+    from factory.apps.sweep.pool import cores
+    from factory.apps.sweep.recipe import recipe_of
+    from factory.apps.sweep.summary import summarise
+    from factory.apps.sweep.sweeping import sweep as swept
     from factory.support.bounds import WORLDS, check_choice, check_values
 
     shared = {"units": units, "seed": seed, "jitter": jitter, "wip": wip}
@@ -236,14 +236,14 @@ def plan(
     `in_place`: the parts are not checked for their places; `library`: of LDraw parts, `boxes` for
     those without a shape. Raises InputError, of code CannotAssemble for parts that interlock.
     """
-    from factory.lang.overlaps import overlaps_in
+    from factory.apps.planning.outcome import refusal, write_planned
+    from factory.apps.planning.plan import CannotAssemble, PlanOptions
+    from factory.apps.planning.plan import plan as planned_for
+    from factory.apps.planning.source import SourceOptions, read_source
     from factory.pipeline import all_templates, read
-    from factory.planning.outcome import refusal, write_planned
-    from factory.planning.plan import CannotAssemble, PlanOptions
-    from factory.planning.plan import plan as planned_for
-    from factory.planning.source import SourceOptions, read_source
     from factory.support.bounds import AIMS, LENGTHS, UPS, check_choice, check_values
     from factory.support.errors import InputError
+    from factory.theory.lang.overlaps import overlaps_in
 
     check_values({"seconds": seconds})
     check_choice("aim", aim, AIMS)

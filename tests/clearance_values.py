@@ -7,8 +7,8 @@ from typing import Any
 
 import mujoco
 
-from factory.exporting.clearance.checking import faults_of
-from factory.exporting.clearance.documents import DocumentReader, Row, proof_of
+from factory.apps.exports.clearance.checking import faults_of
+from factory.apps.exports.clearance.documents import DocumentReader, Row, proof_of
 
 Json = dict[str, Any]
 

@@ -12,11 +12,11 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, settings
 
-from factory.lang import load_templates
-from factory.problem.template import Template
-from factory.study.sweep import Recipe, sweeping
-from factory.study.sweep.grid import Point
-from factory.study.sweep.work import Outcome, Runner
+from factory.apps.sweep import Recipe, sweeping
+from factory.apps.sweep.grid import Point
+from factory.apps.sweep.work import Outcome, Runner
+from factory.theory.lang import load_templates
+from factory.theory.problem.template import Template
 from tests.command_line import Terminal
 from tests.once import ANEW, Stages, stages_once
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from factory.study.sweep.grid import Point, Value
-from factory.study.sweep.recipe import Recipe
+from factory.apps.sweep.grid import Point, Value
+from factory.apps.sweep.recipe import Recipe
 
 
 @dataclass(frozen=True)

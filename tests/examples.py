@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 import factory
-from factory.layout.layout import Layout
+from factory.floor.layout.layout import Layout
 from factory.pipeline import read
 from tests.command_line import ROOT
 

@@ -12,12 +12,12 @@ from typing import Any
 
 import pytest
 
-from factory.exporting import Made, Subject, exporters
-from factory.layout.layout import Layout
+from factory.apps.exports import Made, Subject, exporters
+from factory.apps.log import Log, LogWriter, is_log, read_log
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.layout import Layout
 from factory.pipeline import Project, read
-from factory.record.log import Log, LogWriter, is_log, read_log
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
 from tests.command_line import PAPER, ROOT
 
 LAMP = ROOT / "examples" / "lamp.pag"

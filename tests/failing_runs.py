@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from factory.layout.layout import Layout
+from factory.apps.log import Log, LogWriter, read_log
+from factory.apps.recovery import Campaign, WorldFault, recover
+from factory.engine.simulation.request import RunRequest, WorldName
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.layout import Layout
 from factory.pipeline import read
-from factory.record.log import Log, LogWriter, read_log
-from factory.simulation.recovery import Campaign, WorldFault, recover
-from factory.simulation.request import RunRequest, WorldName
-from factory.simulation.simulation import Simulation
 from tests.command_line import PAPER
 
 FAULTS = """

@@ -8,30 +8,23 @@ from dataclasses import replace
 from functools import cache
 from itertools import combinations
 
-from factory.compiler.assigning import gear_net, shared
-from factory.compiler.compiler import compile_pag
-from factory.compiler.folding import (
-    Line,
-    fold,
-    folded,
-    line_of,
-    mismatch,
-    sides_of,
-)
-from factory.compiler.mating.mating import judged
-from factory.compiler.parallel import in_parallel
-from factory.layout.durations import Pace
-from factory.layout.embedding import lay_out
-from factory.layout.layout import Layout
-from factory.nets.gears import GearNet
-from factory.nets.marked import MarkedNet, marked
+from factory.floor.layout.durations import Pace
+from factory.floor.layout.embedding import lay_out
+from factory.floor.layout.layout import Layout
+from factory.floor.mating.mating import judged
 from factory.pipeline import Project, all_templates
-from factory.plant.approaches import Approach
-from factory.plant.factory import Factory
-from factory.problem.pag import PAG
-from factory.problem.plan import Plan
-from factory.problem.robot_types import Catalogue, load_catalogue
 from factory.support.settings import Settings
+from factory.theory.compiler.assigning import gear_net, shared
+from factory.theory.compiler.compiler import compile_pag
+from factory.theory.compiler.folding import Line, fold, folded, line_of, mismatch, sides_of
+from factory.theory.compiler.parallel import in_parallel
+from factory.theory.nets.gears import GearNet
+from factory.theory.nets.marked import MarkedNet, marked
+from factory.theory.plant.approaches import Approach
+from factory.theory.plant.factory import Factory
+from factory.theory.problem.pag import PAG
+from factory.theory.problem.plan import Plan
+from factory.theory.problem.robot_types import Catalogue, load_catalogue
 from tests.pag_values import SHAPES, TEMPLATES, catalogue, paper, random_pag
 
 INSERTING = {**TEMPLATES, "insert": replace(TEMPLATES["insert"], further="insert")}

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import random
 
-from factory.layout.layout import Layout
-from factory.nets.petri import Marking
-from factory.simulation.run import Run
+from factory.engine.simulation.run import Run
+from factory.floor.layout.layout import Layout
+from factory.theory.nets.petri import Marking
 from tests.token_game import enabled, follower
 
 

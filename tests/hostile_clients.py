@@ -11,7 +11,7 @@ from typing import Any
 
 from asyncua import Client, ua
 
-from factory.show.opcua import SPACE
+from factory.apps.plc.opcua import SPACE
 
 KIND = ua.VariantType
 

@@ -8,8 +8,8 @@ from random import Random
 
 import numpy as np
 
-from factory.layout.layout import Layout
-from factory.simulation.signals import Commands, Controller, Sensed
+from factory.apps.plc.signals import Commands, Controller, Sensed
+from factory.floor.layout.layout import Layout
 
 SOON = 0.4
 """Mean time between two changes of mind [s]."""

@@ -17,41 +17,61 @@ from pathlib import Path
 
 FLOORS = (
     ("support",),
-    ("problem",),
-    ("lang", "geometry", "nets", "control"),
-    ("plant", "importing", "foreign_nets"),
-    ("compiler",),
-    ("layout",),
-    ("modes", "mjcf"),
-    ("timing", "pipeline"),
-    ("record", "planning"),
-    ("simulation",),
-    ("exporting", "study", "rendering"),
-    ("show",),
-    ("commands",),
+    ("theory.problem",),
+    ("theory.lang", "theory.nets", "theory.control"),
+    ("theory.plant",),
+    ("theory.compiler",),
+    ("floor.geometry",),
+    ("floor.mating",),
+    ("floor.layout",),
+    ("floor.modes",),
+    ("engine.mjcf",),
+    ("engine.timing",),
+    ("engine.record",),
+    ("engine.simulation",),
+    ("pipeline",),
+    ("sharing",),
+    ("film",),
 )
-"""Rooms from the ground up. A room imports itself and the floors below it, nothing beside it."""
+"""Rooms of the core from the ground up. A room imports itself and the floors below it, nothing
+beside it. Above them are the apps, then the commands."""
 
-ENTRANCES = ("stages", "studies", "notebook", "__init__", "__main__")
-"""Loose modules above all floors, from the lowest up: the functions that a user calls, how values
-are shown, the command."""
+APPS = (
+    ("foreign_nets", "importing", "few_robots", "relay", "platen", "revise", "log", "recovery"),
+    ("monitor", "disturbance", "planning", "analyze", "exports"),
+    ("runs", "resume"),
+    ("sweep",),
+    ("fidelity",),
+    ("report",),
+    ("pareto", "live"),
+    ("plc",),
+)
+"""The apps, from those that use no other app up. An app imports the core, itself, and the apps
+below it."""
+
+ENTRANCES = ("commands", "stages", "studies", "notebook", "__init__", "__main__")
+"""Above the core and the apps, from the lowest up: the command line, the functions that a user
+calls, how values are shown."""
 
 ENGINE_ROOMS = (
     "support",
-    "mjcf",
-    "record",
-    "simulation/mujoco",
-    "exporting",
-    "study/fidelity",
-    "rendering",
-    "show/report",
+    "engine/mjcf",
+    "engine/record",
+    "engine/simulation/mujoco",
+    "film",
+    "apps",
 )
 """Rooms, or parts of rooms, that may import the engine."""
 
 VAGUE = frozenset({"found", "told", "given", "known", "own"})
 """Names that do not say what a variable is."""
 
-ENGINE_WRITERS = ("simulation/mujoco", "mjcf")
+ENGINE_WRITERS = (
+    "engine/simulation/mujoco",
+    "engine/mjcf",
+    "apps/disturbance",
+    "apps/recovery",
+)
 """Where the engine's model and data are written: those of a run, and those of a replica that no run
 uses."""
 
@@ -70,17 +90,22 @@ ENGINE_FIELDS = frozenset(
 VARIANTS = re.compile(r"(^|_)(fold(s|ed|ing)?|relay(s|ed|ing)?|parallel|forms?)(_|$)")
 """What variants of a factory are called, in identifiers of small letters."""
 
-VARIANT_ROOMS = ("compiler", "layout/relaying", "problem/plan")
+VARIANT_ROOMS = ("theory/compiler", "theory/problem/plan", "apps/relay", "apps/few_robots")
 """Where variants are made. All others know the factory that was made."""
 
 VARIANT_MARKS = {
-    **{"study": 95, "commands": 31, "lang": 28, "pipeline": 17, "planning": 17, "layout": 13},
-    **{"stages": 8, "exporting": 7, "support": 5, "foreign_nets": 4, "plant": 2, "show": 1},
+    **{"commands": 31, "theory.lang": 28, "apps.pareto": 23, "apps.planning": 17, "pipeline": 11},
+    **{"stages": 8, "apps.exports": 7, "floor.layout": 7, "sharing": 6, "floor.mating": 5},
+    **{"support": 5, "apps.foreign_nets": 4, "engine.timing": 3, "theory.plant": 2},
+    **{"apps.sweep": 1},
 }
 """How many identifiers of other rooms may still name a variant. A mark may fall, and never rises:
 what needs it is told by the plan, or by what the factory is."""
 
-MOST_ROOMS, MOST_LINES, MOST_ATTRIBUTES, MOST_PARAMETERS = 23, 350, 12, 8
+STOREYS = ("theory", "floor", "engine", "apps")
+"""Folders whose folders are rooms."""
+
+MOST_LINES = 350
 
 
 @dataclass(frozen=True)
@@ -93,7 +118,11 @@ class Module:
 
     @property
     def room(self) -> str:
-        return self.name.split(".")[0] or "__init__"
+        """Its room, with the storey where that has several: `theory.nets`."""
+        first, *rest = self.name.split(".")
+        if first in STOREYS and rest:
+            return f"{first}.{rest[0]}"
+        return first or "__init__"
 
     @cached_property
     def tree(self) -> ast.Module:
@@ -143,23 +172,22 @@ class House:
 
 
 def floor(room: str) -> int:
-    """The number of a room's floor from the ground up; entrances are above all, in
-    their order."""
+    """The number of a room's floor from the ground up, of the core, the apps, the entrances."""
     if room in ENTRANCES:
-        return len(FLOORS) + ENTRANCES.index(room)
-    return next((n for n, rooms in enumerate(FLOORS) if room in rooms), -1)
+        return len(FLOORS) + len(APPS) + ENTRANCES.index(room)
+    rooms = (*FLOORS, *(tuple(f"apps.{name}" for name in names) for names in APPS))
+    return next((n for n, every in enumerate(rooms) if room in every), -1)
 
 
 def strangers(house: House) -> Iterator[str]:
-    """Rooms and loose modules that no floor names; more rooms than there may be."""
-    rooms = {module.room for module in house.modules.values()} - {*ENTRANCES}
+    """Rooms and loose modules that no floor names."""
+    rooms = {module.room for module in house.modules.values()} - {*ENTRANCES, *STOREYS}
     yield from (f"{room}: on no floor" for room in sorted(rooms) if floor(room) < 0)
-    if len(rooms) > MOST_ROOMS:
-        yield f"{len(rooms)} rooms; at most {MOST_ROOMS}"
 
 
 def upward_imports(house: House) -> Iterator[str]:
-    """Imports of a room on the same floor or above."""
+    """Imports of a room on the same floor or above: of the core from an app, of an app from one
+    beside or above it."""
     for module in house.modules.values():
         for other in sorted(house.imports(module)):
             room = house.modules[other].room
@@ -219,65 +247,6 @@ def classes(house: House) -> Iterator[tuple[Module, ast.ClassDef]]:
         for node in ast.walk(module.tree):
             if isinstance(node, ast.ClassDef):
                 yield module, node
-
-
-def attributes(node: ast.ClassDef) -> set[str]:
-    """Names of a class's fields: annotated in its body, or assigned to self anywhere in it."""
-    fields = {
-        item.target.id
-        for item in node.body
-        if isinstance(item, ast.AnnAssign)
-        and isinstance(item.target, ast.Name)
-        and "ClassVar" not in ast.unparse(item.annotation)
-    }
-    for inner in ast.walk(node):
-        if (
-            isinstance(inner, ast.Attribute)
-            and isinstance(inner.ctx, ast.Store)
-            and isinstance(inner.value, ast.Name)
-            and inner.value.id == "self"
-        ):
-            fields.add(inner.attr)
-    return fields
-
-
-RECORDS = frozenset({"dataclass", "NamedTuple"})
-
-
-def is_record(node: ast.ClassDef) -> bool:
-    """Whether a class is a frozen record of figures or settings, which a table prints whole."""
-    return any("frozen=True" in ast.unparse(d) for d in node.decorator_list) or any(
-        ast.unparse(base) in RECORDS for base in node.bases
-    )
-
-
-def crowded_classes(house: House) -> Iterator[str]:
-    """Classes with more attributes than there may be. Frozen records are documents, not machines:
-    they are left out."""
-    for module, node in classes(house):
-        if not is_record(node) and len(found := attributes(node)) > MOST_ATTRIBUTES:
-            yield f"{module.name}.{node.name}: {len(found)} attributes"
-
-
-def crowded_functions(house: House) -> Iterator[str]:
-    """Functions with more parameters than there may be (self and cls are not counted). In the
-    entrances they are a user's options, as those of commands are: keywords are not counted."""
-    for module in house.modules.values():
-        for node in ast.walk(module.tree):
-            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-                a = node.args
-                keywords = [] if module.room in ENTRANCES else a.kwonlyargs
-                every = [p.arg for p in (*a.posonlyargs, *a.args, *keywords)]
-                count = len([p for p in every if p not in ("self", "cls")])
-                if count > MOST_PARAMETERS and not is_command(node):
-                    yield f"{module.name}.{node.name}: {count} parameters"
-
-
-def is_command(node: ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
-    """Whether click calls it, with a parameter an option."""
-    return any(
-        ast.unparse(d).startswith(("click.", "command", "cli.")) for d in node.decorator_list
-    )
 
 
 def twins(house: House) -> Iterator[str]:

@@ -12,15 +12,15 @@ from types import MappingProxyType
 
 from hypothesis import strategies as st
 
-from factory.geometry.product import product_geometry
-from factory.geometry.solids import Product, Solid
-from factory.layout.embedding import lay_out
-from factory.layout.guidepath import moved as displaced
-from factory.layout.hands.hand import Point3
-from factory.layout.layout import Layout, carriers
-from factory.layout.shapes import is_tool
-from factory.layout.visits import visits_of
-from factory.problem.pag import PAG, Assembly, Parameter, Value
+from factory.floor.geometry.product import product_geometry
+from factory.floor.geometry.solids import Product, Solid
+from factory.floor.layout.embedding import lay_out
+from factory.floor.layout.guidepath import moved as displaced
+from factory.floor.layout.hands.hand import Point3
+from factory.floor.layout.layout import Layout, carriers
+from factory.floor.layout.shapes import is_tool
+from factory.floor.layout.visits import visits_of
+from factory.theory.problem.pag import PAG, Assembly, Parameter, Value
 from tests.pag_values import SHAPES, factory_of, paper, random_pag
 
 STYLES = ("plain", "small", "medium", "large", "far", "mixed")

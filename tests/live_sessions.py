@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from factory.record.state import State
-from factory.show.live import LiveFrame, Session
-from factory.simulation.recovery import Campaign
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+from factory.apps.live import LiveFrame, Session
+from factory.apps.recovery import Campaign
+from factory.engine.record.state import State
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
 from tests.layout_values import paper_layout
 from tests.waiting import until
 

@@ -8,12 +8,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import count
 
-from factory.compiler.assigning import shared
-from factory.compiler.compiler import compile_pag
-from factory.compiler.mixing import lines_of_mix, turns_of
-from factory.lang.pag_reader import read_pag
-from factory.plant.factory import Factory
-from factory.problem.pag import PAG
+from factory.theory.compiler.assigning import shared
+from factory.theory.compiler.compiler import compile_pag
+from factory.theory.compiler.mixing import lines_of_mix, turns_of
+from factory.theory.lang.pag_reader import read_pag
+from factory.theory.plant.factory import Factory
+from factory.theory.problem.pag import PAG
 from tests.pag_values import TEMPLATES, catalogue
 
 LITTLE = """mix = 2 a, 1 b;

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from factory.control.mode import Array
-from factory.control.navigation import KAPPA, Bundle
+from factory.theory.control.mode import Array
+from factory.theory.control.navigation import KAPPA, Bundle
 
 
 def potential(bundle: Bundle, x: Array) -> Array:

@@ -6,10 +6,10 @@ import random
 from dataclasses import replace
 from itertools import product
 
-from factory.nets.gears import Gear, GearNet
-from factory.nets.marked import MarkedNet, marked
-from factory.nets.petri import Marking, PetriNet, Place, Transition
-from factory.nets.threaded import ThreadedNet
+from factory.theory.nets.gears import Gear, GearNet
+from factory.theory.nets.marked import MarkedNet, marked
+from factory.theory.nets.petri import Marking, PetriNet, Place, Transition
+from factory.theory.nets.threaded import ThreadedNet
 from tests.token_game import enabled, follower
 
 

@@ -21,10 +21,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.compiler.mating import mating
-from factory.layout import clearance
-from factory.layout.request import Ground
-from factory.study.pool import pickle_locked_mappings
+from factory.apps.sweep.pool import pickle_locked_mappings
+from factory.floor.layout import clearance
+from factory.floor.layout.request import Ground
+from factory.floor.mating import mating
 from factory.support.files import write_bytes
 from tests import layout_values
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import factory
-from factory.compiler.compiler import compile_pag
-from factory.lang import read_pag, read_template
-from factory.layout.layout import Layout
+from factory.floor.layout.layout import Layout
 from factory.pipeline import all_templates
-from factory.plant.factory import Factory
-from factory.problem.robot_types import Catalogue, load_catalogue
 from factory.support.errors import InputError
+from factory.theory.compiler.compiler import compile_pag
+from factory.theory.lang import read_pag, read_template
+from factory.theory.plant.factory import Factory
+from factory.theory.problem.robot_types import Catalogue, load_catalogue
 
 PAPER = """6 parts; root = sub3; sub3 = mate ( sub2, part3 ); sub2 = weld ( sub1 );
 sub1 = mate ( part1, part2 ); part1 = atomic(); part2 = atomic(); part3 = atomic()"""

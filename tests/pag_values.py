@@ -7,12 +7,12 @@ from functools import cache
 
 from hypothesis import strategies as st
 
-from factory.compiler.compiler import compile_pag
-from factory.plant.factory import Factory
-from factory.problem.pag import PAG, Assembly
-from factory.problem.robot_types import Catalogue, load_catalogue
-from factory.problem.template import Law, Point, Template
 from factory.support.errors import Position
+from factory.theory.compiler.compiler import compile_pag
+from factory.theory.plant.factory import Factory
+from factory.theory.problem.pag import PAG, Assembly
+from factory.theory.problem.robot_types import Catalogue, load_catalogue
+from factory.theory.problem.template import Law, Point, Template
 
 _DOT = Template(
     "atomic", ("dot",), 1, (), ("nopart",), ("LAB1",), Law("navigation", (Point("B", 1),))

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from manifold3d import Manifold
 
+from factory.apps.planning.parts import InPlace
+from factory.apps.planning.source import SourceOptions, read_source
 from factory.pipeline import all_templates
-from factory.planning.parts import InPlace
-from factory.planning.source import SourceOptions, read_source
 
 MM = 1e-3
 

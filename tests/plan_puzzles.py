@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import ConvexHull
 
+from factory.apps.planning.parts import InPlace
+from factory.apps.planning.source import SourceOptions, read_source
 from factory.pipeline import all_templates
-from factory.planning.parts import InPlace
-from factory.planning.source import SourceOptions, read_source
 
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 Body = Box | Sequence[tuple[float, float, float]]

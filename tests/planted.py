@@ -17,24 +17,24 @@ from unittest.mock import patch
 
 import numpy as np
 
-from factory.layout.layout import Layout
-from factory.mjcf import names
-from factory.plant.factory import Operation
-from factory.record.log import Log, read_log
-from factory.record.log.reader import digest_of
-from factory.record.log.writer import LogWriter
-from factory.record.monitor.record import recorded_subject, verdict_on, watch_log
-from factory.record.monitor.watched import watched
-from factory.record.verdict import RunVerdict
-from factory.simulation.mujoco import world as mujoco_world
-from factory.simulation.mujoco.interference import Interference
-from factory.simulation.mujoco.parts import Parts
-from factory.simulation.remade import forged, model_faults
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+from factory.apps.disturbance.interference import Interference
+from factory.apps.log import Log, read_log
+from factory.apps.log.reader import digest_of
+from factory.apps.log.writer import LogWriter
+from factory.apps.monitor.record import recorded_subject, verdict_on, watch_log
+from factory.apps.monitor.watched import watched
+from factory.apps.resume.remade import forged, model_faults
+from factory.engine.mjcf import names
+from factory.engine.record.verdict import RunVerdict
+from factory.engine.simulation.mujoco import world as mujoco_world
+from factory.engine.simulation.mujoco.parts import Parts
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.layout import Layout
 from factory.support.engine import mujoco
 from factory.support.errors import InputError
 from factory.support.settings import Settings
+from factory.theory.plant.factory import Operation
 from tests.command_line import ROOT
 from tests.examples import with_hands
 from tests.pag_texts import laid_out

@@ -9,8 +9,8 @@ from types import TracebackType
 
 import numpy as np
 
-from factory.show.opcua import SPACE
-from factory.simulation.signals import Sensed
+from factory.apps.plc.opcua import SPACE
+from factory.apps.plc.signals import Sensed
 from tests.structured_text import Plc
 
 READ = ("Inputs.Position", "Inputs.Speed", "Inputs.Held", "Inputs.Ready", "Plant.Time")

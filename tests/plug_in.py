@@ -27,9 +27,9 @@ dab = (R, j, ~, <a; b>, F) where
 """,
     "gluing/robots/__init__.py": "",
     "gluing/laws.py": """\
-from factory.control.laws import Setting, navigation
-from factory.control.mode import Mode
-from factory.problem.template import Template
+from factory.theory.control.laws import Setting, navigation
+from factory.theory.control.mode import Mode
+from factory.theory.problem.template import Template
 
 
 def near(template: Template, setting: Setting) -> Mode:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from factory.record.log.blocks import LENGTH, MAGIC
+from factory.apps.log.blocks import LENGTH, MAGIC
 
 EVIL = """</script></title><img src=x onerror="alert(1)">'"&<!--"""
 """A name that would run a script if it were taken for anything but text."""

@@ -9,15 +9,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from factory.compiler.compiler import compile_pag
-from factory.layout.certificate import ALWAYS, Certificate
-from factory.layout.inheriting import Inheritance, pairs_of
-from factory.layout.pins import SAME
+from factory.apps.revise.inheriting import Inheritance, pairs_of
+from factory.apps.revise.matching import matching
+from factory.apps.revise.pairing import Pairing
+from factory.apps.revise.pins import SAME
+from factory.floor.layout.certificate import ALWAYS, Certificate
 from factory.pipeline import all_templates
-from factory.plant.matching import matching
-from factory.plant.pairing import Pairing
-from factory.problem.pag import PAG, Assembly, Parameter
-from factory.problem.robot_types import load_catalogue
+from factory.theory.compiler.compiler import compile_pag
+from factory.theory.problem.pag import PAG, Assembly, Parameter
+from factory.theory.problem.robot_types import load_catalogue
 
 KINDS = ("change", "add", "drop", "swap", "tool", "rename")
 

@@ -29,8 +29,8 @@ from itertools import permutations, product
 
 import numpy as np
 
-from factory.control.mode import Array, Index, Truth, lock
-from factory.control.profile import landing_speed
+from factory.theory.control.mode import Array, Index, Truth, lock
+from factory.theory.control.profile import landing_speed
 from tests.reservation import drive, stopping
 
 SPARE = 0.005

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from factory.nets.marked import MarkedNet
+from factory.theory.nets.marked import MarkedNet
 
 Marking = tuple[int, ...]
 """The tokens of each place."""

@@ -7,9 +7,9 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from factory.problem.pag import PAG, RESERVED, Assembly, Parameter, Value
-from factory.problem.template import Failure, Law, Point, Response, Template, Test
 from factory.support.settings import DWELL
+from factory.theory.problem.pag import PAG, RESERVED, Assembly, Parameter, Value
+from factory.theory.problem.template import Failure, Law, Point, Response, Template, Test
 
 LABEL_LETTERS = "abzAZ0189_-.äßλД中é"
 UNARY = ("weld", "inspect", "press", "glue")

@@ -12,8 +12,8 @@ from collections import deque
 from dataclasses import dataclass
 from itertools import combinations
 
-from factory.nets.marked import MarkedNet
-from factory.nets.petri import PetriNet, Place, Transition
+from factory.theory.nets.marked import MarkedNet
+from factory.theory.nets.petri import PetriNet, Place, Transition
 
 Cell = tuple[int, int]
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from lark import Lark, Token, Tree
 
-from factory.simulation.signals import Commands, Sensed
+from factory.apps.plc.signals import Commands, Sensed
 
 GRAMMAR = r"""
 start: (data_type | function | block | program | configuration)*

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from factory.geometry.overlapping import overlaps_of
-from factory.lang import read_pag, write_pag
+from factory.apps.log import read_log
+from factory.apps.resume.remade import model_faults
+from factory.floor.geometry.overlapping import overlaps_of
 from factory.pipeline import read
-from factory.problem.pag import AllowedOverlap
-from factory.record.log import read_log
-from factory.simulation.remade import model_faults
 from factory.support.errors import InputError
+from factory.theory.lang import read_pag, write_pag
+from factory.theory.problem.pag import AllowedOverlap
 from tests.command_line import ROOT, Terminal
 from tests.pag_texts import TEMPLATES
 from tests.planted import CLOSED

@@ -20,20 +20,20 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 from scipy.sparse import coo_array
 
-from factory.control.mode import Limits
-from factory.layout.layout import Layout
-from factory.modes.modes import robot_limits
-from factory.nets.cycle_ratio import max_cycle_ratio
-from factory.nets.marked import MarkedNet
-from factory.simulation.request import RunRequest
-from factory.simulation.run import Run
-from factory.simulation.simulation import Simulation
-from factory.study.analysis import Change, Timing, analyse
-from factory.study.analysis.analysing import least_wip
-from factory.study.analysis.firing import circuits, earliest_firings, slacks
-from factory.study.analysis.timed import flow, reached, timed_net
+from factory.apps.analyze import Change, Timing, analyse
+from factory.apps.analyze.analysing import least_wip
+from factory.apps.analyze.firing import circuits, earliest_firings, slacks
+from factory.apps.analyze.timed import flow, reached, timed_net
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.run import Run
+from factory.engine.simulation.simulation import Simulation
+from factory.engine.timing.timed import duration, timed
+from factory.floor.layout.layout import Layout
+from factory.floor.modes.modes import robot_limits
 from factory.support.settings import Settings
-from factory.timing.timed import duration, timed
+from factory.theory.control.mode import Limits
+from factory.theory.nets.cycle_ratio import max_cycle_ratio
+from factory.theory.nets.marked import MarkedNet
 from tests.command_line import PAPER, ROOT, Terminal
 from tests.layout_values import paper_layout, random_layout
 from tests.net_values import net_from
@@ -261,7 +261,7 @@ def test_sensitivity_is_what_a_changed_run_shows(monkeypatch: pytest.MonkeyPatch
         return measured
 
     before = cycle()
-    monkeypatch.setattr("factory.simulation.simulation.robot_limits", limits)
+    monkeypatch.setattr("factory.engine.simulation.simulation.robot_limits", limits)
     assert abs(predicted) > 0.2
     assert before - cycle() == pytest.approx(predicted, abs=0.06)
 
@@ -330,7 +330,7 @@ def test_a_slow_robot_shows(monkeypatch: pytest.MonkeyPatch, run: Terminal) -> N
         speed[1] *= 0.1
         return Limits(speed, found.acceleration), gains
 
-    monkeypatch.setattr("factory.simulation.simulation.robot_limits", limits)
+    monkeypatch.setattr("factory.engine.simulation.simulation.robot_limits", limits)
     done = run("analyze", PAPER, "--world", "ideal", "--units", 4, "--run", "--json")
     errors = {d["label"]: d["error"] for d in done.json["measured"]["durations"]}
     assert errors["part3"] < -0.5 and errors["sub3"] < -0.5

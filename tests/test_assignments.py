@@ -9,18 +9,18 @@ from pathlib import Path
 
 import pytest
 
-from factory.compiler.assigning import shared
-from factory.compiler.folding import fold
-from factory.compiler.mating.mating import judged
-from factory.compiler.parallel import in_parallel
-from factory.compiler.tees import on_stems
-from factory.layout.durations import Pace
-from factory.layout.shapes import payload_boxes
-from factory.nets.verify import verify
+from factory.apps.few_robots.lines import Shift
+from factory.floor.layout.durations import Pace
+from factory.floor.layout.shapes import payload_boxes
+from factory.floor.mating.mating import judged
 from factory.pipeline import read
-from factory.plant.factory import Factory
-from factory.study.allocation.lines import Shift
 from factory.support.errors import InputError
+from factory.theory.compiler.assigning import shared
+from factory.theory.compiler.folding import fold
+from factory.theory.compiler.parallel import in_parallel
+from factory.theory.compiler.tees import on_stems
+from factory.theory.nets.verify import verify
+from factory.theory.plant.factory import Factory
 
 PRODUCTS = ("truck", "lamp", "stool", "shelf")
 LONG = ("chair", "gearbox", "chest")

@@ -15,10 +15,10 @@ from pathlib import Path
 import pytest
 
 import factory
-from factory.layout.layout import Layout
-from factory.study.fidelity import QUANTITIES, measure_seed
-from factory.study.fidelity.comparing import Alter, Case
-from factory.study.fidelity.record import Figures
+from factory.apps.fidelity import QUANTITIES, measure_seed
+from factory.apps.fidelity.comparing import Alter, Case
+from factory.apps.fidelity.record import Figures
+from factory.floor.layout.layout import Layout
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
 

@@ -19,7 +19,7 @@ from benches.reporting import Report
 from benches.speed import floors, large, processes, production, replaying
 from benches.speed.__main__ import REPORT
 from benches.speed.factories import laid_out, produce, robots_at_least
-from factory.simulation.simulation import Simulation
+from factory.engine.simulation.simulation import Simulation
 
 KEPT = [
     (report, file)
@@ -101,7 +101,7 @@ def test_a_digest_of_the_physics_is_of_all_its_files(tmp_path: Path) -> None:
     for folder in reporting.PHYSICS:
         shutil.copytree(reporting.ROOT / folder, tmp_path / folder)
     assert reporting.physics(tmp_path) == reporting.physics()
-    for changed in ("mjcf/dot.xml", "factory/layout/hands/limbs.py"):
+    for changed in ("mjcf/dot.xml", "factory/floor/layout/hands/limbs.py"):
         before = reporting.physics(tmp_path)
         (tmp_path / changed).write_text((tmp_path / changed).read_text() + "\n")
         assert reporting.physics(tmp_path) != before

@@ -10,20 +10,20 @@ import numpy as np
 import pytest
 
 import factory
-from factory.layout.bending import Detour, bent
-from factory.layout.certificate import MILLI
-from factory.layout.dimensions import up
-from factory.layout.embedding import certified
-from factory.layout.feeding import cleared
-from factory.layout.layout import Layout
-from factory.layout.way import Bend, Ways, rounding_for, way_of
-from factory.mjcf.loading import load
-from factory.mjcf.stock import written as stock
-from factory.record.monitor import beside
-from factory.simulation.modelling import physical_model
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
-from factory.study.fidelity.measuring import Measurement
+from factory.apps.fidelity.measuring import Measurement
+from factory.apps.monitor import beside
+from factory.engine.mjcf.loading import load
+from factory.engine.mjcf.stock import written as stock
+from factory.engine.simulation.modelling import physical_model
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.bending import Detour, bent
+from factory.floor.layout.certificate import MILLI
+from factory.floor.layout.dimensions import up
+from factory.floor.layout.embedding import certified
+from factory.floor.layout.feeding import cleared
+from factory.floor.layout.layout import Layout
+from factory.floor.layout.way import Bend, Ways, rounding_for, way_of
 from factory.support.errors import RunError
 from factory.support.settings import Settings
 from tests.examples import without_hands

@@ -6,18 +6,18 @@ from dataclasses import replace
 
 import pytest
 
-import factory.simulation.modelling as modelling
+import factory.engine.simulation.modelling as modelling
+from factory.apps.recovery import WorldFault
 from factory.commands.monitor import say_failures
-from factory.layout import bins
-from factory.layout.bins import Bin, bins_of
-from factory.layout.certificate import BIN_BODY, Region
-from factory.layout.clearance import ClearanceSearch
-from factory.layout.dimensions import LAYERS
-from factory.layout.layout import Layout
-from factory.layout.sweeps import piles, regions
-from factory.record.failures import Failures
-from factory.simulation.recovery import WorldFault
-from factory.simulation.request import RunRequest
+from factory.engine.record.failures import Failures
+from factory.engine.simulation.request import RunRequest
+from factory.floor.layout import bins
+from factory.floor.layout.bins import Bin, bins_of
+from factory.floor.layout.certificate import BIN_BODY, Region
+from factory.floor.layout.clearance import ClearanceSearch
+from factory.floor.layout.dimensions import LAYERS
+from factory.floor.layout.layout import Layout
+from factory.floor.layout.sweeps import piles, regions
 from tests.simulation_values import layout_of
 from tests.test_recovery import assert_recovered, run_with
 

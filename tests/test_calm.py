@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from factory.nets.undone import Undone
-from factory.record.log import Log
-from factory.record.log.model import model_of
-from factory.record.monitor.calm import spells
-from factory.record.monitor.record import recorded_subject, verdict_on, watch_log
-from factory.simulation.recovery import Campaign, WorldFault
+from factory.apps.log import Log
+from factory.apps.log.model import model_of
+from factory.apps.monitor.calm import spells
+from factory.apps.monitor.record import recorded_subject, verdict_on, watch_log
+from factory.apps.recovery import Campaign, WorldFault
+from factory.theory.nets.undone import Undone
 from tests.failing_runs import CAMPAIGN, failing
 
 SECOND = Campaign(

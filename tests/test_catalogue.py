@@ -10,12 +10,12 @@ import mujoco
 import pytest
 
 import factory
-from factory.exporting import exporters
-from factory.lang import read_pag, read_template, write_template
-from factory.mjcf.robots import load_robot_model
+from factory.apps.exports import exporters
+from factory.engine.mjcf.robots import load_robot_model
 from factory.pipeline import all_templates
-from factory.problem.robot_types import load_catalogue
-from factory.problem.template import Template
+from factory.theory.lang import read_pag, read_template, write_template
+from factory.theory.problem.robot_types import load_catalogue
+from factory.theory.problem.template import Template
 from tests.command_line import ROOT, Terminal, files_in
 from tests.examples import with_hands
 from tests.export_values import kept_log

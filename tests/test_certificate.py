@@ -16,18 +16,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import factory.exporting.certificate
-from factory.exporting.certificate.check import check_certificate
-from factory.exporting.certificate.listing import CLAIMS, digest
-from factory.exporting.certificate.writer import certificate
-from factory.exporting.pnml import write_pnml
-from factory.foreign_nets.behaviour import analyse
-from factory.foreign_nets.pnml_reader import read_pnml
-from factory.nets.gears import GearNet
-from factory.nets.marked import MarkedNet, marked
-from factory.nets.petri import Place
-from factory.plant.factory import Factory
+import factory.apps.exports.certificate
+from factory.apps.exports.certificate.check import check_certificate
+from factory.apps.exports.certificate.listing import CLAIMS, digest
+from factory.apps.exports.certificate.writer import certificate
+from factory.apps.exports.pnml import write_pnml
+from factory.apps.foreign_nets.behaviour import analyse
+from factory.apps.foreign_nets.pnml_reader import read_pnml
 from factory.support.errors import InputError
+from factory.theory.nets.gears import GearNet
+from factory.theory.nets.marked import MarkedNet, marked
+from factory.theory.nets.petri import Place
+from factory.theory.plant.factory import Factory
 from tests.net_values import (
     net_from,
     planted,
@@ -258,7 +258,7 @@ def test_the_checker_uses_nothing_that_made_the_certificate() -> None:
     folder = Path(factory.exporting.certificate.__file__ or "").parent
     checker = {path.stem: path for path in folder.glob("*.py")}
     assert set(checker) == {"__init__", "writer", "proof_file", "check", "listing"}
-    allowed = {f"factory.exporting.certificate.{name}" for name in ("check", "listing")}
+    allowed = {f"factory.apps.exports.certificate.{name}" for name in ("check", "listing")}
     for name in ("check", "listing"):
         tree = ast.parse(checker[name].read_text("utf-8"))
         froms = {n.module or "" for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}

@@ -11,13 +11,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.layout import exclusions
-from factory.layout.certificate import ALWAYS, KINDS, PAYLOAD_BODY, STATIONS, Certificate, Region
-from factory.layout.clearance import ClearanceSearch, certify, separation
-from factory.layout.crossings import touching
-from factory.layout.dimensions import PAYLOADS, SIDE
-from factory.layout.layout import Layout
-from factory.record.plan_file import read_plan
+from factory.apps.log.plan_file import read_plan
+from factory.floor.layout import exclusions
+from factory.floor.layout.certificate import (
+    ALWAYS,
+    KINDS,
+    PAYLOAD_BODY,
+    STATIONS,
+    Certificate,
+    Region,
+)
+from factory.floor.layout.clearance import ClearanceSearch, certify, separation
+from factory.floor.layout.crossings import touching
+from factory.floor.layout.dimensions import PAYLOADS, SIDE
+from factory.floor.layout.layout import Layout
 from tests.layout_values import (
     DRAWN,
     Drawn,
@@ -56,7 +63,7 @@ def test_every_layout_is_clear(drawn: Drawn) -> None:
 
 @pytest.mark.parametrize("clearance", [0.001, 0.005, 0.0125, 0.05, 0.2])
 def test_any_clearance_can_be_had(clearance: float) -> None:
-    from factory.layout.embedding import lay_out
+    from factory.floor.layout.embedding import lay_out
 
     for layout in (paper_layout(), random_layout(20, 3, "any", "mixed")):
         again = lay_out(layout.factory, layout.product, clearance)
@@ -256,7 +263,7 @@ def test_guidepaths_that_cross_or_leave_the_grid() -> None:
 
 
 def test_boxes_that_touch_are_found_chunk_by_chunk(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("factory.layout.crossings.CHUNK", 7)
+    monkeypatch.setattr("factory.floor.layout.crossings.CHUNK", 7)
     rng = np.random.default_rng(1)
     low = rng.integers(0, 40, (50, 2))
     high = low + rng.integers(0, 12, (50, 2))

@@ -16,12 +16,12 @@ from typing import Any
 
 import pytest
 
-from factory.exporting.build import BuildRequest, build
-from factory.exporting.clearance.checking import faults_of
-from factory.exporting.clearance.documents import ENDINGS, read_folder
-from factory.nets.verify import proved
+from factory.apps.exports.build import BuildRequest, build
+from factory.apps.exports.clearance.checking import faults_of
+from factory.apps.exports.clearance.documents import ENDINGS, read_folder
 from factory.pipeline import read
 from factory.support.errors import InputError
+from factory.theory.nets.verify import proved
 from tests.command_line import ROOT, Terminal
 
 Json = Any

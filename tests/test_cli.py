@@ -13,9 +13,9 @@ from typing import Any
 import click
 import pytest
 
+from factory.apps.exports.certificate.check import check_certificate
+from factory.apps.log import read_log
 from factory.commands import cli
-from factory.exporting.certificate.check import check_certificate
-from factory.record.log import read_log
 from factory.support.version import EXTRAS
 from tests.command_line import PAPER, ROOT, Terminal, files_in
 

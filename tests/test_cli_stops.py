@@ -12,8 +12,8 @@ from pathlib import Path
 import imageio.v3 as iio
 import pytest
 
-from factory.record.log import read_log
-from factory.rendering.reel import Reel
+from factory.apps.log import read_log
+from factory.film.reel import Reel
 from factory.support.errors import MissingError
 from factory.support.gl import probe
 from tests.command_line import PAPER, ROOT, Terminal, files_in, spawn_each, started
@@ -184,7 +184,7 @@ def test_the_engine_warns_on_stderr(out: Path) -> None:
 @pytest.mark.parametrize(
     ("package", "call"),
     [
-        ("av", "from factory.rendering.video import _av as called"),
+        ("av", "from factory.film.video import _av as called"),
         ("mujoco.egl", "from factory.support.gl import context\ncalled = lambda: context(8, 8)"),
     ],
 )

@@ -13,13 +13,13 @@ from typing import Any
 import pytest
 import trimesh
 
-from factory.compiler.mating.overlaps import Finder
-from factory.geometry import meshes
-from factory.geometry.product import product_geometry
-from factory.lang import load_pag
+from factory.floor.geometry import meshes
+from factory.floor.geometry.product import product_geometry
+from factory.floor.mating.overlaps import Finder
 from factory.pipeline import all_templates
 from factory.support.cache import load, store
 from factory.support.files import user_cache
+from factory.theory.lang import load_pag
 from tests.command_line import Terminal
 
 TWO = """root = s; s = mate ( a, b );
@@ -64,7 +64,7 @@ def work(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
         return call
 
     measured = counted("measured", meshes.measured)
-    monkeypatch.setattr("factory.geometry.product.measured", measured)
+    monkeypatch.setattr("factory.floor.geometry.product.measured", measured)
     monkeypatch.setattr(Finder, "_search", counted("searched", Finder._search))
     return found
 
@@ -124,7 +124,7 @@ def test_another_version_measures_again(
     run: Terminal, file: Path, work: dict[str, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run("check", file)
-    monkeypatch.setattr("factory.geometry.product.program", lambda *given: "another")
+    monkeypatch.setattr("factory.floor.geometry.product.program", lambda *given: "another")
     run("check", file)
     assert work["measured"] == 4
 

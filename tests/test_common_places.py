@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.geometry.common_places import APART, CommonPlace, Top, common_places
-from factory.geometry.product import product_geometry
-from factory.geometry.solids import Solid
-from factory.geometry.suction import EVEN, drawn_triangles, height_in
-from factory.lang.pag_reader import read_pag
+from factory.floor.geometry.common_places import APART, CommonPlace, Top, common_places
+from factory.floor.geometry.product import product_geometry
+from factory.floor.geometry.solids import Solid
+from factory.floor.geometry.suction import EVEN, drawn_triangles, height_in
 from factory.pipeline import all_templates
+from factory.theory.lang.pag_reader import read_pag
 
 NOTHING = np.full(2, np.inf), np.full(2, -np.inf)
 HALF = st.floats(0.004, 0.03).map(lambda x: round(x, 4))

@@ -7,12 +7,12 @@ from dataclasses import replace
 import pytest
 from hypothesis import given
 
-from factory.compiler.compiler import compile_pag
-from factory.compiler.expanding import expand
-from factory.lang import read_pag
-from factory.problem.pag import PAG
-from factory.problem.robot_types import Catalogue, load_catalogue
 from factory.support.errors import InputError
+from factory.theory.compiler.compiler import compile_pag
+from factory.theory.compiler.expanding import expand
+from factory.theory.lang import read_pag
+from factory.theory.problem.pag import PAG
+from factory.theory.problem.robot_types import Catalogue, load_catalogue
 from tests.pag_texts import PAPER, TEMPLATES, compiled
 from tests.strategies import pags
 

@@ -6,10 +6,10 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.control.governor import follow, govern
-from factory.control.mode import Array, Limits, Mode
-from factory.control.navigation import Bundle
-from factory.control.profile import SpeedProfile, landing_speed
+from factory.theory.control.governor import follow, govern
+from factory.theory.control.mode import Array, Limits, Mode
+from factory.theory.control.navigation import Bundle
+from factory.theory.control.profile import SpeedProfile, landing_speed
 from tests.navigation_functions import potential
 
 EPS = 2e-4

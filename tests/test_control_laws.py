@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from factory.control.laws import LAWS, Setting, law_of
-from factory.control.mode import Mode
-from factory.problem.template import Law, Point, Template
 from factory.support.errors import InputError
+from factory.theory.control.laws import LAWS, Setting, law_of
+from factory.theory.control.mode import Mode
+from factory.theory.problem.template import Law, Point, Template
 
 MATE = Template(
     name="mate",

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.control.mode import Limits, Mode
-from factory.control.navigation import Bundle
+from factory.theory.control.mode import Limits, Mode
+from factory.theory.control.navigation import Bundle
 
 R = 0.1
 

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.control.governed import GovernedAxis, mode_ticks, trajectories
-from factory.control.governor import follow
-from factory.control.mode import STILL, Array, Limits, Mode
-from factory.control.navigation import Bundle
-from factory.control.profile import SpeedProfile
+from factory.theory.control.governed import GovernedAxis, mode_ticks, trajectories
+from factory.theory.control.governor import follow
+from factory.theory.control.mode import STILL, Array, Limits, Mode
+from factory.theory.control.navigation import Bundle
+from factory.theory.control.profile import SpeedProfile
 
 R, EPS = 0.06, 2e-4
 

@@ -9,19 +9,19 @@ from typing import Any
 
 import pytest
 
-from factory.layout.clearance import certify
-from factory.layout.exclusions import coordinated
-from factory.layout.layout import Layout
-from factory.nets.coordinated import CoordinatedNet, Coordination
-from factory.nets.marked import MarkedNet, marked
+from factory.engine.record.state import Event, State
+from factory.engine.simulation.ordering import Ordering
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.engine.timing.timed import timed
+from factory.engine.timing.timing import Timing
+from factory.floor.layout.clearance import certify
+from factory.floor.layout.exclusions import coordinated
+from factory.floor.layout.layout import Layout
 from factory.pipeline import read
-from factory.problem.plan import Plan
-from factory.record.state import Event, State
-from factory.simulation.ordering import Ordering
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
-from factory.timing.timed import timed
-from factory.timing.timing import Timing
+from factory.theory.nets.coordinated import CoordinatedNet, Coordination
+from factory.theory.nets.marked import MarkedNet, marked
+from factory.theory.problem.plan import Plan
 from tests.command_line import Terminal
 from tests.examples import with_hands
 from tests.fold_values import dates

@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.control.governor import follow
-from factory.control.mode import ROUNDING
-from factory.control.navigation import Bundle
-from factory.simulation.disturbance.interventions import Interventions
-from factory.simulation.mujoco import courses, motion
-from factory.simulation.mujoco.courses import Course, Follower, planned
-from factory.simulation.mujoco.fast import strides
-from factory.simulation.mujoco.fast.strides import Strides
-from factory.simulation.mujoco.motion import Motion
-from factory.simulation.simulation import Simulation
+from factory.apps.disturbance.interventions import Interventions
+from factory.engine.simulation.mujoco import courses, motion
+from factory.engine.simulation.mujoco.courses import Course, Follower, planned
+from factory.engine.simulation.mujoco.fast import strides
+from factory.engine.simulation.mujoco.fast.strides import Strides
+from factory.engine.simulation.mujoco.motion import Motion
+from factory.engine.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from factory.support.settings import MOST, Settings
+from factory.theory.control.governor import follow
+from factory.theory.control.mode import ROUNDING
+from factory.theory.control.navigation import Bundle
 from tests.simulation_values import FINE, read_by, ready, stepping
 
 

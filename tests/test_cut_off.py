@@ -19,14 +19,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from factory.record.ending import CutOff
-from factory.record.log import LogWriter, read_log
-from factory.record.state import State
-from factory.rendering.video import VideoFile
-from factory.show.report import page, recording_of
-from factory.simulation.executing import carry_out
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+from factory.apps.log import LogWriter, read_log
+from factory.apps.report import page, recording_of
+from factory.engine.record.ending import CutOff
+from factory.engine.record.state import State
+from factory.engine.simulation.executing import carry_out
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.film.video import VideoFile
 from factory.support.claim import claimed, is_claimed
 from factory.support.errors import InputError, MissingError
 from factory.support.gl import probe
@@ -247,9 +247,9 @@ def test_a_damaged_block_is_told_where_it_is(run: Terminal, whole: Path, out: Pa
 
 KILLED_AT_ONCE = """
 import os, signal, sys
-from factory.record.log import LogWriter
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+from factory.apps.log import LogWriter
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
 import factory
 layout = factory.lay_out(factory.compile(factory.load_pag("examples/paper.pag")))
 simulation = Simulation(layout, RunRequest(units=20))

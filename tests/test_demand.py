@@ -11,29 +11,29 @@ from pathlib import Path
 
 import pytest
 
-from factory.compiler.mixing import even
-from factory.lang.pag_reader import read_pag
-from factory.layout import resting
-from factory.layout.layout import Layout
-from factory.layout.presence import STILL
-from factory.layout.resting import on_demand
-from factory.nets.threaded import Threads
+from factory.apps.log import read_log
+from factory.apps.monitor import beside
+from factory.apps.monitor.record import watch_log, word_of
+from factory.apps.monitor.watched import watched
+from factory.apps.recovery import recover
+from factory.apps.recovery.faults import Campaign, WorldFault
+from factory.engine.simulation.demand_file import demand_of, read_demand
+from factory.engine.simulation.mujoco.supply import Supply
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.run import Run
+from factory.engine.simulation.simulation import Simulation
+from factory.engine.simulation.supervisor import Supervisor
+from factory.floor.layout import resting
+from factory.floor.layout.layout import Layout
+from factory.floor.layout.presence import STILL
+from factory.floor.layout.resting import on_demand
 from factory.pipeline import Project, all_templates, read
-from factory.plant.demand import Demand, Word
-from factory.plant.factory import Factory, Operation
-from factory.record.log import read_log
-from factory.record.monitor import beside
-from factory.record.monitor.record import watch_log, word_of
-from factory.record.monitor.watched import watched
-from factory.simulation.demand_file import demand_of, read_demand
-from factory.simulation.mujoco.supply import Supply
-from factory.simulation.recovery import recover
-from factory.simulation.recovery.faults import Campaign, WorldFault
-from factory.simulation.request import RunRequest
-from factory.simulation.run import Run
-from factory.simulation.simulation import Simulation
-from factory.simulation.supervisor import Supervisor
 from factory.support.errors import InputError
+from factory.theory.compiler.mixing import even
+from factory.theory.lang.pag_reader import read_pag
+from factory.theory.nets.threaded import Threads
+from factory.theory.plant.demand import Demand, Word
+from factory.theory.plant.factory import Factory, Operation
 from tests.command_line import Terminal
 from tests.mix_values import LITTLE, mixed_factory, random_family
 from tests.pag_values import TEMPLATES

@@ -7,7 +7,7 @@ import pytest
 
 from benches.fidelity import attraction, disturbances
 from benches.fidelity.products import PAPER, layout
-from factory.simulation.disturbance import (
+from factory.apps.disturbance import (
     Delay,
     Dragged,
     Friction,
@@ -18,8 +18,8 @@ from factory.simulation.disturbance import (
     Slowed,
     disturb,
 )
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from factory.support.errors import InputError
 from factory.support.settings import MOST

@@ -15,13 +15,13 @@ from pathlib import Path
 import click
 import pytest
 
+from factory.apps.exports import exporters
 from factory.commands import cli
-from factory.exporting import exporters
-from factory.lang.values import GEOMETRY
 from factory.pipeline import all_templates
-from factory.problem.robot_types import load_catalogue
 from factory.support.explanations import codes
 from factory.support.settings import RANGES
+from factory.theory.lang.values import GEOMETRY
+from factory.theory.problem.robot_types import load_catalogue
 from tests.command_line import ROOT, Terminal
 
 DOCS = ROOT / "docs"

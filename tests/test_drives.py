@@ -11,14 +11,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from factory.layout.durations import Pace
-from factory.layout.embedding import lay_out
-from factory.mjcf import driving
-from factory.mjcf.driving import GRAVITY, HOIST_STIFFNESS, STIFFNESS, drive_for
-from factory.mjcf.robots import Drive
-from factory.simulation.mujoco.drives import Drives
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+from factory.engine.mjcf import driving
+from factory.engine.mjcf.driving import GRAVITY, HOIST_STIFFNESS, STIFFNESS, drive_for
+from factory.engine.mjcf.robots import Drive
+from factory.engine.simulation.mujoco.drives import Drives
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.durations import Pace
+from factory.floor.layout.embedding import lay_out
 from factory.support.engine import mujoco
 from factory.support.settings import RANGES, TICK, Settings
 from tests.simulation_values import layout_of, read_by, ready

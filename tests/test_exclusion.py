@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.nets import exclusion
-from factory.nets.exclusion import ORDER, excluding, ordered
-from factory.nets.marked import MarkedNet
-from factory.nets.petri import PetriNet, Place, Transition
+from factory.theory.nets import exclusion
+from factory.theory.nets.exclusion import ORDER, excluding, ordered
+from factory.theory.nets.marked import MarkedNet
+from factory.theory.nets.petri import PetriNet, Place, Transition
 from tests.net_values import net_from
 from tests.state_space import explored
 

@@ -27,20 +27,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import factory.exporting
+import factory.apps.exports
 from factory import to_networkx
-from factory.exporting import Subject, exporters
-from factory.exporting.csv import COLUMNS
-from factory.exporting.subject import file_name
-from factory.exporting.svg import draw_net, draw_tree
-from factory.exporting.swimlanes import swimlanes
-from factory.exporting.urdf import roll_pitch_yaw
-from factory.geometry.solids import rotation
-from factory.modes.modes import operation_modes
-from factory.nets.marked import MarkedNet, marked
-from factory.nets.petri import PetriNet
-from factory.plant.factory import Factory
-from factory.record.log import read_log
+from factory.apps.exports import Subject, exporters
+from factory.apps.exports.csv import COLUMNS
+from factory.apps.exports.subject import file_name
+from factory.apps.exports.svg import draw_net, draw_tree
+from factory.apps.exports.swimlanes import swimlanes
+from factory.apps.exports.urdf import roll_pitch_yaw
+from factory.apps.log import read_log
+from factory.floor.geometry.solids import rotation
+from factory.floor.modes.modes import operation_modes
+from factory.theory.nets.marked import MarkedNet, marked
+from factory.theory.nets.petri import PetriNet
+from factory.theory.plant.factory import Factory
 from tests.command_line import PAPER, ROOT, Terminal, files_in
 from tests.export_values import LAMP, MESHES, kept_log, made, project, subject
 from tests.net_values import PHILOSOPHERS, net_from, planted, random_marked_net
@@ -83,7 +83,7 @@ def test_the_docs_list_them_all() -> None:
 
 def test_the_order_of_hashing_does_not_show() -> None:
     code = (
-        "import hashlib, pathlib; from factory.exporting import Subject, exporters;"
+        "import hashlib, pathlib; from factory.apps.exports import Subject, exporters;"
         "from factory.pipeline import read;"
         f"file = pathlib.Path({str(PAPER)!r}); s = Subject(file, read(file));"
         "made = [e.export(s) for e in exporters().values() if e.takes != 'log'];"

@@ -12,18 +12,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.exporting import exporters
-from factory.geometry.solids import rotation
-from factory.mjcf.loading import load
-from factory.mjcf.names import COMPASS
-from factory.mjcf.stock import written as stock
-from factory.nets.marked import MarkedNet, marked
-from factory.record.log import read_log
-from factory.record.log.model import model_of
-from factory.simulation.driven import drive
-from factory.simulation.modelling import physical_model
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+from factory.apps.exports import exporters
+from factory.apps.log import read_log
+from factory.apps.log.model import model_of
+from factory.apps.plc.driven import drive
+from factory.engine.mjcf.loading import load
+from factory.engine.mjcf.names import COMPASS
+from factory.engine.mjcf.stock import written as stock
+from factory.engine.simulation.modelling import physical_model
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.geometry.solids import rotation
+from factory.theory.nets.marked import MarkedNet, marked
 from tests.command_line import PAPER, ROOT
 from tests.export_values import (
     LAMP,

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.geometry.product import product_geometry
-from factory.layout.layout import Layout
-from factory.simulation.disturbance.interventions import Interventions
-from factory.simulation.mujoco.courses import AHEAD
-from factory.simulation.mujoco.fast import neighbours
-from factory.simulation.mujoco.world import MujocoWorld
+from factory.apps.disturbance.interventions import Interventions
+from factory.engine.simulation.mujoco.courses import AHEAD
+from factory.engine.simulation.mujoco.fast import neighbours
+from factory.engine.simulation.mujoco.world import MujocoWorld
+from factory.floor.geometry.product import product_geometry
+from factory.floor.layout.layout import Layout
 from factory.support.engine import mujoco
 from factory.support.settings import LOOK, MOST, Settings
 from tests.command_line import PAPER, Terminal

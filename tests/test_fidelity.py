@@ -10,10 +10,10 @@ import pytest
 
 import factory
 from benches.fidelity.convergence import soften
-from factory.layout.layout import Layout
-from factory.study.analysis.measured import operation_times
-from factory.study.fidelity import QUANTITIES, SeedRecord, measure, measure_seed
-from factory.study.fidelity.comparing import Alter, Case
+from factory.apps.analyze.measured import operation_times
+from factory.apps.fidelity import QUANTITIES, SeedRecord, measure, measure_seed
+from factory.apps.fidelity.comparing import Alter, Case
+from factory.floor.layout.layout import Layout
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
 from tests.command_line import PAPER, ROOT, Terminal

@@ -10,16 +10,16 @@ import pytest
 import trimesh
 from manifold3d import Manifold, Mesh64
 
-from factory.compiler.expanding import expand
-from factory.compiler.mating.findings import LEFT_OUT, NO_DEEPER
-from factory.compiler.mating.mating import matings
-from factory.geometry.facets import sagitta
-from factory.geometry.meshes import Array
-from factory.geometry.overlap import common, merged
-from factory.geometry.overlapping import overlaps_of
-from factory.geometry.product import product_geometry
-from factory.lang.pag_reader import load_pag
+from factory.floor.geometry.facets import sagitta
+from factory.floor.geometry.meshes import Array
+from factory.floor.geometry.overlap import common, merged
+from factory.floor.geometry.overlapping import overlaps_of
+from factory.floor.geometry.product import product_geometry
+from factory.floor.mating.findings import LEFT_OUT, NO_DEEPER
+from factory.floor.mating.mating import matings
 from factory.pipeline import all_templates
+from factory.theory.compiler.expanding import expand
+from factory.theory.lang.pag_reader import load_pag
 from tests.command_line import Terminal
 
 MM = 1e-3

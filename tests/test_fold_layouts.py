@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import pytest
 
-from factory.compiler.folding import folded, kind_of
-from factory.layout.clearance import certify
-from factory.layout.durations import Pace
-from factory.layout.embedding import lay_out
-from factory.layout.exclusions import exclusions
-from factory.layout.layout import Layout
-from factory.layout.request import Ground
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.clearance import certify
+from factory.floor.layout.durations import Pace
+from factory.floor.layout.embedding import lay_out
+from factory.floor.layout.exclusions import exclusions
+from factory.floor.layout.layout import Layout
+from factory.floor.layout.request import Ground
 from factory.pipeline import Project, all_templates
-from factory.problem.robot_types import load_catalogue
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
 from factory.support.settings import Settings
+from factory.theory.compiler.folding import folded, kind_of
+from factory.theory.problem.robot_types import load_catalogue
 from tests.fold_values import fold_layout, table_of
 from tests.layout_values import with_visits
 

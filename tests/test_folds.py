@@ -13,41 +13,34 @@ from typing import Any
 
 import pytest
 
-from factory.compiler import folding
-from factory.compiler.assigning import shared
-from factory.compiler.folding import (
-    Line,
-    fold,
-    folded,
-    kept_apart,
-    line_of,
-    lines_of_labels,
-)
-from factory.exporting.certificate.check import check_certificate
-from factory.exporting.certificate.listing import digest
-from factory.exporting.certificate.writer import certificate
-from factory.exporting.pnml import write_pnml
-from factory.foreign_nets.behaviour import analyse, play
-from factory.foreign_nets.pnml_reader import read_pnml
-from factory.lang import write_pag
-from factory.layout.durations import Pace, cycle_of
-from factory.nets.cycle_ratio import max_cycle_ratio
-from factory.nets.gears import Gear, GearNet
-from factory.nets.history import firings, legal_marking, unreached
-from factory.nets.marked import MarkedNet, marked
-from factory.nets.petri import Marking
-from factory.nets.verdict import BEHAVIOUR
-from factory.nets.verify import proved, verify
-from factory.plant.factory import Factory
-from factory.plant.programs import program_of, write_program
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
-from factory.study.analysis.analysing import operation_slacks
-from factory.study.analysis.timed import timed_net
+from factory.apps.analyze.analysing import operation_slacks
+from factory.apps.analyze.timed import timed_net
+from factory.apps.exports.certificate.check import check_certificate
+from factory.apps.exports.certificate.listing import digest
+from factory.apps.exports.certificate.writer import certificate
+from factory.apps.exports.pnml import write_pnml
+from factory.apps.foreign_nets.behaviour import analyse, play
+from factory.apps.foreign_nets.pnml_reader import read_pnml
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.engine.timing.cycle_time import CycleTime, cycle_time
+from factory.engine.timing.timing import Timing
+from factory.floor.layout.durations import Pace, cycle_of
 from factory.support.errors import InputError, RunError
 from factory.support.settings import Settings
-from factory.timing.cycle_time import CycleTime, cycle_time
-from factory.timing.timing import Timing
+from factory.theory.compiler import folding
+from factory.theory.compiler.assigning import shared
+from factory.theory.compiler.folding import Line, fold, folded, kept_apart, line_of, lines_of_labels
+from factory.theory.lang import write_pag
+from factory.theory.nets.cycle_ratio import max_cycle_ratio
+from factory.theory.nets.gears import Gear, GearNet
+from factory.theory.nets.history import firings, legal_marking, unreached
+from factory.theory.nets.marked import MarkedNet, marked
+from factory.theory.nets.petri import Marking
+from factory.theory.nets.verdict import BEHAVIOUR
+from factory.theory.nets.verify import proved, verify
+from factory.theory.plant.factory import Factory
+from factory.theory.plant.programs import program_of, write_program
 from tests.command_line import Terminal
 from tests.fold_values import (
     fold_layout,

@@ -15,21 +15,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import factory
-from factory.compiler.compiler import compile_pag
-from factory.compiler.expanding import expand, joins
-from factory.compiler.mating.mating import Admitted, admitted
-from factory.lang.template_reader import load_templates
-from factory.layout.durations import Pace
-from factory.nets.verify import verify
-from factory.pipeline import Project, read
-from factory.plant.factory import Factory
-from factory.problem.pag import PAG
-from factory.problem.plan import THIRD, Plan
-from factory.problem.robot_types import load_catalogue
-from factory.problem.template import Template
-from factory.study.allocation.aim import Aim
-from factory.study.allocation.candidate import Candidate
-from factory.study.allocation.forms import (
+from factory.apps.few_robots.aim import Aim
+from factory.apps.few_robots.candidate import Candidate
+from factory.apps.few_robots.forms import (
     FormsTask,
     Option,
     _finished,
@@ -37,10 +25,22 @@ from factory.study.allocation.forms import (
     best_forms,
     written_forms,
 )
-from factory.study.allocation.search import Search, allocated
+from factory.apps.few_robots.search import Search, allocated
+from factory.floor.layout.durations import Pace
+from factory.floor.mating.mating import Admitted, admitted
+from factory.pipeline import Project, read
 from factory.support.resources import templates_folder
 from factory.support.settings import Settings
 from factory.support.tables import table_of, value_of
+from factory.theory.compiler.compiler import compile_pag
+from factory.theory.compiler.expanding import expand, joins
+from factory.theory.lang.template_reader import load_templates
+from factory.theory.nets.verify import verify
+from factory.theory.plant.factory import Factory
+from factory.theory.problem.pag import PAG
+from factory.theory.problem.plan import THIRD, Plan
+from factory.theory.problem.robot_types import load_catalogue
+from factory.theory.problem.template import Template
 from tests.command_line import Terminal
 from tests.layout_values import table_pag
 from tests.pag_values import SHAPES, random_pag

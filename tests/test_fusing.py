@@ -11,16 +11,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import factory
-from factory.geometry.product import product_geometry
-from factory.mjcf.masks import robot_code
-from factory.plant.fused_bodies import FUSE_FROM, bodies_of, fused_copies, fusing_pays
-from factory.record.monitor import beside
-from factory.simulation.disturbance import Mass, disturb
-from factory.simulation.modelling import physical_model
-from factory.simulation.mujoco.fusing import SETTLING, Fusion, rotations
-from factory.simulation.mujoco.holdings import Holdings
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+from factory.apps.disturbance import Mass, disturb
+from factory.apps.monitor import beside
+from factory.engine.mjcf.masks import robot_code
+from factory.engine.simulation.modelling import physical_model
+from factory.engine.simulation.mujoco.fusing import SETTLING, Fusion, rotations
+from factory.engine.simulation.mujoco.holdings import Holdings
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.geometry.fused_bodies import FUSE_FROM, bodies_of, fused_copies, fusing_pays
+from factory.floor.geometry.product import product_geometry
 from factory.support.engine import mujoco
 from factory.support.settings import MOST, Settings
 from tests.command_line import PAPER, Terminal
@@ -275,7 +275,7 @@ def test_large_factories_are_fused_by_themselves(tmp_path: Path) -> None:
     chain += "".join(f"n{k} = mate(n{k - 1}, q{k});\n" for k in range(2, 240))
     assert not fuses(tmp_path, chain + ";\n".join(f"q{n} = atomic()" for n in range(240)))
     with pytest.MonkeyPatch.context() as patch:  # convex pieces count, not parts
-        patch.setattr("factory.plant.fused_bodies.FUSE_FROM", 1)
+        patch.setattr("factory.floor.geometry.fused_bodies.FUSE_FROM", 1)
         assert fusing_pays(small.factory, small.product)
         assert not fusing_pays(many.factory, many.product)
 
@@ -296,7 +296,7 @@ def test_a_body_that_has_just_become_free_can_take_the_place_of_others(
 ) -> None:
     """The only copy of a sub-assembly is still joined to something else when the next one is
     made; both become one in the same tick, in either order."""
-    monkeypatch.setattr("factory.simulation.mujoco.parts.SETTLING", np.inf)
+    monkeypatch.setattr("factory.engine.simulation.mujoco.parts.SETTLING", np.inf)
     simulation = Simulation(layout_of("chest"), RunRequest(units=4, fuse=True))
     world, parts = simulation.physical, simulation.physical.parts
     holdings = parts.holdings
@@ -330,7 +330,7 @@ def test_what_has_not_settled_is_not_one_body_yet(monkeypatch: pytest.MonkeyPatc
     operation ends; its misfit is kept, and is part of the product's error."""
     simulation = ready("paper", fuse=True)
     world, joining = simulation.physical, simulation.physical.parts.joining
-    monkeypatch.setattr("factory.simulation.mujoco.parts.RIGID", 0.0)
+    monkeypatch.setattr("factory.engine.simulation.mujoco.parts.RIGID", 0.0)
     waited: list[float] = []
     while not world.delivered():
         simulation.supervisor.step()
@@ -360,7 +360,7 @@ def test_what_has_not_settled_is_left_out_of_contact_too(monkeypatch: pytest.Mon
     layout = laid_out(INTERLOCKED)
     for settles in (True, False):
         if not settles:
-            monkeypatch.setattr("factory.simulation.mujoco.parts.SETTLING", np.inf)
+            monkeypatch.setattr("factory.engine.simulation.mujoco.parts.SETTLING", np.inf)
         run = Simulation(layout, RunRequest(units=2, fuse=True)).run()
         assert run.products == 2 and run.physics and run.physics.excluded == (("b", "c"),)
         assert run.physics.unintended_contacts == 0 and run.physics.mating_force_max_n == 0

@@ -18,19 +18,19 @@ import pytest
 import trimesh
 
 import factory
-from factory.exporting import exporters
-from factory.exporting.subject import Subject
-from factory.foreign_nets.discover import discover
-from factory.foreign_nets.pnml_reader import load_net
-from factory.importing import Options, import_product
-from factory.importing.loose import bodies_in, loose_product
-from factory.nets.gears import GearNet
+from factory.apps.exports import exporters
+from factory.apps.exports.subject import Subject
+from factory.apps.foreign_nets.discover import discover
+from factory.apps.foreign_nets.pnml_reader import load_net
+from factory.apps.importing import Options, import_product
+from factory.apps.importing.loose import bodies_in, loose_product
+from factory.apps.log import plan_file
+from factory.apps.log.plan_file import plan_files
+from factory.apps.plc.signals import Commands
+from factory.commands.checking import check_net
 from factory.pipeline import all_templates, read
-from factory.record import plan_file
-from factory.record.plan_file import plan_files
-from factory.simulation.signals import Commands
-from factory.study.checking import check_net
 from factory.support.errors import FactoryError
+from factory.theory.nets.gears import GearNet
 from tests.step_boxes import step_of
 
 WORDS = (
@@ -266,7 +266,7 @@ def read_plan(folder: Path, draw: Random) -> None:
 def take_written(_: Path, draw: Random) -> None:
     """Whatever is written into the variables of a plant, commands of the right form come out."""
     ua = pytest.importorskip("asyncua", reason="the extra `opcua` is not installed")
-    from factory.show.written import WrittenCommands
+    from factory.apps.plc.written import WrittenCommands
 
     kinds, kept = ua.ua.VariantType, Commands(np.zeros(3), (False,) * 3, (0,) * 3)
     taken = WrittenCommands(ua, kept)

@@ -10,8 +10,8 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from factory.geometry.limits import METRES
-from factory.geometry.meshes import (
+from factory.floor.geometry.limits import METRES
+from factory.floor.geometry.meshes import (
     LEAST_INERTIA,
     LEAST_MASS,
     MOST_FACES,
@@ -20,12 +20,12 @@ from factory.geometry.meshes import (
     sound,
     usable,
 )
-from factory.geometry.product import product_geometry
-from factory.geometry.solids import Product, Solid, rotation
-from factory.lang import read_pag
+from factory.floor.geometry.product import product_geometry
+from factory.floor.geometry.solids import Product, Solid, rotation
 from factory.pipeline import all_templates
-from factory.problem.pag import PAG, Value
 from factory.support.errors import InputError
+from factory.theory.lang import read_pag
+from factory.theory.problem.pag import PAG, Value
 from tests.layout_values import table_pag
 
 lengths = st.floats(0.001, 1.0)

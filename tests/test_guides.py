@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.mjcf.driving import GRAVITY, ROLLING
-from factory.problem.robot_bodies import FRICTION
-from factory.record.state import State
-from factory.simulation.disturbance import Friction, disturb
-from factory.simulation.simulation import Simulation
+from factory.apps.disturbance import Friction, disturb
+from factory.engine.mjcf.driving import GRAVITY, ROLLING
+from factory.engine.record.state import State
+from factory.engine.simulation.simulation import Simulation
 from factory.support.engine import mujoco
+from factory.theory.problem.robot_bodies import FRICTION
 from tests.good_runs import random_marking
 from tests.simulation_values import layout_of, ready
 

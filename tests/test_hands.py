@@ -10,24 +10,24 @@ import numpy as np
 import pytest
 
 import factory
-from factory.geometry.product import product_geometry
-from factory.layout.clearance import certify
-from factory.layout.embedding import lay_out
-from factory.layout.exclusions import awaited_positions, coordinated
-from factory.layout.hands.bores import bores
-from factory.layout.hands.choosing import Hands
-from factory.layout.hands.hand import AIR
-from factory.layout.hands.holding import held
-from factory.layout.hands.limbs import limbs
-from factory.layout.hands.surfaces import Surfaces, hit, retreat, swept
-from factory.layout.layout import Layout
-from factory.mjcf import names
-from factory.mjcf.pads import Pads
+from factory.apps.fidelity.hidden import HiddenPenetrations
+from factory.apps.monitor.watched import watched
+from factory.engine.mjcf import names
+from factory.engine.mjcf.pads import Pads
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.geometry.product import product_geometry
+from factory.floor.layout.clearance import certify
+from factory.floor.layout.embedding import lay_out
+from factory.floor.layout.exclusions import awaited_positions, coordinated
+from factory.floor.layout.hands.bores import bores
+from factory.floor.layout.hands.choosing import Hands
+from factory.floor.layout.hands.hand import AIR
+from factory.floor.layout.hands.holding import held
+from factory.floor.layout.hands.limbs import limbs
+from factory.floor.layout.hands.surfaces import Surfaces, hit, retreat, swept
+from factory.floor.layout.layout import Layout
 from factory.pipeline import read
-from factory.record.monitor.watched import watched
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
-from factory.study.fidelity.hidden import HiddenPenetrations
 
 EXAMPLES = Path(factory.__file__).parent.parent / "examples"
 AT_MOST_MM = 0.1

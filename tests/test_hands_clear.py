@@ -9,24 +9,24 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from factory.layout import clearance
-from factory.layout.certificate import Exclusions
-from factory.layout.dimensions import FINGER_TOP, PAYLOAD
-from factory.layout.feeding import feeder_of
-from factory.layout.hands.apart import LEVEL, HandsApart
-from factory.layout.hands.hand import BEAM, Hand
-from factory.layout.hands.holding import Holding
-from factory.layout.hands.limbs import limbs
-from factory.layout.hands.outermost import outermost
-from factory.layout.hands.places import Places
-from factory.layout.hands.surfaces import Body
-from factory.layout.homeward import Homeward
-from factory.layout.layout import Layout
+from factory.apps.fidelity.hidden import HiddenPenetrations
+from factory.apps.monitor.watched import watched
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout import clearance
+from factory.floor.layout.certificate import Exclusions
+from factory.floor.layout.dimensions import FINGER_TOP, PAYLOAD
+from factory.floor.layout.feeding import feeder_of
+from factory.floor.layout.hands.apart import LEVEL, HandsApart
+from factory.floor.layout.hands.hand import BEAM, Hand
+from factory.floor.layout.hands.holding import Holding
+from factory.floor.layout.hands.limbs import limbs
+from factory.floor.layout.hands.outermost import outermost
+from factory.floor.layout.hands.places import Places
+from factory.floor.layout.hands.surfaces import Body
+from factory.floor.layout.homeward import Homeward
+from factory.floor.layout.layout import Layout
 from factory.pipeline import read
-from factory.record.monitor.watched import watched
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
-from factory.study.fidelity.hidden import HiddenPenetrations
 from factory.support.errors import RunError
 
 AT_MOST_MM = 0.1

@@ -8,20 +8,20 @@ from pathlib import Path
 
 import pytest
 
-from factory.layout.certificate import fault
-from factory.layout.dimensions import TOOL_TRAVEL
-from factory.layout.embedding import certified
-from factory.layout.shapes import is_tool
+from factory.apps.few_robots.aim import Aim
+from factory.apps.few_robots.search import allocated
+from factory.apps.fidelity.hidden import HiddenPenetrations
+from factory.apps.monitor.watched import watched
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.certificate import fault
+from factory.floor.layout.dimensions import TOOL_TRAVEL
+from factory.floor.layout.embedding import certified
+from factory.floor.layout.shapes import is_tool
 from factory.pipeline import Project, read
-from factory.problem.plan import Plan
-from factory.record.monitor.watched import watched
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
-from factory.study.allocation.aim import Aim
-from factory.study.allocation.search import allocated
-from factory.study.fidelity.hidden import HiddenPenetrations
 from factory.support.errors import RunError
 from factory.support.settings import LEAST
+from factory.theory.problem.plan import Plan
 from tests.random_products import random_blocks, random_product
 
 AT_MOST_MM, GRIP_MM = 0.1, 0.5

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from factory.mjcf.solid import drawn
-from factory.record.state import State
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
-from factory.study.fidelity.hidden import HiddenPenetrations, overlaps_of
+from factory.apps.fidelity.hidden import HiddenPenetrations, overlaps_of
+from factory.engine.mjcf.solid import drawn
+from factory.engine.record.state import State
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from tests.command_line import PAPER, Terminal
 from tests.pag_texts import laid_out

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from factory.foreign_nets import pnml_reader
-from factory.lang import load_templates, read_pag
+from factory.apps.foreign_nets import pnml_reader
 from factory.support import files, xml_tree
 from factory.support.errors import SHOWN, InputError, did_you_mean
 from factory.support.files import MESH, MIB, NET, RECORD, TABLE, TEXT, read_bytes
+from factory.theory.lang import load_templates, read_pag
 from tests.command_line import PAPER, ROOT, Terminal
 
 PART = 'root = p; p = atomic(mesh = "p.obj");'
@@ -112,7 +112,7 @@ def test_process_substitution_and_stdin() -> None:
 
 def test_looking_at_a_pipe_takes_nothing_from_it(tmp_path: Path) -> None:
     """Whether a file is a log or a net is seen from its first bytes, of regular files alone."""
-    from factory.record.log import is_log
+    from factory.apps.log import is_log
 
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)

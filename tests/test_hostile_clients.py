@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.simulation.corridors import Corridors
-from factory.simulation.driven import DrivenSupervisor, drive
-from factory.simulation.request import RunRequest
-from factory.simulation.signals import NOBODY, Commands, Sensed
-from factory.simulation.simulation import Simulation, compiled
+from factory.apps.plc.corridors import Corridors
+from factory.apps.plc.driven import DrivenSupervisor, drive
+from factory.apps.plc.signals import NOBODY, Commands, Sensed
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation, compiled
 from tests.examples import with_hands
 from tests.hostile_controllers import HostileController
 from tests.structured_text import Plc
@@ -25,8 +25,8 @@ pytest.importorskip("asyncua", reason="the extra `opcua` is not installed")
 
 from asyncua import Client, ua
 
-from factory.show import opcua_server
-from factory.show.opcua import SPACE, OpcuaPlant
+from factory.apps.plc import opcua_server
+from factory.apps.plc.opcua import SPACE, OpcuaPlant
 from tests.hostile_clients import KIND, MISTYPED, Deaf, HostileClient, plain, unfit
 
 TRIES = 300

@@ -15,14 +15,14 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.geometry.product import product_geometry
-from factory.geometry.solids import rotation
-from factory.importing import Options, import_product
-from factory.importing.part_maker import quaternion
-from factory.lang import read_pag
-from factory.problem.pag import PAG
-from factory.problem.template import Template
+from factory.apps.importing import Options, import_product
+from factory.apps.importing.part_maker import quaternion
+from factory.floor.geometry.product import product_geometry
+from factory.floor.geometry.solids import rotation
 from factory.support.errors import InputError
+from factory.theory.lang import read_pag
+from factory.theory.problem.pag import PAG
+from factory.theory.problem.template import Template
 from tests.command_line import ROOT, Terminal, files_in
 from tests.strategies import pags
 

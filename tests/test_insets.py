@@ -14,24 +14,24 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.compiler.mating.depth import exact, polytope
-from factory.compiler.mating.overlaps import CLEAR
-from factory.geometry.insets import _faces, _largest_ball, breadth, inset
-from factory.geometry.product import product_geometry
-from factory.lang import read_pag
-from factory.layout.layout import Layout
-from factory.mjcf.insets import insets_of
-from factory.mjcf.loading import load
-from factory.mjcf.model import Model
+from factory.apps.live import Session
+from factory.engine.mjcf.insets import insets_of
+from factory.engine.mjcf.loading import load
+from factory.engine.mjcf.model import Model
+from factory.engine.simulation.modelling import physical_model
+from factory.engine.simulation.mujoco.fast.neighbours import boxes
+from factory.engine.simulation.mujoco.world import MujocoWorld
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.geometry.insets import _faces, _largest_ball, breadth, inset
+from factory.floor.geometry.product import product_geometry
+from factory.floor.layout.layout import Layout
+from factory.floor.mating.depth import exact, polytope
+from factory.floor.mating.overlaps import CLEAR
 from factory.pipeline import read
-from factory.show.live import Session
-from factory.simulation.modelling import physical_model
-from factory.simulation.mujoco.fast.neighbours import boxes
-from factory.simulation.mujoco.world import MujocoWorld
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
+from factory.theory.lang import read_pag
 from tests.command_line import Terminal
 from tests.examples import with_hands
 from tests.pag_texts import TEMPLATES, laid_out

@@ -7,16 +7,16 @@ from dataclasses import replace
 
 import pytest
 
-from factory.compiler.compiler import compile_pag
-from factory.geometry.product import product_geometry
-from factory.layout.embedding import lay_out
-from factory.layout.feeding import feeder_of
-from factory.layout.guidepath import hull
-from factory.layout.layout import Layout, carriers
-from factory.layout.sweeps import piles
-from factory.modes.modes import operation_modes
-from factory.problem.template import Law, Point
+from factory.floor.geometry.product import product_geometry
+from factory.floor.layout.embedding import lay_out
+from factory.floor.layout.feeding import feeder_of
+from factory.floor.layout.guidepath import hull
+from factory.floor.layout.layout import Layout, carriers
+from factory.floor.layout.sweeps import piles
+from factory.floor.modes.modes import operation_modes
 from factory.support.errors import InputError, RunError
+from factory.theory.compiler.compiler import compile_pag
+from factory.theory.problem.template import Law, Point
 from tests.layout_values import (
     DRAWN,
     Drawn,

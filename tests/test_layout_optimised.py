@@ -11,24 +11,24 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-import factory.layout.optimising as optimising
-from factory.geometry.product import product_geometry
-from factory.layout.bounds import cycle_time_bound
-from factory.layout.dimensions import LAYERS, Clearance
-from factory.layout.durations import Pace, gear_times, operation_times
-from factory.layout.embedding import lay_out
-from factory.layout.layout import Layout
-from factory.layout.optimising import first_feasible
-from factory.layout.outline import Choice, Outline
-from factory.layout.request import Ground
-from factory.layout.shapes import Shape
-from factory.layout.skyline import Skyline
+import factory.floor.layout.optimising as optimising
+from factory.engine.timing.gain import gain, soonest
+from factory.engine.timing.timed import pace as paced
+from factory.engine.timing.timing import Timing
+from factory.floor.geometry.product import product_geometry
+from factory.floor.layout.bounds import cycle_time_bound
+from factory.floor.layout.dimensions import LAYERS, Clearance
+from factory.floor.layout.durations import Pace, gear_times, operation_times
+from factory.floor.layout.embedding import lay_out
+from factory.floor.layout.layout import Layout
+from factory.floor.layout.optimising import first_feasible
+from factory.floor.layout.outline import Choice, Outline
+from factory.floor.layout.request import Ground
+from factory.floor.layout.shapes import Shape
+from factory.floor.layout.skyline import Skyline
 from factory.pipeline import read
 from factory.support.errors import RunError
 from factory.support.settings import Settings
-from factory.timing.gain import gain, soonest
-from factory.timing.timed import pace as paced
-from factory.timing.timing import Timing
 from tests.command_line import ROOT, Terminal
 from tests.layout_values import (
     STYLES,

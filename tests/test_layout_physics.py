@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from factory.layout.certificate import KINDS, NAMES
-from factory.layout.layout import Box, Layout
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.certificate import KINDS, NAMES
+from factory.floor.layout.layout import Box, Layout
 from factory.support.settings import Settings
 from tests.layout_values import STYLES, random_layout, row_of_inserts
 from tests.pag_values import SHAPES
@@ -37,9 +37,9 @@ def test_nothing_touches(number: int) -> None:
 @pytest.mark.parametrize("layout", [*LAYOUTS[:4], row_of_inserts()])
 def test_bodies_are_inside_their_regions(layout: Layout) -> None:
     """Every geom that can collide, at both ends of its robot's guidepath."""
-    from factory.mjcf.loading import load
-    from factory.mjcf.model import build_model
-    from factory.problem.robot_types import load_catalogue
+    from factory.engine.mjcf.loading import load
+    from factory.engine.mjcf.model import build_model
+    from factory.theory.problem.robot_types import load_catalogue
 
     copies = {leaf.label: 1 for leaf in layout.factory.leaves}
     m = load(build_model(layout, load_catalogue(), copies, Settings(timestep=0.002)))

@@ -6,15 +6,15 @@ import mujoco
 import numpy as np
 import pytest
 
-import factory.layout.optimising as optimising
-from factory.compiler.mating.mating import judged
-from factory.geometry.product import product_geometry
-from factory.layout.embedding import lay_out
-from factory.layout.layout import Layout
-from factory.layout.sides import admissible, admitted
-from factory.record.state import State
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+import factory.floor.layout.optimising as optimising
+from factory.engine.record.state import State
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.geometry.product import product_geometry
+from factory.floor.layout.embedding import lay_out
+from factory.floor.layout.layout import Layout
+from factory.floor.layout.sides import admissible, admitted
+from factory.floor.mating.mating import judged
 from tests.pag_texts import PAPER, compiled
 
 BALANCED = """root = r; r = mate(s, t); s = mate(a, b); t = mate(c, d);

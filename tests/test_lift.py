@@ -7,21 +7,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from factory.compiler.expanding import expand
-from factory.compiler.mating.mating import matings
-from factory.geometry.product import product_geometry
-from factory.lang.pag_reader import read_pag
-from factory.layout.clearance import certify
-from factory.layout.feeding import feeder_of
-from factory.modes.modes import operation_modes, operation_starts
-from factory.nets.verify import verify
+from factory.engine.record.state import State
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.geometry.product import product_geometry
+from factory.floor.layout.clearance import certify
+from factory.floor.layout.feeding import feeder_of
+from factory.floor.mating.mating import matings
+from factory.floor.modes.modes import operation_modes, operation_starts
 from factory.pipeline import all_templates
-from factory.plant.approaches import MARGIN
-from factory.plant.factory import Factory
-from factory.record.state import State
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
+from factory.theory.compiler.expanding import expand
+from factory.theory.lang.pag_reader import read_pag
+from factory.theory.nets.verify import verify
+from factory.theory.plant.approaches import MARGIN
+from factory.theory.plant.factory import Factory
 from tests.layout_values import with_visits
 from tests.pag_texts import laid_out
 from tests.simulation_values import FENCE, laid_out_with_lifts
@@ -207,7 +207,7 @@ def test_without_a_lift_the_ball_is_blocked_and_its_pairs_left_out() -> None:
 
 
 def test_a_catalogue_without_lifts_is_told() -> None:
-    from factory.compiler.compiler import compile_pag
+    from factory.theory.compiler.compiler import compile_pag
     from tests.pag_values import catalogue
 
     templates = all_templates()

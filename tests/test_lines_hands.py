@@ -12,25 +12,25 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.geometry.solids import Product
-from factory.layout import hanging
-from factory.layout.clearance import certify
-from factory.layout.embedding import lay_out
-from factory.layout.feeding import feeder_of
-from factory.layout.hands import holding
-from factory.layout.hands.hand import AIR, Hand
-from factory.layout.hands.limbs import limbs
-from factory.layout.hands.places import Places
-from factory.layout.hands.places import places as found_places
-from factory.layout.hanging import Hanging
-from factory.layout.layout import Layout
+from factory.apps.fidelity.hidden import HiddenPenetrations
+from factory.apps.monitor.watched import watched
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.run import Run
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.geometry.solids import Product
+from factory.floor.layout import hanging
+from factory.floor.layout.clearance import certify
+from factory.floor.layout.embedding import lay_out
+from factory.floor.layout.feeding import feeder_of
+from factory.floor.layout.hands import holding
+from factory.floor.layout.hands.hand import AIR, Hand
+from factory.floor.layout.hands.limbs import limbs
+from factory.floor.layout.hands.places import Places
+from factory.floor.layout.hands.places import places as found_places
+from factory.floor.layout.hanging import Hanging
+from factory.floor.layout.layout import Layout
 from factory.pipeline import Project, read
-from factory.record.monitor.watched import watched
 from factory.sharing import with_lines
-from factory.simulation.request import RunRequest
-from factory.simulation.run import Run
-from factory.simulation.simulation import Simulation
-from factory.study.fidelity.hidden import HiddenPenetrations
 from tests.layout_values import with_visits
 
 AT_MOST_MM = 0.1

@@ -17,17 +17,17 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from factory.nets.replay import replay
-from factory.record.monitor import beside
-from factory.record.state import State
-from factory.show.live import Server, Session
-from factory.show.live.commands import FAULTS, KEYS, Command, command_of
-from factory.show.live.page import page, stage_of
-from factory.show.report.drawings import floor_plan, labels_of
-from factory.simulation.disturbance.interventions import Interventions
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+from factory.apps.disturbance.interventions import Interventions
+from factory.apps.live import Server, Session
+from factory.apps.live.commands import FAULTS, KEYS, Command, command_of
+from factory.apps.live.page import page, stage_of
+from factory.apps.monitor import beside
+from factory.apps.report.drawings import floor_plan, labels_of
+from factory.engine.record.state import State
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
 from factory.support.errors import InputError
+from factory.theory.nets.replay import replay
 from tests.command_line import PAPER, Terminal, started
 from tests.layout_values import paper_layout
 from tests.live_sessions import Running, a_session
@@ -283,7 +283,7 @@ def test_no_more_may_watch_than_it_can_serve(
 ) -> None:
     from websockets.exceptions import InvalidStatus
 
-    monkeypatch.setattr("factory.show.live.server.MOST", 2)
+    monkeypatch.setattr("factory.apps.live.server.MOST", 2)
     with socket_of(server) as one, socket_of(server) as other:
         assert one.recv(10) and other.recv(10)
         with pytest.raises(InvalidStatus, match="503"), socket_of(server):

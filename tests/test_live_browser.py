@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from factory.show.live import Server
-from factory.show.live.page import page
-from factory.simulation.recovery import Campaign, WorldFault
+from factory.apps.live import Server
+from factory.apps.live.page import page
+from factory.apps.recovery import Campaign, WorldFault
 from tests.live_sessions import Running, a_session
 from tests.waiting import until
 

@@ -15,20 +15,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.nets.replay import replay
-from factory.nets.undone import Undone
-from factory.record.state import State
-from factory.show.live import Server
-from factory.show.live.commands import FAULTS, KEYS, LASTS, Command, command_of
-from factory.show.live.outages import Outages, Watch
-from factory.show.live.page import page
-from factory.simulation.disturbance.interventions import Interventions
-from factory.simulation.recovery import Campaign, Recovery, WorldFault
-from factory.simulation.recovery.faults import KINDS
-from factory.simulation.request import RunRequest
-from factory.simulation.run import entries_of
-from factory.simulation.simulation import Simulation
+from factory.apps.disturbance.interventions import Interventions
+from factory.apps.live import Server
+from factory.apps.live.commands import FAULTS, KEYS, LASTS, Command, command_of
+from factory.apps.live.outages import Outages, Watch
+from factory.apps.live.page import page
+from factory.apps.recovery import Campaign, Recovery, WorldFault
+from factory.apps.recovery.faults import KINDS
+from factory.engine.record.state import State
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.run import entries_of
+from factory.engine.simulation.simulation import Simulation
 from factory.support.errors import InputError
+from factory.theory.nets.replay import replay
+from factory.theory.nets.undone import Undone
 from tests import failing_runs
 from tests.command_line import PAPER, started
 from tests.layout_values import paper_layout
@@ -347,7 +347,7 @@ def test_the_page_has_the_buttons_only_where_it_can_fail() -> None:
 
 def test_every_button_sends_a_command_with_its_keys() -> None:
     """By the text of the page's program: commands have the keys that are read, and no others."""
-    text = resources.files("factory.show.live").joinpath("assets/live.js").read_text("utf-8")
+    text = resources.files("factory.apps.live").joinpath("assets/live.js").read_text("utf-8")
     found = re.findall(r"{ do: '(\w+)'((?:, \w+(?:: [^,}]+)?)*) }", text)
     every = {**KEYS, **FAULTS}
     assert {name for name, _ in found} >= {*FAULTS, "push", "slow", "block"}

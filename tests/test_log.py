@@ -16,14 +16,14 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 import factory
-from factory.record.log import MAGIC, Log, LogWriter, is_log, read_log
-from factory.record.log.blocks import HEAD, LENGTH, Arrays, block, blocks, pack_rows, unpack_rows
-from factory.record.log.model import model_of
-from factory.record.log.reader import header_in
-from factory.record.monitor.record import jumps, observations, watch_log
-from factory.record.state import State
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+from factory.apps.log import MAGIC, Log, LogWriter, is_log, read_log
+from factory.apps.log.blocks import HEAD, LENGTH, Arrays, block, blocks, pack_rows, unpack_rows
+from factory.apps.log.model import model_of
+from factory.apps.log.reader import header_in
+from factory.apps.monitor.record import jumps, observations, watch_log
+from factory.engine.record.state import State
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from factory.support.errors import InputError
 
@@ -140,7 +140,7 @@ def test_the_memory_for_a_log_does_not_grow_with_its_states(
     recorded, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What is kept of each row, such as its time, takes a small share of them."""
-    monkeypatch.setattr("factory.record.monitor.record.SPAN", 100)
+    monkeypatch.setattr("factory.apps.monitor.record.SPAN", 100)
     short, long = (longer(recorded[0], times, tmp_path / f"{times}") for times in (2, 6))
     log, more = read_log(long), peak(long) - peak(short)
     states = 8 * 4 / 6 * len(log) * (log.header["nq"] + log.header["nv"])

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.record.log import MAGIC, LogWriter, read_log
-from factory.record.log.blocks import HEAD, LENGTH, Arrays, block, unpacked
-from factory.record.log.checks import LogHeader
-from factory.record.log.model import model_of
-from factory.simulation.simulation import Simulation
+from factory.apps.log import MAGIC, LogWriter, read_log
+from factory.apps.log.blocks import HEAD, LENGTH, Arrays, block, unpacked
+from factory.apps.log.checks import LogHeader
+from factory.apps.log.model import model_of
+from factory.engine.simulation.simulation import Simulation
 from factory.support.errors import InputError
 from factory.support.tables import misfit
 from tests.command_line import PAPER, Terminal
@@ -271,7 +271,7 @@ def test_a_log_that_does_not_fit(
     def full(*_: object) -> None:
         raise error("too much")
 
-    monkeypatch.setattr("factory.record.log.blocks.unpacked", full)
+    monkeypatch.setattr("factory.apps.log.blocks.unpacked", full)
     assert is_refused(log, words)
 
 
@@ -309,7 +309,7 @@ def test_models_that_are_not_written_do_not_reach_the_engine(
     change, words = STRANGE[name]
     kept = read_log(log)
     assert change(kept.xml) != kept.xml
-    monkeypatch.setattr("factory.record.log.model.compiled", pytest.fail)
+    monkeypatch.setattr("factory.apps.log.model.compiled", pytest.fail)
     with pytest.raises(InputError, match=rf"BadLog the log's model is broken: .*{words}"):
         model_of(replace(kept, xml=change(kept.xml)))
 

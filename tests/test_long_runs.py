@@ -10,9 +10,9 @@ import pytest
 from benches.fidelity import long_runs
 from benches.fidelity.__main__ import REPORT
 from benches.fidelity.products import PAPER, layout
-from factory.record.state import State
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+from factory.engine.record.state import State
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
 
 
 @pytest.fixture

@@ -6,11 +6,11 @@ from itertools import combinations
 
 import pytest
 
-from factory.record.state import State
-from factory.simulation.recovery import recover
-from factory.simulation.recovery.faults import Campaign, WorldFault
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+from factory.apps.recovery import recover
+from factory.apps.recovery.faults import Campaign, WorldFault
+from factory.engine.record.state import State
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from tests.examples import with_hands
 

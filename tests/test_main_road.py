@@ -19,7 +19,7 @@ ASIDE = ("foreign_nets", "networkx")
 OFF_THE_ROAD = {"foreign_nets", "exporting", "study", "commands"}
 """Rooms that may import `foreign_nets`: commands when they are given a net in PNML."""
 
-PLANTED = "import factory.foreign_nets.behaviour"
+PLANTED = "import factory.apps.foreign_nets.behaviour"
 
 
 def entered(words: list[str], first: str = "") -> set[str]:
@@ -37,7 +37,7 @@ def entered(words: list[str], first: str = "") -> set[str]:
         check=True,
     )
     modules = json.loads(done.stderr.splitlines()[-1])
-    assert "factory.nets.petri" in modules
+    assert "factory.theory.nets.petri" in modules
     return {room for room in ASIDE for m in modules if room in m.split(".")[:2]}
 
 

@@ -9,27 +9,27 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from factory.compiler.folding import folded
-from factory.exporting.ways import ways
-from factory.geometry.solids import rotation
-from factory.geometry.turning import axis_of, presented, turning_box, turning_pieces
-from factory.layout.embedding import lay_out
-from factory.layout.layout import Layout, carriers, delivery
-from factory.layout.request import Ground
-from factory.layout.stops import stops_of
-from factory.mjcf import stock
-from factory.mjcf.loading import load
-from factory.mjcf.model import build_model
-from factory.mjcf.names import turn
-from factory.modes.modes import operation_mode
+from factory.apps.exports.ways import ways
+from factory.engine.mjcf import stock
+from factory.engine.mjcf.loading import load
+from factory.engine.mjcf.model import build_model
+from factory.engine.mjcf.names import turn
+from factory.engine.record.state import State
+from factory.engine.simulation.ordering import Ordering
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.geometry.solids import rotation
+from factory.floor.geometry.turning import axis_of, presented, turning_box, turning_pieces
+from factory.floor.layout.embedding import lay_out
+from factory.floor.layout.layout import Layout, carriers, delivery
+from factory.floor.layout.request import Ground
+from factory.floor.layout.stops import stops_of
+from factory.floor.modes.modes import operation_mode
 from factory.pipeline import read
-from factory.problem.robot_types import load_catalogue
-from factory.record.state import State
-from factory.simulation.ordering import Ordering
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
 from factory.support.settings import Settings
+from factory.theory.compiler.folding import folded
+from factory.theory.problem.robot_types import load_catalogue
 from tests.clearance_values import check
 from tests.command_line import ROOT, Terminal
 from tests.good_runs import assert_good

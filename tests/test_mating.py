@@ -17,31 +17,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
+from factory.apps.exports.clash_picture import draw
+from factory.apps.exports.product_view import picture_names
 from factory.commands.warnings import LISTED, condensed
-from factory.compiler.expanding import expand
-from factory.compiler.mating import bodies, paths
-from factory.compiler.mating.depth import Difference, exact, polytope, rough, summits
-from factory.compiler.mating.findings import (
-    BLOCKED,
-    LEFT_OUT,
-    NO_DEEPER,
-    STRICT,
-    Mating,
-    Matings,
-)
-from factory.compiler.mating.mating import matings
-from factory.compiler.mating.meetings import meetings
-from factory.compiler.mating.overlaps import CHUNK
-from factory.compiler.mating.paths import CLEAR, NEAR, TOLERANCE, depths_of, sought
-from factory.exporting.clash_picture import draw
-from factory.exporting.product_view import picture_names
-from factory.geometry.product import product_geometry
-from factory.geometry.solids import Product
-from factory.lang import read_pag
+from factory.floor.geometry.product import product_geometry
+from factory.floor.geometry.solids import Product
+from factory.floor.mating import bodies, paths
+from factory.floor.mating.depth import Difference, exact, polytope, rough, summits
+from factory.floor.mating.findings import BLOCKED, LEFT_OUT, NO_DEEPER, STRICT, Mating, Matings
+from factory.floor.mating.mating import matings
+from factory.floor.mating.meetings import meetings
+from factory.floor.mating.overlaps import CHUNK
+from factory.floor.mating.paths import CLEAR, NEAR, TOLERANCE, depths_of, sought
 from factory.pipeline import all_templates
-from factory.problem.pag import PAG
-from factory.problem.template import Template
 from factory.support.errors import Diagnostic
+from factory.theory.compiler.expanding import expand
+from factory.theory.lang import read_pag
+from factory.theory.problem.pag import PAG
+from factory.theory.problem.template import Template
 from tests.command_line import Terminal
 from tests.strategies import pags, random_pag_text
 from tests.work import counted
@@ -621,7 +614,7 @@ def test_check_computes_no_geometry_where_no_part_has_a_shape(
 ) -> None:
     file = tmp_path / "plain.pag"
     file.write_text("root = r; r = mate ( a, b ); a = atomic(); b = atomic()")
-    monkeypatch.setattr("factory.geometry.product.product_geometry", pytest.fail)
+    monkeypatch.setattr("factory.floor.geometry.product.product_geometry", pytest.fail)
     document = run("check", file, "--clashes", tmp_path / "none", "--json").json
     assert document["approaches"] is None and document["clashes"] == []
     assert not (tmp_path / "none").exists()

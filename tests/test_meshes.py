@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 import trimesh
 
-from factory.geometry.mending import zipped
-from factory.geometry.mesh_file import EXPECTED, MeshFile, UnreadableMesh
-from factory.geometry.mesh_reader import read_mesh
-from factory.geometry.meshes import is_closed, volume_of
-from factory.geometry.product import product_geometry
-from factory.geometry.solids import Product
-from factory.importing.bodies import FileBody, solids_of
-from factory.problem.pag import PAG
+from factory.apps.importing.bodies import FileBody, solids_of
+from factory.floor.geometry.mending import zipped
+from factory.floor.geometry.mesh_file import EXPECTED, MeshFile, UnreadableMesh
+from factory.floor.geometry.mesh_reader import read_mesh
+from factory.floor.geometry.meshes import is_closed, volume_of
+from factory.floor.geometry.product import product_geometry
+from factory.floor.geometry.solids import Product
 from factory.support.errors import InputError
+from factory.theory.problem.pag import PAG
 from tests.command_line import Terminal
 from tests.layout_values import table_pag
 

@@ -11,25 +11,25 @@ from pathlib import Path
 
 import pytest
 
-from factory.compiler.mixing import even, orders
-from factory.exporting.certificate.check import check_certificate
-from factory.exporting.certificate.writer import certificate
-from factory.geometry.product import product_geometry
-from factory.lang.pag_reader import read_pag
-from factory.lang.writer import write_pag
-from factory.layout.bounds import least_times
-from factory.layout.durations import Pace
-from factory.nets.marked import marked
-from factory.nets.verify import verify
+from factory.apps.exports.certificate.check import check_certificate
+from factory.apps.exports.certificate.writer import certificate
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.engine.timing.cycle_time import cycle_time
+from factory.floor.geometry.fused_bodies import repeated
+from factory.floor.geometry.product import product_geometry
+from factory.floor.layout.bounds import least_times
+from factory.floor.layout.durations import Pace
 from factory.pipeline import Project, all_templates, read
-from factory.plant.fused_bodies import repeated
-from factory.problem.pag import PAG, Mix
-from factory.problem.plan import NOBODY, Plan
 from factory.sharing import with_lines
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
-from factory.timing.cycle_time import cycle_time
+from factory.theory.compiler.mixing import even, orders
+from factory.theory.lang.pag_reader import read_pag
+from factory.theory.lang.writer import write_pag
+from factory.theory.nets.marked import marked
+from factory.theory.nets.verify import verify
+from factory.theory.problem.pag import PAG, Mix
+from factory.theory.problem.plan import NOBODY, Plan
 from tests.command_line import Terminal
 from tests.fold_values import pairs_of_tours, simulated_cycle, swapped
 from tests.mix_values import LITTLE, Tree, family_of, mixed_factory, random_family

@@ -18,12 +18,12 @@ import pytest
 import trimesh
 
 import factory
-from factory.layout.layout import Layout
-from factory.mjcf import names
-from factory.mjcf.loading import load
-from factory.mjcf.model import Model, model_files
-from factory.mjcf.stock import written
-from factory.simulation.modelling import physical_model
+from factory.engine.mjcf import names
+from factory.engine.mjcf.loading import load
+from factory.engine.mjcf.model import Model, model_files
+from factory.engine.mjcf.stock import written
+from factory.engine.simulation.modelling import physical_model
+from factory.floor.layout.layout import Layout
 from factory.support.errors import InputError, RunError
 from factory.support.files import write_all
 from factory.support.settings import Settings

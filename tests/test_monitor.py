@@ -15,20 +15,20 @@ import numpy as np
 import pytest
 
 import factory
-from factory.lang import read_pag
-from factory.layout.layout import Layout
-from factory.nets.history import legal_marking
+from factory.apps.log import Log, LogWriter, read_log
+from factory.apps.monitor import MonitorSubject, Report, beside, subject_of
+from factory.apps.monitor.explanation import SeenFirings
+from factory.apps.monitor.motion import AxisMotion
+from factory.apps.monitor.record import watch_log
+from factory.engine.record.state import Observation
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.layout import Layout
 from factory.pipeline import all_templates
-from factory.record.log import Log, LogWriter, read_log
-from factory.record.monitor import MonitorSubject, Report, beside, subject_of
-from factory.record.monitor.explanation import SeenFirings
-from factory.record.monitor.motion import AxisMotion
-from factory.record.monitor.record import watch_log
-from factory.record.state import Observation
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
 from factory.support.settings import Settings
+from factory.theory.lang import read_pag
+from factory.theory.nets.history import legal_marking
 from tests.command_line import PAPER, ROOT, Terminal
 from tests.examples import with_hands
 from tests.good_runs import assert_good, random_marking
@@ -468,7 +468,7 @@ def test_run_with_a_monitor(run: Terminal) -> None:
 
 def test_a_faulty_run_fails(run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two parts are never let go: status 1, beside the run and from its log."""
-    from factory.simulation.mujoco.welds import Welds
+    from factory.engine.simulation.mujoco.welds import Welds
 
     loose = Welds.loose
 

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.layout.layout import Layout
-from factory.mjcf.masks import NOBODY
-from factory.simulation.disturbance import Push, disturb
-from factory.simulation.disturbance.interventions import Interventions
-from factory.simulation.mujoco.contacts import ContactMasks
-from factory.simulation.mujoco.fast import neighbours
-from factory.simulation.mujoco.fast.neighbours import CALM, Neighbours
-from factory.simulation.mujoco.fast.strides import Strides
-from factory.simulation.mujoco.holdings import Holdings
-from factory.simulation.simulation import Simulation
+from factory.apps.disturbance import Push, disturb
+from factory.apps.disturbance.interventions import Interventions
+from factory.engine.mjcf.masks import NOBODY
+from factory.engine.simulation.mujoco.contacts import ContactMasks
+from factory.engine.simulation.mujoco.fast import neighbours
+from factory.engine.simulation.mujoco.fast.neighbours import CALM, Neighbours
+from factory.engine.simulation.mujoco.fast.strides import Strides
+from factory.engine.simulation.mujoco.holdings import Holdings
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.layout import Layout
 from factory.support.engine import mujoco
 from factory.support.settings import MOST, Settings
 from tests.good_runs import random_marking

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from factory.compiler.expanding import expand
-from factory.nets import threaded
-from factory.nets.petri import PetriNet, Place, Transition
-from factory.nets.threaded import Slot, ThreadedNet, Threads
-from factory.plant.factory import Factory
+from factory.theory.compiler.expanding import expand
+from factory.theory.nets import threaded
+from factory.theory.nets.petri import PetriNet, Place, Transition
+from factory.theory.nets.threaded import Slot, ThreadedNet, Threads
+from factory.theory.plant.factory import Factory
 from tests.net_values import legal_markings, random_legal_marking
 from tests.pag_values import TEMPLATES, factories, factory_of, paper
 from tests.token_game import ThreadedMarking, enabled, follower

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import factory
-from factory.layout.hands.misses import NoGrip
-from factory.layout.hands.tips import STRONG
+from factory.floor.layout.hands.misses import NoGrip
+from factory.floor.layout.hands.tips import STRONG
 from factory.pipeline import read
 from tests.command_line import ROOT, Terminal
 

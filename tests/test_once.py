@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from factory.layout import clearance
+from factory.floor.layout import clearance
 from factory.pipeline import read
 from tests.command_line import PAPER
 

@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.record.monitor.watched import watched
-from factory.record.state import State
-from factory.simulation.driven import DrivenSupervisor
-from factory.simulation.request import RunRequest
-from factory.simulation.run import Run
-from factory.simulation.signals import Sensed
-from factory.simulation.simulation import Simulation
+from factory.apps.monitor.watched import watched
+from factory.apps.plc.driven import DrivenSupervisor
+from factory.apps.plc.signals import Sensed
+from factory.engine.record.state import State
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.run import Run
+from factory.engine.simulation.simulation import Simulation
 from tests.command_line import PAPER, ROOT, Terminal, started
 from tests.examples import with_hands
 from tests.structured_text import Plc
@@ -30,7 +30,7 @@ from tests.test_plc import text
 
 pytest.importorskip("asyncua", reason="the extra `opcua` is not installed")
 
-from factory.show.opcua import SPACE, OpcuaPlant
+from factory.apps.plc.opcua import SPACE, OpcuaPlant
 from tests.plc_client import PlcClient
 
 SCAN = 0.01

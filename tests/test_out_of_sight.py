@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from factory.layout.dimensions import RISE
-from factory.layout.feeding import feeder_of
-from factory.layout.layout import Layout
-from factory.mjcf import names
-from factory.mjcf.parts import HIDDEN
-from factory.mjcf.replica import SHOWN, Replica
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+from factory.engine.mjcf import names
+from factory.engine.mjcf.parts import HIDDEN
+from factory.engine.mjcf.replica import SHOWN, Replica
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.dimensions import RISE
+from factory.floor.layout.feeding import feeder_of
+from factory.floor.layout.layout import Layout
 from factory.support import gl
 from factory.support.engine import mujoco
 from factory.support.resource import Closing

@@ -10,10 +10,10 @@ import pytest
 import trimesh
 from manifold3d import Manifold
 
-from factory.geometry.overlap import common, drawn, swept
-from factory.geometry.product import product_geometry
-from factory.lang.pag_reader import load_pag
+from factory.floor.geometry.overlap import common, drawn, swept
+from factory.floor.geometry.product import product_geometry
 from factory.pipeline import all_templates
+from factory.theory.lang.pag_reader import load_pag
 
 SMALL = 1e-12
 """A volume [m³] that rounding makes."""

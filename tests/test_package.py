@@ -136,7 +136,7 @@ def test_every_stage_gives_the_same_run() -> None:
 
 def test_a_layout_is_not_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
     layout = factory.lay_out(PAPER, clearance=0.03)
-    monkeypatch.setattr("factory.layout.request.Ground.lay_out", None)
+    monkeypatch.setattr("factory.floor.layout.request.Ground.lay_out", None)
     built = factory.build(layout)
     assert built.model.settings.clearance == 0.03
     assert factory.analyze(layout).timing.layout is layout
@@ -294,15 +294,15 @@ factory.run("p.pag", world="moojoco")
 factory.run("p.pag", unit=3)
 """
 TYPES = (
-    "factory.problem.pag.PAG",
-    "factory.plant.factory.Factory",
-    "factory.layout.layout.Layout",
-    "factory.simulation.run.Run",
+    "factory.theory.problem.pag.PAG",
+    "factory.theory.plant.factory.Factory",
+    "factory.floor.layout.layout.Layout",
+    "factory.engine.simulation.run.Run",
     "float | None",
     "bool | None",
     "tuple[pathlib.Path, ...]",
     "tuple[str, ...]",
-    "factory.problem.pag.PAG",
+    "factory.theory.problem.pag.PAG",
 )
 
 

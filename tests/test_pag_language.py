@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.lang import load_pag, load_templates, read_pag, write_pag
-from factory.lang import pag_syntax as syntax
-from factory.lang.recovery import Stuck, drive
-from factory.problem.pag import PAG, Parameter
 from factory.support.errors import Diagnostic, InputError
+from factory.theory.lang import load_pag, load_templates, read_pag, write_pag
+from factory.theory.lang import pag_syntax as syntax
+from factory.theory.lang.recovery import Stuck, drive
+from factory.theory.problem.pag import PAG, Parameter
 from tests.pag_texts import read_or_refused
 from tests.strategies import mutations, pags, random_pag_text
 from tests.work import counted

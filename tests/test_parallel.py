@@ -12,37 +12,37 @@ from typing import Any
 
 import pytest
 
-from factory.compiler.mating.mating import judged
-from factory.compiler.parallel import in_parallel
-from factory.exporting.certificate.check import check_certificate
-from factory.exporting.certificate.writer import certificate
-from factory.layout.bounds import cycle_time_bound
-from factory.layout.durations import Pace, cycle_of
-from factory.layout.hands.choosing import Hands
-from factory.layout.hands.hand import Hand
-from factory.layout.stops import stops_of
-from factory.nets.history import legal_marking
-from factory.nets.marked import marked
-from factory.nets.replay import replay
-from factory.nets.verify import verify
+from factory.apps.analyze.analysing import least_wip
+from factory.apps.analyze.timed import flow, timed_net
+from factory.apps.exports.certificate.check import check_certificate
+from factory.apps.exports.certificate.writer import certificate
+from factory.apps.monitor.watched import watched
+from factory.apps.report.drawings import about, labels_of, links
+from factory.engine.simulation.request import RunRequest, WorldName
+from factory.engine.simulation.run import Run
+from factory.engine.simulation.simulation import Simulation
+from factory.engine.timing.cycle_time import cycle_time
+from factory.engine.timing.pool import part_pool
+from factory.engine.timing.timing import Timing
+from factory.floor.geometry.fused_bodies import repeated
+from factory.floor.layout.bounds import cycle_time_bound
+from factory.floor.layout.durations import Pace, cycle_of
+from factory.floor.layout.hands.choosing import Hands
+from factory.floor.layout.hands.hand import Hand
+from factory.floor.layout.stops import stops_of
+from factory.floor.mating.mating import judged
 from factory.pipeline import Project, all_templates, read
-from factory.plant.factory import Factory
-from factory.plant.fused_bodies import repeated
-from factory.plant.programs import program_of, write_program
-from factory.problem.pag import PAG, Parameter
-from factory.problem.robot_types import load_catalogue
-from factory.record.monitor.watched import watched
 from factory.sharing import with_branches
-from factory.show.report.drawings import about, labels_of, links
-from factory.simulation.request import RunRequest, WorldName
-from factory.simulation.run import Run
-from factory.simulation.simulation import Simulation
-from factory.study.analysis.analysing import least_wip
-from factory.study.analysis.timed import flow, timed_net
 from factory.support.errors import InputError
-from factory.timing.cycle_time import cycle_time
-from factory.timing.pool import part_pool
-from factory.timing.timing import Timing
+from factory.theory.compiler.parallel import in_parallel
+from factory.theory.nets.history import legal_marking
+from factory.theory.nets.marked import marked
+from factory.theory.nets.replay import replay
+from factory.theory.nets.verify import verify
+from factory.theory.plant.factory import Factory
+from factory.theory.plant.programs import program_of, write_program
+from factory.theory.problem.pag import PAG, Parameter
+from factory.theory.problem.robot_types import load_catalogue
 from tests.command_line import Terminal
 from tests.fold_values import branched, plain, random_fold, simulated_cycle, swapped, table_of
 from tests.pag_values import paper

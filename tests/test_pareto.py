@@ -14,12 +14,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from factory.apps.few_robots.aim import least_robots
+from factory.apps.pareto import Effort, FrontPoint, FrontSweep, ParetoFront, pareto, sweeping
+from factory.apps.pareto.chart import ChartAxis, cycle_chart
+from factory.apps.pareto.front import Trial, commands_of, point_files, tried, undominated
+from factory.apps.pareto.page import floor_plans, front_page
 from factory.pipeline import Project, read
-from factory.show.pareto.chart import ChartAxis, cycle_chart
-from factory.show.pareto.page import floor_plans, front_page
-from factory.study.allocation.aim import least_robots
-from factory.study.pareto import Effort, FrontPoint, FrontSweep, ParetoFront, pareto, sweeping
-from factory.study.pareto.front import Trial, commands_of, point_files, tried, undominated
 from factory.support import progress
 from factory.support.progress import StepBar
 from tests.command_line import PAPER, ROOT, Screen, Terminal, files_in
@@ -277,7 +277,7 @@ def test_what_fits_a_floor_is_found_where_the_product_as_written_does_not(run: T
 
 def test_a_failed_run_is_told(run: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
     failed = Trial(4, 1.0, 1.0, 1.0, ("mujoco: Contact: r1 meets r2",))
-    monkeypatch.setattr("factory.study.pareto.front.tried", lambda _: failed)
+    monkeypatch.setattr("factory.apps.pareto.front.tried", lambda _: failed)
     done = run("pareto", PAPER, "--validate", 1)
     assert done.status == 1
     assert "failed" in done.out

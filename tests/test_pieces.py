@@ -21,11 +21,14 @@ from hypothesis import strategies as st
 from manifold3d import Manifold, OpType
 
 import factory
-from factory.geometry import decomposition
-from factory.geometry.glb_reader import UPRIGHT
-from factory.geometry.meshes import Array, Indices, Mesh, is_closed
-from factory.geometry.overlap import drawn
-from factory.geometry.pieces import (
+from factory.engine.mjcf import names
+from factory.engine.mjcf.model import model_files
+from factory.engine.simulation.modelling import physical_model
+from factory.floor.geometry import decomposition
+from factory.floor.geometry.glb_reader import UPRIGHT
+from factory.floor.geometry.meshes import Array, Indices, Mesh, is_closed
+from factory.floor.geometry.overlap import drawn
+from factory.floor.geometry.pieces import (
     MOST_PIECES,
     ROUND,
     box_piece,
@@ -35,13 +38,10 @@ from factory.geometry.pieces import (
     is_convex,
     sphere_piece,
 )
-from factory.geometry.product import product_geometry
-from factory.geometry.solids import Solid
-from factory.geometry.touching import bodies
-from factory.mjcf import names
-from factory.mjcf.model import model_files
-from factory.problem.pag import PAG
-from factory.simulation.modelling import physical_model
+from factory.floor.geometry.product import product_geometry
+from factory.floor.geometry.solids import Solid
+from factory.floor.geometry.touching import bodies
+from factory.theory.problem.pag import PAG
 from tests.layout_values import table_pag
 from tests.work import counted
 

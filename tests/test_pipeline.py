@@ -13,11 +13,11 @@ from click.testing import CliRunner
 
 from factory.commands.options import MOTION, OUTPUT, SOURCE
 from factory.commands.requests import OutputOptions, ProjectOptions
-from factory.layout.request import Ground
+from factory.floor.layout.request import Ground
 from factory.pipeline import read
-from factory.problem.plan import Plan
 from factory.support.errors import InputError
 from factory.support.settings import Settings
+from factory.theory.problem.plan import Plan
 from tests.command_line import PAPER, ROOT, Terminal
 from tests.test_relay_hands import sawn
 

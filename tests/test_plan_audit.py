@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 from manifold3d import Manifold, OpType
 
-from factory.compiler.expanding import expand
-from factory.compiler.mating.findings import Mating
-from factory.compiler.mating.mating import matings
-from factory.geometry.overlap import drawn
-from factory.geometry.product import product_geometry
-from factory.geometry.solids import Product
+from factory.apps.planning.plan import CannotAssemble, Planned, PlanOptions, plan
+from factory.apps.planning.source import SourceOptions, read_source
+from factory.apps.planning.writing import planned_product
+from factory.floor.geometry.overlap import drawn
+from factory.floor.geometry.product import product_geometry
+from factory.floor.geometry.solids import Product
+from factory.floor.mating.findings import Mating
+from factory.floor.mating.mating import matings
 from factory.pipeline import all_templates
-from factory.planning.plan import CannotAssemble, Planned, PlanOptions, plan
-from factory.planning.source import SourceOptions, read_source
-from factory.planning.writing import planned_product
-from factory.problem.pag import PAG
+from factory.theory.compiler.expanding import expand
+from factory.theory.problem.pag import PAG
 
 ROOT = Path(__file__).parents[1]
 CASES = ROOT.parent / "shared" / "cases"
@@ -39,7 +39,7 @@ EXAMPLES = [
 @pytest.fixture(autouse=True)
 def no_decomposition(monkeypatch: pytest.MonkeyPatch) -> None:
     """Ways are the same without CoACD, which takes most of the time."""
-    monkeypatch.setattr("factory.geometry.decomposition.release", lambda package: "")
+    monkeypatch.setattr("factory.floor.geometry.decomposition.release", lambda package: "")
 
 
 @pytest.mark.parametrize("name", [*QUICK, *EXAMPLES])

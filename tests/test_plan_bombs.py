@@ -17,11 +17,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from factory.geometry import glb_reader
-from factory.geometry.mesh_file import UnreadableMesh
-from factory.importing.scene_file import read_scene
+from factory.apps.importing.scene_file import read_scene
+from factory.apps.planning.source import SourceOptions, read_source
+from factory.floor.geometry import glb_reader
+from factory.floor.geometry.mesh_file import UnreadableMesh
 from factory.pipeline import all_templates
-from factory.planning.source import SourceOptions, read_source
 from factory.support.errors import FactoryError
 from tests.command_line import ROOT
 
@@ -134,8 +134,8 @@ MEMORY = 1_500_000
 READ = """
 import sys
 from pathlib import Path
-from factory.importing.scene_file import read_scene
-from factory.geometry.mesh_file import UnreadableMesh
+from factory.apps.importing.scene_file import read_scene
+from factory.floor.geometry.mesh_file import UnreadableMesh
 for name in sys.argv[1:]:
     path = Path(name)
     try:

@@ -12,11 +12,11 @@ from types import SimpleNamespace
 import imageio.v3 as iio
 import pytest
 
+from factory.apps.planning.blocking import blocking
+from factory.apps.planning.cannot import interlocks
+from factory.apps.planning.interlocked import PAINTS
 from factory.commands.plan import _by_label
 from factory.pipeline import read
-from factory.planning.blocking import blocking
-from factory.planning.cannot import interlocks
-from factory.rendering.interlocked import PAINTS
 from factory.support.progress import StepBar
 from tests.command_line import ROOT, Done, Terminal, files_in
 from tests.opengl import needs_gl
@@ -48,7 +48,7 @@ def puzzle(folder: Path, parts: Parts) -> Path:
 def test_a_plan_is_free_and_no_slower_than_the_tree_drawn_by_hand(
     planning: Planning, run: Terminal, name: str
 ) -> None:
-    from factory.timing.timed import pace
+    from factory.engine.timing.timed import pace
 
     done = planning(EXAMPLES / f"{name}.pag", "--no-look", "--no-screws")
     assert done.status == 0, done.err
@@ -255,8 +255,8 @@ def test_the_time_that_is_asked_for_bounds_proofs_of_small_products(planning: Pl
 @pytest.mark.parametrize(
     ("where", "kept"),
     [
-        ("factory.planning.plan.blocking", False),
-        ("factory.rendering.exploded.ExplodedView.film", True),
+        ("factory.apps.planning.plan.blocking", False),
+        ("factory.apps.planning.exploded.ExplodedView.film", True),
     ],
 )
 def test_a_signal_is_heard_at_once(
@@ -268,7 +268,7 @@ def test_a_signal_is_heard_at_once(
         os.kill(os.getpid(), signal.SIGINT)
         raise AssertionError("the signal was not heard")
 
-    monkeypatch.setattr("factory.rendering.exploded.ExplodedView.still", lambda *_: None)
+    monkeypatch.setattr("factory.apps.planning.exploded.ExplodedView.still", lambda *_: None)
     monkeypatch.setattr(where, stop)
     done = planning(LOADED, "--seconds", 0.001)
     assert (done.status, done.codes) == (130, ["Interrupted"])
@@ -282,7 +282,7 @@ def test_the_answer_does_not_wait_for_pictures(
     def stop(*_: object) -> None:
         os.kill(os.getpid(), signal.SIGINT)
 
-    monkeypatch.setattr("factory.rendering.exploded.ExplodedView.still", stop)
+    monkeypatch.setattr("factory.apps.planning.exploded.ExplodedView.still", stop)
     done = run("plan", puzzle(tmp_path, PEG), "--replan", "-o", tmp_path / "out")
     assert done.status == 130
     assert "robots, cycle time about" in done.out and "factory run" in done.out

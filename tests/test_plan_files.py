@@ -16,19 +16,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.layout import request
-from factory.layout.layout import Layout
-from factory.layout.request import Ground
-from factory.layout.saved import LayoutTable
+from factory.apps.analyze import Timing, analyse
+from factory.apps.log.plan_file import plan_files, read_plan
+from factory.apps.report import page, recording_of
+from factory.engine.simulation.modelling import physical_model
+from factory.floor.layout import request
+from factory.floor.layout.layout import Layout
+from factory.floor.layout.request import Ground
+from factory.floor.layout.saved import LayoutTable
 from factory.pipeline import Project, read
-from factory.problem.plan import Plan
-from factory.record.plan_file import plan_files, read_plan
 from factory.sharing import with_branches, with_lines
-from factory.show.report import page, recording_of
-from factory.simulation.modelling import physical_model
-from factory.study.analysis import Timing, analyse
 from factory.support.errors import Diagnostic, InputError
 from factory.support.tables import table_of, value_of
+from factory.theory.problem.plan import Plan
 from tests.command_line import PAPER, ROOT, Terminal
 from tests.layout_values import (
     Drawn,

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 import trimesh
 
+from factory.apps.planning.parts import InPlace
+from factory.apps.planning.source import SourceOptions, read_source
 from factory.pipeline import all_templates
-from factory.planning.parts import InPlace
-from factory.planning.source import SourceOptions, read_source
 from factory.support.errors import InputError
 from tests.command_line import ROOT, Terminal
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from factory.apps.planning.exploded import ExplodedView
+from factory.apps.planning.exploding import explosion
 from factory.pipeline import read
-from factory.planning.exploding import explosion
-from factory.rendering.exploded import ExplodedView
 from tests.command_line import Terminal
 from tests.opengl import needs_gl
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from manifold3d import Manifold
 
-from factory.planning.plan import CannotAssemble, Planned, PlannedJoin, PlanOptions, plan
+from factory.apps.planning.plan import CannotAssemble, Planned, PlannedJoin, PlanOptions, plan
 from tests.plan_models import MODELS, Model, model_source
 
 QUICK = PlanOptions(lay_out=False)
@@ -23,7 +23,7 @@ CANNOT = [name for name, model in MODELS.items() if model.stuck]
 @pytest.fixture(autouse=True)
 def no_decomposition(monkeypatch: pytest.MonkeyPatch) -> None:
     """Ways are the same without CoACD, which takes most of the time."""
-    monkeypatch.setattr("factory.geometry.decomposition.release", lambda package: "")
+    monkeypatch.setattr("factory.floor.geometry.decomposition.release", lambda package: "")
 
 
 def test_there_are_twenty_of_which_eight_cannot_be_joined() -> None:

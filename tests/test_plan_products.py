@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from factory.compiler.expanding import expand
-from factory.compiler.mating.mating import matings
-from factory.geometry.product import product_geometry
+from factory.apps.planning.plan import CannotAssemble, Planned, PlanOptions, plan
+from factory.apps.planning.source import SourceOptions, read_source
+from factory.apps.planning.writing import planned_product
+from factory.engine.timing.timed import pace
+from factory.floor.geometry.product import product_geometry
+from factory.floor.mating.mating import matings
 from factory.pipeline import all_templates, read
-from factory.planning.plan import CannotAssemble, Planned, PlanOptions, plan
-from factory.planning.source import SourceOptions, read_source
-from factory.planning.writing import planned_product
-from factory.timing.timed import pace
+from factory.theory.compiler.expanding import expand
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from factory.compiler.mating.paths import TOLERANCE
-from factory.planning.plan import CannotAssemble, Planned, PlanOptions, plan
+from factory.apps.planning.plan import CannotAssemble, Planned, PlanOptions, plan
+from factory.floor.mating.paths import TOLERANCE
 from factory.support.errors import InputError
 from tests.plan_puzzles import Box, Parts, block, dovetail, pinwheel, ring, source, tub
 

@@ -10,12 +10,12 @@ import pytest
 import trimesh
 from manifold3d import Manifold
 
-from factory.planning.fastening import fasteners
-from factory.planning.names import Says, says
-from factory.planning.parts import InPlace
-from factory.planning.plan import Planned, PlanOptions, plan
-from factory.planning.writing import planned_product, screws_in
-from factory.problem.pag import PAG
+from factory.apps.planning.fastening import fasteners
+from factory.apps.planning.names import Says, says
+from factory.apps.planning.parts import InPlace
+from factory.apps.planning.plan import Planned, PlanOptions, plan
+from factory.apps.planning.writing import planned_product, screws_in
+from factory.theory.problem.pag import PAG
 from tests.command_line import Terminal
 from tests.plan_models import box, model_source, rod
 
@@ -25,7 +25,7 @@ NO_SCREWS = PlanOptions(lay_out=False, screws=None)
 
 @pytest.fixture(autouse=True)
 def no_decomposition(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("factory.geometry.decomposition.release", lambda package: "")
+    monkeypatch.setattr("factory.floor.geometry.decomposition.release", lambda package: "")
 
 
 def bolt(at: tuple[float, float, float], long: float = 18) -> Manifold:

@@ -10,24 +10,32 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.compiler.expanding import expand
-from factory.compiler.mating.findings import BLOCKED, LEFT_OUT, NO_DEEPER, STRICT
-from factory.compiler.mating.mating import admitted, matings
-from factory.geometry.product import product_geometry
-from factory.lang.pag_reader import read_pag
-from factory.layout.durations import Pace
+from factory.apps.planning.blocking import (
+    CLASHES,
+    DEEPER,
+    FREE,
+    LOCKED,
+    SCRAPES,
+    Blocking,
+    blocking,
+)
+from factory.apps.planning.cannot import cores, interlocks, removal
+from factory.apps.planning.divisions import divisions
+from factory.apps.planning.exact import Best, Expected, Tree, TreeTask, tables
+from factory.apps.planning.growing import Divider, bettered, divided, units_of
+from factory.apps.planning.judging import Judged, Site
+from factory.apps.planning.parts import InPlace
+from factory.apps.planning.searching import Sought, budget_of, trees
+from factory.apps.planning.source import placed
+from factory.apps.planning.subsets import ROOT_AXIS, Stance, stances, subsets
+from factory.apps.planning.writing import planned_product
+from factory.floor.geometry.product import product_geometry
+from factory.floor.layout.durations import Pace
+from factory.floor.mating.findings import BLOCKED, LEFT_OUT, NO_DEEPER, STRICT
+from factory.floor.mating.mating import admitted, matings
 from factory.pipeline import all_templates
-from factory.planning.blocking import CLASHES, DEEPER, FREE, LOCKED, SCRAPES, Blocking, blocking
-from factory.planning.cannot import cores, interlocks, removal
-from factory.planning.divisions import divisions
-from factory.planning.exact import Best, Expected, Tree, TreeTask, tables
-from factory.planning.growing import Divider, bettered, divided, units_of
-from factory.planning.judging import Judged, Site
-from factory.planning.parts import InPlace
-from factory.planning.searching import Sought, budget_of, trees
-from factory.planning.source import placed
-from factory.planning.subsets import ROOT_AXIS, Stance, stances, subsets
-from factory.planning.writing import planned_product
+from factory.theory.compiler.expanding import expand
+from factory.theory.lang.pag_reader import read_pag
 
 TEMPLATES = all_templates()
 EXPECTED = Expected(Pace())

@@ -15,7 +15,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import factory
-from factory.geometry.alike import (
+from factory.apps.planning.parts import InPlace
+from factory.apps.planning.plan import Planned, PlanOptions, plan
+from factory.apps.planning.source import SourceOptions, read_source
+from factory.apps.planning.writing import planned_product
+from factory.floor.geometry.alike import (
     PartShape,
     RigidMotion,
     alike,
@@ -23,12 +27,8 @@ from factory.geometry.alike import (
     moved,
     shape_of,
 )
-from factory.geometry.meshes import Array
+from factory.floor.geometry.meshes import Array
 from factory.pipeline import all_templates, read
-from factory.planning.parts import InPlace
-from factory.planning.plan import Planned, PlanOptions, plan
-from factory.planning.source import SourceOptions, read_source
-from factory.planning.writing import planned_product
 from factory.support.files import write_all
 from tests.command_line import ROOT, Terminal, files_in
 from tests.plan_models import box, model_source, rod
@@ -394,7 +394,7 @@ def test_a_hull_that_stands_for_a_mesh_is_told(
     run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A tapered bore: bodies of prisms need no library."""
-    monkeypatch.setattr("factory.geometry.decomposition.release", lambda package: "")
+    monkeypatch.setattr("factory.floor.geometry.decomposition.release", lambda package: "")
     profile = [(20, -15), (40, -15), (40, 15), (30, 15), (20, -15)]
     ring = trimesh.creation.revolve(np.array(profile))
     ring.apply_translation((300, 200, 440))
@@ -418,7 +418,7 @@ def test_a_peg_comes_out_of_a_sleeve_that_no_library_decomposes(
     run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The hull of the sleeve hides its hole; its volume does not."""
-    monkeypatch.setattr("factory.geometry.decomposition.release", lambda package: "")
+    monkeypatch.setattr("factory.floor.geometry.decomposition.release", lambda package: "")
     parts, out = folder_of(tmp_path / "parts", sleeve()), tmp_path / "out"
     done = run("plan", parts, "-o", out, "--no-look", "--json")
     join = next(j for j in done.json["joins"] if {"peg", "ring"} <= {*j["pile"], *j["come"]})
@@ -488,7 +488,7 @@ def test_what_is_written_checks_and_runs_as_it_is(run: Terminal, tmp_path: Path)
 def test_a_turned_product_is_the_same_product(by: RigidMotion) -> None:
     source = read_source(ROOT / "examples" / "chair.pag", TEMPLATES, SourceOptions(replan=True))
     made = planned_product(source, tuple(p.label for p in source.parts), by.turn)
-    from factory.geometry.product import product_geometry
+    from factory.floor.geometry.product import product_geometry
 
     solids = product_geometry(made.pag, made.files).solids
     for part in source.parts:
@@ -512,7 +512,7 @@ def test_names_from_files_stay_in_the_folder(tmp_path: Path) -> None:
 
 
 def test_the_exploded_view_takes_back_what_is_assembled() -> None:
-    from factory.planning.exploding import explosion
+    from factory.apps.planning.exploding import explosion
 
     project = read(ROOT / "examples" / "chair.pag")
     assert project.matings is not None

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from manifold3d import Manifold
 
+from factory.apps.planning.plan import CannotAssemble, Planned, PlanOptions, plan
+from factory.apps.planning.source import SourceOptions, read_source
+from factory.apps.planning.standing import overhang
 from factory.pipeline import all_templates
-from factory.planning.plan import CannotAssemble, Planned, PlanOptions, plan
-from factory.planning.source import SourceOptions, read_source
-from factory.planning.standing import overhang
 from factory.support.errors import InputError
 from tests.plan_models import box, jig, model_source, slanted, socket, tail
 
@@ -22,7 +22,7 @@ CASES = Path(__file__).parents[1].parent / "shared" / "cases"
 @pytest.fixture(autouse=True)
 def no_decomposition(monkeypatch: pytest.MonkeyPatch) -> None:
     """Ways are the same without CoACD, which takes most of the time."""
-    monkeypatch.setattr("factory.geometry.decomposition.release", lambda package: "")
+    monkeypatch.setattr("factory.floor.geometry.decomposition.release", lambda package: "")
 
 
 def turned(parts: dict[str, Manifold], *angles: float) -> dict[str, Manifold]:

@@ -10,24 +10,24 @@ from pathlib import Path
 
 import pytest
 
-from factory.compiler.assigning import shared
-from factory.compiler.expanding import joins
-from factory.compiler.mating.mating import judged
-from factory.layout.clearance import certify
-from factory.layout.durations import Pace
-from factory.layout.saved import LayoutTable
-from factory.layout.shapes import payload_boxes
-from factory.nets.marked import marked
-from factory.nets.verify import verify
+from factory.apps.few_robots.lines import Shift
+from factory.apps.log.plan_file import PLAN_NAME, plan_files, read_plan
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.clearance import certify
+from factory.floor.layout.durations import Pace
+from factory.floor.layout.saved import LayoutTable
+from factory.floor.layout.shapes import payload_boxes
+from factory.floor.mating.mating import judged
 from factory.pipeline import Project, read
-from factory.problem.plan import THIRD, Plan
-from factory.record.plan_file import PLAN_NAME, plan_files, read_plan
 from factory.sharing import with_branches
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
-from factory.study.allocation.lines import Shift
 from factory.support.errors import Diagnostic, InputError, RunError
 from factory.support.settings import Settings
+from factory.theory.compiler.assigning import shared
+from factory.theory.compiler.expanding import joins
+from factory.theory.nets.marked import marked
+from factory.theory.nets.verify import verify
+from factory.theory.problem.plan import THIRD, Plan
 from tests.random_products import random_product
 from tests.state_space import explored
 

@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 
 import factory
-from factory.exporting.floor_plan import flat_shapes
-from factory.layout import compacting
-from factory.layout.bending import Detour
-from factory.layout.clearance import searched
-from factory.layout.compacting import compacted
-from factory.layout.durations import Pace, cycle_of
-from factory.layout.layout import Layout
-from factory.layout.placing import Floor, Placing
-from factory.layout.platen import on_platen
-from factory.layout.saved import LayoutTable
-from factory.layout.sweeps import piles, regions
-from factory.layout.tiles import fill_of, tiles_of
-from factory.layout.way import Bend
+from factory.apps.exports.floor_plan import flat_shapes
+from factory.apps.platen.platen import on_platen
+from factory.floor.layout import compacting
+from factory.floor.layout.bending import Detour
+from factory.floor.layout.clearance import searched
+from factory.floor.layout.compacting import compacted
+from factory.floor.layout.durations import Pace, cycle_of
+from factory.floor.layout.layout import Layout
+from factory.floor.layout.placing import Floor, Placing
+from factory.floor.layout.saved import LayoutTable
+from factory.floor.layout.sweeps import piles, regions
+from factory.floor.layout.tiles import fill_of, tiles_of
+from factory.floor.layout.way import Bend
 from factory.support.errors import InputError, RunError
 from factory.support.tables import table_of, value_of
 from tests.command_line import ROOT, spawn
@@ -48,7 +48,7 @@ def found(straight: Layout) -> list[Layout]:
 def platen(straight: Layout, found: list[Layout]) -> Layout:
     """The best of that on tiles."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("factory.layout.platen.compacted", lambda *_: found)
+        patch.setattr("factory.apps.platen.platen.compacted", lambda *_: found)
         return on_platen(straight, PACE, 0.24)
 
 
@@ -86,7 +86,7 @@ def test_branches_that_come_too_near_are_seen(straight: Layout) -> None:
 
 
 def certified_or_none(straight: Layout, placing: Placing) -> Layout | None:
-    from factory.layout.bending import bent
+    from factory.floor.layout.bending import bent
 
     layout = bent(straight, placing.bends)
     search, _ = searched(layout)

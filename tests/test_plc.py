@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 from lark.exceptions import LarkError
 
-from factory.exporting.iec.cell import cell, scan_time
-from factory.exporting.iec.structured_text import write
-from factory.record.monitor.watched import watched
-from factory.simulation.driven import DrivenSupervisor, drive
-from factory.simulation.request import RunRequest
-from factory.simulation.run import Run
-from factory.simulation.signals import Commands, Sensed
-from factory.simulation.simulation import Simulation
+from factory.apps.exports.iec.cell import cell, scan_time
+from factory.apps.exports.iec.structured_text import write
+from factory.apps.monitor.watched import watched
+from factory.apps.plc.driven import DrivenSupervisor, drive
+from factory.apps.plc.signals import Commands, Sensed
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.run import Run
+from factory.engine.simulation.simulation import Simulation
 from factory.support.errors import InputError
 from factory.support.settings import Settings
 from tests.examples import with_hands

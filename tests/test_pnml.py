@@ -12,15 +12,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.exporting.dot import write_dot
-from factory.exporting.pnml import write_pnml
-from factory.foreign_nets.behaviour import analyse
-from factory.foreign_nets.pnml_reader import read_pnml
-from factory.nets.gears import GearNet
-from factory.nets.marked import MarkedNet, marked
-from factory.nets.petri import Transition
-from factory.plant.factory import Factory
+from factory.apps.exports.dot import write_dot
+from factory.apps.exports.pnml import write_pnml
+from factory.apps.foreign_nets.behaviour import analyse
+from factory.apps.foreign_nets.pnml_reader import read_pnml
 from factory.support.errors import InputError
+from factory.theory.nets.gears import GearNet
+from factory.theory.nets.marked import MarkedNet, marked
+from factory.theory.nets.petri import Transition
+from factory.theory.plant.factory import Factory
 from tests.net_values import (
     net_from,
     planted,

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from factory.study import pool
-from factory.study.pool import over_processes
+from factory.apps.sweep import pool
+from factory.apps.sweep.pool import over_processes
 from factory.support.errors import Diagnostic, InputError
 
 

@@ -13,19 +13,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import factory
-from factory.foreign_nets.behaviour import analyse
-from factory.lang import read_pag
-from factory.mjcf import loading, model
-from factory.nets.cycle_ratio import max_cycle_ratio
-from factory.nets.marked import MarkedNet, marked
+from factory.apps.foreign_nets.behaviour import analyse
+from factory.engine.mjcf import loading, model
+from factory.engine.simulation.modelling import physical_model
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.engine.timing.cycle_time import cycle_time
+from factory.engine.timing.pool import part_pool, with_wip
 from factory.pipeline import all_templates
-from factory.plant.factory import Factory
-from factory.simulation.modelling import physical_model
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
-from factory.timing.cycle_time import cycle_time
-from factory.timing.pool import part_pool, with_wip
+from factory.theory.lang import read_pag
+from factory.theory.nets.cycle_ratio import max_cycle_ratio
+from factory.theory.nets.marked import MarkedNet, marked
+from factory.theory.plant.factory import Factory
 from tests.examples import without_hands
 from tests.net_values import net_from
 from tests.pag_values import factories, factory_of, paper, random_pag

@@ -15,8 +15,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
 from factory.support import progress
 from factory.support.interruption import awaited, side_by_side
 from factory.support.progress import Progress, Waiting

@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from factory.exporting.certificate.listing import CLAIMS, digest
-from factory.exporting.certificate.proof_file import first_difference
+from factory.apps.exports.certificate.listing import CLAIMS, digest
+from factory.apps.exports.certificate.proof_file import first_difference
 from tests.command_line import PAPER, Done, Terminal
 
 Json = dict[str, Any]

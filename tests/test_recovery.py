@@ -11,24 +11,24 @@ from typing import Any
 
 import pytest
 
-import factory.simulation.recovery.responding as responding
-from factory.layout.layout import Layout
-from factory.nets.replay import replay
-from factory.nets.undo import undo
-from factory.nets.undone import Undone
+import factory.apps.recovery.responding as responding
+from factory.apps.recovery import Campaign, WorldFault, recover
+from factory.apps.recovery.faults import ASKEW, KINDS, SLIPPED
+from factory.apps.recovery.mujoco.plant import MujocoPlant, Senses
+from factory.apps.recovery.standing import Standing
+from factory.engine.record.failures import Failures
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.run import Run, entries_of
+from factory.engine.simulation.simulation import Simulation, compiled
+from factory.floor.layout.layout import Layout
 from factory.pipeline import read
-from factory.plant.factory import Factory
-from factory.problem.template import Failure
-from factory.record.failures import Failures
 from factory.sharing import with_lines
-from factory.simulation.mujoco.failing.plant import MujocoPlant, Senses
-from factory.simulation.recovery import Campaign, WorldFault, recover
-from factory.simulation.recovery.faults import ASKEW, KINDS, SLIPPED
-from factory.simulation.recovery.standing import Standing
-from factory.simulation.request import RunRequest
-from factory.simulation.run import Run, entries_of
-from factory.simulation.simulation import Simulation, compiled
 from factory.support.errors import InputError
+from factory.theory.nets.replay import replay
+from factory.theory.nets.undo import undo
+from factory.theory.nets.undone import Undone
+from factory.theory.plant.factory import Factory
+from factory.theory.problem.template import Failure
 from tests.command_line import PAPER, Terminal
 from tests.examples import with_hands
 from tests.good_runs import assert_good
@@ -238,8 +238,8 @@ def test_a_folded_factory(fuse: bool) -> None:
 @cache
 def folded() -> Layout:
     """The paper's example with three robots."""
-    from factory.study.allocation.aim import Aim
-    from factory.study.allocation.search import allocated
+    from factory.apps.few_robots.aim import Aim
+    from factory.apps.few_robots.search import allocated
 
     return allocated(read(PAPER), Aim(3)).layout
 

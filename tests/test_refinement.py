@@ -12,23 +12,23 @@ import numpy as np
 import pytest
 
 from benches.speed.factories import cube
-from factory.layout.exclusions import awaited_positions, coordinated
-from factory.layout.hands.leaving import SPARE
-from factory.layout.layout import Layout
-from factory.layout.machines import presences
-from factory.layout.presence import Presence
-from factory.layout.request import Ground
+from factory.apps.few_robots.aim import Aim
+from factory.apps.few_robots.search import allocated
+from factory.apps.monitor.watched import watched
+from factory.apps.recovery import Campaign, WorldFault, recover
+from factory.engine.record.state import Event, State
+from factory.engine.simulation.mujoco.passing import Passing
+from factory.engine.simulation.mujoco.sliders import NEVER
+from factory.engine.simulation.ordering import Ordering
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.exclusions import awaited_positions, coordinated
+from factory.floor.layout.hands.leaving import SPARE
+from factory.floor.layout.layout import Layout
+from factory.floor.layout.machines import presences
+from factory.floor.layout.presence import Presence
+from factory.floor.layout.request import Ground
 from factory.pipeline import read
-from factory.record.monitor.watched import watched
-from factory.record.state import Event, State
-from factory.simulation.mujoco.passing import Passing
-from factory.simulation.mujoco.sliders import NEVER
-from factory.simulation.ordering import Ordering
-from factory.simulation.recovery import Campaign, WorldFault, recover
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
-from factory.study.allocation.aim import Aim
-from factory.study.allocation.search import allocated
 from factory.support.settings import LEAST
 from tests import test_demand, test_tees
 from tests.random_products import random_blocks, random_product
@@ -231,7 +231,7 @@ def test_passes_are_made_when_demand_is_over() -> None:
 def test_a_pass_that_nobody_makes_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """Robots that are awaited wait where they have delivered."""
     layout = tee()
-    monkeypatch.setattr("factory.modes.staging.awaited_positions", lambda layout: {})
+    monkeypatch.setattr("factory.floor.modes.staging.awaited_positions", lambda layout: {})
     monkeypatch.setattr(Ordering, "hold_up", lambda *_: False)
     faults = played(layout, 1, units=2)
     assert any(fault.endswith("is not made") for fault in faults), faults

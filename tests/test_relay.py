@@ -13,31 +13,31 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benches.speed.factories import cube
-from factory.compiler.compiler import compile_pag
-from factory.compiler.expanding import expand, nodes_of
-from factory.geometry.product import product_geometry
-from factory.lang import read_pag, write_pag
-from factory.lang.template_reader import load_templates
-from factory.layout.clearance import certify
-from factory.layout.dimensions import Clearance
-from factory.layout.durations import Pace, gear_times
-from factory.layout.embedding import lay_out
-from factory.layout.layout import Layout
-from factory.layout.optimising import optimised
-from factory.layout.relaying import relayed
-from factory.layout.relaying.splitting import split
-from factory.layout.relaying.ways import Way, ways
-from factory.nets.verify import verify
+from factory.apps.monitor import beside
+from factory.apps.relay import relayed
+from factory.apps.relay.splitting import split
+from factory.apps.relay.ways import Way, ways
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.engine.timing.pool import part_pool
+from factory.floor.geometry.product import product_geometry
+from factory.floor.layout.clearance import certify
+from factory.floor.layout.dimensions import Clearance
+from factory.floor.layout.durations import Pace, gear_times
+from factory.floor.layout.embedding import lay_out
+from factory.floor.layout.layout import Layout
+from factory.floor.layout.optimising import optimised
 from factory.pipeline import read
-from factory.problem.plan import Plan
-from factory.problem.robot_types import load_catalogue
-from factory.problem.template import Template
-from factory.record.monitor import beside
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
 from factory.support.resources import templates_folder
 from factory.support.settings import Settings
-from factory.timing.pool import part_pool
+from factory.theory.compiler.compiler import compile_pag
+from factory.theory.compiler.expanding import expand, nodes_of
+from factory.theory.lang import read_pag, write_pag
+from factory.theory.lang.template_reader import load_templates
+from factory.theory.nets.verify import verify
+from factory.theory.problem.plan import Plan
+from factory.theory.problem.robot_types import load_catalogue
+from factory.theory.problem.template import Template
 from tests.layout_values import (
     Drawn,
     drawn_layouts,

@@ -12,26 +12,26 @@ from tempfile import TemporaryDirectory
 import pytest
 
 from benches.speed.factories import cube
-from factory.layout.certificate import ARM_BODY
-from factory.layout.clearance import certify
-from factory.layout.dimensions import Clearance
-from factory.layout.durations import Pace, gear_times
-from factory.layout.embedding import certified
-from factory.layout.hands.choosing import Hands
-from factory.layout.hands.in_the_way import BESIDE
-from factory.layout.hands.limbs import cross_of
-from factory.layout.layout import Layout
-from factory.layout.relaying import relayed
-from factory.layout.relaying.relaying import Room as RoomForLanes
-from factory.layout.relaying.splitting import split
-from factory.layout.relaying.ways import ways
-from factory.nets.verify import verify
+from factory.apps.relay import relayed
+from factory.apps.relay.relaying import Room as RoomForLanes
+from factory.apps.relay.splitting import split
+from factory.apps.relay.ways import ways
+from factory.engine.timing.timed import pace
+from factory.floor.layout.certificate import ARM_BODY
+from factory.floor.layout.clearance import certify
+from factory.floor.layout.dimensions import Clearance
+from factory.floor.layout.durations import Pace, gear_times
+from factory.floor.layout.embedding import certified
+from factory.floor.layout.hands.choosing import Hands
+from factory.floor.layout.hands.in_the_way import BESIDE
+from factory.floor.layout.hands.limbs import cross_of
+from factory.floor.layout.layout import Layout
 from factory.pipeline import read
-from factory.plant.factory import Operation
-from factory.problem.robot_bodies import ARM_WIDTH
-from factory.problem.robot_types import load_catalogue
 from factory.support.settings import Settings
-from factory.timing.timed import pace
+from factory.theory.nets.verify import verify
+from factory.theory.plant.factory import Operation
+from factory.theory.problem.robot_bodies import ARM_WIDTH
+from factory.theory.problem.robot_types import load_catalogue
 from tests.command_line import Terminal
 from tests.test_hands import AT_MOST_MM, GRIP_MM, looked_at
 from tests.test_relay import templates_of

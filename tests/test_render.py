@@ -21,22 +21,22 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 import factory
-from factory.geometry.meshes import Mesh
-from factory.geometry.sight import Framing, fit, towards
-from factory.mjcf.mesh_files import corner_normals, face_normals, mesh_file
-from factory.record.log import LogWriter, read_log
-from factory.record.log.pictures import render_log
-from factory.record.monitor.subject import subject_of_run
-from factory.record.state import State
-from factory.rendering import Film, Picture, Still, check_output
-from factory.rendering.action import Snapshot
-from factory.rendering.caption import Caption
-from factory.rendering.painter import Painter, Renderer
-from factory.rendering.picture import from_above, overview
-from factory.rendering.reel import HOLD
-from factory.rendering.video import ENCODERS, VideoFile
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+from factory.apps.log import LogWriter, read_log
+from factory.apps.runs.pictures import render_log
+from factory.engine.mjcf.mesh_files import corner_normals, face_normals, mesh_file
+from factory.engine.record.state import State
+from factory.engine.record.subject import subject_of_run
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.film import Film, Picture, Still, check_output
+from factory.film.action import Snapshot
+from factory.film.caption import Caption
+from factory.film.painter import Painter, Renderer
+from factory.film.picture import from_above, overview
+from factory.film.reel import HOLD
+from factory.film.video import ENCODERS, VideoFile
+from factory.floor.geometry.meshes import Mesh
+from factory.floor.geometry.sight import Framing, fit, towards
 from factory.support import gl
 from factory.support.engine import mujoco
 from factory.support.errors import InputError, MissingError
@@ -195,7 +195,7 @@ def test_a_killed_process_leaves_all_but_the_last_second(
     path = tmp_path / f"k{ending}"
     code = (
         "import sys, numpy as np; from pathlib import Path;"
-        "from factory.rendering.video import VideoFile;"
+        "from factory.film.video import VideoFile;"
         f"v = VideoFile(Path({str(path)!r}), (64, 48), {fps});"
         "noise = np.random.default_rng(0).integers(0, 255, (60, 48, 64, 3), np.uint8);"
         "[v.write(frame) for frame in noise];"

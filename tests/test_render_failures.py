@@ -9,23 +9,23 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.mjcf.replica import Replica
-from factory.nets.undo import marking_after, undo
-from factory.nets.undone import Undone
-from factory.record.failures import Death, Failing, deaths
-from factory.record.log import Log
-from factory.record.log.model import model_of
-from factory.record.log.pictures import moment_of
-from factory.record.monitor.record import recorded_subject
-from factory.record.monitor.subject import subject_of
-from factory.rendering.caption import TOLD, Caption, draw_notices
-from factory.rendering.gantt_panel import GanttPanel
-from factory.rendering.history import History
-from factory.rendering.ink import AMBER, DEAD, FLASH, Ink
-from factory.rendering.marks import Mark, Marks
-from factory.rendering.net_panel import NetPanel
-from factory.rendering.sheet import Rows
+from factory.apps.log import Log
+from factory.apps.log.model import model_of
+from factory.apps.monitor.record import recorded_subject
+from factory.apps.runs.pictures import moment_of
+from factory.engine.mjcf.replica import Replica
+from factory.engine.record.failures import Death, Failing, deaths
+from factory.engine.record.subject import subject_of
+from factory.film.caption import TOLD, Caption, draw_notices
+from factory.film.gantt_panel import GanttPanel
+from factory.film.history import History
+from factory.film.ink import AMBER, DEAD, FLASH, Ink
+from factory.film.marks import Mark, Marks
+from factory.film.net_panel import NetPanel
+from factory.film.sheet import Rows
 from factory.support.settings import Settings
+from factory.theory.nets.undo import marking_after, undo
+from factory.theory.nets.undone import Undone
 from tests.failing_runs import failing, paper_layout
 from tests.token_game import enabled, follower
 

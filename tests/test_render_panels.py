@@ -10,25 +10,25 @@ import numpy as np
 import pytest
 
 import factory
-from factory.lang import read_pag
-from factory.pipeline import all_templates
-from factory.record.log import Log, LogWriter, read_log
-from factory.record.log.pictures import moment_of, render_log, take_of
-from factory.record.monitor.record import recorded_subject
-from factory.record.monitor.subject import subject_of_run
-from factory.record.state import State
-from factory.rendering import Film, Picture, Still, camera_named, panels_named
-from factory.rendering.action import Snapshot
-from factory.rendering.camerawork import Moment
-from factory.rendering.caption import FADES, SHOWN, draw_title, strength
-from factory.rendering.following import Followed
-from factory.rendering.gantt_panel import GanttPanel
-from factory.rendering.history import History, OperationProgress, depths, followed
-from factory.rendering.ink import GROUND, Ink, fitted, operation_colours, robot_colours, width
-from factory.rendering.net_panel import NetPanel
-from factory.rendering.picture import PANELS, shared
-from factory.rendering.reel import Poster
-from factory.rendering.sheet import (
+from factory.apps.log import Log, LogWriter, read_log
+from factory.apps.monitor.record import recorded_subject
+from factory.apps.runs.pictures import moment_of, render_log, take_of
+from factory.engine.record.state import State
+from factory.engine.record.subject import subject_of_run
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.film import Film, Picture, Still, camera_named, panels_named
+from factory.film.action import Snapshot
+from factory.film.camerawork import Moment
+from factory.film.caption import FADES, SHOWN, draw_title, strength
+from factory.film.following import Followed
+from factory.film.gantt_panel import GanttPanel
+from factory.film.history import History, OperationProgress, depths, followed
+from factory.film.ink import GROUND, Ink, fitted, operation_colours, robot_colours, width
+from factory.film.net_panel import NetPanel
+from factory.film.picture import PANELS, shared
+from factory.film.reel import Poster
+from factory.film.sheet import (
     BOTTOM,
     CLOSE,
     EASY,
@@ -39,9 +39,9 @@ from factory.rendering.sheet import (
     Rows,
     neighbourhood,
 )
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+from factory.pipeline import all_templates
 from factory.support.errors import InputError
+from factory.theory.lang import read_pag
 from tests.command_line import PAPER, Terminal, files_in
 from tests.examples import without_hands
 from tests.opengl import needs_gl

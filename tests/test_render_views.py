@@ -7,20 +7,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from factory.geometry.sight import Framing, View, fit, towards
-from factory.mjcf import names
-from factory.mjcf.replica import Replica
-from factory.problem.pag import NOPART
-from factory.record.log import Log, LogWriter, read_log
-from factory.record.log.pictures import moment_of, take_of
-from factory.rendering.action import FAINT, Action, Fading, action_of, placed, shape_of
-from factory.rendering.camerawork import Take
-from factory.rendering.following import Viewpoint
-from factory.rendering.junction import handover_view
-from factory.rendering.picture import Picture, orbit, overview
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+from factory.apps.log import Log, LogWriter, read_log
+from factory.apps.runs.pictures import moment_of, take_of
+from factory.engine.mjcf import names
+from factory.engine.mjcf.replica import Replica
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.film.action import FAINT, Action, Fading, action_of, placed, shape_of
+from factory.film.camerawork import Take
+from factory.film.following import Viewpoint
+from factory.film.junction import handover_view
+from factory.film.picture import Picture, orbit, overview
+from factory.floor.geometry.sight import Framing, View, fit, towards
 from factory.support.engine import mujoco
+from factory.theory.problem.pag import NOPART
 from tests.examples import without_hands
 from tests.pag_texts import laid_out
 

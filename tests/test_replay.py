@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from factory.foreign_nets.behaviour import play
-from factory.nets.gears import Gear, GearNet
-from factory.nets.history import firings, legal_marking
-from factory.nets.marked import marked
-from factory.nets.replay import replay
-from factory.nets.threaded import ThreadedNet
-from factory.plant.factory import Factory
+from factory.apps.foreign_nets.behaviour import play
 from factory.support.errors import InputError
+from factory.theory.nets.gears import Gear, GearNet
+from factory.theory.nets.history import firings, legal_marking
+from factory.theory.nets.marked import marked
+from factory.theory.nets.replay import replay
+from factory.theory.nets.threaded import ThreadedNet
+from factory.theory.plant.factory import Factory
 from tests.net_values import fair_run, legal_markings, net_from, random_legal_marking
 from tests.pag_values import factories, factory_of, paper
 from tests.token_game import follower

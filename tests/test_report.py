@@ -15,21 +15,21 @@ import numpy as np
 import pytest
 
 import factory
-from factory.problem.pag import PAG, Assembly
-from factory.record.log import LogWriter, read_log
-from factory.show.report import page, recording_of
-from factory.show.report.drawings import data, floor_plan, labels_of, links
-from factory.show.report.pace import fidelity, measured
-from factory.show.report.page import SCRIPTS, json_inside
-from factory.show.report.sections import assembly_tree
-from factory.show.report.words import proof
-from factory.simulation.request import RunRequest
-from factory.simulation.run import STEADY
-from factory.simulation.simulation import Simulation
-from factory.study.analysis import Timing, analyse
-from factory.study.analysis.measured import logged_record
-from factory.study.fidelity.record import QUANTITIES
+from factory.apps.analyze import Timing, analyse
+from factory.apps.analyze.measured import logged_record
+from factory.apps.fidelity.record import QUANTITIES
+from factory.apps.log import LogWriter, read_log
+from factory.apps.report import page, recording_of
+from factory.apps.report.drawings import data, floor_plan, labels_of, links
+from factory.apps.report.pace import fidelity, measured
+from factory.apps.report.page import SCRIPTS, json_inside
+from factory.apps.report.sections import assembly_tree
+from factory.apps.report.words import proof
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.run import STEADY
+from factory.engine.simulation.simulation import Simulation
 from factory.support.errors import InputError
+from factory.theory.problem.pag import PAG, Assembly
 from tests.command_line import PAPER, Terminal, files_in
 from tests.layout_values import paper_layout
 from tests.report_values import EVIL, Page, altered

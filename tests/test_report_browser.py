@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 
 import factory
-from factory.record.log import LogWriter, read_log
-from factory.show.report import page, recording_of
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+from factory.apps.log import LogWriter, read_log
+from factory.apps.report import page, recording_of
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
 from tests.command_line import PAPER
 from tests.report_values import EVIL, altered
 from tests.waiting import until

@@ -10,17 +10,17 @@ from pathlib import Path
 
 import pytest
 
-from factory.exporting import Subject, exporters
-from factory.exporting.csv import rows
-from factory.record.log import LogWriter
-from factory.record.log.failed import failures_of
-from factory.show.report import page, recording_of
-from factory.show.report.failures import failures_data, failures_section
-from factory.show.report.pace import measured
-from factory.show.report.recording import Recording
-from factory.simulation.recovery import Campaign, recover
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+from factory.apps.exports import Subject, exporters
+from factory.apps.exports.csv import rows
+from factory.apps.log import LogWriter
+from factory.apps.log.failed import failures_of
+from factory.apps.recovery import Campaign, recover
+from factory.apps.report import page, recording_of
+from factory.apps.report.failures import failures_data, failures_section
+from factory.apps.report.pace import measured
+from factory.apps.report.recording import Recording
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
 from factory.support.tables import table_of
 from tests.command_line import PAPER, Terminal
 from tests.failing_runs import FAULTS, failing, paper_layout

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from factory.record.log import MAGIC, LogWriter, read_log
-from factory.record.log.blocks import LENGTH
+from factory.apps.log import MAGIC, LogWriter, read_log
+from factory.apps.log.blocks import LENGTH
 from factory.support.errors import MissingError
 from factory.support.gl import probe
 from tests.command_line import PAPER, ROOT
@@ -28,7 +28,7 @@ print(digest(reproduced()))
 
 LOGGED = """
 import sys
-from factory.record.log import LogWriter
+from factory.apps.log import LogWriter
 from tests.simulation_values import reproduced
 made = reproduced(1000000)
 def tell(state):
@@ -94,7 +94,7 @@ def test_a_film_changes_nothing(here: str, tmp_path: Path) -> None:
         probe()
     except MissingError:
         pytest.skip("no GL here")
-    from factory.rendering import Film, Picture
+    from factory.film import Film, Picture
 
     made = reproduced()
     with Film(made, tmp_path / "f.mp4", Picture((64, 48)), 2.0) as film:

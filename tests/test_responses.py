@@ -8,17 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from factory.layout.layout import Layout
-from factory.nets.undone import Undone
+from factory.apps.recovery import Campaign, Recovery, WorldFault, recover
+from factory.apps.recovery.recovery import summed
+from factory.engine.record.failures import Failing
+from factory.engine.record.state import State
+from factory.engine.simulation.mujoco.feeders import Feeders
+from factory.engine.simulation.request import RunRequest, WorldName
+from factory.engine.simulation.run import Run
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.layout import Layout
 from factory.pipeline import read
-from factory.record.failures import Failing
-from factory.record.state import State
-from factory.simulation.mujoco.feeders import Feeders
-from factory.simulation.recovery import Campaign, Recovery, WorldFault, recover
-from factory.simulation.recovery.recovery import summed
-from factory.simulation.request import RunRequest, WorldName
-from factory.simulation.run import Run
-from factory.simulation.simulation import Simulation
+from factory.theory.nets.undone import Undone
 from tests.command_line import PAPER, ROOT
 
 WORLDS = "ideal", "mujoco"

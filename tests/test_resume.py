@@ -15,16 +15,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.record.log import LogWriter, read_log
-from factory.record.log.blocks import Arrays, pack_rows, unpack_rows
-from factory.record.log.continued import Continued, last_full
-from factory.record.log.reader import digest_of, header_in
-from factory.record.log.writer import rows_of_a_block
-from factory.record.state import State
-from factory.record.verdict import HEADER
-from factory.simulation.request import RunRequest
-from factory.simulation.resuming import Resumed
-from factory.simulation.simulation import Compiled, Simulation, compiled
+from factory.apps.log import LogWriter, read_log
+from factory.apps.log.blocks import Arrays, pack_rows, unpack_rows
+from factory.apps.log.reader import digest_of, header_in
+from factory.apps.log.writer import rows_of_a_block
+from factory.apps.resume.continued import Continued, last_full
+from factory.apps.resume.resuming import Resumed
+from factory.engine.record.state import State
+from factory.engine.record.verdict import HEADER
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Compiled, Simulation, compiled
 from factory.support.claim import claimed, claimed_again
 from factory.support.errors import InputError
 from factory.support.files import RECORD, content_of

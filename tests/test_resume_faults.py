@@ -12,11 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from factory.record.log import LogWriter
-from factory.simulation.recovery import Campaign, Recovery, Sensors, WorldFault, recover
-from factory.simulation.recovery.faults import KINDS, OF_ROBOT, campaign_of
-from factory.simulation.request import RunRequest, WorldName
-from factory.simulation.simulation import Simulation
+from factory.apps.log import LogWriter
+from factory.apps.recovery import Campaign, Recovery, Sensors, WorldFault, recover
+from factory.apps.recovery.faults import KINDS, OF_ROBOT, campaign_of
+from factory.engine.simulation.request import RunRequest, WorldName
+from factory.engine.simulation.simulation import Simulation
 from tests.command_line import PAPER, Terminal, spawn
 from tests.layout_values import paper_layout
 from tests.test_log import block_ends

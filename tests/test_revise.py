@@ -9,19 +9,19 @@ from pathlib import Path
 
 import pytest
 
-from factory.lang import read_pag, write_pag
-from factory.lang.pag_reader import load_pag
-from factory.layout.certificate import Fault
-from factory.layout.clearance import certify
-from factory.nets.verify import verify
+from factory.apps.revise.family import family
+from factory.apps.revise.matching import below, label_digests, matching, shifted
+from factory.apps.revise.revision import Revision, revised
+from factory.floor.layout.certificate import Fault
+from factory.floor.layout.clearance import certify
 from factory.pipeline import Project, all_templates
-from factory.plant.family import family
-from factory.plant.matching import below, label_digests, matching, shifted
-from factory.problem.pag import PAG, Mix, Parameter
-from factory.problem.plan import Plan
 from factory.sharing import with_lines
-from factory.study.revision import Revision, revised
 from factory.support.errors import Diagnostic, InputError, RunError
+from factory.theory.lang import read_pag, write_pag
+from factory.theory.lang.pag_reader import load_pag
+from factory.theory.nets.verify import verify
+from factory.theory.problem.pag import PAG, Mix, Parameter
+from factory.theory.problem.plan import Plan
 from tests.command_line import spawn
 from tests.revisions import KINDS, edited, kept_share, refuted, shuffled
 
@@ -229,7 +229,7 @@ def test_what_no_pinned_layout_is_found_for_is_laid_out_with_less(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """And with nothing where no layout has the old hands; names are kept."""
-    monkeypatch.setattr("factory.layout.pinning.AGAIN", 0)
+    monkeypatch.setattr("factory.apps.revise.pinning.AGAIN", 0)
     old, new = project(example("truck")), project(van())
     found = revised(old, new)
     assert (found.asked, found.pinned) == ("all", "hands")
@@ -238,7 +238,7 @@ def test_what_no_pinned_layout_is_found_for_is_laid_out_with_less(
     def refused(*_: object) -> None:
         raise RunError(Diagnostic("Layout", "the old hands are in the way"))
 
-    monkeypatch.setattr("factory.study.revision.Hands", refused)
+    monkeypatch.setattr("factory.apps.revise.revision.Hands", refused)
     found = revised(old, new)
     assert (found.pinned, found.new.layout.factory.robots[2].name) == ("none", "r5")
 

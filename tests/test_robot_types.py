@@ -15,16 +15,16 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from factory.lang.pag_reader import load_pag
-from factory.layout.certificate import CARRIAGE_BODY
-from factory.mjcf.driving import RESERVE
+from factory.engine.mjcf.driving import RESERVE
+from factory.floor.layout.certificate import CARRIAGE_BODY
 from factory.pipeline import Project, all_templates
-from factory.problem.robot_bodies import ARM_TOP, CARRIAGE, CARRIAGE_TOP, MAST
-from factory.problem.robot_reader import read_body
-from factory.problem.robot_types import Catalogue, RobotType, load_catalogue
 from factory.sharing import with_branches
 from factory.support.errors import InputError
 from factory.support.extensions import extensions
+from factory.theory.lang.pag_reader import load_pag
+from factory.theory.problem.robot_bodies import ARM_TOP, CARRIAGE, CARRIAGE_TOP, MAST
+from factory.theory.problem.robot_reader import read_body
+from factory.theory.problem.robot_types import Catalogue, RobotType, load_catalogue
 from tests.command_line import PAPER, ROOT, Terminal
 from tests.pag_texts import compiled
 

@@ -12,24 +12,24 @@ from typing import Any
 
 import pytest
 
-from factory.control.navigation import Bundle
-from factory.layout.layout import Layout
-from factory.mjcf import loading
-from factory.plant.factory import Operation
-from factory.record.figures import PhysicsFigures
-from factory.record.log import LogWriter
-from factory.record.monitor import beside
-from factory.record.state import Event, State
-from factory.simulation import bundles
-from factory.simulation.disturbance import Gain, Noise, Push, disturb
-from factory.simulation.mujoco import outfeed
-from factory.simulation.mujoco.courses import Follower
-from factory.simulation.mujoco.fast import neighbours, strides
-from factory.simulation.mujoco.parts import Parts
-from factory.simulation.simulation import Simulation
-from factory.study.fidelity.measuring import Measurement
+from factory.apps.disturbance import Gain, Noise, Push, disturb
+from factory.apps.fidelity.measuring import Measurement
+from factory.apps.log import LogWriter
+from factory.apps.monitor import beside
+from factory.engine.mjcf import loading
+from factory.engine.record.figures import PhysicsFigures
+from factory.engine.record.state import Event, State
+from factory.engine.simulation import bundles
+from factory.engine.simulation.mujoco import outfeed
+from factory.engine.simulation.mujoco.courses import Follower
+from factory.engine.simulation.mujoco.fast import neighbours, strides
+from factory.engine.simulation.mujoco.parts import Parts
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.layout import Layout
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
+from factory.theory.control.navigation import Bundle
+from factory.theory.plant.factory import Operation
 from tests.examples import with_hands
 from tests.good_runs import random_marking
 from tests.layout_values import random_layout

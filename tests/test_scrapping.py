@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from factory.layout.clearance import separation
-from factory.layout.scrapping import not_carried_back
-from factory.layout.sweeps import piles
+from factory.floor.layout.clearance import separation
+from factory.floor.layout.scrapping import not_carried_back
+from factory.floor.layout.sweeps import piles
 from tests.examples import with_hands
 
 

@@ -10,12 +10,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from factory.layout.layout import Layout
-from factory.mjcf.loading import load
-from factory.mjcf.model import Model
-from factory.mjcf.replica import SHOWN
-from factory.mjcf.robot_bodies import DIGITS, STROKES
-from factory.simulation.modelling import physical_model
+from factory.engine.mjcf.loading import load
+from factory.engine.mjcf.model import Model
+from factory.engine.mjcf.replica import SHOWN
+from factory.engine.mjcf.robot_bodies import DIGITS, STROKES
+from factory.engine.simulation.modelling import physical_model
+from factory.floor.layout.layout import Layout
 from tests.examples import with_hands
 
 EXAMPLES = ["paper", "lamp", pytest.param("gearbox", marks=pytest.mark.slow)]

@@ -11,17 +11,17 @@ import pytest
 
 import factory
 from benches.speed.factories import laid_out as floor_of
-from factory.layout.layout import Layout
-from factory.nets.replay import replay
+from factory.engine.record.state import Event, State
+from factory.engine.simulation.distributed import DistributedSupervisor
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.run import busy_times, mean_interval, steady_from
+from factory.engine.simulation.simulation import Simulation
+from factory.engine.timing.timed import timed
+from factory.engine.timing.timing import Timing
+from factory.floor.layout.layout import Layout
 from factory.pipeline import all_templates
-from factory.record.state import Event, State
-from factory.simulation.distributed import DistributedSupervisor
-from factory.simulation.request import RunRequest
-from factory.simulation.run import busy_times, mean_interval, steady_from
-from factory.simulation.simulation import Simulation
 from factory.support.settings import Settings
-from factory.timing.timed import timed
-from factory.timing.timing import Timing
+from factory.theory.nets.replay import replay
 from tests.good_runs import assert_good, random_marking
 from tests.layout_values import Drawn, random_layout
 from tests.pag_texts import LONE, PAPER, PRODUCTS, laid_out

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from factory.simulation.mujoco import sleep
-from factory.simulation.mujoco.sleep import AWAKE, FRESH, MAY_SLEEP, STAYS_AWAKE, Sleep
-from factory.simulation.simulation import Simulation
+from factory.engine.simulation.mujoco import sleep
+from factory.engine.simulation.mujoco.sleep import AWAKE, FRESH, MAY_SLEEP, STAYS_AWAKE, Sleep
+from factory.engine.simulation.simulation import Simulation
 from factory.support.settings import Settings
 from tests.good_runs import assert_good
 from tests.simulation_values import FINE, layout_of, ready

@@ -14,34 +14,34 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.control.mode import Mode
-from factory.layout.bounds import cycle_time_bound
-from factory.layout.clearance import certify
-from factory.layout.dimensions import Clearance
-from factory.layout.durations import Pace, gear_times, operation_times
-from factory.layout.hands.limbs import rises_first
-from factory.layout.layout import Layout
-from factory.layout.optimising import first_feasible, optimised
-from factory.modes import staging
-from factory.modes.modes import operation_modes
-from factory.modes.staging import stages
-from factory.nets.cycle_ratio import max_cycle_ratio
-from factory.nets.marked import MarkedNet
-from factory.nets.petri import PetriNet, Place, Transition
+from factory.apps.analyze import Timing
+from factory.apps.analyze.analysing import operation_slacks
+from factory.apps.analyze.firing import earliest_firings
+from factory.apps.analyze.timed import flow, timed_net
+from factory.apps.monitor import beside
+from factory.engine.simulation import simulation as simulations
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.engine.timing.cycle_time import cycle_time
+from factory.engine.timing.timed import timed
+from factory.engine.timing.timing import Change
+from factory.floor.layout.bounds import cycle_time_bound
+from factory.floor.layout.clearance import certify
+from factory.floor.layout.dimensions import Clearance
+from factory.floor.layout.durations import Pace, gear_times, operation_times
+from factory.floor.layout.hands.limbs import rises_first
+from factory.floor.layout.layout import Layout
+from factory.floor.layout.optimising import first_feasible, optimised
+from factory.floor.modes import staging
+from factory.floor.modes.modes import operation_modes
+from factory.floor.modes.staging import stages
 from factory.pipeline import read
-from factory.problem.pag import NOPART
-from factory.record.monitor import beside
-from factory.simulation import simulation as simulations
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
-from factory.study.analysis import Timing
-from factory.study.analysis.analysing import operation_slacks
-from factory.study.analysis.firing import earliest_firings
-from factory.study.analysis.timed import flow, timed_net
 from factory.support.settings import Settings
-from factory.timing.cycle_time import cycle_time
-from factory.timing.timed import timed
-from factory.timing.timing import Change
+from factory.theory.control.mode import Mode
+from factory.theory.nets.cycle_ratio import max_cycle_ratio
+from factory.theory.nets.marked import MarkedNet
+from factory.theory.nets.petri import PetriNet, Place, Transition
+from factory.theory.problem.pag import NOPART
 from tests.command_line import PAPER, ROOT
 from tests.examples import without_hands
 from tests.layout_values import (

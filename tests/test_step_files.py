@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from factory.geometry.meshes import volume_of
+from factory.apps.planning.source import read_source
+from factory.floor.geometry.meshes import volume_of
 from factory.pipeline import all_templates
-from factory.planning.source import read_source
 from tests.command_line import ROOT, Terminal
 from tests.step_boxes import Box, Vector, step_of
 
@@ -242,7 +242,9 @@ def test_a_file_that_ends_its_reader_ends_no_more(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What makes OpenCASCADE crash, here an abort in its place, is told with the status."""
-    monkeypatch.setattr("factory.importing.scene_file.CONVERT", "import os; print('x'); os.abort()")
+    monkeypatch.setattr(
+        "factory.apps.importing.scene_file.CONVERT", "import os; print('x'); os.abort()"
+    )
     (tmp_path / "a.step").write_text(step_of({"a": LOWER}))
     done = Terminal(capsys)("plan", tmp_path / "a.step", "-o", tmp_path / "out", "--json")
     assert (done.status, done.codes) == (2, ["BadMesh"])
@@ -256,6 +258,6 @@ def test_a_fault_of_ours_is_no_fault_of_the_file(
         raise IndexError("ours")
 
     (tmp_path / "a.step").write_text(step_of({"a": LOWER}))
-    monkeypatch.setattr("factory.importing.scene_file._body", wrong)
+    monkeypatch.setattr("factory.apps.importing.scene_file._body", wrong)
     with pytest.raises(IndexError):
         read_source(tmp_path / "a.step", TEMPLATES)

@@ -9,20 +9,20 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from factory.control.mode import Array, Index
-from factory.layout.dimensions import Clearance
-from factory.mjcf import names
-from factory.mjcf.scene import SHOE
-from factory.mjcf.stops import OVERLOAD
-from factory.mjcf.timestep import timed
-from factory.problem.robot_bodies import CARRIAGE, CARRIAGE_TOP
-from factory.record.state import State
-from factory.simulation.modelling import physical_model
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+from factory.engine.mjcf import names
+from factory.engine.mjcf.scene import SHOE
+from factory.engine.mjcf.stops import OVERLOAD
+from factory.engine.mjcf.timestep import timed
+from factory.engine.record.state import State
+from factory.engine.simulation.modelling import physical_model
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.dimensions import Clearance
 from factory.support.engine import mujoco
 from factory.support.resources import mjcf_folder
 from factory.support.settings import TICK, Settings
+from factory.theory.control.mode import Array, Index
+from factory.theory.problem.robot_bodies import CARRIAGE, CARRIAGE_TOP
 from tests.simulation_values import layout_of
 
 MOST = 1e-3
@@ -205,8 +205,8 @@ def test_buffers_are_where_the_shoes_of_carriages_meet_them() -> None:
 
 def test_the_urdf_has_them() -> None:
     """The ranges of joints are those of the model."""
-    from factory.exporting.urdf import _Writer
-    from factory.mjcf.loading import load
+    from factory.apps.exports.urdf import _Writer
+    from factory.engine.mjcf.loading import load
 
     m = load(physical_model(layout_of("fence"), 1))
     root = ElementTree.fromstring(_Writer(m, 0.5, "meshes").text("fence"))

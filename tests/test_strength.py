@@ -12,30 +12,30 @@ import numpy as np
 import pytest
 
 import factory
-from factory.control.mode import Limits
-from factory.geometry.product import product_geometry
-from factory.layout.embedding import lay_out
-from factory.layout.hands import gauges
-from factory.layout.hands.gauges import gauge, middle
-from factory.layout.hands.holding import Holding, held
-from factory.layout.hands.places import GRAVITY, PUSH, SURGE, centre_of
-from factory.layout.hands.tips import Tip, TipName, shares, tip
-from factory.layout.layout import Layout
-from factory.layout.request import Ground
-from factory.mjcf import names
-from factory.record.log import read_log
-from factory.record.monitor.record import verdict_on, watch_log
-from factory.record.monitor.watched import watched
-from factory.record.state import State
-from factory.show.live import Session
-from factory.show.live.commands import Command
-from factory.simulation.disturbance import Mass, disturb
-from factory.simulation.mujoco import strength
-from factory.simulation.request import RunRequest
-from factory.simulation.run import Run
-from factory.simulation.simulation import FALL, Simulation
+from factory.apps.disturbance import Mass, disturb
+from factory.apps.live import Session
+from factory.apps.live.commands import Command
+from factory.apps.log import read_log
+from factory.apps.monitor.record import verdict_on, watch_log
+from factory.apps.monitor.watched import watched
+from factory.engine.mjcf import names
+from factory.engine.record.state import State
+from factory.engine.simulation.mujoco import strength
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.run import Run
+from factory.engine.simulation.simulation import FALL, Simulation
+from factory.floor.geometry.product import product_geometry
+from factory.floor.layout.embedding import lay_out
+from factory.floor.layout.hands import gauges
+from factory.floor.layout.hands.gauges import gauge, middle
+from factory.floor.layout.hands.holding import Holding, held
+from factory.floor.layout.hands.places import GRAVITY, PUSH, SURGE, centre_of
+from factory.floor.layout.hands.tips import Tip, TipName, shares, tip
+from factory.floor.layout.layout import Layout
+from factory.floor.layout.request import Ground
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
+from factory.theory.control.mode import Limits
 from tests.command_line import ROOT, Terminal
 from tests.live_sessions import Stopped
 

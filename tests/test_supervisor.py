@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.control.mode import Array, Truth
-from factory.control.navigation import Bundle
-from factory.simulation.mujoco.feeders import Feeders
-from factory.simulation.mujoco.world import MujocoWorld
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+from factory.engine.simulation.mujoco.feeders import Feeders
+from factory.engine.simulation.mujoco.world import MujocoWorld
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
 from factory.support.settings import Settings
+from factory.theory.control.mode import Array, Truth
+from factory.theory.control.navigation import Bundle
 from tests.pag_texts import KARY, laid_out
 from tests.simulation_values import layout_of
 

@@ -20,15 +20,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from factory.apps.sweep import Recipe, points, pool, read_axes, summarise
+from factory.apps.sweep.grid import Value
+from factory.apps.sweep.store import COLUMNS, Store
+from factory.apps.sweep.sweeping import run_local, sweep
+from factory.apps.sweep.work import FIGURES, Outcome, Runner
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
 from factory.pipeline import read
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
-from factory.study import pool
-from factory.study.sweep import Recipe, points, read_axes, summarise
-from factory.study.sweep.grid import Value
-from factory.study.sweep.store import COLUMNS, Store
-from factory.study.sweep.sweeping import run_local, sweep
-from factory.study.sweep.work import FIGURES, Outcome, Runner
 from factory.support.errors import InputError, RunError
 from factory.support.settings import Settings
 from tests.command_line import PAPER, ROOT, Terminal, files_in

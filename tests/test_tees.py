@@ -9,23 +9,23 @@ from pathlib import Path
 
 import pytest
 
-from factory.compiler.parallel import in_parallel
-from factory.compiler.tees import heads, on_stems
-from factory.layout.clearance import certify
-from factory.layout.fork import Fork
-from factory.layout.layout import Layout
-from factory.nets.verify import verify
+from factory.apps.monitor.watched import watched
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.run import Run
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.clearance import certify
+from factory.floor.layout.fork import Fork
+from factory.floor.layout.layout import Layout
 from factory.pipeline import Project, all_templates, read
-from factory.problem.pag import PAG, Parameter
-from factory.problem.robot_types import load_catalogue
-from factory.problem.template import Template
-from factory.record.monitor.watched import watched
 from factory.sharing import with_branches, with_tees
-from factory.simulation.request import RunRequest
-from factory.simulation.run import Run
-from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
 from factory.support.settings import Settings
+from factory.theory.compiler.parallel import in_parallel
+from factory.theory.compiler.tees import heads, on_stems
+from factory.theory.nets.verify import verify
+from factory.theory.problem.pag import PAG, Parameter
+from factory.theory.problem.robot_types import load_catalogue
+from factory.theory.problem.template import Template
 from tests.command_line import Terminal
 from tests.fold_values import branched, plain, table_of
 from tests.pag_values import paper

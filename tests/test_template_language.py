@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.lang import load_templates, read_template, write_template
-from factory.problem.template import LOST, Failure, Law, Point, Response, Template
 from factory.support.errors import Diagnostic, InputError
+from factory.theory.lang import load_templates, read_template, write_template
+from factory.theory.problem.template import LOST, Failure, Law, Point, Response, Template
 from tests.pag_texts import MATE, read_or_refused
 from tests.strategies import mutations
 from tests.strategies import templates as random_templates

@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.foreign_nets.behaviour import analyse, play
-from factory.nets.history import firings
-from factory.nets.marked import MarkedNet, marked
-from factory.nets.petri import Marking
-from factory.nets.verify import verify
-from factory.plant.factory import Factory
+from factory.apps.foreign_nets.behaviour import analyse, play
+from factory.theory.nets.history import firings
+from factory.theory.nets.marked import MarkedNet, marked
+from factory.theory.nets.petri import Marking
+from factory.theory.nets.verify import verify
+from factory.theory.plant.factory import Factory
 from tests.net_values import (
     fair_run,
     glued,

@@ -17,22 +17,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import factory
-from factory.geometry.product import product_geometry
-from factory.layout.layout import Layout
-from factory.layout.request import Ground
-from factory.mjcf import driving, timestep
-from factory.mjcf.driving import ALLOWED, STEPS
-from factory.mjcf.timestep import USUAL, timed
-from factory.problem.pag import PAG, Parameter
-from factory.problem.robot_bodies import FRICTION
-from factory.record.state import State
-from factory.simulation.modelling import physical_model
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
-from factory.study.fidelity.record import QUANTITIES
+from factory.apps.fidelity.record import QUANTITIES
+from factory.engine.mjcf import driving, timestep
+from factory.engine.mjcf.driving import ALLOWED, STEPS
+from factory.engine.mjcf.timestep import USUAL, timed
+from factory.engine.record.state import State
+from factory.engine.simulation.modelling import physical_model
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.geometry.product import product_geometry
+from factory.floor.layout.layout import Layout
+from factory.floor.layout.request import Ground
 from factory.support.errors import InputError
 from factory.support.resources import mjcf_folder
 from factory.support.settings import AUTO, TICK, Settings
+from factory.theory.problem.pag import PAG, Parameter
+from factory.theory.problem.robot_bodies import FRICTION
 from tests.command_line import PAPER, Terminal
 from tests.layout_values import STYLES, shaped
 from tests.pag_values import SHAPES, random_pag

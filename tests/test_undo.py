@@ -10,14 +10,14 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from factory.foreign_nets.behaviour import play
-from factory.nets.history import firings
-from factory.nets.marked import MarkedNet, marked, token_free
-from factory.nets.petri import Marking
-from factory.nets.undo import marking_after, tokens_after, undo
-from factory.nets.undone import Joins, Undone
-from factory.plant.factory import Factory
-from factory.problem.pag import NOPART
+from factory.apps.foreign_nets.behaviour import play
+from factory.theory.nets.history import firings
+from factory.theory.nets.marked import MarkedNet, marked, token_free
+from factory.theory.nets.petri import Marking
+from factory.theory.nets.undo import marking_after, tokens_after, undo
+from factory.theory.nets.undone import Joins, Undone
+from factory.theory.plant.factory import Factory
+from factory.theory.problem.pag import NOPART
 from tests.fold_values import inserted, plain, random_fold, three_robots
 from tests.net_values import fair_run, random_marked_net
 from tests.pag_values import factory_of, paper

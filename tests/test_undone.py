@@ -8,11 +8,11 @@ from dataclasses import dataclass, field, replace
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from factory.nets.history import firings
-from factory.nets.replay import ReplayVerdict, replay
-from factory.nets.undo import marking_after, tokens_after, undo
-from factory.nets.undone import Entry, Joins, Undone, lasting
-from factory.plant.factory import Factory
+from factory.theory.nets.history import firings
+from factory.theory.nets.replay import ReplayVerdict, replay
+from factory.theory.nets.undo import marking_after, tokens_after, undo
+from factory.theory.nets.undone import Entry, Joins, Undone, lasting
+from factory.theory.plant.factory import Factory
 from tests.fold_values import inserted, plain, random_fold, three_robots
 from tests.net_values import random_legal_marking
 from tests.pag_values import SHAPES, factory_of, paper, random_pag

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.nets.replay import replay
-from factory.nets.undone import Undone
-from factory.plant.factory import Factory
-from factory.record.log.reader import Log, read_log
-from factory.record.monitor.record import recorded_subject, verdict_on, watch_log
-from factory.study.analysis.measured import logged_record
+from factory.apps.analyze.measured import logged_record
+from factory.apps.log.reader import Log, read_log
+from factory.apps.monitor.record import recorded_subject, verdict_on, watch_log
 from factory.support.errors import InputError
+from factory.theory.nets.replay import replay
+from factory.theory.nets.undone import Undone
+from factory.theory.plant.factory import Factory
 from tests.command_line import PAPER, Terminal, spawn
 from tests.test_log import block_ends
 from tests.test_log_damage import put_together, taken_apart

@@ -7,11 +7,11 @@ from xml.etree import ElementTree
 
 import pytest
 
-from factory.mjcf import loading
-from factory.mjcf.unseen import leave_out_what_is_shown
-from factory.record.log import read_log
-from factory.simulation.modelling import physical_model
-from factory.simulation.simulation import Simulation
+from factory.apps.log import read_log
+from factory.engine.mjcf import loading
+from factory.engine.mjcf.unseen import leave_out_what_is_shown
+from factory.engine.simulation.modelling import physical_model
+from factory.engine.simulation.simulation import Simulation
 from tests.command_line import PAPER, Terminal
 from tests.simulation_values import gone_wild, layout_of, ready, states
 

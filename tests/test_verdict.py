@@ -13,23 +13,23 @@ import pytest
 
 import factory
 from benches.speed.factories import balanced
-from factory.layout.layout import Layout
-from factory.layout.request import Ground
-from factory.mjcf import loading, names
-from factory.mjcf.model import Model
+from factory.apps.disturbance import Gain, Mass, Noise, disturb
+from factory.apps.disturbance.interference import Interference
+from factory.apps.log import read_log
+from factory.apps.log.writer import LogWriter
+from factory.apps.monitor import beside
+from factory.apps.monitor.record import verdict_on, watch_log
+from factory.apps.monitor.watched import watched
+from factory.engine.mjcf import loading, names
+from factory.engine.mjcf.model import Model
+from factory.engine.record.findings import Report, Violation
+from factory.engine.record.verdict import LIMITS, RunVerdict, check_figures, judged
+from factory.engine.simulation.mujoco import world as mujoco_world
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.layout import Layout
+from factory.floor.layout.request import Ground
 from factory.pipeline import read
-from factory.record.findings import Report, Violation
-from factory.record.log import read_log
-from factory.record.log.writer import LogWriter
-from factory.record.monitor import beside
-from factory.record.monitor.record import verdict_on, watch_log
-from factory.record.monitor.watched import watched
-from factory.record.verdict import LIMITS, RunVerdict, check_figures, judged
-from factory.simulation.disturbance import Gain, Mass, Noise, disturb
-from factory.simulation.mujoco import world as mujoco_world
-from factory.simulation.mujoco.interference import Interference
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
 from factory.support.errors import Diagnostic
 from factory.support.settings import Settings
 from tests.command_line import PAPER, ROOT, Terminal

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from factory.foreign_nets.behaviour import analyse
-from factory.foreign_nets.explore import explore
-from factory.nets.gears import Gear, GearNet
-from factory.nets.marked import MarkedNet, marked
-from factory.nets.verdict import Verdict, Witness
-from factory.nets.verify import proved, verify
-from factory.plant.factory import Factory
+from factory.apps.foreign_nets.behaviour import analyse
+from factory.apps.foreign_nets.explore import explore
 from factory.support.errors import RunError
+from factory.theory.nets.gears import Gear, GearNet
+from factory.theory.nets.marked import MarkedNet, marked
+from factory.theory.nets.verdict import Verdict, Witness
+from factory.theory.nets.verify import proved, verify
+from factory.theory.plant.factory import Factory
 from tests.net_values import (
     PHILOSOPHERS,
     crossed_twice,

@@ -14,23 +14,23 @@ import mujoco
 import numpy as np
 import pytest
 
-from factory.exporting.ways import ways
-from factory.layout import presence
-from factory.layout.clearance import certify
-from factory.layout.coordinating import with_machines
-from factory.layout.exclusions import awaited_positions, coordinated, exclusions
-from factory.layout.layout import Layout
-from factory.layout.machines import presences
-from factory.layout.presence import Presence
-from factory.mjcf import stock
-from factory.mjcf.loading import load
-from factory.mjcf.model import build_model
-from factory.nets.coordinated import Order, Past
+from factory.apps.exports.ways import ways
+from factory.engine.mjcf import stock
+from factory.engine.mjcf.loading import load
+from factory.engine.mjcf.model import build_model
+from factory.engine.simulation.ordering import Ordering
+from factory.floor.layout import presence
+from factory.floor.layout.clearance import certify
+from factory.floor.layout.coordinating import with_machines
+from factory.floor.layout.exclusions import awaited_positions, coordinated, exclusions
+from factory.floor.layout.layout import Layout
+from factory.floor.layout.machines import presences
+from factory.floor.layout.presence import Presence
 from factory.pipeline import read
-from factory.problem.robot_types import load_catalogue
-from factory.simulation.ordering import Ordering
 from factory.support.errors import RunError
 from factory.support.settings import Settings
+from factory.theory.nets.coordinated import Order, Past
+from factory.theory.problem.robot_types import load_catalogue
 from tests.clearance_values import check
 from tests.random_products import random_product
 
@@ -239,7 +239,7 @@ def test_hands_that_collide_where_an_operation_ends_are_a_fault(
     """What is lowered comes down through a beam, where hands are chosen as if that were a pin."""
     file = tmp_path / "product.pag"
     file.write_text(random_product(2611270266))
-    narrow = "factory.layout.hands.in_the_way.under_beam"
+    narrow = "factory.floor.layout.hands.in_the_way.under_beam"
     monkeypatch.setattr(narrow, lambda kind, low, high, radius: (low, high))
     with pytest.raises(RunError, match=r"beam of r6 and p15 of r7 .* at the end of 's16'"):
         _ = read(file).layout

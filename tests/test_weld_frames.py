@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import factory
-from factory.mjcf.weld_frames import WeldFrames, check_holders, gaps, held_at
-from factory.simulation.simulation import Simulation
+from factory.engine.mjcf.weld_frames import WeldFrames, check_holders, gaps, held_at
+from factory.engine.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 
 EXAMPLES = Path(__file__).parent.parent / "examples"

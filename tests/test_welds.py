@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.mjcf.masks import ALL, NOBODY
-from factory.simulation.mujoco.contacts import LAST
-from factory.simulation.mujoco.sleep import AWAKE, FRESH
-from factory.simulation.mujoco.world import MujocoWorld
+from factory.engine.mjcf.masks import ALL, NOBODY
+from factory.engine.simulation.mujoco.contacts import LAST
+from factory.engine.simulation.mujoco.sleep import AWAKE, FRESH
+from factory.engine.simulation.mujoco.world import MujocoWorld
 from tests.good_runs import random_marking
 from tests.pag_texts import laid_out
 from tests.simulation_values import FENCE, layout_of, ready

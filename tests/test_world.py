@@ -9,16 +9,16 @@ from typing import Any, Literal, get_type_hints
 import numpy as np
 import pytest
 
-from factory.control.mode import Array
-from factory.plant.factory import Operation
-from factory.simulation.disturbance import Slowed, disturb
-from factory.simulation.disturbance.interventions import Interventions
-from factory.simulation.ideal import IdealWorld
-from factory.simulation.mujoco.world import MujocoWorld
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
-from factory.simulation.world import Hooks, World
+from factory.apps.disturbance import Slowed, disturb
+from factory.apps.disturbance.interventions import Interventions
+from factory.engine.simulation.ideal import IdealWorld
+from factory.engine.simulation.mujoco.world import MujocoWorld
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.engine.simulation.world import Hooks, World
 from factory.support.errors import InputError
+from factory.theory.control.mode import Array
+from factory.theory.plant.factory import Operation
 from tests.simulation_values import FINE, layout_of, ready
 
 Name = Literal["mujoco", "ideal"]

@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import pytest
 
-from factory.nets.exclusion import ORDER, excluding, ordered, times
-from factory.nets.marked import MarkedNet, stuck_circuit, token_free
-from factory.nets.petri import Place
+from factory.theory.nets.exclusion import ORDER, excluding, ordered, times
+from factory.theory.nets.marked import MarkedNet, stuck_circuit, token_free
+from factory.theory.nets.petri import Place
 from tests.state_space import Truth, explored
 from tests.street_programs import Streets, stalls, streets
 

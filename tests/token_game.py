@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from factory.nets.petri import Marking, PetriNet
-from factory.nets.threaded import Slot, ThreadedNet
+from factory.theory.nets.petri import Marking, PetriNet
+from factory.theory.nets.threaded import Slot, ThreadedNet
 
 
 def enabled(net: PetriNet, marking: Marking) -> tuple[int, ...]:

@@ -9,12 +9,12 @@ from typing import Any
 import factory
 from benches.fidelity.products import file_of
 from benches.tables import table
-from factory.layout.exclusions import coordinated
-from factory.layout.layout import Layout
-from factory.nets.verdict import listing
-from factory.simulation.ordering import Ordering
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+from factory.engine.simulation.ordering import Ordering
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.exclusions import coordinated
+from factory.floor.layout.layout import Layout
+from factory.theory.nets.verdict import listing
 
 NAMES, UNITS = ("paper", "lamp", "stool", "truck", "chair", "gearbox"), 4
 

@@ -8,11 +8,11 @@ from typing import Any
 import factory
 from benches.fidelity.products import file_of, is_here
 from benches.tables import table
-from factory.layout.layout import Layout
-from factory.plant.factory import Operation
-from factory.record.state import Event, State
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+from factory.engine.record.state import Event, State
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.layout import Layout
+from factory.theory.plant.factory import Operation
 
 NAMES = (
     *("paper", "lamp", "stool", "truck", "chair", "gearbox"),

@@ -8,7 +8,7 @@ from typing import Any
 import factory
 from benches.fidelity.products import BRICKS_NAMES, EXAMPLES, file_of, is_here
 from benches.tables import table
-from factory.layout.exclusions import coordinated
+from factory.floor.layout.exclusions import coordinated
 from factory.pipeline import read
 
 

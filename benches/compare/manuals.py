@@ -14,7 +14,7 @@ import trimesh
 import factory
 from benches.speed.processes import FACTORY, run
 from benches.tables import table
-from factory.problem.pag import PAG
+from factory.theory.problem.pag import PAG
 
 DATA = os.environ.get("FACTORY_IKEA", "")
 """The folder of the data set, with `main_data.json` and `parts/`; "" where it is not there."""

@@ -8,8 +8,8 @@ from typing import Any
 
 from benches.faults.trials import JITTER, Kept, Trial, is_good, project, tried_so_far
 from benches.tables import table
-from factory.plant.factory import Factory
-from factory.simulation.recovery import WorldFault
+from factory.apps.recovery import WorldFault
+from factory.theory.plant.factory import Factory
 
 PRODUCTS = ("paper", "truck", "chest")
 KINDS = {

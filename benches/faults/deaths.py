@@ -8,8 +8,8 @@ from typing import Any
 from benches.faults.campaigns import PRODUCTS
 from benches.faults.trials import JITTER, Kept, Trial, is_good, project, tried_so_far
 from benches.tables import table
-from factory.simulation.recovery import WorldFault
-from factory.simulation.request import WorldName
+from factory.apps.recovery import WorldFault
+from factory.engine.simulation.request import WorldName
 
 UNITS, SWAP = 14, 10.0
 WORLDS: tuple[WorldName, ...] = ("ideal", "mujoco")

@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from benches.tables import table
-from factory.record.log.reader import read_log
+from factory.apps.log.reader import read_log
 from tests.command_line import spawn
 from tests.test_resume import FACTORIES, killed_and_gone_on, ticks_of
 from tests.test_resume_faults import FACTORIES as FAILING

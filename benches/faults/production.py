@@ -7,8 +7,8 @@ from typing import Any
 
 from benches.faults.trials import JITTER, Kept, Trial, is_good, tried_so_far
 from benches.tables import table
-from factory.simulation.recovery import WorldFault
-from factory.simulation.request import WorldName
+from factory.apps.recovery import WorldFault
+from factory.engine.simulation.request import WorldName
 
 UNITS = 2000
 """Units of each run."""

@@ -8,11 +8,11 @@ from functools import cache
 from typing import Any
 
 from benches.fidelity.products import EXAMPLES
+from factory.apps.recovery import Campaign, Sensors, WorldFault, recover
+from factory.apps.sweep.pool import cores, over_processes
+from factory.engine.simulation.request import RunRequest, WorldName
+from factory.engine.simulation.simulation import Simulation
 from factory.pipeline import Project, read
-from factory.simulation.recovery import Campaign, Sensors, WorldFault, recover
-from factory.simulation.request import RunRequest, WorldName
-from factory.simulation.simulation import Simulation
-from factory.study.pool import cores, over_processes
 
 JITTER = 0.3
 """Robots differ by this share, in every trial."""

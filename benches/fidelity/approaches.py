@@ -7,11 +7,11 @@ from typing import Any
 
 from benches.fidelity.products import BRICKS_NAMES, REAL, file_of, is_here, layout
 from benches.tables import table
-from factory.compiler.mating.findings import LEFT_OUT, NO_DEEPER, STRICT
-from factory.compiler.mating.paths import CLEAR, TOLERANCE
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.mating.findings import LEFT_OUT, NO_DEEPER, STRICT
+from factory.floor.mating.paths import CLEAR, TOLERANCE
 from factory.pipeline import read
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
 
 PRODUCTS = (*REAL, "chest", "stool", "lamp", "shelf", *BRICKS_NAMES)
 """Products whose parts have shapes of their own."""

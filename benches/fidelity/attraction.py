@@ -21,16 +21,16 @@ import numpy as np
 
 from benches.fidelity.products import CAMPAIGN, layout
 from benches.tables import table
-from factory.control.mode import REST, Array, Index
-from factory.control.navigation import Bundle
-from factory.layout.exclusions import awaited_positions, coordinated
-from factory.layout.layout import Layout
-from factory.layout.machines import presences
-from factory.layout.presence import ROUNDING, Span
-from factory.nets.petri import Marking
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.exclusions import awaited_positions, coordinated
+from factory.floor.layout.layout import Layout
+from factory.floor.layout.machines import presences
+from factory.floor.layout.presence import ROUNDING, Span
 from factory.support.engine import mujoco
+from factory.theory.control.mode import REST, Array, Index
+from factory.theory.control.navigation import Bundle
+from factory.theory.nets.petri import Marking
 from tests.token_game import enabled, follower
 
 KINDS = ("inside", "stop", "touching", "gate")

@@ -10,10 +10,10 @@ from typing import Any
 
 from benches.fidelity.products import PAPER, REAL, layout
 from benches.tables import table
-from factory.mjcf.timestep import timed
-from factory.study.fidelity import QUANTITIES
-from factory.study.fidelity.comparing import Case, over_cases
-from factory.study.fidelity.record import Figures
+from factory.apps.fidelity import QUANTITIES
+from factory.apps.fidelity.comparing import Case, over_cases
+from factory.apps.fidelity.record import Figures
+from factory.engine.mjcf.timestep import timed
 from factory.support.engine import mujoco
 
 UNITS = 4

@@ -14,8 +14,7 @@ import numpy as np
 
 from benches.fidelity.products import SMALL, layout
 from benches.tables import table
-from factory.layout.layout import Layout
-from factory.simulation.disturbance import (
+from factory.apps.disturbance import (
     Delay,
     Disturbance,
     Dragged,
@@ -27,9 +26,10 @@ from factory.simulation.disturbance import (
     Slowed,
     disturb,
 )
-from factory.simulation.request import RunRequest
-from factory.simulation.run import Run
-from factory.simulation.simulation import Simulation
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.run import Run
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.layout import Layout
 from factory.support.settings import Settings
 
 ERROR_MM = 0.5

@@ -23,10 +23,10 @@ import numpy as np
 
 from benches.fidelity.products import PAPER, REAL, layout
 from benches.tables import table
-from factory.mjcf import names
-from factory.record.state import State
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
+from factory.engine.mjcf import names
+from factory.engine.record.state import State
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
 
 RUNS = ((PAPER, 500), *((name, 50) for name in REAL))
 

@@ -9,8 +9,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from benches.tables import table
-from factory.exporting.clearance.checking import faults_of
-from factory.exporting.clearance.documents import read_folder
+from factory.apps.exports.clearance.checking import faults_of
+from factory.apps.exports.clearance.documents import read_folder
 from tests.planted import BENIGN, PLANTS
 from tests.test_clearance_files import FORGERIES, Forgery, built
 

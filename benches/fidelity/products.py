@@ -7,7 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 
 import factory
-from factory.layout.layout import Layout
+from factory.floor.layout.layout import Layout
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 

@@ -16,8 +16,8 @@ from datetime import UTC, datetime
 from typing import Any
 
 from benches.tables import table
-from factory.mjcf.insets import insets_of
-from factory.study.fidelity import measure as compared
+from factory.apps.fidelity import measure as compared
+from factory.engine.mjcf.insets import insets_of
 from factory.support.settings import Settings
 
 from .products import PAPER, REAL, is_here, layout

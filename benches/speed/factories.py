@@ -8,16 +8,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import factory
-from factory.geometry.product import product_geometry
-from factory.layout.layout import Layout
-from factory.layout.request import Ground
-from factory.nets.replay import replay
-from factory.record.verdict import RunVerdict, judged, kept_figures
-from factory.simulation.mujoco.courses import Course
-from factory.simulation.request import RunRequest
-from factory.simulation.run import entries_of
-from factory.simulation.simulation import Simulation
+from factory.engine.record.verdict import RunVerdict, judged, kept_figures
+from factory.engine.simulation.mujoco.courses import Course
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.run import entries_of
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.geometry.product import product_geometry
+from factory.floor.layout.layout import Layout
+from factory.floor.layout.request import Ground
 from factory.support.settings import MOST, Settings
+from factory.theory.nets.replay import replay
 
 ENDLESS = 1000
 """Units asked for: more than the pool of parts ever needs, so that it is the whole pool."""

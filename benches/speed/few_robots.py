@@ -11,13 +11,13 @@ from typing import Any
 from benches.fidelity.products import BRICKS, EXAMPLES
 from benches.speed.factories import require
 from benches.tables import table
-from factory.nets.verify import verify
+from factory.apps.few_robots.aim import Aim, least_robots
+from factory.apps.few_robots.search import allocated
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.geometry.fused_bodies import fusing_pays
 from factory.pipeline import read
-from factory.plant.fused_bodies import fusing_pays
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
-from factory.study.allocation.aim import Aim, least_robots
-from factory.study.allocation.search import allocated
+from factory.theory.nets.verify import verify
 
 JITTER, UNITS = 0.3, 6
 """Of all runs, but for a product of which one unit is enough."""

@@ -11,7 +11,7 @@ import factory
 from benches.fidelity.products import BRICKS
 from benches.speed.processes import FACTORY, run
 from benches.tables import table
-from factory.problem.pag import PAG, Assembly
+from factory.theory.problem.pag import PAG, Assembly
 
 ROCKET = BRICKS.parent / "rocket.pag"
 """LEGO set 21309 without geometry: 1,845 parts."""

@@ -21,7 +21,7 @@ from benches.speed.factories import (
 )
 from benches.speed.processes import fresh, interleaved, median, resident, serve, spread
 from benches.tables import table
-from factory.simulation.simulation import Simulation
+from factory.engine.simulation.simulation import Simulation
 
 TIMESTEPS = (0.002, None)
 """The engine's timesteps [s]; None is the default."""

@@ -35,10 +35,10 @@ BUILD_AIM = 1.0
 
 def work(file: str, lay_out: bool) -> dict[str, Any]:
     """The stages of `check`, and of `build` up to the certificate, one by one [s]."""
-    from factory.nets.verify import verify
+    from factory.engine.timing.pool import part_pool
     from factory.pipeline import read
     from factory.support.collector import collector_paused
-    from factory.timing.pool import part_pool
+    from factory.theory.nets.verify import verify
 
     found: dict[str, Any] = {}
     with collector_paused():
@@ -56,9 +56,9 @@ def work(file: str, lay_out: bool) -> dict[str, Any]:
 
 
 def _laid_out(plan: Any) -> dict[str, float]:
-    from factory.geometry.product import product_geometry
-    from factory.layout.clearance import certify
-    from factory.layout.embedding import lay_out
+    from factory.floor.geometry.product import product_geometry
+    from factory.floor.layout.clearance import certify
+    from factory.floor.layout.embedding import lay_out
 
     begin = perf_counter()
     layout = lay_out(plan, product_geometry(plan.pag))

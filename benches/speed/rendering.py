@@ -14,14 +14,14 @@ import numpy as np
 from benches.speed.factories import Case, Steady, laid_out, robots_at_least, run_until
 from benches.speed.processes import ROOT, fresh, interleaved, median, ratio, serve, spread
 from benches.tables import table
-from factory.record.monitor.subject import subject_of_run
-from factory.rendering.action import Snapshot
-from factory.rendering.camerawork import Camerawork, Moment, Take
-from factory.rendering.history import History
-from factory.rendering.picture import Picture
-from factory.rendering.reel import Reel
-from factory.rendering.video import FPS
-from factory.simulation.simulation import Simulation
+from factory.engine.record.subject import subject_of_run
+from factory.engine.simulation.simulation import Simulation
+from factory.film.action import Snapshot
+from factory.film.camerawork import Camerawork, Moment, Take
+from factory.film.history import History
+from factory.film.picture import Picture
+from factory.film.reel import Reel
+from factory.film.video import FPS
 from factory.support import gl
 from factory.support.engine import mujoco
 

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from benches.speed.factories import Case, Steady, judge, produce, run_in, run_until
-from factory.layout.layout import Layout
-from factory.simulation.simulation import Simulation
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.layout import Layout
 from factory.support.engine import mujoco
 
 DATA = ("ctrl", "history", "qpos", "qvel", "eq_active", "tree_asleep", "xpos", "xmat", "xquat")

@@ -15,10 +15,10 @@ import click
 from reference_text import code, definition, heading, prose, table
 
 from factory.commands import cli
-from factory.exporting import exporters
-from factory.lang.values import GEOMETRY
+from factory.apps.exports import exporters
+from factory.theory.lang.values import GEOMETRY
 from factory.pipeline import all_templates
-from factory.problem.robot_types import load_catalogue
+from factory.theory.problem.robot_types import load_catalogue
 from factory.support.explanations import codes, explain
 from factory.support.resources import mjcf_folder
 from factory.support.settings import RANGES, Settings
@@ -159,8 +159,8 @@ def diagnostics() -> str:
 
 def log_format() -> str:
     """The log of a run, as the package that writes and reads it describes it."""
-    from factory.record import log
-    from factory.record.log import blocks
+    from factory.apps import log
+    from factory.apps.log import blocks
 
     return "\n\n".join(
         [
@@ -169,7 +169,7 @@ def log_format() -> str:
             heading(2, "Blocks"),
             definition(docstring(blocks)),
             "`factory export LOG --format csv`, `mcap` or `usd` makes other files of "
-            "it; `factory.record.log.read_log` reads it in Python.",
+            "it; `factory.apps.log.read_log` reads it in Python.",
         ]
     )
 

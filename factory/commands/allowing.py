@@ -6,8 +6,8 @@ from typing import Any
 
 import click
 
-from factory.problem.pag import AllowedOverlap
 from factory.support.errors import InputError
+from factory.theory.problem.pag import AllowedOverlap
 
 
 class OverlapOption(click.ParamType[AllowedOverlap]):
@@ -16,7 +16,7 @@ class OverlapOption(click.ParamType[AllowedOverlap]):
     name = "[part:part][:depth]"
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        from factory.lang.overlaps import overlap_in
+        from factory.theory.lang.overlaps import overlap_in
 
         try:
             return value if isinstance(value, AllowedOverlap) else overlap_in(value)

@@ -10,20 +10,20 @@ from typing import TYPE_CHECKING
 
 import click
 
+from factory.apps.runs.options import RunOptions
 from factory.commands import options as shared
 from factory.commands.grouped import Grouped
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced, cut_off, read_partly
-from factory.simulation.options import RunOptions
 from factory.support.console import emit, say, table
 from factory.support.errors import Diagnostic, InputError, usage_error
 
 if TYPE_CHECKING:
+    from factory.apps.analyze import Analysis, Change, Timing
+    from factory.apps.analyze.measured import RunRecord
+    from factory.apps.log import Log
     from factory.pipeline import Project
-    from factory.plant.factory import Factory
-    from factory.record.log import Log
-    from factory.study.analysis import Analysis, Change, Timing
-    from factory.study.analysis.measured import RunRecord
+    from factory.theory.plant.factory import Factory
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class AnalyzeOptions:
 
     def change(self, factory: Factory) -> tuple[str, Change] | None:
         """The change of a what-if question and its description; None without. Raises InputError."""
-        from factory.study.analysis.analysing import change_of
+        from factory.apps.analyze.analysing import change_of
 
         faster = dict(_percent(text, "--faster") for text in self.faster)
         shorter = dict(_percent(text, "--shorter") for text in self.shorter)
@@ -84,10 +84,10 @@ def analyze(
     out: OutputOptions,
 ) -> int:
     """Find the bottleneck of FILE.pag, and what would relieve it."""
-    from factory.nets.verify import proved
-    from factory.study.analysis import Timing, analyse
-    from factory.study.analysis.document import document
-    from factory.study.analysis.measured import Conditions, conditions, logged_record
+    from factory.apps.analyze import Timing, analyse
+    from factory.apps.analyze.document import document
+    from factory.apps.analyze.measured import Conditions, conditions, logged_record
+    from factory.theory.nets.verify import proved
 
     log = study.log(out.silent)
     made = (
@@ -117,7 +117,7 @@ def analyze(
 
 
 def _print(analysis: Analysis, options: ProjectOptions, verbose: bool) -> None:
-    from factory.study.analysis.tables import summary, tables
+    from factory.apps.analyze.tables import summary, tables
 
     for line in (*summary(analysis), *_spare_branches(analysis, options)):
         say(line)
@@ -130,7 +130,7 @@ def _print(analysis: Analysis, options: ProjectOptions, verbose: bool) -> None:
 def _spare_branches(analysis: Analysis, options: ProjectOptions) -> Iterator[str]:
     """For each branch that is there several times, though the factory with one is no slower: the
     cycle times of both, in words."""
-    from factory.study.analysis.timed import timed_net
+    from factory.apps.analyze.timed import timed_net
     from factory.support.files import is_plan
 
     timing, pace = analysis.timing, analysis.net.pace
@@ -147,10 +147,10 @@ def _run(
     project: Project, timing: Timing, asked: RunOptions, silent: bool
 ) -> tuple[RunRecord, int]:
     """A run without fused parts, and its exit status."""
-    from factory.record.monitor.watched import watched
-    from factory.simulation.executing import carry_out
-    from factory.simulation.simulation import Simulation
-    from factory.study.analysis.measured import record_of
+    from factory.apps.analyze.measured import record_of
+    from factory.apps.monitor.watched import watched
+    from factory.engine.simulation.executing import carry_out
+    from factory.engine.simulation.simulation import Simulation
 
     request = replace(asked, fuse=False).request(project, shown=False)
     run = carry_out(Simulation(timing.layout, request), silent, go=watched)

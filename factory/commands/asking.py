@@ -13,8 +13,8 @@ from factory.support.bounds import LENGTHS
 from factory.support.errors import InputError
 
 if TYPE_CHECKING:
-    from factory.planning.parts import InPlace
-    from factory.planning.source import SourceOptions
+    from factory.apps.planning.parts import InPlace
+    from factory.apps.planning.source import SourceOptions
 
 
 def is_terminal() -> bool:

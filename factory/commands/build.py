@@ -23,7 +23,7 @@ from factory.support.files import is_plan
 from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
-    from factory.exporting.build import Built
+    from factory.apps.exports.build import Built
     from factory.pipeline import Project
 
 SHOWN = 20
@@ -61,10 +61,10 @@ def build(
     kept = find_build(name)
     is_current = kept is not None
     if kept is None:
-        from factory.exporting.build import BuildRequest
-        from factory.exporting.build import build as build_files
-        from factory.nets.verify import proved
-        from factory.record.plan_file import plan_and_layout
+        from factory.apps.exports.build import BuildRequest
+        from factory.apps.exports.build import build as build_files
+        from factory.apps.log.plan_file import plan_and_layout
+        from factory.theory.nets.verify import proved
 
         request = BuildRequest(mjcf, output, units, wip)
         if not is_plan(options.file):  # a search for few robots lays out too
@@ -105,10 +105,10 @@ def _listed(files: list[str], verbose: bool) -> list[str]:
 
 def _printed(project: Project, built: Built, spent: float, wip: int | None) -> dict[str, Any]:
     """What a build prints: the document of `--json`, the lines for people, the warnings."""
-    from factory.layout.hands.bores import bores
-    from factory.layout.tiles import fill_of, tiles_of
+    from factory.engine.timing.gain import gain
+    from factory.floor.layout.hands.bores import bores
+    from factory.floor.layout.tiles import fill_of, tiles_of
     from factory.support.settings import AUTO
-    from factory.timing.gain import gain
 
     layout, settings, model = project.layout, project.settings, built.model
     root, robots = layout.factory.pag.root, len(layout.factory.robots)

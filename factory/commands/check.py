@@ -32,11 +32,11 @@ from factory.support.files import is_net
 from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
-    from factory.compiler.mating.findings import Matings
-    from factory.nets.coordinated import CoordinatedNet
-    from factory.nets.verdict import Witness
-    from factory.problem.pag import AllowedOverlap
-    from factory.study.checking import Checked
+    from factory.commands.checking import Checked
+    from factory.floor.mating.findings import Matings
+    from factory.theory.nets.coordinated import CoordinatedNet
+    from factory.theory.nets.verdict import Witness
+    from factory.theory.problem.pag import AllowedOverlap
 
 SHOWN = 24
 """The most robots that are printed, unless `-v` asks for all."""
@@ -86,7 +86,7 @@ def check(
         return _check_clearance(folder, out)
     if options.file == Path():
         raise usage_error("Missing argument 'FILE'.", "see factory check --help")
-    from factory.study.checking import check_net, check_project
+    from factory.commands.checking import check_net, check_project
     from factory.support.files import own_names, write_all, write_text
 
     file = options.file
@@ -106,7 +106,7 @@ def check(
         own_names(clashes, files)
         write_all(files)
     if certificate is not None:
-        from factory.exporting.certificate.writer import certificate as document
+        from factory.apps.exports.certificate.writer import certificate as document
 
         proof = document(checked.net, checked.verdict)
         write_text(certificate, json.dumps(proof, ensure_ascii=False) + "\n")
@@ -123,8 +123,8 @@ def check(
 def _check_clearance(folder: Path, out: OutputOptions) -> int:
     """Check the clearance certificate in a folder. Raises InputError, or RunError (BadProof) with
     everything that is wrong with it."""
-    from factory.exporting.clearance.checking import faults_of
-    from factory.exporting.clearance.documents import read_folder
+    from factory.apps.exports.clearance.checking import faults_of
+    from factory.apps.exports.clearance.documents import read_folder
 
     with Waiting("checking that machines never meet", out.silent):
         proof = read_folder(folder)
@@ -147,8 +147,8 @@ def _check_clearance(folder: Path, out: OutputOptions) -> int:
 def _proved(certificate: Path, checked: Checked) -> dict[str, bool | None]:
     """The claims of a certificate of the checked net: each property proved (True), said to fail
     (False) or open (None). Raises InputError, or RunError if the certificate is refused."""
-    from factory.exporting.certificate.listing import CLAIMS, TRAIN
-    from factory.exporting.certificate.proof_file import check_against
+    from factory.apps.exports.certificate.listing import CLAIMS, TRAIN
+    from factory.apps.exports.certificate.proof_file import check_against
 
     document = check_against(certificate, checked.net, checked.verdict)
     claims = (*CLAIMS, TRAIN) if TRAIN in document else CLAIMS
@@ -168,7 +168,7 @@ def _claims(proved: dict[str, bool | None]) -> str:
 def _pictures(checked: Checked, folder: Path) -> dict[Path, bytes]:
     """The files of `--clashes`: a picture of each blocked operation, and of each sub-assembly that
     no hand can hold."""
-    from factory.exporting import clash_picture, grip_picture
+    from factory.apps.exports import clash_picture, grip_picture
 
     drawn: dict[Path, bytes] = {}
     if checked.product is None:

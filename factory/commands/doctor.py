@@ -107,7 +107,7 @@ def _extra(name: str) -> Finding:
 def _assets() -> Finding:
     try:
         from factory.pipeline import all_templates
-        from factory.problem.robot_types import load_catalogue
+        from factory.theory.problem.robot_types import load_catalogue
 
         counts = f"{len(all_templates())} operations, {len(load_catalogue().types)} robot types"
         return Finding("assets", True, counts)

@@ -19,7 +19,7 @@ from factory.support.console import emit, say, warn
 from factory.support.errors import usage_error
 
 if TYPE_CHECKING:
-    from factory.exporting.subject import Source
+    from factory.apps.exports.subject import Source
 
 
 STDOUT = Path("-")
@@ -30,7 +30,7 @@ class _Listing(Grouped):
     """A command whose help ends with the summary of every exporter."""
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        from factory.exporting import exporters
+        from factory.apps.exports import exporters
 
         with formatter.section("Formats"):
             formatter.write_dl([(e.format, e.summary) for e in exporters().values()])
@@ -43,14 +43,14 @@ class _Format(click.ParamType[str]):
 
     def get_missing_message(self, param: click.Parameter, ctx: click.Context | None) -> str:
         """The list of formats."""
-        from factory.exporting import exporters
+        from factory.apps.exports import exporters
 
         return f"There are: {', '.join(exporters())}."
 
     def shell_complete(
         self, ctx: click.Context, param: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
-        from factory.exporting import exporters
+        from factory.apps.exports import exporters
 
         offered = exporters().values()
         return [
@@ -87,10 +87,10 @@ def export(
     of: str,
 ) -> int:
     """Write FILE.pag, a net in FILE.pnml or a LOG of a run for other tools."""
-    from factory.exporting.writing import check_taken, exporter, read_source, takes_folder
-    from factory.exporting.writing import export as exported
+    from factory.apps.exports.writing import check_taken, exporter, read_source, takes_folder
+    from factory.apps.exports.writing import export as exported
+    from factory.apps.log import Log
     from factory.pipeline import Project
-    from factory.record.log import Log
     from factory.support.files import write_all
 
     chosen = exporter(form, of, exporting)

@@ -17,7 +17,7 @@ from factory.commands.warnings import announced
 from factory.support.console import emit, finite, say, table
 
 if TYPE_CHECKING:
-    from factory.study.fidelity.record import Fidelity
+    from factory.apps.fidelity.record import Fidelity
 
 
 @click.command(cls=Grouped)
@@ -54,11 +54,11 @@ def fidelity(
     max_time: float | None,
 ) -> int:
     """Compare FILE.pag in MuJoCo with the ideal world over the same seeds."""
-    from factory.nets.verify import proved
-    from factory.study.fidelity import measure
-    from factory.study.pool import cores
+    from factory.apps.fidelity import measure
+    from factory.apps.sweep.pool import cores
     from factory.support.files import write_text
     from factory.support.progress import StepBar
+    from factory.theory.nets.verify import proved
 
     writable(output)
     project = options.project(out.silent)
@@ -88,7 +88,7 @@ def fidelity(
 
 def _print(measured: Fidelity, verbose: bool) -> None:
     """Print the figures as a table."""
-    from factory.study.fidelity import QUANTITIES
+    from factory.apps.fidelity import QUANTITIES
 
     worst, mean = measured.worst(), measured.mean()
     rows = [

@@ -17,7 +17,7 @@ from factory.support.errors import Diagnostic, InputError, usage_error
 from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
-    from factory.problem.template import Template
+    from factory.theory.problem.template import Template
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 
@@ -63,8 +63,8 @@ def import_(
 ) -> int:
     """Convert SOURCE to a PAG: an LDraw model (.ldr, .mpd), a tree of meshes (.json, .yaml), a bill
     of materials with levels (.csv), or a folder with one of these."""
-    from factory.importing import Options, import_product
-    from factory.importing.draft import Mates
+    from factory.apps.importing import Options, import_product
+    from factory.apps.importing.draft import Mates
     from factory.pipeline import all_templates
     from factory.support.files import own_names, write_all
 
@@ -112,7 +112,7 @@ def import_(
 
 def _chosen(columns: Sequence[str]) -> dict[str, str]:
     """The titles of columns by their names. Raises InputError (Usage)."""
-    from factory.importing.bill_header import TITLES
+    from factory.apps.importing.bill_header import TITLES
 
     chosen = dict[str, str]()
     for said in columns:
@@ -126,9 +126,9 @@ def _chosen(columns: Sequence[str]) -> dict[str, str]:
 
 def _shape_warnings(pag: Path, templates: Mapping[str, Template]) -> tuple[Diagnostic, ...]:
     """The warnings that `build` will give about the shapes of a written PAG."""
-    from factory.geometry.overlapping import overlaps_of
-    from factory.geometry.product import product_geometry
-    from factory.lang.pag_reader import load_pag
+    from factory.floor.geometry.overlapping import overlaps_of
+    from factory.floor.geometry.product import product_geometry
+    from factory.theory.lang.pag_reader import load_pag
 
     try:
         made = load_pag(pag, templates)

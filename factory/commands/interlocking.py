@@ -11,8 +11,8 @@ from factory.support.errors import InputError, MissingError
 from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
-    from factory.planning.parts import InPlace
-    from factory.planning.plan import CannotAssemble
+    from factory.apps.planning.parts import InPlace
+    from factory.apps.planning.plan import CannotAssemble
 
 DRAWN = 6
 """Maximum number of pictures, one for each set of interlocked parts."""
@@ -22,7 +22,7 @@ def refuse(
     placed: InPlace, why: CannotAssemble, folder: Path, look: bool, out: OutputOptions
 ) -> int:
     """Print why there is no assembly tree, and draw it; returns the exit status."""
-    from factory.planning.outcome import refusal
+    from factory.apps.planning.outcome import refusal
     from factory.support.console import fail
 
     pictures = _interlocked(placed, why, folder, out) if look else []
@@ -39,8 +39,8 @@ def _interlocked(
 ) -> list[Path]:
     """Pictures of the first sets of interlocked parts; none, with a warning, on a machine without
     GL."""
-    from factory.importing.draft import file_stem
-    from factory.rendering.interlocked import InterlockedView
+    from factory.apps.importing.draft import file_stem
+    from factory.apps.planning.interlocked import InterlockedView
     from factory.support.files import own_names
 
     locks = why.interlocks[:DRAWN]

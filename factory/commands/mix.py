@@ -30,10 +30,10 @@ def mix(
     out: OutputOptions,
 ) -> int:
     """Write ONE.pag and OTHER.pag as one product family, in which what is equal is written once."""
-    from factory.lang import load_pag, write_pag
+    from factory.apps.revise.family import family
     from factory.pipeline import all_templates
-    from factory.plant.family import family
     from factory.support.files import write_all
+    from factory.theory.lang import load_pag, write_pag
 
     writable(output)
     templates, counts = all_templates(folders), _counts(count)

@@ -14,10 +14,10 @@ from factory.commands.requests import OutputOptions
 from factory.support.console import emit, say
 
 if TYPE_CHECKING:
-    from factory.record.ending import CutOff
-    from factory.record.failures import Failures
-    from factory.record.monitor import Report
-    from factory.record.verdict import RunVerdict
+    from factory.apps.monitor import Report
+    from factory.engine.record.ending import CutOff
+    from factory.engine.record.failures import Failures
+    from factory.engine.record.verdict import RunVerdict
 
 
 @click.command()
@@ -33,9 +33,9 @@ def monitor(file: Path, lenient: bool, strict: bool, out: OutputOptions) -> int:
     net says, or that was cut off before its units were made, for a LOG that is not that of its PAG
     or was kept with other versions, whose states are not judged, and 2 for a LOG that ends before
     there is anything to judge."""
-    from factory.record.log import read_log
-    from factory.record.monitor.record import recorded_subject, verdict_on, watch_log
-    from factory.simulation.remade import forged, model_faults
+    from factory.apps.log import read_log
+    from factory.apps.monitor.record import recorded_subject, verdict_on, watch_log
+    from factory.apps.resume.remade import forged, model_faults
 
     log = read_log(file)
     of = recorded_subject(log.header).factory

@@ -51,7 +51,7 @@ def new(name: Path, out: OutputOptions) -> int:
 def starter(name: str) -> dict[str, bytes]:
     """The files of a product called `name`, by their paths. Raises InputError (BadValue) for an
     invalid name."""
-    from factory.problem.pag import RESERVED
+    from factory.theory.problem.pag import RESERVED
 
     if not re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_\-]{0,60}", name) or name in (*RESERVED, *LABELS):
         message = f"'{name}' cannot be the name of a product"

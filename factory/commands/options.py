@@ -11,24 +11,24 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import click
 
+from factory.apps.runs.options import RunOptions
 from factory.commands.paths import OUT as OUT
 from factory.commands.paths import PATH as PATH
 from factory.commands.paths import pag_files as pag_files
 from factory.commands.requests import OutputOptions, PictureOptions, ProjectOptions
-from factory.simulation.options import RunOptions
 from factory.support.bounds import BOUNDS, TIMES
 from factory.support.errors import FactoryError
 from factory.support.settings import LEAST, MOST_BRANCHES
 
 if TYPE_CHECKING:
-    from factory.problem.pag import PAG
+    from factory.theory.problem.pag import PAG
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
 def cameras(ctx: click.Context, param: click.Parameter, begun: str) -> list[str]:
     """Completions of --camera in a shell: those of FILE, if that can be read."""
-    from factory.rendering.picture import camera_names
+    from factory.film.picture import camera_names
 
     # Of a line that is not complete click keeps the arguments apart, and sets no parameter.
     files = [ctx.params.get("file"), *map(Path, ctx.args)]
@@ -43,12 +43,12 @@ def panels(ctx: click.Context, param: click.Parameter, begun: str) -> list[str]:
 
 def _pag(file: Path | None, folders: Sequence[Path]) -> PAG | None:
     """The PAG in a file or a log; None where it cannot be read."""
-    from factory.lang import load_pag
+    from factory.apps.log import is_log, read_log
+    from factory.apps.log.plan_file import read_plan
+    from factory.apps.log.project_table import factory_of, project_of
     from factory.pipeline import all_templates
-    from factory.record.log import is_log, read_log
-    from factory.record.plan_file import read_plan
-    from factory.record.project_table import factory_of, project_of
     from factory.support.files import is_plan
+    from factory.theory.lang import load_pag
 
     try:
         if file is None:

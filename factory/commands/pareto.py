@@ -19,9 +19,9 @@ from factory.support.console import emit, say, table
 from factory.support.errors import Diagnostic, StoppedError, usage_error
 
 if TYPE_CHECKING:
+    from factory.apps.pareto import Effort, FrontPoint, ParetoFront
+    from factory.apps.pareto.sweeping import Step
     from factory.pipeline import Project
-    from factory.study.pareto import Effort, FrontPoint, ParetoFront
-    from factory.study.pareto.sweeping import Step
 
 PAGE_NAME = "pareto.html"
 
@@ -66,7 +66,7 @@ def pareto(
 
     Ctrl-C ends the search; the points found until then are printed and written. The exit status
     is 1 if a point that was run fails, or differs from its prediction by more than 2 %."""
-    from factory.study.pareto import Effort
+    from factory.apps.pareto import Effort
     from factory.support.files import own_names
 
     if trials and not layouts:
@@ -101,8 +101,8 @@ def _found(
 ) -> tuple[ParetoFront, StoppedError | None]:
     """The front, with the runs of `trials` of its points; and the error of an interruption, if the
     user stopped the search after a first point."""
-    from factory.study.pareto import FrontSweep
-    from factory.study.pareto.front import tried
+    from factory.apps.pareto import FrontSweep
+    from factory.apps.pareto.front import tried
     from factory.support.progress import StepBar
 
     front = None
@@ -133,8 +133,8 @@ def _written(
 ) -> tuple[Sequence[str | None], list[Path]]:
     """Write the page and the files of the points into a folder, if there is one. Returns the
     commands that build the points, and the files."""
-    from factory.show.pareto.page import floor_plans, front_page
-    from factory.study.pareto.front import commands_of, point_files
+    from factory.apps.pareto.front import commands_of, point_files
+    from factory.apps.pareto.page import floor_plans, front_page
     from factory.support.files import own_names, write_all
 
     if folder is None:

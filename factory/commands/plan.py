@@ -22,13 +22,13 @@ from factory.support.errors import MissingError
 from factory.support.progress import StepBar, Waiting
 
 if TYPE_CHECKING:
-    from factory.geometry.meshes import Array
-    from factory.geometry.overlapping import Overlapping
+    from factory.apps.planning.parts import InPlace
+    from factory.apps.planning.plan import CannotAssemble, Planned, PlannedJoin, PlanOptions
+    from factory.apps.planning.searching import Aim
+    from factory.floor.geometry.meshes import Array
+    from factory.floor.geometry.overlapping import Overlapping
     from factory.pipeline import Project
-    from factory.planning.parts import InPlace
-    from factory.planning.plan import CannotAssemble, Planned, PlannedJoin, PlanOptions
-    from factory.planning.searching import Aim
-    from factory.plant.approaches import Approach, Kind
+    from factory.theory.plant.approaches import Approach, Kind
 
 LOOKS = ("exploded.png", "assembly.mp4")
 """Suffixes of the names of the still and of the film."""
@@ -103,14 +103,14 @@ def plan(
     write the assembly tree as a PAG with its meshes. SOURCE is a folder of meshes, a file with
     named bodies (.glb, .3mf, .step), an LDraw model (.ldr, .mpd), or a PAG whose assembly tree is
     to be ignored."""
-    from factory.importing.draft import file_stem
-    from factory.lang.overlaps import overlaps_in
+    from factory.apps.importing.draft import file_stem
+    from factory.apps.planning.outcome import write_planned
+    from factory.apps.planning.plan import CannotAssemble, PlanOptions
+    from factory.apps.planning.source import SourceOptions, read_source
     from factory.pipeline import all_templates, read
-    from factory.planning.outcome import write_planned
-    from factory.planning.plan import CannotAssemble, PlanOptions
-    from factory.planning.source import SourceOptions, read_source
     from factory.sharing import with_lines
     from factory.support.files import own_names
+    from factory.theory.lang.overlaps import overlaps_in
 
     templates = all_templates(folders)
     writable_folder(output)
@@ -161,8 +161,8 @@ def _sought(
 ) -> tuple[Planned | CannotAssemble, bool]:
     """The best plan found within the time or until a signal, or the reason why there is none; and
     whether there was a signal. Before a first tree is found a signal is raised at once."""
-    from factory.planning.plan import LAYING
-    from factory.planning.plan import plan as sought
+    from factory.apps.planning.plan import LAYING
+    from factory.apps.planning.plan import plan as sought
     from factory.support.interruption import Interruption
 
     with (
@@ -181,8 +181,8 @@ def _sought(
 def _looks(project: Project, out: OutputOptions) -> list[Path]:
     """The still and the film of the exploded view, written beside the PAG; none, with a warning, on
     a machine without GL."""
-    from factory.planning.exploding import explosion
-    from factory.rendering.exploded import ExplodedView
+    from factory.apps.planning.exploded import ExplodedView
+    from factory.apps.planning.exploding import explosion
 
     still, film = map(project.file.with_name, _looks_of(project.name))
     if project.matings is None:
@@ -284,7 +284,7 @@ def _print_files(files: Sequence[Path], out: OutputOptions) -> None:
 
 def _way(approach: Approach, orientation: Array) -> str:
     """The approach of an operation in words, with directions in the frame of the source."""
-    from factory.planning.posing import in_words
+    from factory.apps.planning.posing import in_words
 
     if approach.kind == "lower":
         return f"{approach.told} from {in_words(orientation[2])}"

@@ -6,13 +6,13 @@ import sys
 
 import click
 
+from factory.apps.runs.options import RunOptions
 from factory.commands.grouped import Grouped
 from factory.commands.monitor import tell_failures
 from factory.commands.options import FLOOR, LENIENT, MOTION, OUTPUT, RUN, SOURCE, address
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.run import summarise
 from factory.commands.warnings import announced
-from factory.simulation.options import RunOptions
 from factory.support.console import emit, say
 from factory.support.errors import usage_error
 
@@ -55,10 +55,10 @@ def plant(
     The controller writes targets, grips, jobs and a heartbeat, without which all axes stand. What
     the net or the reach of a grip does not allow is refused by name. `export --format st` writes
     a controller."""
-    from factory.commands.running import carry_on
-    from factory.nets.verify import proved
-    from factory.show.opcua import OpcuaPlant, check_plant
-    from factory.simulation.simulation import Simulation
+    from factory.apps.plc.opcua import OpcuaPlant, check_plant
+    from factory.apps.runs.running import carry_on
+    from factory.engine.simulation.simulation import Simulation
+    from factory.theory.nets.verify import proved
 
     check_plant(host, expose)
     if asked.start is not None:

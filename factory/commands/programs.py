@@ -17,7 +17,7 @@ from factory.support.errors import did_you_mean, usage_error
 @OUTPUT
 def programs(options: ProjectOptions, out: OutputOptions, robot: str | None) -> int:
     """Print each robot's program, in the paper's form."""
-    from factory.plant.programs import program_of, write_program
+    from factory.theory.plant.programs import program_of, write_program
 
     factory = options.project(out.silent).factory
     names = [r.name for r in factory.robots]

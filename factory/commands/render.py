@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from factory.apps.runs.options import RunOptions
 from factory.commands import options as shared
 from factory.commands.grouped import Grouped
 from factory.commands.outputs import for_a_pag, writable
 from factory.commands.requests import OutputOptions, PictureOptions, ProjectOptions
 from factory.commands.warnings import announced, cut_off, read_partly
-from factory.simulation.options import RunOptions
 from factory.support.console import emit, say, warn
 from factory.support.errors import Diagnostic, InputError
 
@@ -45,9 +45,9 @@ def render(
     at: str,
 ) -> int:
     """Film FILE.pag, or the run in a LOG written by `run --log`, headless through EGL."""
-    from factory.record.log import is_log
-    from factory.record.log.pictures import Shot
-    from factory.record.log.pictures import render as taken
+    from factory.apps.log import is_log
+    from factory.apps.runs.pictures import Shot
+    from factory.apps.runs.pictures import render as taken
 
     file = options.file
     if is_log(file):

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import click
 
+from factory.apps.runs.options import RunOptions
 from factory.commands import options as shared
 from factory.commands.grouped import Grouped
 from factory.commands.outputs import for_a_pag, writable
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.run import summarise
 from factory.commands.warnings import announced
-from factory.simulation.options import RunOptions
 from factory.support.console import emit, say
 
 
@@ -43,8 +43,8 @@ def report(options: ProjectOptions, asked: RunOptions, out: OutputOptions, outpu
     The page is always written. The exit status is 1 if the run failed, or was cut off before its
     units were made; --lenient ignores what its bodies do, and with --strict a run whose success is
     qualified fails."""
-    from factory.record.log import is_log
-    from factory.show.report.page import report_on
+    from factory.apps.log import is_log
+    from factory.apps.report.page import report_on
     from factory.support.files import write_text
 
     file = options.file

@@ -8,18 +8,18 @@ from math import inf, prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from factory.simulation.options import check_together
+from factory.apps.runs.options import check_together
 from factory.support.bounds import pair
 from factory.support.errors import Diagnostic, InputError, did_you_mean, usage_error
 
 if TYPE_CHECKING:
-    from factory.layout.request import Ground
+    from factory.apps.few_robots.candidate import Candidate
+    from factory.apps.log.plan_file import PlanFile
+    from factory.film import Picture
+    from factory.floor.layout.request import Ground
     from factory.pipeline import Project
-    from factory.problem.pag import PAG, AllowedOverlap
-    from factory.record.plan_file import PlanFile
-    from factory.rendering import Picture
-    from factory.study.allocation.candidate import Candidate
     from factory.support.settings import Settings
+    from factory.theory.problem.pag import PAG, AllowedOverlap
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +78,7 @@ class ProjectOptions:
 
     def ground(self) -> Ground:
         """The request of FLOOR and RELAY. Raises InputError (BadValue)."""
-        from factory.layout.request import TILE, WIDEST, Ground
+        from factory.floor.layout.request import TILE, WIDEST, Ground
         from factory.support.user_defaults import defaults_for
 
         floor = None if self.floor is None else pair(self.floor, "--floor", "4x3", float, WIDEST)
@@ -161,14 +161,14 @@ class ProjectOptions:
         ]
         if faults:
             raise InputError(faults)
-        from factory.record.plan_file import read_plan
+        from factory.apps.log.plan_file import read_plan
 
         return read_plan(self.file)
 
     def _with_few_robots(self, project: Project, silent: bool) -> Project:
         """The project with the plan that is found for --robots and --cycle."""
-        from factory.study.allocation.aim import Aim, usual_effort
-        from factory.study.allocation.search import allocated
+        from factory.apps.few_robots.aim import Aim, usual_effort
+        from factory.apps.few_robots.search import allocated
         from factory.support.console import warn
         from factory.support.progress import StepBar
 
@@ -206,7 +206,7 @@ class PictureOptions:
         """The picture that the options describe; `pag`: the product whose labels cameras may name,
         None for any. Raises InputError (BadValue) for an unknown name, a size without room for
         the panels, or a poster that cannot be a still."""
-        from factory.rendering import Picture, camera_named, check_output, panels_named
+        from factory.film import Picture, camera_named, check_output, panels_named
 
         camera, panels = camera_named(self.camera, pag), panels_named(self.panels)
         picture = Picture(self.area(), camera, panels=panels, title=self.title)

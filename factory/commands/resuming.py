@@ -11,7 +11,7 @@ from factory.support.console import emit, say
 from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
-    from factory.simulation.resuming import Resumed
+    from factory.apps.resume.resuming import Resumed
 
 ALLOWED = ("resume", "max_time", "lenient", "strict", "monitor")
 """The options of `run` that go with --resume."""
@@ -20,8 +20,8 @@ ALLOWED = ("resume", "max_time", "lenient", "strict", "monitor")
 def resumed(file: Path, max_time: float | None, out: OutputOptions) -> Resumed | None:
     """The run in a log, to be continued until `max_time` [s]; prints how far it came. None, with a
     message, for a run that has made its units."""
-    from factory.record.ending import CutOff
-    from factory.simulation.resuming import resume
+    from factory.apps.resume.resuming import resume
+    from factory.engine.record.ending import CutOff
 
     for_a_pag(file, "a log", *ALLOWED)
     with Waiting("reading the log and rebuilding its simulation", out.silent):

@@ -16,7 +16,7 @@ from factory.support.errors import RunError
 from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
-    from factory.study.revision import Pin
+    from factory.apps.revise.revision import Pin
 
 
 @click.command()
@@ -50,12 +50,12 @@ def revise(
 
     With --live, -o DIR also writes DIR/family.pag, the mix of both, and DIR/live.csv, orders for a
     change: factory run DIR/family.pag --demand DIR/live.csv --units 18 --wip 4"""
-    from factory.exporting.build import BuildRequest, build
-    from factory.nets.verify import proved
-    from factory.study.live import FAMILY_NAME, ORDERS_NAME, LiveChange
-    from factory.study.revision import revised
+    from factory.apps.exports.build import BuildRequest, build
+    from factory.apps.revise.live import FAMILY_NAME, ORDERS_NAME, LiveChange
+    from factory.apps.revise.revision import revised
+    from factory.engine.timing.timed import pace
     from factory.support.files import own_names, write_all
-    from factory.timing.timed import pace
+    from factory.theory.nets.verify import proved
 
     writable(picture)
     writable_folder(output)
@@ -85,7 +85,7 @@ def revise(
         write_all(texts)
         files += map(str, texts)
     if picture is not None:
-        from factory.exporting.revision_picture import draw_revision
+        from factory.apps.revise.revision_picture import draw_revision
 
         layouts, moved = (before.layout, revision.new.layout), revision.inheritance.shift
         write_all({picture: draw_revision(revision.title, layouts, revision.kept, moved).encode()})

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from factory.apps.runs.options import RunOptions, check_ideal
 from factory.commands import options as shared
 from factory.commands.allowing import ALLOW
 from factory.commands.grouped import Grouped
@@ -20,18 +21,17 @@ from factory.commands.requests import (
 )
 from factory.commands.resuming import resumed
 from factory.commands.warnings import announced, say_allowed
-from factory.simulation.options import RunOptions, check_ideal
 from factory.support.console import emit, say, table
 from factory.support.errors import usage_error
 from factory.support.guard import reading
 from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
-    from factory.commands.running import Filming
+    from factory.apps.resume.resuming import Resumed
+    from factory.apps.runs.running import Filming
+    from factory.engine.simulation.run import Run
     from factory.pipeline import Project
-    from factory.plant.factory import Factory
-    from factory.simulation.resuming import Resumed
-    from factory.simulation.run import Run
+    from factory.theory.plant.factory import Factory
 
 
 @click.command(cls=Grouped)
@@ -93,7 +93,7 @@ def run(
     if video is not None:
         shown.area()
     project = options.project(out.silent)
-    from factory.commands.running import check_run, run_project
+    from factory.apps.runs.running import check_run, run_project
 
     check_run(project, asked)
     with Waiting("reading the shapes and laying out", out.silent):
@@ -112,7 +112,7 @@ def run(
 
 def _continue(going: Resumed, asked: RunOptions, monitor: bool | None, out: OutputOptions) -> int:
     """Continue the run in a log to its end; returns the exit status."""
-    from factory.commands.running import carry_on
+    from factory.apps.runs.running import carry_on
 
     made = going.simulation
     record = carry_on(made, asked, out.silent, going.path, [going.recorder], monitor)
@@ -153,7 +153,7 @@ def _film(
         return None
     if asked.world == "ideal":
         raise usage_error("the ideal world has no bodies to film", "leave out --world ideal")
-    from factory.rendering import Film, check_output
+    from factory.film import Film, check_output
     from factory.support.gl import probe
 
     check_output(video, shown.area(), shown.fps)
@@ -164,7 +164,7 @@ def _film(
 
 def summarise(record: Run, factory: Factory, verbose: bool) -> None:
     """Print a run in a few lines; the first line of a failed run says why."""
-    from factory.simulation.figures import figures
+    from factory.engine.simulation.figures import figures
 
     if not record.succeeded:
         say_verdict(record.verdict, verbose)

@@ -18,8 +18,8 @@ from factory.support.console import emit, say, table
 from factory.support.errors import usage_error
 
 if TYPE_CHECKING:
-    from factory.study.sweep.summary import Summary
-    from factory.study.sweep.sweeping import Tally
+    from factory.apps.sweep.summary import Summary
+    from factory.apps.sweep.sweeping import Tally
 
 SHOWN = 8
 """The most reasons of failed runs that are printed."""
@@ -110,10 +110,10 @@ def _carry_out(
     out: OutputOptions,
 ) -> tuple[Tally, list[dict[str, object]]]:
     """Plan, prove and run a sweep. Returns the warnings too. Raises InputError."""
-    from factory.study.pool import cores
-    from factory.study.sweep.grid import read_axes
-    from factory.study.sweep.recipe import recipe_of
-    from factory.study.sweep.sweeping import sweep
+    from factory.apps.sweep.grid import read_axes
+    from factory.apps.sweep.pool import cores
+    from factory.apps.sweep.recipe import recipe_of
+    from factory.apps.sweep.sweeping import sweep
 
     writable(database)
     axes = read_axes(vary)
@@ -144,7 +144,7 @@ def _print(tally: Tally, database: Path) -> None:
 
 def _summarise(database: Path | None, out: OutputOptions) -> dict[str, Any]:
     """Summarise a database. Returns the key `summary` of `sweep --summary --json`."""
-    from factory.study.sweep.summary import summarise
+    from factory.apps.sweep.summary import summarise
 
     if database is None:
         raise usage_error("there is no database", "factory sweep RESULTS --summary")
@@ -156,7 +156,7 @@ def _summarise(database: Path | None, out: OutputOptions) -> dict[str, Any]:
 
 def _print_summary(result: Summary, verbose: bool) -> None:
     """A table for each group: figure, mean, spread, confidence interval."""
-    from factory.study.sweep.summary import CONFIDENCE, FIRST
+    from factory.apps.sweep.summary import CONFIDENCE, FIRST
 
     heads = ("figure", "mean", "deviation", f"{CONFIDENCE:.0%} from", "to", "least", "greatest")
     for group in result.groups:

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 
 import click
 
+from factory.apps.runs.options import RunOptions
 from factory.commands import options as shared
 from factory.commands.grouped import Grouped
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced
-from factory.simulation.options import RunOptions
 from factory.support.console import emit, say
 
 if TYPE_CHECKING:
-    from factory.show.live import Server
+    from factory.apps.live import Server
 
 FOR_EVER = 10**9
 """Units of a run that does not end by itself."""
@@ -47,13 +47,13 @@ def view(
     """Run FILE.pag endlessly in a browser, where you can pause it, push robots and block feeders.
 
     With --spares or --faults the run recovers from failures: you can pause or kill robots."""
-    from factory.commands.running import campaign_of
-    from factory.nets.verify import proved
-    from factory.show.live import Server, Session
-    from factory.show.live.page import page
-    from factory.show.live.server import check_server
-    from factory.simulation.simulation import Simulation
+    from factory.apps.live import Server, Session
+    from factory.apps.live.page import page
+    from factory.apps.live.server import check_server
+    from factory.apps.runs.running import campaign_of
+    from factory.engine.simulation.simulation import Simulation
     from factory.support.interruption import Interruption
+    from factory.theory.nets.verify import proved
 
     check_server(host, expose)
     asked.check_combination()

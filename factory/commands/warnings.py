@@ -14,8 +14,8 @@ from factory.support.errors import Diagnostic
 from factory.support.files import natural
 
 if TYPE_CHECKING:
+    from factory.apps.log import Log
     from factory.pipeline import Project
-    from factory.record.log import Log
 
 
 LISTED = {"Overlap": (6, "pairs overlap"), "Blocked": (24, "operations are blocked")}
@@ -73,7 +73,7 @@ def say_allowed(project: Project) -> None:
 
 def read_partly(file: Path, silent: bool) -> Log:
     """The log in a file, with a warning where its run was cut off. Raises InputError (BadLog)."""
-    from factory.record.log import read_log
+    from factory.apps.log import read_log
 
     log = read_log(file)
     if log.cut_off:

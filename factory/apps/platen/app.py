@@ -2,4 +2,4 @@
 
 from factory.support.apps import App
 
-APP = App("platen", layouts={"platen": "factory.layout.platen:platen"})
+APP = App("platen", layouts={"platen": "factory.apps.platen.platen:platen"})

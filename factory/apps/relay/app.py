@@ -2,4 +2,4 @@
 
 from factory.support.apps import App
 
-APP = App("relay", layouts={"relay": "factory.layout.relaying.relaying:relay"})
+APP = App("relay", layouts={"relay": "factory.apps.relay.relaying:relay"})

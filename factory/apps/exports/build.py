@@ -1,0 +1,141 @@
+"""The files of a build: the model, the floor plan, the programs, the net and the proofs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from factory.apps.exports.certificate.writer import certificate
+from factory.apps.exports.dot import write_dot
+from factory.apps.exports.floor_sheet import write_svg
+from factory.apps.exports.pnml import write_pnml
+from factory.apps.exports.ways import ways
+from factory.apps.log.plan_file import LAYOUT_NAME, PLAN_NAME, plan_files
+from factory.engine.mjcf.binary import beside, kept, key_of, packed, seal_of, sealed
+from factory.engine.mjcf.model import Model, model_files
+from factory.engine.mjcf.stock import written
+from factory.engine.simulation.modelling import physical_model
+from factory.floor.layout.certificate import Certificate
+from factory.floor.layout.clearance import certify
+from factory.floor.layout.exclusions import coordinated
+from factory.floor.modes.modes import operation_modes
+from factory.pipeline import Project
+from factory.support.errors import RunError
+from factory.support.files import own_names, write_all
+from factory.theory.nets.verdict import Verdict
+from factory.theory.plant.programs import program_of, write_program
+
+
+def _json(document: object) -> str:
+    return json.dumps(document, ensure_ascii=False) + "\n"
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """What the documents of a build are about."""
+
+    project: Project
+    clearance: Certificate
+    verdict: Verdict
+    model: Model
+
+
+def _programs(what: _Drawn) -> str:
+    factory = what.project.layout.factory
+    programs = (write_program(program_of(factory, robot.index)) for robot in factory.robots)
+    return "\n\n".join(programs) + "\n"
+
+
+DOCUMENTS: Mapping[str, Callable[[_Drawn], str]] = {
+    "svg": lambda what: write_svg(what.project.layout),
+    "programs.txt": _programs,
+    "proof.json": lambda what: _json(certificate(what.project.layout.factory.net, what.verdict)),
+    "clearance.json": lambda what: _json(what.clearance.as_json()),
+    "dot": lambda what: write_dot(what.project.layout.factory.net),
+    "pnml": lambda what: write_pnml(what.project.layout.factory.net),
+    "coordinated.pnml": lambda what: write_pnml(coordinated(what.project.layout).net),
+    "ways.json": lambda what: _json(ways(what.model)),
+}
+"""Everything about a factory but the model: by the endings of their files, what writes the text."""
+
+
+@dataclass(frozen=True, slots=True)
+class BuildRequest:
+    """What a build writes: the model at `mjcf`, and everything into the folder `output`. The model
+    has parts for so many `units` (None: for ever) with `wip` units inside at once."""
+
+    mjcf: Path | None = None
+    output: Path | None = None
+    units: int | None = None
+    wip: int | None = None
+
+    def model_path(self, name: str) -> Path | None:
+        """Where the model of a product of this `name` is written; None where it is not."""
+        return self.mjcf or (self.output and self.output / f"{name}.xml")
+
+    def claim(self, name: str) -> None:
+        """Declare the files that a build of this `name` writes, except meshes, before it begins.
+        Raises InputError (BadFile)."""
+        if mjcf := self.model_path(name):
+            binary = beside(mjcf)
+            chosen = () if self.mjcf else (mjcf,)
+            own_names(mjcf.parent, (*chosen, *((binary, seal_of(binary)) if binary else ())))
+        if self.output is not None:
+            documents = *(f"{name}.{end}" for end in DOCUMENTS), PLAN_NAME, LAYOUT_NAME
+            own_names(self.output, (self.output / document for document in documents))
+
+
+@dataclass(frozen=True)
+class Built:
+    """A build's model, its clearance certificate and its files, including those that existed
+    before; `mjcf`: the file of the model."""
+
+    model: Model
+    clearance: Certificate
+    mjcf: Path | None
+    files: tuple[Path, ...]
+
+
+def build(project: Project, verdict: Verdict, request: BuildRequest) -> Built:
+    """Build the model and write the requested files, with the proof of the net's `verdict`.
+
+    Raises RunError where the layout is not certified; InputError where an operation cannot reach
+    its goal in it, where the engine refuses the model, and where a file whose name is chosen here
+    would be written through a link, or over what was read. Nothing is written then."""
+    request.claim(project.name)
+    layout, settings, output = project.layout, project.settings, request.output
+    operation_modes(layout, settings.eps)
+    clearance = layout.certificate or certify(layout)
+    if not clearance.holds:
+        raise RunError(fault.diagnostic() for fault in clearance.faults)
+    model = written(physical_model(layout, request.units, settings, project.catalogue, request.wip))
+    mjcf = request.model_path(project.name)
+    path = beside(mjcf) if mjcf else None
+    binary = _binary(model, path)
+    files: dict[Path, bytes] = {}
+    if mjcf is not None:
+        files |= model_files(model, mjcf)
+        own_names(mjcf.parent, (files.keys() | binary.keys()) - {request.mjcf})
+    if output is not None:
+        what = _Drawn(project, clearance, verdict, model)
+        texts = {f"{project.name}.{end}": write(what) for end, write in DOCUMENTS.items()}
+        documents = {output / name: text.encode() for name, text in texts.items()}
+        documents |= plan_files(project, output)
+        own_names(output, documents)
+        files |= documents
+    write_all(files | binary)
+    named = (*files, path, seal_of(path)) if path else tuple(files)
+    return Built(model, clearance, mjcf, named)
+
+
+def _binary(model: Model, path: Path | None) -> dict[Path, bytes]:
+    """The files of the engine's binary model and its seal; none where they are at `path` already,
+    since the engine has accepted this model then. Raises InputError where it does not."""
+    if path and kept(path, key_of(model)) is not None:
+        return {}
+    from factory.engine.mjcf.loading import load
+
+    m = load(model)
+    return sealed(path, key_of(model), packed(m)) if path else {}

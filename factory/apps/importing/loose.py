@@ -1,0 +1,132 @@
+"""Loose parts: a folder of meshes, or a file of bodies, without a tree."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from factory.apps.importing.bodies import Bodies, FileBody, apart, check_count, unit_of
+from factory.apps.importing.draft import (
+    PART,
+    DraftNode,
+    ImportFaults,
+    assemble,
+    file_stem,
+    label_of,
+)
+from factory.apps.importing.importer import Imported
+from factory.apps.importing.mesh_files import MeshStore
+from factory.apps.importing.part_maker import Placement
+from factory.apps.importing.scene_file import MESHES, SCENES, read_one, read_scene
+from factory.floor.geometry.alike import alike, shape_of
+from factory.floor.geometry.mesh_file import ANEW, UnreadableMesh, obj_of
+from factory.floor.geometry.meshes import Array, Indices
+from factory.floor.geometry.solids import colour
+from factory.support.errors import Diagnostic, InputError, Position
+from factory.support.files import MESH, natural, read_bytes
+from factory.theory.lang.source import quoted
+from factory.theory.problem.pag import PAG, Assembly, Parameter
+
+
+def bodies_in(path: Path) -> Bodies:
+    """The bodies of a folder, one part per file, or of a single file. Raises InputError (BadFile,
+    BadMesh) with every file that cannot be read."""
+    if not path.is_dir():
+        faults: list[Diagnostic] = []
+        bodies = _read(path, faults)
+        if bodies is None:
+            raise InputError(faults)
+        return bodies
+    return _folder(path)
+
+
+def _folder(folder: Path) -> Bodies:
+    seen = sorted(p for p in folder.iterdir() if not p.name.startswith("."))
+    files = [p for p in seen if p.suffix.lower() in (*MESHES, *SCENES) and not p.is_dir()]
+    files.sort(key=lambda path: natural(path.name))
+    faults: list[Diagnostic] = []
+    sources = [source for path in files if (source := _read(path, faults, whole=True)) is not None]
+    if faults:
+        raise InputError(faults)
+    check_count(folder, [path.stem for path in files], "mesh files")
+    left = [p.name for p in seen if p not in files]
+    notes = [f"{len(files)} mesh files, one part each"]
+    if left:
+        shown = ", ".join(left[:5]) + ", ..." * (len(left) > 5)
+        notes.append(f"{len(left)} files in the folder are not meshes and are ignored: {shown}")
+    units = {source.unit for source in sources}
+    one = sources[0] if len(units) == 1 else Bodies(())
+    notes += [note for source in sources for note in source.notes]
+    every = tuple(body for source in sources for body in source.bodies)
+    return Bodies(every, one.unit, one.by, one.sure, tuple(notes))
+
+
+def _read(path: Path, faults: list[Diagnostic], whole: bool = False) -> Bodies | None:
+    """The bodies of a file; None after a fault. `whole`: all bodies as one."""
+    suffix = path.suffix.lower()
+    try:
+        content = read_bytes(path, MESH)
+        if whole or suffix in MESHES:
+            return read_one(path, content)
+        made = read_scene(content, suffix)
+        return replace(made, notes=(f"{len(made.bodies)} bodies in {path.name}", *made.notes))
+    except (OSError, UnreadableMesh) as error:
+        why = error.strerror if isinstance(error, OSError) else error
+        message = f"cannot read {quoted(path.name)}: {why}"
+        code = "BadFile" if isinstance(error, OSError) else "BadMesh"
+        faults.append(Diagnostic(code, message, None, ANEW))
+        return None
+
+
+def loose_product(path: Path, bodies: Bodies, unit: str | None) -> Imported:
+    """The product of loose bodies: one mesh per kind, and the place of each part. A single body is
+    split into its connected components."""
+    notes = list(bodies.notes)
+    if len(bodies.bodies) == 1 and len(pieces := apart(bodies.bodies[0])) > 1:
+        bodies = replace(bodies, bodies=pieces)
+        notes.append(f"one body of {len(pieces)} disconnected pieces: one part each")
+    check_count(path, [body.name for body in bodies.bodies], "bodies")
+    metres, unit_note = unit_of(bodies, unit)
+    name = file_stem(path.resolve().name if path.is_dir() else path.stem)
+    pag, meshes = _assembled(name, path, bodies.bodies, metres)
+    return Imported(name, pag, meshes, path.name, (*notes, unit_note), has_tree=False)
+
+
+def _assembled(
+    name: str, path: Path, bodies: tuple[FileBody, ...], unit: float
+) -> tuple[PAG, dict[str, bytes]]:
+    """The PAG that mates all bodies at once, and its mesh files. Parts of one kind that have no
+    colour get the same one."""
+    here, store = Position(str(path), 1, 1), MeshStore("meshes")
+    drafts = [DraftNode(name, here, inputs=list(range(1, len(bodies) + 1)))]
+    shapes = [shape_of(*_scaled(body.mesh.merged(), unit)) for body in bodies]
+    kinds, origins, meshes = alike(shapes), dict[int, Array](), dict[int, str]()
+    numbers = {kind: number for number, kind in enumerate(dict.fromkeys(kinds.kinds))}
+    for index, body in enumerate(bodies):
+        kind, motion = kinds.kinds[index], kinds.motions[index]
+        if kind == index:
+            low, high = shapes[index].vertices.min(axis=0), shapes[index].vertices.max(axis=0)
+            origins[kind] = np.round((low + high) / 2, 6)
+            vertices, faces = _scaled(body.mesh.merged(), unit)
+            content = obj_of(vertices - origins[kind], faces, "made by factory plan; metres")
+            meshes[kind] = store.add(_name(body, index), ".obj", content)
+        at = motion.turn @ origins[kind] + motion.shift
+        stands = Placement(motion.turn, at, moved=True).parameters({})
+        rgba = body.colour or colour(Assembly("", PART), numbers[kind])
+        parameters = (Parameter("mesh", meshes[kind]), *stands, Parameter("rgba", rgba))
+        drafts.append(DraftNode(_name(body, index), here, PART, [], parameters))
+    return assemble(drafts, ImportFaults()), store.files
+
+
+def _scaled(mesh: tuple[Array, Indices], unit: float) -> tuple[Array, Indices]:
+    return mesh[0] * unit, mesh[1]
+
+
+def _name(body: FileBody, index: int) -> str:
+    """A name that begins with a letter, from that of the body or its number."""
+    label = label_of(body.name)
+    if not label:
+        return f"part{index + 1}"
+    return label if label[0].isalpha() else f"part-{label}"

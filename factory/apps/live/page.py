@@ -1,0 +1,110 @@
+"""The page of a running factory: the drawings of a report, moved by the messages of a socket."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html import escape
+
+import numpy as np
+
+from factory.apps.live.commands import FACTORS, SPEEDS
+from factory.apps.live.session import Session
+from factory.apps.report.drawings import data, floor_plan, labels_of, net_drawing
+from factory.apps.report.page import counts, filled, options
+from factory.apps.report.scene import DrawnFactory, Pack, scene, stations
+from factory.apps.report.sections import assembly_tree
+from factory.engine.mjcf import names
+from factory.engine.mjcf.parts import HIDDEN
+from factory.engine.mjcf.replica import Floats
+from factory.engine.record.subject import subject_of_run
+from factory.engine.simulation.simulation import Simulation
+from factory.theory.plant.factory import Operation
+
+SCRIPTS = (
+    "report/three.min.js",
+    "report/data.js",
+    "report/selection.js",
+    "report/views.js",
+    "report/replay.js",
+    "report/wiring.js",
+    "live/rolling.js",
+    "live/outages.js",
+    "live/live.js",
+)
+"""In the order in which they run."""
+
+
+def page(session: Session, command: str = "factory view FILE.pag") -> bytes:
+    """The page, for as long as the session lasts; it says what `command` begins another."""
+    stage, pack = stage_of(session.simulation), Pack()
+    factory = stage.factory
+    labels, name = labels_of(factory), factory.pag.title
+    document = {
+        **data(factory),
+        "name": name,
+        "roles": list(stage.roles),
+        "parts": [o.label for o in factory.leaves],
+        "factors": FACTORS,
+        "fails": session.fails,
+        "scene": scene(stage, labels, pack),
+        "frames": {
+            "parents": {},
+            "moving": session.bodies.tolist(),
+            "turning": session.bodies.tolist(),
+            "hidden": HIDDEN,
+            "position": np.round(stage.position, 5).tolist(),
+            "quaternion": np.round(stage.quaternion, 6).tolist(),
+            "reach": np.round(stage.reach[:, session.bodies], 4).tolist(),
+        },
+        "arrays": pack.index,
+    }
+    fields = {
+        "name": escape(name, quote=True),
+        "counts": escape(f"{counts(factory)}, proved live"),
+        "tree": assembly_tree(factory.pag, labels),
+        "floor": floor_plan(stage, labels),
+        "net": net_drawing(factory, stage.roles),
+        "speeds": "".join(
+            f'<option value="{s:g}"{" selected" * (s == 1)}>{f"{s:g}×" if s else "max"}</option>'
+            for s in SPEEDS
+        ),
+        "options": options(document),
+        "command": escape(command),
+    }
+    styles = ("report/report.css", "report/failures.css", "live/live.css")
+    text = filled("live/live.html", fields, document, pack.text(), SCRIPTS, styles, "'self'")
+    return text.encode()
+
+
+def stage_of(simulation: Simulation) -> DrawnFactory:
+    """What there is to be drawn of a simulation that has not begun; bodies are where they are in
+    the world."""
+    layout, world = simulation.layout, simulation.physical
+    m, d, factory, (at, _) = world.m, world.d, layout.factory, world.motion.axes.measured(world.d)
+    low, high = d.xpos.copy(), d.xpos.copy()
+    for robot in factory.robots:
+        body, path = m.body(names.carriage(robot.name)).id, layout.guidepaths[robot.index]
+        ends, x = [layout.home(robot.index, o) for o in robot.operations], float(at[robot.index])
+        away = np.concatenate(path.pieces(min(ends), max(ends))) - path.pieces(x, x)[0][0]
+        places = d.xpos[body] + np.pad(away, ((0, 0), (0, 1)))
+        low[body] = np.minimum(low[body], places.min(axis=0))
+        high[body] = np.maximum(high[body], places.max(axis=0))
+    return DrawnFactory(
+        factory,
+        m,
+        d.xpos.copy(),
+        d.xquat.copy(),
+        np.stack([low, high]),
+        subject_of_run(simulation).as_json()["places"],
+        stations(factory, m, _ends(simulation)),
+    )
+
+
+def _ends(simulation: Simulation) -> Iterator[tuple[Operation, Floats]]:
+    """The state of the engine with the robots of an operation where it ends."""
+    layout, world = simulation.layout, simulation.physical
+    for operation in layout.factory.operations:
+        qpos, at = world.d.qpos.copy(), layout.visits
+        stops = np.array([at[operation.index, robot].at for robot in operation.robots])
+        world.motion.axes.configure(qpos, np.array(operation.robots), stops)
+        yield operation, qpos

@@ -1,0 +1,236 @@
+"""Directional blocking graphs: which parts block which along each axis, and which touch.
+
+A part i that leaves along +axis past j, both in the finished product, is *blocked* by j as `check`
+would find (`compiler/mating/`): with the same bodies, depths and tolerance. The pairs of an axis
+are a directional blocking graph (Wilson and Latombe, *Geometric Reasoning about Mechanical
+Assembly*, 1994) for an infinite translation, so a part that is free in it can be removed
+completely. The graph of the opposite direction is its transpose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from factory.apps.planning.parts import InPlace
+from factory.apps.planning.standing import Feet
+from factory.floor.geometry.meshes import Array
+from factory.floor.geometry.overlapping import Overlapping
+from factory.floor.geometry.solids import Product
+from factory.floor.mating.bodies import ConvexBodies, bodies
+from factory.floor.mating.mating import AMPLE
+from factory.floor.mating.meetings import Ints, Meeting, Meetings
+from factory.floor.mating.overlaps import Finder, Overlaps
+from factory.floor.mating.paths import TOLERANCE
+
+FREE, SCRAPES, DEEPER, LOCKED, CLASHES = range(5)
+"""Levels of blocking: none; the parts scrape, or stay drawn into each other; parts that were drawn
+into each other get a little deeper; they pass through each other, which `check` leaves out; parts
+that are apart in the end pass through each other, which `check` calls blocked. From LOCKED on,
+parts interlock."""
+
+TIMES, SLACK = 2.0, 3e-4
+"""Parts that are drawn into each other and known only by their hulls interlock if they get deeper
+on the way than so many times their depth when finished, plus SLACK [m]."""
+
+NEAR = 5e-4
+"""Parts no further apart than this [m] are near each other, as a bolt in a clearance hole."""
+
+CONTACT = 5e-5
+"""Parts no further apart than this [m] touch. If the product is then not connected, the nearest
+parts of its components touch as well."""
+
+WIDER = 2.0
+"""The growth factor of the gap by which components are connected."""
+
+AXES = range(3)
+"""x, y and z of the product."""
+
+
+@dataclass(frozen=True)
+class Blocking:
+    """The blocking graphs of the units of a plan, by their `labels`.
+
+    `levels` (3, n, n): how much j blocks i that leaves along +x, +y or +z; the opposite direction
+    has the transpose. `locks` (3, n, n): whether j prevents i from leaving. `touch` (n, n): which
+    units touch; `near` (n, n): which are near each other. `low`, `high` (n, 3): their boxes [m].
+    `depths` (3, n, n): how deep i gets into j [m]; empty if unknown. `hidden`: the parts of two
+    units that overlap in the finished product according to the hull of an open mesh, the deepest
+    first. `feet`: what units stand on; None if tipping does not matter. `base`: the unit onto which
+    all others come, -1 for none.
+    """
+
+    labels: tuple[str, ...]
+    levels: NDArray[np.int8] = field(repr=False)
+    locks: NDArray[np.bool_] = field(repr=False)
+    touch: NDArray[np.bool_] = field(repr=False)
+    low: Array = field(repr=False)
+    high: Array = field(repr=False)
+    depths: Array = field(default_factory=lambda: np.zeros((3, 0, 0)), repr=False)
+    hidden: tuple[Overlapping, ...] = field(default=(), repr=False)
+    feet: Feet | None = field(default=None, repr=False)
+    base: int = -1
+    near: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), bool), repr=False)
+
+    def __post_init__(self) -> None:
+        for array in (self.levels, self.locks, self.touch, self.low, self.high, self.depths):
+            array.setflags(write=False)
+
+    def __len__(self) -> int:
+        return len(self.labels)
+
+    def allowing(self, allowed: Sequence[str]) -> Blocking:
+        """The same graphs if units with these labels may pass through all others, or two (`a:b`)
+        through each other."""
+        free = np.isin(self.labels, allowed)
+        accepted = free[:, None] | free
+        for one, _, other in (name.partition(":") for name in allowed if ":" in name):
+            both = np.isin(self.labels, one), np.isin(self.labels, other)
+            accepted |= np.outer(*both) | np.outer(*both[::-1])
+        return replace(self, locks=self.locks & ~accepted)
+
+    def hangs(self, members: Sequence[int]) -> bool:
+        """Whether units are connected by contacts."""
+        touch = self.touch[np.ix_(members, members)]
+        return int(connected_components(touch, directed=False)[0]) <= 1
+
+    def least(self, one: int, other: int) -> tuple[float, int, int]:
+        """The direction in which a unit gets least deep into another: the depth [m], the axis, and
+        the side, +1 or -1, to which the first leaves."""
+        sides = ((+1, one, other), (-1, other, one))
+        return min(
+            (float(self.depths[axis, i, j]), axis, side) for axis in AXES for side, i, j in sides
+        )
+
+    def grouped(self, groups: Sequence[Sequence[int]]) -> Blocking:
+        """The graphs of groups of units that are already joined; each is named after its first
+        unit."""
+        count = len(groups)
+        member = np.zeros((count, len(self)), bool)
+        for number, group in enumerate(groups):
+            member[number, list(group)] = True
+        order = np.concatenate([np.flatnonzero(row) for row in member])
+        starts = np.concatenate([[0], np.cumsum(member.sum(axis=1))[:-1]])
+
+        def most(table: NDArray[Any]) -> NDArray[Any]:
+            rows = np.maximum.reduceat(table[..., order, :][..., order], starts, axis=-2)
+            return np.asarray(np.maximum.reduceat(rows, starts, axis=-1))
+
+        itself = np.eye(count, dtype=bool)
+        based = [number for number, group in enumerate(groups) if self.base in group]
+        return Blocking(
+            tuple(self.labels[group[0]] for group in groups),
+            np.where(itself, FREE, most(self.levels)).astype(np.int8),
+            most(self.locks) & ~itself,
+            most(self.touch),
+            np.minimum.reduceat(self.low[order], starts),
+            np.maximum.reduceat(self.high[order], starts),
+            feet=self.feet and self.feet.grouped(groups),
+            base=based[0] if based else -1,
+        )
+
+
+def blocking(source: InPlace) -> Blocking:
+    """The blocking graphs of a source's units. Almost linear in the number of bodies, unless very
+    many lie behind one another."""
+    units = source.units()
+    finder, convex, unit = _bodies(source)
+    count = len(units)
+    levels, depths = np.zeros((3, count, count), np.int8), np.zeros((3, count, count))
+    for axis in AXES:
+        overlaps = finder.along(axis, np.ones(1, bool))
+        _enter(overlaps, unit, levels[axis], depths[axis])
+    bounds = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    np.minimum.at(bounds[0], unit[convex.part], convex.low)
+    np.maximum.at(bounds[1], unit[convex.part], convex.high)
+    labels = tuple(label for label, _ in units)
+    touch = _touching(finder, convex, unit, count)
+    near = touch | _within(finder, unit, count, NEAR)
+    hidden = _hidden(overlaps, unit, [part.label for _, members in units for part in members])
+    locks = levels >= LOCKED
+    return Blocking(labels, levels, locks, touch, *bounds, depths, hidden, near=near)
+
+
+def rooms(source: InPlace, axis: int) -> Array:
+    """The least clearance (n, n) [m] between units while the first leaves along an axis past the
+    second: negative where they overlap, infinite where it exceeds AMPLE."""
+    finder, _, unit = _bodies(source)
+    count = len(source.units())
+    room = np.full((count, count), np.inf)
+    moving, standing, least = finder.rooms(axis, AMPLE)
+    one, other = unit[moving], unit[standing]
+    for column, at in enumerate(((other, one), (one, other))):
+        apart = one != other
+        np.minimum.at(room, (at[0][apart], at[1][apart]), least[apart, column])
+    return np.where(room >= AMPLE, np.inf, room)
+
+
+def _bodies(source: InPlace) -> tuple[Finder, ConvexBodies, Ints]:
+    """The convex bodies of all parts, unit by unit, and the unit of each part."""
+    units = source.units()
+    solids = {part.label: part.solid for _, members in units for part in members}
+    unit = np.repeat(np.arange(len(units)), [len(members) for _, members in units])
+    low = np.min([solid.low for solid in solids.values()], axis=0)
+    high = np.max([solid.high for solid in solids.values()], axis=0)
+    convex = bodies(Product(solids, low, high), list(solids))
+    every = Meeting("", (), 0, 0, 0, len(solids), either=True)
+    borders, levels = np.zeros(len(solids) - 1, np.int64), np.zeros(1, np.int64)
+    return Finder(convex, Meetings(tuple(solids), (every,), borders, levels)), convex, unit
+
+
+def _hidden(overlaps: Overlaps, unit: Ints, labels: Sequence[str]) -> tuple[Overlapping, ...]:
+    """The parts of two units that overlap in the finished product according to hulls alone; any
+    axis shows them."""
+    finished = overlaps.depths.finished
+    drawn_in = (
+        overlaps.rough & (finished > TOLERANCE) & (unit[overlaps.one] != unit[overlaps.other])
+    )
+    rows = np.flatnonzero(drawn_in)[np.argsort(-finished[drawn_in], kind="stable")]
+    one, other = (array[rows].tolist() for array in (overlaps.one, overlaps.other))
+    pairs = zip(one, other, finished[rows].tolist(), strict=True)
+    return tuple(Overlapping(labels[one], labels[other], depth) for one, other, depth in pairs)
+
+
+def _enter(overlaps: Overlaps, unit: Ints, levels: NDArray[np.int8], deep: Array) -> None:
+    """Enter the overlaps along an axis. The later part of a pair leaves to the lower side and the
+    earlier one to the upper side, or the other way round."""
+    one, other, depths = unit[overlaps.one], unit[overlaps.other], overlaps.depths
+    slack = TIMES * depths.finished[:, None] + SLACK
+    level = np.where(depths.faulty, SCRAPES, FREE)
+    level[overlaps.deeper] = DEEPER
+    level[overlaps.deeper & (depths.path > slack)] = LOCKED
+    level[overlaps.clashing] = CLASHES
+    for column, (moving, standing) in enumerate(((one, other), (other, one))):
+        apart = moving != standing
+        at = moving[apart], standing[apart]
+        np.maximum.at(levels, at, level[apart, column].astype(np.int8))
+        np.maximum.at(deep, at, depths.path[apart, column])
+
+
+def _touching(finder: Finder, convex: ConvexBodies, unit: Ints, count: int) -> NDArray[np.bool_]:
+    """Which units touch: those in contact, then those that connect components."""
+    touch = np.eye(count, dtype=bool)
+    gap, furthest = CONTACT, float((convex.high.max(axis=0) - convex.low.min(axis=0)).max())
+    while count > 1 and gap < 2 * furthest:
+        near = _within(finder, unit, count, gap)
+        pieces, piece = connected_components(touch, directed=False)
+        if gap > CONTACT:
+            near &= piece[:, None] != piece[None, :]
+        touch |= near
+        if pieces > 1 and connected_components(touch, directed=False)[0] == 1:
+            break
+        gap *= WIDER
+    return touch
+
+
+def _within(finder: Finder, unit: Ints, count: int, gap: float) -> NDArray[np.bool_]:
+    """Which units (n, n) are at most so far from each other [m]."""
+    near = np.zeros((count, count), bool)
+    one, other = finder.near(gap)
+    near[unit[one], unit[other]] = True
+    return near | near.T

@@ -1,0 +1,215 @@
+"""Screws: which parts are screws, and where in a tree they are driven in, after all that they
+clamp, and their nuts put on."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from factory.apps.planning.blocking import Blocking
+from factory.apps.planning.cannot import Direction, Units
+from factory.apps.planning.exact import Tree
+from factory.apps.planning.judging import Join, Judged
+from factory.apps.planning.parts import InPlace
+from factory.apps.planning.shanks import screws_among
+from factory.apps.planning.subsets import ROOT_AXIS, Stance
+from factory.apps.planning.threads import Thread
+from factory.apps.planning.writing import Screwed
+
+
+def fasteners(source: InPlace, named: Sequence[str]) -> tuple[str, ...]:
+    """The units of a source that are screws: those that are `named`, and parts that are recognised
+    (`shanks`)."""
+    kept = {keep.label for keep in source.kept}
+    screws = {*screws_among(source.parts, named), *named}
+    return tuple(label for label, _ in source.units() if label in named or label in screws - kept)
+
+
+@dataclass(frozen=True)
+class _Place:
+    """A sub-assembly of a tree: its path from the root, its units, and the axis of the floor along
+    which its inputs come."""
+
+    path: tuple[int, ...]
+    units: Units
+    axis: int
+
+
+@dataclass
+class Fastening:
+    """Places screws in a tree of the other units of a product."""
+
+    graphs: Blocking
+    judged: Judged
+    up: Stance
+    places: list[_Place] = field(default_factory=list)
+    joins: list[tuple[tuple[int, ...], int, Join]] = field(default_factory=list)
+    driven: dict[tuple[int, ...], list[Join]] = field(default_factory=dict)
+    put: dict[tuple[int, ...], list[Join]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._walk(self.judged.tree, (), ROOT_AXIS, iter(self.judged.joins))
+        self.places.sort(key=lambda place: (len(place.units), -len(place.path)))
+
+    def _walk(self, tree: Tree, path: tuple[int, ...], axis: int, joins: Iterator[Join]) -> Units:
+        if isinstance(tree, int):
+            self.places.append(_Place(path, (tree,), axis))
+            return (tree,)
+        units = self._walk(tree[0], (*path, 0), 1 - axis, joins)
+        for number, below in enumerate(tree[1:]):
+            units = (*units, *self._walk(below, (*path, number + 1), 1 - axis, joins))
+            self.joins.append((path, number, next(joins)))
+        if len(tree) > 1:
+            self.places.append(_Place(path, units, axis))
+        return units
+
+    def drive(self, threads: Sequence[Thread]) -> bool:
+        """Drive screws, one after the other, into the smallest sub-assembly that contains all parts
+        that they clamp, if they can get there and no later operation collides with them. Returns
+        whether there is such a place."""
+        needed = {unit for thread in threads for unit in thread.clamps}
+        return self._joined([t.screw for t in threads], needed, self.driven, (self.up.up,))
+
+    def put_on(self, ring: int, screw: int, near: Sequence[int]) -> bool:
+        """Put a nut or a washer on a screw, from above or from below, in the smallest sub-assembly
+        that has that screw and all that is `near` the ring. Returns whether there is such a
+        place."""
+        return self._joined([ring], {screw, *near}, self.put, (self.up.up, -self.up.up))
+
+    def _joined(
+        self,
+        come: Sequence[int],
+        needed: Collection[int],
+        at: dict[tuple[int, ...], list[Join]],
+        upright: Sequence[int],
+    ) -> bool:
+        for place in self.places:
+            there = self._with_screws(place.units, place.path)
+            if not {*needed} <= {*there}:
+                continue
+            joins = list[Join]()
+            for unit in come:
+                join = self._way(unit, there, place.axis, upright)
+                if join is None or not self._passes(unit, place):
+                    break
+                joins.append(join)
+                there = (*there, unit)
+            else:
+                at.setdefault(place.path, []).extend(joins)
+                return True
+        return False
+
+    def _with_screws(self, units: Units, path: tuple[int, ...]) -> Units:
+        """Units, and the screws that are driven in at a path or below it, with their rings."""
+        screws = [
+            join.come[0]
+            for at, joins in (*self.driven.items(), *self.put.items())
+            for join in joins
+            if at[: len(path)] == path or set(join.pile) <= set(units)
+        ]
+        return (*units, *dict.fromkeys(screws))
+
+    def _way(self, unit: int, there: Units, across: int, upright: Sequence[int]) -> Join | None:
+        """The motion of a unit to others: along the vertical, or else along the axis of their
+        carrier."""
+        ways: list[tuple[Direction, bool]] = [((self.up.axes[2], side), True) for side in upright]
+        ways += [((self.up.axes[across], side), False) for side in (+1, -1)]
+        for (axis, side), lowered in ways:
+            at = np.ix_([unit], there) if side > 0 else np.ix_(there, [unit])
+            if not self.graphs.locks[axis][at].any():
+                level = int(self.graphs.levels[axis][at].max())
+                return Join(tuple(sorted(there)), (unit,), (axis, side), level, lowered)
+        return None
+
+    def _passes(self, screw: int, place: _Place) -> bool:
+        """Whether a screw in a place blocks no later operation."""
+        for path, number, join in self.joins:
+            here = place.path[: len(path)] == path and len(place.path) > len(path)
+            child = place.path[len(path)] if here else number + 2
+            if child > number + 1:
+                continue
+            comes = child == number + 1
+            others = self._with_screws(join.pile if comes else join.come, (-1,))
+            axis, side = join.direction
+            at = np.ix_([screw], others) if comes == (side > 0) else np.ix_(others, [screw])
+            if self.graphs.locks[axis][at].any():
+                return False
+        return True
+
+    def result(self, dwell: float) -> Judged:
+        """The tree with its screws, and with their nuts. Each screw takes a robot that brings it,
+        and those of one sub-assembly a driver for `dwell` [s] one after the other."""
+        screws = [join for joins in self.driven.values() for join in joins]
+        rings = [join for joins in self.put.values() for join in joins]
+        most = max(map(len, self.driven.values()), default=0)
+        return replace(
+            self.judged,
+            tree=self._rebuilt(self.judged.tree, ()),
+            joins=(*self.judged.joins, *screws, *rings),
+            robots=self.judged.robots + len(screws) + len(self.driven) + 2 * len(rings),
+            seconds=self.judged.seconds + dwell * most,
+        )
+
+    def _rebuilt(self, tree: Tree, path: tuple[int, ...]) -> Tree:
+        if not isinstance(tree, int):
+            tree = tuple(self._rebuilt(below, (*path, n)) for n, below in enumerate(tree))
+        if joins := self.driven.get(path):
+            tree = Screwed(tree, tuple(join.come[0] for join in joins))
+        return self._with_rings(tree, path)
+
+    def _with_rings(self, tree: Tree, path: tuple[int, ...]) -> Tree:
+        """A sub-assembly with its nuts and washers: those from above are inserted one after the
+        other, and it is lowered onto each of those from below. Each time its axis turns, so that
+        it may have to be handed over first."""
+        joins = self.put.get(path, [])
+        above = [join.come[0] for join in joins if join.direction[1] == self.up.up]
+        below = [join.come[0] for join in joins if join.direction[1] != self.up.up]
+        if self._slides_below(path) and (bool(above) + len(below)) % 2:
+            tree = (tree,)
+        tree = (tree, *above) if above else tree
+        for ring in below:
+            tree = (tree, ring)
+        return tree
+
+    def _slides_below(self, path: tuple[int, ...]) -> bool:
+        """Whether the way of some join below a path, or at it, is horizontal."""
+        every = [(at, join) for at, _, join in self.joins]
+        every += [(at, join) for at, joins in self.driven.items() for join in joins]
+        return any(at[: len(path)] == path and not join.lowered for at, join in every)
+
+
+def renumbered(judged: Judged, units: Sequence[int]) -> Judged:
+    """A judged tree with renumbered units."""
+
+    def tree(old: Tree) -> Tree:
+        return units[old] if isinstance(old, int) else tuple(map(tree, old))
+
+    def many(old: Units) -> Units:
+        return tuple(units[n] for n in old)
+
+    joins = tuple(replace(j, pile=many(j.pile), come=many(j.come)) for j in judged.joins)
+    return replace(judged, tree=tree(judged.tree), joins=joins)
+
+
+def fastened(
+    graphs: Blocking, judged: Judged, threads: Sequence[Thread], dwell: float
+) -> tuple[Judged, tuple[int, ...]]:
+    """A tree of all other units with the screws in it, and their nuts, and those of both for which
+    there is no place."""
+    work, left = Fastening(graphs, judged, judged.stance), list[int]()
+    alike: dict[tuple[str, int], list[Thread]] = {}
+    for one in threads:
+        alike.setdefault((one.kind, one.into), []).append(one)
+    for several in alike.values():
+        if not work.drive(several):  # in one place, to share a driver
+            left += [one.screw for one in several if not work.drive([one])]
+    screws, follow = {one.screw for one in threads}, {n for one in threads for n in one.follow}
+    for one in threads:
+        for ring in one.follow if one.screw not in left else ():
+            near = np.flatnonzero(graphs.touch[ring]).tolist()
+            needed = [n for n in near if n not in screws | follow]
+            if not work.put_on(ring, one.screw, needed):
+                left.append(ring)
+    return work.result(dwell), tuple(left)

@@ -1,0 +1,35 @@
+"""A platen: a floor of square tiles over which robots go in both directions, so that guidepaths may
+bend and a factory takes less floor."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from factory.floor.layout.compacting import compacted
+from factory.floor.layout.durations import Pace
+from factory.floor.layout.embedding import certified
+from factory.floor.layout.guidepath import Point2
+from factory.floor.layout.hands.choosing import Hands
+from factory.floor.layout.layout import Layout
+from factory.floor.layout.request import Ground
+from factory.support.errors import RunError
+from factory.support.settings import Settings
+
+
+def on_platen(layout: Layout, pace: Pace, tile: float, wanted: Point2 | None = None) -> Layout:
+    """A layout on tiles of a size [m], with the bends that were found for robots of a `pace`, and
+    certified anew. Raises RunError (Layout) where it does not fit a floor of the wanted width and
+    depth."""
+    for made in reversed(compacted(layout, pace)):
+        try:
+            layout = certified(made)
+            break
+        except RunError:  # the search knows regions only; the one before takes a little more
+            continue
+    return certified(replace(layout, tile=tile), wanted)
+
+
+def platen(layout: Layout, ground: Ground, settings: Settings, hands: Hands) -> Layout:
+    """The variant of a layout on the tiles that a ground asks for. Raises RunError (Layout)."""
+    assert ground.tile is not None
+    return on_platen(layout, Pace.of(settings), ground.tile, ground.floor)

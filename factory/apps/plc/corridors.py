@@ -1,0 +1,126 @@
+"""Corridors of a driven plant: where each axis may go while places of the coordinated net are
+marked.
+
+They are the ways for which the certificate of the layout proves that no two machines come near each
+other, and inside an operation what its mode keeps apart. So a controller may ask for any target: no
+axis leaves its corridor. A part of a way that a pass has ended is closed for good, since others
+have been let in by it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from factory.floor.layout.coordinating import Coordinated
+from factory.floor.layout.exclusions import awaited_positions
+from factory.floor.layout.layout import Layout
+from factory.floor.layout.presence import Span
+from factory.floor.layout.staying import Staying, Sweep
+from factory.theory.control.mode import Array, Mode
+from factory.theory.nets.coordinated import Past
+
+SLACK = 1e-3
+"""An axis is where it has to be within this [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class WayPart:
+    """A part of a robot's way in one place of the compiled net: the `sweeps` of its carriage and
+    its lift, until one of the passes `ends`."""
+
+    ends: tuple[Past, ...]
+    sweeps: tuple[Sweep, ...]
+
+
+class Corridors:
+    """The corridors of a `layout` in its coordinated `net`, with the modes of its operations."""
+
+    def __init__(self, layout: Layout, net: Coordinated, modes: Sequence[Mode]) -> None:
+        self._factory, self._modes = layout.factory, modes
+        ended = {place: past for past, (place, _) in net.passes.items()}
+        self._ways = dict[tuple[int, int], list[WayPart]]()
+        for presence in Staying(layout, net, awaited_positions(layout)).presences():
+            ends = tuple(ended[place] for place in presence.places[1:] if place in ended)
+            key = presence.robot, presence.places[0]
+            self._ways.setdefault(key, []).append(WayPart(ends, presence.sweeps))
+        self._passed = dict[Past, int]()
+
+    def bounds(
+        self, marked: Sequence[int], fired: Sequence[int], x: Array, stops: Array
+    ) -> tuple[Array, Array]:
+        """The lowest and the highest target of each axis (n,) [m] in a marking, with firing counts
+        `fired`, axes at `x` that can stop at `stops` [m]. Remembers the passes."""
+        low, high = x.copy(), x.copy()
+        for (robot, place), stretches in self._ways.items():
+            if not marked[place]:
+                continue
+            axes = [robot]
+            if robot in self._factory.lift_axis:
+                axes.append(self._factory.lift_axis[robot])
+            sweeps = [*self._left(stretches, fired, x)]
+            for which, axis in enumerate(axes):
+                other = float(x[axes[1 - which]]) if len(axes) == 2 else 0.0
+                spans = _beside(sweeps, which, other) if len(axes) == 2 else [s[0] for s in sweeps]
+                low[axis] = min(min(span) for span in spans)
+                high[axis] = max(max(span) for span in spans)
+        for operation, mode in zip(self._factory.operations, self._modes, strict=True):
+            if marked[operation.place]:
+                axes = [*self._factory.axes[operation.index]]
+                _keep_gates(mode, axes, x, low, high)
+                _keep_apart(mode, axes, x, stops, low, high)
+        return low, high
+
+    def _left(self, stretches: list[WayPart], fired: Sequence[int], x: Array) -> Iterator[Sweep]:
+        """The sweeps of what is left of a way; its last stretch is never ended."""
+        for past in (past for stretch in stretches for past in stretch.ends):
+            if past.holds(float(x[past.axis])):
+                self._passed[past] = fired[past.after]
+        left = [
+            stretch
+            for stretch in stretches
+            if not any(self._passed.get(past) == fired[past.after] for past in stretch.ends)
+        ]
+        for stretch in left or stretches[-1:]:
+            yield from stretch.sweeps
+
+
+def _beside(sweeps: Sequence[Sweep], which: int, other: float) -> list[Span]:
+    """The spans of one of two axes, 0 or 1, in the sweeps in which the other may be where it is,
+    or in those that are nearest to that."""
+    off = [max(min(s[1 - which]) - other, other - max(s[1 - which]), 0.0) for s in sweeps]
+    reach = max(SLACK, min(off))
+    return [sweep[which] for sweep, far in zip(sweeps, off, strict=True) if far <= reach]
+
+
+def _keep_gates(mode: Mode, axes: Sequence[int], x: Array, low: Array, high: Array) -> None:
+    """No axis comes nearer to its goal than its standoff before its gate stands at its own, and the
+    gate stays there then."""
+    for slot, gate in enumerate(mode.gate.tolist()):
+        standoff = float(mode.standoff[slot])
+        if gate < 0 or standoff <= 0.0:
+            continue
+        axis, guard = axes[slot], axes[gate]
+        goal, nearest = float(mode.goals[gate]), float(mode.goals[slot]) + standoff
+        if x[axis] < nearest - mode.eps:
+            ends = goal - mode.eps, goal + mode.eps
+            low[guard], high[guard] = max(low[guard], ends[0]), min(high[guard], ends[1])
+        if abs(float(x[guard]) - goal) >= mode.eps:
+            low[axis] = max(low[axis], min(nearest, float(x[axis])))
+
+
+def _keep_apart(
+    mode: Mode, axes: Sequence[int], x: Array, stops: Array, low: Array, high: Array
+) -> None:
+    """No two robots whose guidepaths meet touch, where the other can stop."""
+    for pair, meet, touch in zip(
+        mode.pairs.tolist(), mode.meet.tolist(), mode.touch.tolist(), strict=True
+    ):
+        for one, other in ((0, 1), (1, 0)):
+            axis, off = axes[pair[one]], abs(float(stops[axes[pair[other]]]) - meet[other])
+            if (near := touch - off) <= 0.0:
+                continue
+            if x[axis] >= meet[one]:
+                low[axis] = max(low[axis], min(meet[one] + near, float(x[axis])))
+            else:
+                high[axis] = min(high[axis], max(meet[one] - near, float(x[axis])))

@@ -1,0 +1,166 @@
+"""A plant driven by a controller through signals, as by a PLC: axis targets, grips and jobs in;
+positions and sensors out. The controller decides what the net leaves open; the plant's interlock
+refuses forbidden commands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from factory.apps.plc.corridors import SLACK
+from factory.apps.plc.interlock import PlantInterlock
+from factory.apps.plc.signals import NOBODY, AxisDrives, Commands, Controller, Refusal, Sensed
+from factory.engine.record.state import Event
+from factory.engine.simulation.ordering import Ordering
+from factory.engine.simulation.supervisor import Active
+from factory.engine.timing.distributed import Scan
+from factory.support.settings import Settings
+from factory.theory.control.mode import Array, Limits
+from factory.theory.plant.factory import Factory, Operation
+
+if TYPE_CHECKING:
+    from factory.engine.simulation.simulation import Simulation
+
+
+class DrivenSupervisor:
+    """Lets a `controller` drive a plant through its `interlock`, asking it every `scan` [s],
+    rounded to whole timesteps. No axis leaves its corridor; after a contact that is not meant, or a
+    dropped part, all axes stand for good: `tripped`."""
+
+    def __init__(
+        self,
+        interlock: PlantInterlock,
+        limits: Limits,
+        settings: Settings,
+        controller: Controller,
+        scan: float,
+    ) -> None:
+        self.interlock, self._controller = interlock, controller
+        self.tripped, self._astray = False, set[int]()
+        self._steps, self._period = settings.steps, max(1, round(scan / settings.step))
+        self.drives = AxisDrives(interlock.commands.target, limits, self._period * settings.step)
+        self._count = 0
+
+    @property
+    def factory(self) -> Factory:
+        """The driven factory."""
+        return self.interlock.factory
+
+    @property
+    def ordering(self) -> Ordering:
+        """The order places that are enforced."""
+        return self.interlock.ordering
+
+    @property
+    def events(self) -> list[Event]:
+        """The record so far."""
+        return self.interlock.events
+
+    @property
+    def refusals(self) -> list[Refusal]:
+        """All commands that were refused."""
+        return self.interlock.refusals
+
+    @property
+    def marked(self) -> bytearray:
+        """1 for each place that is marked, 0 for the others."""
+        return self.interlock.marked
+
+    @property
+    def active(self) -> Active:
+        """The operations under way."""
+        return Active(tuple(o.index for o in self.factory.operations if self.marked[o.place]))
+
+    def awaited(self) -> list[Operation]:
+        """The operations all of whose robots wait for them."""
+        possible = self.interlock.threads.possible
+        return [self.factory.operations[event // 2] for event in sorted(possible)]
+
+    def limit(self, limits: Limits) -> None:
+        """Set the limits of the axes."""
+        self.drives.limits = limits
+
+    def step(self, ticks: int = 1) -> None:
+        """Advance the world by a tick, with a scan of the controller at each of its times."""
+        world, end = self.interlock.world, self._count + self._steps
+        while self._count < end:
+            if self._count % self._period == 0:
+                self._scan()
+            steps = min(self._period - self._count % self._period, end - self._count)
+            world.advance(steps)
+            self._count += steps
+        world.settle()
+
+    def coast(self, ticks: int = 1) -> None:
+        """Advance by a tick without scans."""
+        self.interlock.world.advance(self._steps)
+        self.interlock.world.settle()
+
+    def sensed(self) -> Sensed:
+        """What the controller reads now."""
+        interlock, factory = self.interlock, self.factory
+        held = tuple(map(interlock.held, range(len(factory.robots))))
+        leaves = tuple(map(interlock.ready, factory.leaves))
+        outfeed = any(map(interlock.ready, factory.dropoffs))
+        return Sensed(interlock.world.time, *interlock.world.sense(), held, (*leaves, outfeed))
+
+    def refuse(self, message: str) -> None:
+        """Refuse what concerns no single robot."""
+        self.refusals.append(Refusal(self.interlock.world.time, NOBODY, message))
+
+    @property
+    def scans(self) -> Sequence[Scan]:
+        """None: what the controller does is not known before."""
+        return ()
+
+    def _scan(self) -> None:
+        """Scan the controller, carry out its permitted commands, and move the drives; robots that
+        the interlock holds stand."""
+        commands = self._controller.scan(self.sensed())
+        self._trip()
+        self.interlock.carry_out(commands)
+        drives, back, stops = self.drives, self.interlock.held_back, self.drives.stops
+        target = self._confined(commands, stops)
+        for axis, where in enumerate(target.tolist()):
+            stands = commands.stop or self.tripped or self.factory.robot_of(axis) in back
+            drives.target[axis] = stops[axis] if stands else where
+        drives.go(self.interlock.world)
+
+    def _trip(self) -> None:
+        """Stop for good where bodies touch that are not meant to, or one was dropped."""
+        world = self.interlock.world
+        why = f"{touch} touch" if (touch := world.collision) else ""
+        if world.dropped is not None:
+            why = world.dropped.diagnostic.message
+        if why and not self.tripped:
+            self.tripped = True
+            self.refuse(f"{why}: all axes stand until the plant is started anew")
+
+    def _confined(self, commands: Commands, stops: Array) -> Array:
+        """The targets in their corridors; those that are not are refused once."""
+        interlock = self.interlock
+        low, high = interlock.corridors.bounds(
+            interlock.marked, interlock.fired, interlock.world.sense()[0], stops
+        )
+        high = np.maximum(low, high)
+        confined = np.clip(commands.target, low, high)
+        astray = {*np.flatnonzero(np.abs(confined - commands.target) > SLACK).tolist()}
+        for axis in sorted(astray - self._astray):
+            robot = self.factory.robot_of(axis)
+            name = self.factory.robots[robot].name + (" lift" if axis != robot else "")
+            ends = f"between {low[axis]:.3f} m and {high[axis]:.3f} m now"
+            message = f"{name} is sent to {commands.target[axis]:.6g} m: it may go {ends}"
+            self.refusals.append(Refusal(interlock.world.time, robot, message))
+        self._astray = astray
+        return confined
+
+
+def drive(simulation: Simulation, controller: Controller, scan: float) -> DrivenSupervisor:
+    """Let a controller drive the plant of a simulation from the start, asked every `scan` [s]."""
+    net, settings = simulation.timing.coordinated, simulation.request.settings
+    interlock = PlantInterlock(simulation.layout, simulation.modes, simulation.world, net)
+    driven = DrivenSupervisor(interlock, simulation.limits, settings, controller, scan)
+    simulation.supervisor = driven
+    return driven

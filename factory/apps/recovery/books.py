@@ -1,0 +1,51 @@
+"""The state that the marking implies: which operation each robot is in, and which label it
+holds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from factory.engine.simulation.supervisor import Supervisor
+from factory.theory.nets.petri import Marking
+from factory.theory.plant.factory import Factory, Operation
+from factory.theory.problem.pag import NOPART
+
+
+class Books:
+    """Reads the state of a factory from a supervisor's marking, or from another marking."""
+
+    def __init__(self, factory: Factory, supervisor: Supervisor) -> None:
+        self.factory, self.supervisor = factory, supervisor
+
+    @property
+    def marking(self) -> Marking:
+        """The marked places."""
+        return frozenset(place for place, is_so in enumerate(self.supervisor.marked) if is_so)
+
+    def step_of(self, robot: int, marking: Marking | None = None) -> int:
+        """The position of a robot (index) in its gear: 2k before the k-th operation of its program,
+        2k + 1 in it."""
+        marked = self.marking if marking is None else marking
+        places = self.factory.net.gears[robot].places
+        return next(step for step, place in enumerate(places) if place in marked)
+
+    def operation_of(self, robot: int, marking: Marking | None = None) -> Operation:
+        """The operation that a robot (index) takes part in or waits for."""
+        step = self.step_of(robot, marking)
+        return self.factory.operations[self.factory.robots[robot].operations[step // 2]]
+
+    def holds(
+        self, robot: int, marking: Marking | None = None, fired: Sequence[int] | None = None
+    ) -> str:
+        """The label that a robot (index) holds, NOPART for none. `fired`: firing counts of the
+        transitions, for another marking."""
+        operation, is_in_it = self.operation_of(robot, marking), self.step_of(robot, marking) % 2
+        counts = self.supervisor.fired if fired is None else fired
+        unit = self.factory.unit(operation, counts[operation.start] - is_in_it)
+        is_made = self.supervisor.word.is_made(unit)
+        return operation.before[operation.robots.index(robot)] if is_made else NOPART
+
+    def held(self, marking: Marking | None = None, fired: Sequence[int] | None = None) -> list[str]:
+        """The label that each robot holds, NOPART for none."""
+        marked = self.marking if marking is None else marking
+        return [self.holds(robot.index, marked, fired) for robot in self.factory.robots]

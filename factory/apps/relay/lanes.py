@@ -1,0 +1,173 @@
+"""Payloads of robots in lanes, and obstacles of their hands."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from factory.floor.geometry.meshes import Array
+from factory.floor.layout.dimensions import FINGER, Clearance
+from factory.floor.layout.hands.apart import BESIDE, HandsApart, Swept
+from factory.floor.layout.hands.hand import Hand, Kind, widths
+from factory.floor.layout.hands.holding import Holding, held
+from factory.floor.layout.hands.in_the_way import InTheWay, Passed
+from factory.floor.layout.hands.places import Places
+from factory.floor.layout.hands.surfaces import Way, swept
+from factory.floor.layout.layout import Layout
+from factory.theory.control.mode import Truth
+from factory.theory.plant.factory import Factory, Operation
+
+
+@dataclass(frozen=True, slots=True)
+class Lane:
+    """Where a robot runs that relays another: how it lies (`heading`, and `toward`, that of the
+    carrier at the end of the line), the `line` across its heading in the frame of the product [m]
+    to one `side` of which (+1, -1 along the axis) its lane is and it holds."""
+
+    heading: Way
+    toward: Way
+    line: float
+    side: int
+
+    @property
+    def across(self) -> int:
+        """The axis across its heading."""
+        return 1 if self.heading[0] else 0
+
+
+SAME = 1e-5
+"""Places that are no further apart across are on one line [m]."""
+
+NOTHING = Hand("none", ((0.0, 0.0, 0.0),))
+"""Where there is no hand."""
+
+
+class HoldingInLanes(Holding):
+    """As `Holding`; no robot comes to a hand-over in line. `cut`: the robots that run on a piece of
+    a guidepath."""
+
+    def __init__(
+        self,
+        before: Layout,
+        factory: Factory,
+        origins: Sequence[int],
+        cut: Collection[int],
+        relays: Collection[int],
+    ) -> None:
+        super().__init__(factory, before.product)
+        self.relays, self.clearance = relays, Clearance(before.clearance, before.factory.carriage)
+        self.origins, self.cut = origins, cut
+        self.headings = [before.guidepaths[old].heading for old in origins]
+        for robot in cut:
+            self.axis[robot] = 0 if self.headings[robot][0] else 1
+
+    def made(self, robot: int) -> list[Operation]:
+        return [o for o in super().made(robot) if o.index not in self.relays]
+
+    def gives(self, robot: int) -> bool:
+        """Whether a robot delivers to one in line with it."""
+        return self.last(robot).index in self.relays
+
+    def takes(self, robot: int) -> bool:
+        """Whether a robot takes over from one in line with it."""
+        return self.factory.robots[robot].operations[0] in self.relays
+
+
+class HandsApartInLanes(HandsApart):
+    """As `HandsApart`, for robots in lanes, and for those whose hands are chosen anew on the line
+    of the one that was `kept`."""
+
+    holding: HoldingInLanes
+
+    def __init__(
+        self,
+        holding: HoldingInLanes,
+        lanes: Mapping[int, Lane],
+        hand_of: Callable[[int, Way], Hand],
+    ) -> None:
+        super().__init__(holding, hand_of)
+        self.lanes, self.kept = lanes, dict[int, Hand]()
+
+    def own_side(self, robot: int, kind: Kind, places: Places, u: Way, t: Way) -> Truth:
+        if robot in self.kept:
+            kept, across = self.kept[robot], 1 if u[0] else 0
+            free: Truth = np.abs(places.at[:, across] - kept.places[0][across]) < SAME
+            free &= places.radius <= max(kept.radius, FINGER / 2) + SAME
+            return free & super().own_side(robot, kind, places, u, t)
+        lane, c = self.lanes[robot], self.holding.clearance
+        wide = widths(places.radius) / 2
+        away = (places.at[:, lane.across] - lane.line) * lane.side
+        free = (away - wide >= c.c / 2) & (away - places.radius >= BESIDE)
+        free &= away + wide <= c.spread + c.carriage / 2
+        if self.holding.gives(robot):
+            return free
+        return free & super().own_side(robot, kind, places, u, t)
+
+    def crossing(self, robot: int, places: Places, u: Way, t: Way) -> Array:
+        if self.holding.gives(robot):
+            return np.zeros(len(places))
+        return super().crossing(robot, places, u, t)
+
+    def carriers_hand(
+        self, robot: int, kind: Kind, places: Places, u: Way, t: Way
+    ) -> Iterator[Swept]:
+        if not self.holding.gives(robot):
+            yield from super().carriers_hand(robot, kind, places, u, t)
+
+
+class InTheWayInLanes(InTheWay):
+    """As `InTheWay`, for robots in lanes; `settled`: hands chosen already."""
+
+    holding: HoldingInLanes
+    apart: HandsApartInLanes
+
+    def __init__(
+        self, holding: HoldingInLanes, lanes: Mapping[int, Lane], settled: Sequence[Hand | None]
+    ) -> None:
+        def hand_of(robot: int, _: Way) -> Hand:
+            return settled[robot] or NOTHING
+
+        super().__init__(holding, hand_of)
+        self.apart = HandsApartInLanes(holding, lanes, hand_of)
+
+    def possible(
+        self, robot: int, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]
+    ) -> bool:
+        """Always true: a lane has two ends."""
+        return True
+
+    def checks(
+        self, robot: int, label: str, kind: Kind, places: Places, frames: Sequence[tuple[Way, Way]]
+    ) -> tuple[dict[str, Truth], Truth]:
+        """Not cached, since lanes and settled hands change."""
+        return self._looked_at(robot, label, kind, places, frames)
+
+    def _passing(
+        self, robot: int, label: str, kind: Kind, places: Places, u: Way, t: Way
+    ) -> Passed:
+        return self._looked_past(robot, label, kind, places, u, t)
+
+    def _going_on(self, robot: int, kind: Kind, places: Places, u: Way, t: Way) -> Array:
+        if self.holding.gives(robot):
+            return np.zeros(len(places))
+        return super()._going_on(robot, kind, places, u, t)
+
+    def _leaving(self, robot: int, kind: Kind, places: Places, u: Way) -> Iterator[Swept]:
+        """Also the sweep of a hand as it comes to take over, from ahead."""
+        low, high = self.reach(kind, places, u)
+        if self.holding.takes(robot):
+            label = held(self.holding.factory, robot)
+            yield (*swept(low, high, u), self.holding.boxes(label))
+        if self.holding.gives(robot):
+            last = held(self.holding.factory, robot, at_last=True)
+            yield (*swept(low, high, (-u[0], -u[1])), self.holding.boxes(last))
+        else:
+            yield from super()._leaving(robot, kind, places, u)
+
+    def coming(
+        self, robot: int, label: str, kind: Kind, places: Places, u: Way, t: Way
+    ) -> Iterator[Swept]:
+        if not self.holding.takes(robot):
+            yield from super().coming(robot, label, kind, places, u, t)

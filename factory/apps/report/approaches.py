@@ -1,0 +1,93 @@
+"""The approaches of the inputs of each operation, as HTML."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from html import escape
+
+from factory.apps.report.recording import Recording
+from factory.floor.mating.mating import AMPLE, rooms
+from factory.theory.compiler.expanding import nodes_of
+from factory.theory.plant.approaches import Approach, Pair
+from factory.theory.plant.factory import Operation
+
+COLUMNS = ("Operation", "Inputs", "Approach", "Clearance on approach", "Excluded")
+
+LEGEND = (
+    "Clearance: the least distance between the moving and the standing parts during the approach, "
+    "except in its last millimetre. Excluded: pairs of parts that overlap or touch there, and so "
+    "are excluded from contact in the run."
+)
+
+NAMED = 100
+"""Upper bound on the listed pairs of an operation."""
+
+
+def approaches_section(recording: Recording, labels: Mapping[str, int]) -> str:
+    """The section on approaches; empty for a product of default boxes, which has none."""
+    operations = [o for o in recording.factory.operations if o.approach is not None]
+    if not operations:
+        return ""
+    chosen = {o.label: _taken(recording, o) for o in operations}
+    room = _rooms(recording, chosen)
+    rows = "".join(_row(o, chosen[o.label], room.get(o.label), labels) for o in operations)
+    head = "".join(f"<th>{name}</th>" for name in COLUMNS)
+    return (
+        '\n<section class="panel wide approaches" aria-labelledby="h-approaches">\n'
+        '<div class="bar"><h2 id="h-approaches">How parts come together</h2></div>'
+        f'<div class="text"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>'
+        f"<p class='note'>{LEGEND}</p></div>\n</section>"
+    )
+
+
+def _taken(recording: Recording, operation: Operation) -> Approach:
+    """The approach of an operation, from the side chosen by its layout where there is one."""
+    approach = operation.approach
+    assert approach is not None
+    if recording.layout is None or approach.kind == "lower" or not any(approach.overlaps):
+        return approach
+    side = recording.layout.side(operation)
+    overlaps = approach.overlaps[approach.sides.index(side)]
+    return replace(approach, sides=(side,), overlaps=(overlaps,))
+
+
+def _rooms(recording: Recording, chosen: Mapping[str, Approach]) -> Mapping[str, float]:
+    """The clearance on each approach by label; empty where the meshes are missing."""
+    if recording.layout is None:
+        return {}
+    return rooms(nodes_of(recording.factory), recording.layout.product, chosen)
+
+
+def _row(o: Operation, approach: Approach, room: float | None, labels: Mapping[str, int]) -> str:
+    pairs = {overlap.parts for side in approach.overlaps for overlap in side}
+    name, number = escape(o.label), labels.get(o.label)
+    if number is not None:
+        name = f'<button class="link" data-label="{number}">{name}</button>'
+    bad = ' class="bad"' if approach.kind == "blocked" else ""
+    return (
+        f"<tr{bad}><td>{name}</td><td>{escape(' + '.join(o.inputs))}</td>"
+        f"<td>{escape(approach.told)}</td><td>{_room(room)}</td><td>{_left_out(pairs)}</td></tr>"
+    )
+
+
+def _room(room: float | None) -> str:
+    """A clearance in words [mm]."""
+    if room is None:
+        return "–"
+    if room == float("inf"):
+        return f"more than {1e3 * AMPLE:g} mm"
+    millimetres = round(1e3 * room, 2)
+    if millimetres >= 0:
+        return f"{abs(millimetres):.2f} mm"
+    return f"overlap of {-millimetres:.2f} mm as drawn"
+
+
+def _left_out(pairs: set[Pair]) -> str:
+    """The number of pairs, and a list."""
+    if not pairs:
+        return "none"
+    named = [escape(f"{one} - {other}") for one, other in sorted(pairs)[:NAMED]]
+    more = [f"and {len(pairs) - NAMED} more"] if len(pairs) > NAMED else []
+    listed = "".join(f"<li>{words}</li>" for words in (*named, *more))
+    return f"<details><summary>{len(pairs)}</summary><ul>{listed}</ul></details>"

@@ -1,0 +1,89 @@
+"""The failures of a recorded run and the responses to them, as HTML and as data."""
+
+from __future__ import annotations
+
+from collections import Counter
+from html import escape
+from math import isfinite
+from typing import Any
+
+from factory.apps.report.recording import Recording
+from factory.engine.record.failures import Death, Failing, Failures, deaths
+from factory.theory.lang.source import counted
+
+LEGEND = (
+    "Robots over time: undone operations are hatched; in a band a robot stands still, in a dark one"
+    " it is dead, until a spare replaces it."
+)
+
+COLUMNS = ("Time", "Failure", "Response", "Undone", "Scrapped")
+
+
+def failures_section(recording: Recording) -> str:
+    """The section of a run that recovers from failures; empty for any other."""
+    failures = recording.log.failures
+    if failures is None:
+        return ""
+    head = "".join(f"<th>{name}</th>" for name in COLUMNS)
+    rows = "".join(_row(recording, one) for one in failures.found)
+    table = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>" if rows else ""
+    text = f"<p>{escape(_summary(failures))}</p>{table}<p class='note'>{LEGEND}</p>"
+    return (
+        '\n<section class="panel wide failures" aria-labelledby="h-failures">\n'
+        '<div class="bar"><h2 id="h-failures">Failures</h2></div>'
+        f'<div class="text">{text}</div>\n</section>'
+    )
+
+
+def failures_data(recording: Recording) -> dict[str, Any]:
+    """The data of the page: `undone`: number of firings before, time [s] and transitions; `dead`:
+    robot, start and end [s], null where nothing replaced it, and the situation after it; `stood`:
+    times [s] and the robots that stood still from then on."""
+    log, net = recording.log, recording.factory.net.threaded.net.transition_index
+    if log.failures is None:
+        return {}
+    robots = {robot.name: robot.index for robot in recording.factory.robots}
+    return {
+        "undone": [
+            [after, round(undone.t, 4), [net[name] for name in undone.transitions]]
+            for after, undone in log.undone
+        ],
+        "dead": [_dead(robots[one.robot], one) for one in deaths(log.failures.found)],
+        "stood": [
+            [round(t, 4), [robots[name] for name in names]] for t, names in log.failures.stood
+        ],
+    }
+
+
+def _dead(robot: int, death: Death) -> list[Any]:
+    """A death, as in `failures_data`."""
+    start, end = round(death.start, 4), round(death.end, 4) if isfinite(death.end) else None
+    return [robot, start, end, f", then {death.then}" if end is not None else ""]
+
+
+def _summary(failures: Failures) -> str:
+    """The counts of all failures, in words."""
+    struck = ", ".join(f"{n} {kind.replace('_', ' ')}" for kind, n in failures.struck.items() if n)
+    figures = (
+        counted(len(failures.found), "failure"),
+        f"{counted(failures.undone, 'transition')} undone",
+        f"{failures.scrapped} scrapped",
+        f"{counted(failures.spares, 'spare')} used",
+        f"{counted(failures.contacts, 'contact')} with fallen or misplaced parts",
+    )
+    detection = f"{failures.missed} missed, {counted(failures.false_alarms, 'false alarm')}"
+    return f"Faults: {struck or 'none'}; {detection}. {', '.join(figures)}."
+
+
+def _row(recording: Recording, one: Failing) -> str:
+    undone = Counter(
+        name
+        for _, entry in recording.log.undone
+        if (entry.operation, entry.reason) == (one.operation, one.test)
+        if abs(entry.t - one.t) < 1e-6
+        for name in entry.transitions
+    )
+    names = ", ".join(f"{name} ({n} times)" if n > 1 else name for name, n in undone.items())
+    cells = (one.done, names or "–", ", ".join(one.scrapped) or "–")
+    values = "".join(f"<td>{escape(cell)}</td>" for cell in cells)
+    return f"<tr><th>{one.t:.2f} s</th><td>{escape(one.what)}</td>{values}</tr>"

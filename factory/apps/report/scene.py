@@ -1,0 +1,173 @@
+"""The drawable data of a factory in the engine, and its 3-D view: coloured triangles, shared by
+bodies of the same shape, and the robot or label of each body."""
+
+from __future__ import annotations
+
+import gzip
+from base64 import b64encode
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from hashlib import sha256
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from factory.engine.mjcf import names
+from factory.engine.mjcf.replica import Floats, Replica, paint, shown, triangles
+from factory.engine.mjcf.robots import ROLES
+from factory.floor.geometry.pieces import joined
+from factory.floor.geometry.solids import rotation
+from factory.support.engine import mujoco
+from factory.theory.plant.factory import Factory, Operation
+
+
+class Pack:
+    """A growing buffer. `index`: for each array by name its type, first byte and count."""
+
+    def __init__(self) -> None:
+        self.index: dict[str, tuple[str, int, int]] = {}
+        self._parts: list[bytes] = []
+        self._size = 0
+
+    def add(self, name: str, values: NDArray[Any]) -> None:
+        """Add an array, of type f4, u4 or u1, starting at a multiple of four bytes."""
+        kind = {"f": "f4", "u": f"u{values.dtype.itemsize}"}[values.dtype.kind]
+        content = np.ascontiguousarray(values, dtype=f"<{kind}").tobytes()
+        content += bytes(-len(content) % 4)
+        self.index[name] = kind, self._size, int(values.size)
+        self._parts.append(content)
+        self._size += len(content)
+
+    def text(self) -> str:
+        """The buffer, compressed with gzip (the same bytes at any time), in base 64."""
+        return b64encode(gzip.compress(b"".join(self._parts), 9, mtime=0)).decode()
+
+
+@dataclass(frozen=True)
+class DrawnFactory:
+    """A factory and the engine's model `m` of it. `position` (bodies, 3) [m] and `quaternion`
+    (bodies, 4) of each body at the start, of one that has a parent relative to that or, of a run
+    that is not over, to the world; `reach` (2, bodies, 3): the least and the greatest position;
+    `places`: where the body of each part is in the finished product [m]; `stations`: where the
+    payload is held as operations of several robots end (x, y) [m], each with the labels they make.
+    """
+
+    factory: Factory
+    m: mujoco.MjModel = field(repr=False)
+    position: Floats = field(repr=False)
+    quaternion: Floats = field(repr=False)
+    reach: Floats = field(repr=False)
+    places: Mapping[str, Iterable[float]] = field(repr=False)
+    stations: Mapping[tuple[float, float], list[str]] = field(repr=False)
+
+    @cached_property
+    def roles(self) -> tuple[str, ...]:
+        """What each robot is for, as its paint shows: output, carrier, fed or tool, else shared."""
+        m = self.m
+        paints = {i: m.mat(i).name.removeprefix("role/") for i in range(m.nmat)}
+        by_robot = []
+        for robot in self.factory.robots:
+            body = m.body(names.carriage(robot.name))
+            first = int(body.geomadr[0])
+            worn = (int(m.geom_matid[g]) for g in range(first, first + int(body.geomnum[0])))
+            roles = (paints[paint] for paint in worn if paints.get(paint) in ROLES)
+            by_robot.append(next(roles, "shared"))
+        return tuple(by_robot)
+
+
+def stations(
+    factory: Factory, m: mujoco.MjModel, ends: Iterable[tuple[Operation, Floats]]
+) -> dict[tuple[float, float], list[str]]:
+    """The stations of operations, each with the state of the engine (nq,) as it ends."""
+    replica, sites = Replica(m), {m.site(number).name for number in range(m.nsite)}
+    stations: dict[tuple[float, float], list[str]] = {}
+    for operation, qpos in ends:
+        nest = f"{factory.robots[operation.carrier].name}/nest"
+        if len(operation.robots) < 2 or nest not in sites:
+            continue
+        replica.place(qpos)
+        x, y = (round(float(v), 3) for v in replica.d.site_xpos[m.site(nest).id][:2])
+        stations.setdefault((x, y), []).append(operation.label)
+    return stations
+
+
+def placed(m: mujoco.MjModel, geom: int) -> tuple[Floats, NDArray[np.int64]]:
+    """A geom's vertices, in the frame of its body [m], and faces."""
+    points, faces = triangles(m, geom)
+    return points @ rotation(m.geom_quat[geom]).T + m.geom_pos[geom], faces
+
+
+def _look(m: mujoco.MjModel, geoms: Sequence[int]) -> tuple[list[NDArray[Any]], float]:
+    """Several geoms of a body as one: vertices (n, 3) [m] in its frame, faces (k, 3), colours
+    (n, 3) from 0 to 255; and how opaque it is."""
+    meshes = [placed(m, geom) for geom in geoms]
+    paints = np.array([paint(m, geom) for geom in geoms])
+    counts = [len(points) for points, _ in meshes]
+    vertices, faces = joined(meshes)
+    colours = np.round(255 * np.clip(paints[:, :3], 0, 1)).astype(np.uint8)
+    made = [
+        vertices.astype(np.float32),
+        faces.astype(np.uint32),
+        np.repeat(colours, counts, axis=0),
+    ]
+    return made, float(paints[:, 3].min())
+
+
+def scene(stage: DrawnFactory, labels: dict[str, int], pack: Pack) -> dict[str, Any]:
+    """The geometry, into the pack, and the list of things: each a shape, the body it moves with,
+    and what it stands for (`robot` or `label`, by number)."""
+    m = stage.m
+    robots = {robot.name: robot.index for robot in stage.factory.robots}
+    shapes: dict[bytes, int] = {}
+    alphas: list[float] = []
+    things = []
+    for body, geoms in _groups(m):
+        made, alpha = _look(m, geoms)
+        key = sha256(b"".join(a.tobytes() for a in made) + repr(alpha).encode()).digest()
+        if key not in shapes:
+            shapes[key] = number = len(shapes)
+            alphas.append(round(alpha, 3))
+            for letter, values in zip("vfc", made, strict=True):
+                pack.add(f"{letter}{number}", values)
+        name = owner(m.geom(geoms[0]).name) if body == 0 else m.body(body).name
+        things.append({"shape": shapes[key], "body": body, **stands_for(name, robots, labels)})
+    return {"alphas": alphas, "things": things, "places": _places(stage, labels)}
+
+
+def _groups(m: mujoco.MjModel) -> Iterator[tuple[int, list[int]]]:
+    """The geoms that make one thing: those of a body; of the world those of a robot."""
+    owned: dict[str, list[int]] = {}
+    for geom in shown(m, 0):
+        owned.setdefault(owner(m.geom(geom).name), []).append(geom)
+    for geoms in owned.values():
+        yield 0, geoms
+    for body in range(1, m.nbody):
+        if geoms := list(shown(m, body)):
+            yield body, geoms
+
+
+def owner(geom: str) -> str:
+    """What a geom of the world belongs to, by its name: `feeder/part1` of `feeder/part1/cap`."""
+    return geom.rpartition("/")[0]
+
+
+def stands_for(name: str, robots: dict[str, int], labels: dict[str, int]) -> dict[str, int]:
+    """What a body, or a geom of the world, is about: a robot, or a part with its feeder and what
+    moves in that."""
+    head, _, rest = name.partition("/")
+    if head in robots:
+        return {"robot": robots[head]}
+    if head == "part" and names.label_of(name) in labels:
+        return {"label": labels[names.label_of(name)], "copy": 1}
+    if head == "feeder":
+        label = rest if rest in labels else rest.rpartition("/")[0]
+        return {"label": labels[label]} if label in labels else {}
+    return {}
+
+
+def _places(stage: DrawnFactory, labels: dict[str, int]) -> dict[str, list[float]]:
+    """Where the body of each part, by its label's number, is in the finished product [m]."""
+    places = stage.places.items()
+    return {str(labels[k]): [round(x, 6) for x in v] for k, v in places if k in labels}

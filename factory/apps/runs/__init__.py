@@ -1,0 +1,1 @@
+"""Runs of projects: logged, filmed, recovering, watched by a monitor, and judged."""

@@ -1,0 +1,145 @@
+"""The options of a run as values, for the command line and for functions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from factory.support.bounds import WORLDS, WorldName, check_choice, check_values
+from factory.support.errors import Diagnostic, InputError, usage_error
+
+if TYPE_CHECKING:
+    from factory.engine.simulation.request import RunRequest
+    from factory.pipeline import Project
+    from factory.theory.nets.petri import Marking
+
+APART = (
+    (
+        "--relay",
+        ("--robots", "--parallel", "[lines]"),
+        "a relay cuts the way of one tour, and a robot has several then",
+    ),
+    ("[tees]", ("--robots", "--cycle", "--relay"), "they change the robots that share a stem"),
+    (
+        "--demand",
+        ("--distributed", "--from"),
+        "one supervisor skips what nobody has ordered, from the beginning on",
+    ),
+    (
+        "--distributed",
+        ("--faults", "--spares"),
+        "robots that run their own programs do not recover",
+    ),
+    ("--platen", ("--relay", "--cycle"), "what they change has no room on guidepaths that bend"),
+)
+"""Options that exclude others, with the reason. All other pairs can be combined; of a product,
+--relay goes with none of a mix, and with no plan whose robots have several tours (`Project`)."""
+
+
+def check_together(values: Mapping[str, bool]) -> None:
+    """Raises InputError (BadValue) for options that exclude each other."""
+    for one, others, reason in APART:
+        for other in others:
+            if values.get(one) and values.get(other):
+                message = f"{one} cannot be combined with {other}: {reason}"
+                raise InputError(Diagnostic("BadValue", message, None, "leave out one of the two"))
+
+
+@dataclass(frozen=True, slots=True)
+class RunOptions:
+    """How a run is made: in a `world`, until so many `units` are dropped off; `seed` and `jitter`
+    draw each robot's speed and gain within ± jitter. `wip`: most copies of each part inside;
+    `start`: a legal marking, or the names of its places, separated by commas, m_0 where None;
+    `fuse`: whether parts joined for good become one body, None where that pays; `max_time`: at most
+    so long [simulated s]; `distributed`: robots run their own programs; `lenient`: what its bodies
+    do does not count; `faults`: a file of what goes wrong, `spares`: robots in reserve, `swap`: how
+    long an exchange takes [s]; `demand`: a file of the orders for a mix, or a seed that draws them;
+    `strict`: a run fails whose success is qualified. Raises InputError (Usage) with every value out
+    of its bounds."""
+
+    world: WorldName = "mujoco"
+    units: int = 1
+    seed: int = 0
+    jitter: float = 0.0
+    wip: int | None = None
+    start: str | Marking | None = None
+    fuse: bool | None = None
+    max_time: float | None = None
+    distributed: bool = False
+    lenient: bool = False
+    faults: Path | None = None
+    spares: int = 0
+    swap: float | None = None
+    demand: str | None = None
+    strict: bool = False
+
+    def __post_init__(self) -> None:
+        check_choice("world", self.world, WORLDS)
+        names = ("units", "seed", "jitter", "wip", "max_time", "spares", "swap")
+        check_values({name: getattr(self, name) for name in names})
+
+    @property
+    def recovers(self) -> bool:
+        """Whether the run recovers from failures."""
+        return self.faults is not None or self.spares > 0
+
+    def check_combination(self) -> None:
+        """Raises InputError (BadValue) where options of the run do not go together. Nothing is laid
+        out for that."""
+        check_together(
+            {
+                "--demand": self.demand is not None,
+                "--from": self.start is not None,
+                "--distributed": self.distributed,
+                "--faults": self.faults is not None,
+                "--spares": self.spares > 0,
+            }
+        )
+
+    def check(self, project: Project) -> None:
+        """The same, before a project is laid out; the file of a demand is read, but for a pipe,
+        which is read once. Raises InputError."""
+        from factory.engine.simulation.demand_file import demand_of
+
+        self.check_combination()
+        if self.demand is not None and not Path(self.demand).is_fifo():
+            demand_of(self.demand, project.pag, self.units)
+
+    def request(self, project: Project, shown: bool = True) -> RunRequest:
+        """The request of a run; `shown`: whether it is filmed or logged. Raises InputError."""
+        from factory.engine.simulation.demand_file import demand_of
+        from factory.engine.simulation.request import RunRequest
+        from factory.floor.geometry.fused_bodies import fusing_pays
+        from factory.theory.nets.history import legal_marking
+
+        self.check_combination()
+        layout, start, units, demand = project.layout, self.start, self.units, None
+        if self.demand is not None:
+            demand = demand_of(self.demand, project.pag, units)
+            units = len(demand.orders) or units
+        if isinstance(start, str):
+            start = legal_marking(layout.factory.net, start)
+        return RunRequest(
+            self.world,
+            units,
+            self.seed,
+            self.jitter,
+            project.settings,
+            start,
+            self.wip,
+            self.distributed,
+            fusing_pays(layout.factory, layout.product) if self.fuse is None else self.fuse,
+            shown,
+            recovers=self.recovers,
+            catalogue=project.catalogue,
+            demand=demand,
+        )
+
+
+def check_ideal(fuse: bool | None, monitor: bool = False) -> None:
+    """Raises InputError (Usage) for options that need bodies, which the ideal world lacks."""
+    for wanted, purpose in ((monitor, "for a monitor to observe"), (fuse, "that could become one")):
+        if wanted:
+            raise usage_error(f"the ideal world has no bodies {purpose}", "leave out --world ideal")

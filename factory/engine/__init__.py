@@ -1,0 +1,1 @@
+"""Runs in MuJoCo and in the ideal world: the model, the worlds, the supervisor, the record."""

@@ -1,0 +1,285 @@
+"""Drives: what each moves, and the gains and force that it has for that.
+
+The drive of a robot is sized for its heaviest payload, unless its type has gains of its own; it is
+never stronger than the motor of its type.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from math import inf, sqrt
+
+from factory.engine.mjcf.robots import Drive
+from factory.engine.mjcf.stops import OVERLOAD
+from factory.engine.mjcf.tools import GYRATION, gyration
+from factory.floor.layout.guidepath import LEVER
+from factory.floor.layout.layout import Layout
+from factory.support.errors import Diagnostic, InputError
+from factory.support.settings import AUTO, TICK, Settings
+from factory.theory.problem.robot_bodies import FRICTION, LIFT_JOINT, RobotAxis
+
+STIFFNESS = 70.0
+"""Natural frequency of a robot's position loop at full payload [rad/s]."""
+
+HOIST_STIFFNESS = 200.0
+"""The same of a lift's, which holds a weight: half a payload unaccounted for lets it sag by 0.1
+mm [rad/s]."""
+
+PUSHED, DAMPED = 0.4, 0.8
+"""In a timestep a drive that carries nothing takes at most such shares of an offset and of a speed
+away: it is explicit, overshoots at 1, and is unstable where the first and twice the second are 4.
+With a long timestep it is less stiff for that."""
+
+LEAST = 0.5
+"""What moves a payload weighs at least this share of it: a weld is as stiff as the lighter of its
+bodies is heavy, and a heavy payload would swing on it. A motor's inertia makes up for what is
+missing."""
+
+STEPS = (1, 2, 4, 5, 10, 20)
+"""So many timesteps may a tick have: 10, 5, 2.5, 2, 1 or 0.5 ms each."""
+
+ALLOWED = 0.5e-3
+"""Half of what a good factory keeps of tracking errors, gaps and residuals (`fidelity`) [m]."""
+
+GRAVITY = 9.81
+"""[m/s²]; the engine's own."""
+
+ROLLING = 0.003
+"""Friction of a carriage's and the tray's guide, as a share of the weight that it bears: that of a
+profile rail with balls (docs/decisions/guides.md)."""
+
+SLACK = 0.3
+"""Share of a lift's weight that its drive must hold without having been told: drives that are a
+third stronger or weaker, and parts half as heavy again, are survived (docs/fidelity.md)."""
+
+SURE = 1.25
+"""Measured errors are up to so many times the formula's: 630 random runs at 10 ms."""
+
+RESERVE = 1.5
+"""A motor gives at least so many times the force that its robot's acceleration takes."""
+
+SETTLED = 0.7
+"""Least damping ratio of gains that a type has of its own: with less a robot swings at its goal."""
+
+
+@dataclass(frozen=True, slots=True)
+class DrivenAxis:
+    """What a drive moves: its `own` mass and a `load` [kg], with an `acceleration` [m/s²] that
+    changes by up to twice its amount, times `jump`, at once; `push` [m/s²] is what its force is
+    for; its `stiffness` [rad/s] and the least `gain` that jitter draws for it; `held`: what it must
+    push against untold [N]; `room`: how far its end stops may let it go [m]; `motor`: the axis of
+    the robot type, None of a station."""
+
+    own: float
+    load: float
+    acceleration: float
+    push: float
+    stiffness: float
+    gain: float = 1.0
+    jump: float = 1.0
+    held: float = 2 * FRICTION
+    room: float = inf
+    motor: RobotAxis | None = None
+
+    @classmethod
+    def loaded(
+        cls,
+        mass: float,
+        load: float,
+        acceleration: float,
+        room: float = inf,
+        gain: float = 1.0,
+        jump: float = 1.0,
+    ) -> DrivenAxis:
+        """A station's whose guide bears its load, and which pushes for its acceleration alone."""
+        held = 2 * (FRICTION + ROLLING * load * GRAVITY)
+        return cls(mass, load, acceleration, acceleration, STIFFNESS, gain, jump, held, room)
+
+    def drive(self, settings: Settings) -> Drive:
+        """Its drive."""
+        sized = drive_for(self.own, self.load, self.push, settings, self.stiffness)
+        if self.motor is None:
+            return sized
+        if self.motor.kp is not None and self.motor.kv is not None:
+            sized = replace(sized, kp=self.motor.kp, kv=self.motor.kv)
+        return replace(sized, force=min(sized.force, self.motor.force))
+
+    def error(self, settings: Settings) -> float:
+        """How far it may get off its reference [m]: the speed that it misses, times the peak of a
+        drive's answer to a speed of 1, and how far it is held off."""
+        drive, h = self.drive(settings), settings.step
+        mass = self.own + drive.inertia + self.load
+        stiff, damping = self.gain * drive.kp / mass, self.gain * drive.kv / mass
+        missed = self.jump * self.acceleration * h * abs(1 - damping * h)
+        return SURE * (missed / (sqrt(stiff) + 0.85 * damping) + self.rest(settings))
+
+    def leap(self, settings: Settings) -> float:
+        """How far it goes from rest in the step in which it meets the buffer of its stop [m], when
+        it is empty and under all that a stop withstands."""
+        drive = self.drive(settings)
+        force = (1 + OVERLOAD) * drive.force
+        return force / (self.own + drive.inertia) * settings.step**2
+
+    def rest(self, settings: Settings) -> float:
+        """How far off its reference it may be held for ever [m]."""
+        return self.held / (self.gain * self.drive(settings).kp)
+
+    @property
+    def usual(self) -> bool:
+        """Whether its drive is sized for its load, against no more friction than usual."""
+        return self.motor is None or self.motor.usual
+
+    def follows(self, settings: Settings, lever: float = 1.0) -> bool:
+        """Whether its gains are stable, do not swing, and keep it on its reference; `lever`: how
+        far it goes along for each unit [m]. The shorter the timestep, the sooner."""
+        drive, h = self.drive(settings), settings.step
+        empty, mass = self.own + drive.inertia, self.own + drive.inertia + self.load
+        stable = drive.kp <= PUSHED * empty / h**2 and drive.kv <= DAMPED * empty / h
+        calm = drive.kv >= 2 * SETTLED * sqrt(drive.kp * mass)
+        near = lever * self.error(settings) < ALLOWED
+        return stable and calm and near and lever * self.rest(settings) <= settings.eps
+
+
+def drive_for(
+    empty_mass: float,
+    load: float,
+    acceleration: float,
+    settings: Settings,
+    stiffness: float = STIFFNESS,
+) -> Drive:
+    """Critically damped gains for what moves a load, and the load [kg]; the force that their
+    acceleration [m/s²] takes; the inertia that the motor adds."""
+    inertia = max(0.0, LEAST * load - empty_mass)
+    empty, rate = empty_mass + inertia, 1 / settings.step
+    mass = empty + load
+    kp = min(mass * stiffness**2, PUSHED * empty * rate**2)
+    kv = min(2 * mass * stiffness, DAMPED * empty * rate)
+    force = settings.force * mass * acceleration + 5
+    return Drive(round(kp, 3), round(kv, 3), round(force, 3), settings.samples, round(inertia, 3))
+
+
+def moment_of(axis: RobotAxis) -> float:
+    """Moment of inertia [kg m²] of a fixed robot's tool without payload, and of its motor."""
+    return round(GYRATION * axis.mass + axis.armature, 9)
+
+
+def along(axis: RobotAxis, load: float, settings: Settings) -> DrivenAxis:
+    """A robot's axis along its guidepath, with a load [kg]."""
+    empty, a = axis.mass + axis.armature, settings.acceleration
+    held = 2 * (axis.friction + ROLLING * load * GRAVITY)
+    return DrivenAxis(empty, load, a, a, STIFFNESS, held=held, motor=axis)
+
+
+def turning(axis: RobotAxis, moment: float, settings: Settings) -> DrivenAxis:
+    """The axis of a fixed robot's tool, with a load's moment of inertia [kg m²]."""
+    a, held = settings.acceleration / LEVER, 2 * axis.friction
+    return DrivenAxis(moment_of(axis), moment, a, a, HOIST_STIFFNESS, held=held, motor=axis)
+
+
+def up(axis: RobotAxis, load: float, settings: Settings) -> DrivenAxis:
+    """The axis of a robot's lift, with a load [kg]."""
+    empty, a = axis.mass + axis.armature, settings.acceleration
+    held = 2 * axis.friction + SLACK * (axis.mass + load) * GRAVITY
+    return DrivenAxis(empty, load, a, a + GRAVITY, HOIST_STIFFNESS, held=held, motor=axis)
+
+
+def first_axis(
+    layout: Layout,
+    robot: int,
+    load: float,
+    settings: Settings,
+    gain: float = 1.0,
+    room: float = inf,
+) -> DrivenAxis:
+    """A robot's first axis: along its guidepath; of one that is fixed the one that turns. Raises
+    InputError (NoGrip) where that has no hand."""
+    axis = layout.factory.robots[robot].body.first
+    if not layout.guidepaths[robot].fixed:
+        return along(axis, load, settings)
+    return turning(axis, load * gyration(layout, robot) ** 2, settings)
+
+
+def heaviest(layout: Layout, masses: Mapping[str, float]) -> list[float]:
+    """The heaviest load that each robot carries [kg], by what labels weigh."""
+    operations, robots = layout.factory.operations, layout.factory.robots
+    return [
+        max(
+            masses.get(o.after[o.robots.index(robot.index)], 0.0)
+            for o in (operations[number] for number in robot.operations)
+        )
+        for robot in robots
+    ]
+
+
+def lifted(layout: Layout, masses: Mapping[str, float]) -> dict[int, float]:
+    """The heaviest load that each robot with a lift delivers [kg], by what labels weigh."""
+    factory = layout.factory
+    return {
+        robot: max(masses[label] for label in factory.deliveries(robot))
+        for robot in factory.strokes
+    }
+
+
+def weights_of(layout: Layout) -> dict[str, float]:
+    """What the result of each operation weighs [kg], by its label."""
+    masses: dict[str, float] = {}
+    for operation in reversed(layout.factory.making):
+        inputs = [masses[label] for label in operation.inputs]
+        solids = layout.product.solids
+        masses[operation.label] = sum(inputs) if inputs else solids[operation.label].mass
+    return masses
+
+
+def check_drives(layout: Layout, settings: Settings) -> None:
+    """Raises InputError (BadRobot) where the motor of a robot type is too weak for what a robot
+    carries, or gains that the type has of its own do not keep a robot on its reference."""
+    motors = {axis for robot in layout.factory.robots for axis in robot.body.axes}
+    if all(motor.usual and motor.force == inf for motor in motors):
+        return
+    axes = _axes(layout, settings)
+    faults = [fault for each in axes for fault in _faults(*each, settings)]
+    if faults:
+        raise InputError(faults)
+
+
+def _axes(layout: Layout, settings: Settings) -> Iterator[tuple[str, DrivenAxis, float]]:
+    """The axes of all robots, with the robot's name and how far each goes along for a unit."""
+    robots, masses = layout.factory.robots, weights_of(layout)
+    for robot, load in zip(robots, heaviest(layout, masses), strict=True):
+        lever = layout.guidepaths[robot.index].lever
+        yield robot.name, first_axis(layout, robot.index, load, settings), lever
+    for number, load in lifted(layout, masses).items():
+        yield robots[number].name, up(robots[number].body.axis(LIFT_JOINT), load, settings), 1.0
+
+
+def _faults(name: str, axis: DrivenAxis, lever: float, settings: Settings) -> Iterator[Diagnostic]:
+    """What is wrong with the drive of one axis."""
+    motor = axis.motor
+    assert motor is not None, "it is a robot's"
+    each = [settings]
+    if settings.timestep == AUTO:
+        each = [replace(settings, timestep=TICK / n, substeps=n) for n in STEPS]
+    unit, of = ("N", "kg") if lever == 1.0 else ("N m", "kg m²")
+    carries = f"{name}, with {axis.load:.3g} {of}"
+    moved = axis.drive(each[-1]).inertia + axis.own + axis.load
+    needed = RESERVE * moved * axis.push + axis.held / 2
+    if motor.force < needed:
+        yield Diagnostic(
+            "BadRobot",
+            f"the motor of '{motor.joint}' gives {motor.force:g} {unit}, and {carries}, needs"
+            f" {needed:.3g} {unit}",
+            motor.position,
+            f"valid: a forcerange from {needed:.3g} {unit}, less --acceleration, lighter parts",
+        )
+    if axis.usual or any(axis.follows(s, lever) for s in each):
+        return
+    drive, sized = (a.drive(each[-1]) for a in (axis, replace(axis, motor=None)))
+    yield Diagnostic(
+        "BadRobot",
+        f"kp {drive.kp:g} and kv {drive.kv:g} of '{motor.joint}' do not keep {carries}, within"
+        f" {ALLOWED * 1e3:g} mm of its reference, against {motor.friction:g} {unit} of friction",
+        motor.position,
+        f"valid: about kp {sized.kp:g}, kv {sized.kv:g}; neither, then they are sized; less"
+        " frictionloss",
+    )

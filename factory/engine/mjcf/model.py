@@ -1,0 +1,258 @@
+"""The model of a run: a layout as one XML with its mesh files. What is written of it for others
+follows from it (`stock.py`).
+
+Guarantees: every weld that a run can switch is there, with its nominal frame compiled from nest and
+product pose; robots come before parts; nothing depends on hashing, so the same factory gives the
+same bytes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import ceil
+from pathlib import Path
+from types import MappingProxyType
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+from xml.sax.saxutils import quoteattr
+
+from factory.engine.mjcf.bins import add_bins
+from factory.engine.mjcf.driving import (
+    GRAVITY,
+    HOIST_STIFFNESS,
+    drive_for,
+    first_axis,
+    heaviest,
+    lifted,
+    up,
+)
+from factory.engine.mjcf.elements import fill
+from factory.engine.mjcf.feeders import SLIDER_MASS, add_feeders
+from factory.engine.mjcf.insets import Insets, insets_of
+from factory.engine.mjcf.outfeed import SHUTTER_MASS, TRAY_MASS, add_outfeed
+from factory.engine.mjcf.parts import add_meshes, add_parts, add_wholes
+from factory.engine.mjcf.robot_bodies import add_robots
+from factory.engine.mjcf.robots import MOTOR, Drive, Hoist, add_paints
+from factory.engine.mjcf.scene import add_scene
+from factory.engine.mjcf.stops import stops_of
+from factory.engine.mjcf.unseen import leave_out_what_is_shown
+from factory.engine.mjcf.welds import add_exclusions, add_welds
+from factory.floor.geometry.fused_bodies import FusedBodies, Inside, bodies_of
+from factory.floor.layout.bins import Bin
+from factory.floor.layout.feeding import outlets_of
+from factory.floor.layout.hanging import Hanging
+from factory.floor.layout.layout import Layout
+from factory.support.errors import Diagnostic
+from factory.support.settings import Settings
+from factory.theory.control.profile import SpeedProfile
+from factory.theory.plant.approaches import Pair
+from factory.theory.plant.factory import Factory
+from factory.theory.problem.robot_bodies import LIFT_JOINT
+from factory.theory.problem.robot_types import Catalogue
+
+SKELETON = Path(__file__).with_name("skeleton.xml")
+"""What every model has, whatever the factory."""
+
+MOST_BODIES = 8000
+"""A pool of parts has at most so many bodies, unless told how many units may be inside: the engine
+takes minutes to compile more."""
+
+ARENA = 64
+"""The engine's memory for contacts and constraints [MiB], without that for pairs of bodies."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """A factory as MJCF: the XML, its mesh files by name, and the numbers the run needs.
+
+    `carried`: what bodies there are, `copies`: how many of each; `masses`: of each label carried
+    [kg]; `drives`: of each robot; `insets`: what is taken from the shapes that collide; `wip`: the
+    most units inside at once that they are enough for, None where more never are; `apart`: the
+    pairs of parts that are `excluded`, each part with a body that may bring it to the other;
+    `bins`: those for scrap; `overlaps`: what is said of parts that overlap in the finished product.
+    """
+
+    layout: Layout
+    settings: Settings
+    carried: FusedBodies = field(repr=False)
+    copies: Mapping[str, int]
+    masses: Mapping[str, float]
+    drives: tuple[Drive, ...]
+    insets: Insets = field(repr=False)
+    xml: str = field(repr=False)
+    files: Mapping[str, bytes] = field(repr=False)
+    joints: int = 0
+    welds: int = 0
+    wip: int | None = None
+    apart: tuple[tuple[Inside, Inside], ...] = ()
+    bins: tuple[Bin, ...] = ()
+    overlaps: tuple[Diagnostic, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("copies", "masses", "files"):
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+
+    @property
+    def factory(self) -> Factory:
+        """The factory the model is of."""
+        return self.layout.factory
+
+    @property
+    def excluded(self) -> tuple[Pair, ...]:
+        """The pairs of parts between which there is no contact."""
+        return self.insets.excluded
+
+    @cached_property
+    def bodies(self) -> int:
+        """How many bodies of parts and sub-assemblies there are."""
+        return sum(self.copies.values())
+
+
+def part_copies(
+    pool: Mapping[str, int],
+    units: int | None,
+    wip: int | None = None,
+    under_way: Mapping[str, int] | None = None,
+) -> dict[str, int]:
+    """Bodies of each part: the pool and one shown at the feeder, or the units asked for if less; at
+    least as many as are `under_way` where a run starts, and one."""
+    copies = {}
+    for label, most in pool.items():
+        inside = min(most, wip) if wip else most
+        wanted = inside + 1 if units is None else min(inside + 1, units)
+        copies[label] = max(1, wanted, (under_way or {}).get(label, 0))
+    return copies
+
+
+def fitting_wip(pool: Mapping[str, int], units: int | None) -> int | None:
+    """The most units that can be inside at once with at most MOST_BODIES bodies of parts, at least
+    one; None where the whole pool has no more."""
+    if sum(part_copies(pool, units).values()) <= MOST_BODIES:
+        return None
+    least, most = 1, max(pool.values())
+    while most - least > 1:
+        wip = (least + most) // 2
+        fits = sum(part_copies(pool, units, wip).values()) <= MOST_BODIES
+        least, most = (wip, most) if fits else (least, wip)
+    return least
+
+
+def build_model(
+    layout: Layout,
+    catalogue: Catalogue,
+    copies: Mapping[str, int],
+    settings: Settings,
+    bodies: FusedBodies | None = None,
+    shown: bool = True,
+    wip: int | None = None,
+    bins: tuple[Bin, ...] = (),
+) -> Model:
+    """The model of a laid-out factory, of one body a part unless other `bodies` are given; without
+    what is only there to be `shown`, if it is not; with `bins`, if parts may be scrapped. The
+    `copies` are enough for `wip` units inside at once. Raises InputError where the MJCF of a robot
+    type is unusable."""
+    factory, product = layout.factory, layout.product
+    bodies = bodies or bodies_of(factory, product)
+    masses = {
+        label: sum(bodies.mass[body] for body in inner) for label, inner in bodies.carried.items()
+    }
+    drives = tuple(
+        first_axis(layout, robot, load, settings).drive(settings)
+        for robot, load in enumerate(heaviest(layout, masses))
+    )
+    root = ElementTree.parse(SKELETON).getroot()
+    root.set("model", product_name(factory))
+    section = {child.tag: child for child in root}
+    world, equality, actuator = (section[tag] for tag in ("worldbody", "equality", "actuator"))
+    fill(section["option"], timestep=settings.step)
+    add_paints(section["asset"])
+    insets = insets_of(layout, settings.overlap)
+    apart = tuple(m for pair in insets.excluded for m in bodies.meeting(factory, pair))
+    files = add_meshes(section["asset"], product, insets)
+    add_scene(world, section["statistic"], layout)
+    hoists = _hoists(layout, masses, settings)
+    add_robots(layout, catalogue, drives, hoists, section)
+    load = max(masses[product] for product in factory.products)
+    fast = settings.outfeed_acceleration
+    tray = drive_for(TRAY_MASS, load, fast, settings)
+    shutter = drive_for(
+        SHUTTER_MASS + MOTOR, 0.0, settings.shutter_limits[1] + GRAVITY, settings, HOIST_STIFFNESS
+    )
+    add_outfeed(world, actuator, layout, tray, shutter)
+    hanging = Hanging.of(layout)
+    sliders = _sliders(layout, hanging, masses, settings)
+    add_feeders(world, actuator, layout, hanging, sliders)
+    add_bins(world, layout, bins)
+    add_parts(world, layout, hanging, copies, insets)
+    add_wholes(world, layout, bodies, copies, insets, {inside for both in apart for inside in both})
+    add_welds(equality, layout, hanging, bodies, copies)
+    add_exclusions(section["contact"], apart, copies)
+    if not len(section["contact"]):
+        root.remove(section["contact"])
+    if not shown:
+        leave_out_what_is_shown(root)
+    fill(section["size"], memory=f"{ARENA + broad_phase(root) // 2**20}M")
+    ElementTree.indent(root)
+    xml = ElementTree.tostring(root, encoding="unicode") + "\n"
+    joints = len(factory.robots) + len(hoists) + 2 + len(sliders) + sum(copies.values())
+    made = Model(layout, settings, bodies, copies, masses, drives, insets, xml, files)
+    return replace(made, joints=joints, welds=len(equality), wip=wip, apart=apart, bins=bins)
+
+
+def broad_phase(root: Element) -> int:
+    """What the engine's broad phase sets aside [bytes]: two arrays with four bytes for each pair of
+    bodies. Only what is written to is taken from the machine's memory."""
+    bodies = sum(1 for _ in root.iter("body")) + 1
+    return 2 * 4 * bodies * (bodies - 1) // 2
+
+
+def product_name(factory: Factory) -> str:
+    """The name of the model: that of the PAG file, without folder and ending."""
+    name = "".join(c if c.isprintable() else "?" for c in Path(factory.pag.file).stem)
+    return name or "factory"
+
+
+def model_files(model: Model, path: Path) -> dict[Path, bytes]:
+    """The XML at `path` and, beside it, its mesh folder `NAME_meshes`: what to write where."""
+    folder = path.with_name(f"{path.stem}_meshes")
+    xml = model.xml.replace('meshdir="meshes"', f"meshdir={quoteattr(folder.name)}", 1)
+    meshes = {folder / name: content for name, content in model.files.items()}
+    return {path: xml.encode(errors="surrogateescape"), **meshes}
+
+
+def _hoists(layout: Layout, masses: Mapping[str, float], settings: Settings) -> dict[int, Hoist]:
+    """The lifts, for the heaviest load of each: what it delivers."""
+    robots, loads, hoists = layout.factory.robots, lifted(layout, masses), {}
+    for robot, stroke in layout.strokes.items():
+        drive = up(robots[robot].body.axis(LIFT_JOINT), loads[robot], settings).drive(settings)
+        hoists[robot] = Hoist(stroke, drive, stops_of(0.0, stroke, layout.clearance))
+    return hoists
+
+
+def _sliders(
+    layout: Layout, hanging: Hanging, masses: Mapping[str, float], settings: Settings
+) -> dict[str, Drive]:
+    """The drives of the feeders' sliders, for the heaviest that they bring down. Their buffers hold
+    the setpoints of a whole stroke of any of them, and longer than until it is seen to be over:
+    what is shown of a stroke meanwhile comes after those."""
+    most = settings.feeder_limits[1] + GRAVITY
+    samples = (stroke_ticks(layout, settings) + 2 * settings.stride) * settings.steps + 2
+    loads: dict[str, float] = {}
+    for outlet in outlets_of(layout):
+        slider = hanging.slider[outlet.label]
+        loads[slider] = max(loads.get(slider, 0.0), masses[outlet.label])
+    return {
+        slider: replace(
+            drive_for(SLIDER_MASS + MOTOR, load, most, settings, HOIST_STIFFNESS), samples=samples
+        )
+        for slider, load in loads.items()
+    }
+
+
+def stroke_ticks(layout: Layout, settings: Settings) -> int:
+    """No stroke of a feeder's slider takes more ticks."""
+    profile = SpeedProfile(*settings.feeder_limits)
+    strokes = (outlet.feeder.stroke for outlet in outlets_of(layout))
+    return ceil(profile.rest(max(strokes)) / settings.tick) + 4

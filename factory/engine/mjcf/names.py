@@ -1,0 +1,195 @@
+"""The names in a model, made and read in one place: they carry meaning, parts by `/`."""
+
+from __future__ import annotations
+
+from factory.theory.plant.robot import Robot
+
+
+def carriage(robot: str) -> str:
+    """The body of a robot, `r3/carriage`."""
+    return f"{robot}/carriage"
+
+
+def slide(robot: str) -> str:
+    """The joint of a robot along its guidepath, `r3/slide`."""
+    return f"{robot}/slide"
+
+
+def turn(robot: str) -> str:
+    """The joint of a fixed robot's tool, about the vertical, `r3/turn`."""
+    return f"{robot}/turn"
+
+
+def first_axis(robot: Robot) -> str:
+    """The joint of a robot's first axis: along its guidepath, or about the vertical."""
+    return turn(robot.name) if robot.fixed else slide(robot.name)
+
+
+def drive(robot: str) -> str:
+    """The actuator of a robot, `r3/drive`."""
+    return f"{robot}/drive"
+
+
+def slide_across(robot: str) -> str:
+    """The joint of a robot across its heading, where its guidepath has bends,
+    `r3/slide_across`."""
+    return f"{robot}/slide_across"
+
+
+def drive_across(robot: str) -> str:
+    """The actuator of that joint, `r3/drive_across`."""
+    return f"{robot}/drive_across"
+
+
+def head(robot: str) -> str:
+    """The body of a robot that its lift moves, and that holds its payload, `r3/head`."""
+    return f"{robot}/head"
+
+
+def tool(robot: str) -> str:
+    """The body of a fixed robot that turns, and that holds its payload, `r3/tool`."""
+    return f"{robot}/tool"
+
+
+def lift(robot: str) -> str:
+    """The vertical joint of a robot, `r3/lift`."""
+    return f"{robot}/lift"
+
+
+def hoist(robot: str) -> str:
+    """The actuator of a lift, `r3/hoist`."""
+    return f"{robot}/hoist"
+
+
+def copy(label: str, number: int) -> str:
+    """The name of a part's copy, counted from 1: `part1#2`."""
+    return f"{label}#{number}"
+
+
+def part(label: str, number: int) -> str:
+    """The body of a part's copy, `part/part1#2`."""
+    return f"part/{copy(label, number)}"
+
+
+def piece(body: str, number: int) -> str:
+    """The geom of a part's convex piece, counted from 1: `part/part1#2/3`."""
+    return f"{body}/{number}"
+
+
+SHELL = "shell"
+"""What the names of bodies begin with that hold one part's geoms in a fused body."""
+
+
+def solid(label: str, number: int, part_inside: str) -> str:
+    """The body that has the geoms of a part in a body's copy: that copy, or where the body is a
+    fused one the part's shell, `shell/sub1#2/part1`."""
+    if label == part_inside:
+        return part(label, number)
+    return f"{SHELL}/{copy(label, number)}/{part_inside}"
+
+
+def grip(robot: str, label: str) -> str:
+    """The weld by which a robot holds a part, `grip/r3/part1`; it is aimed at the copy it holds."""
+    return f"grip/{robot}/{label}"
+
+
+def feed(label: str) -> str:
+    """The weld by which a feeder presents a part, `feed/part1`."""
+    return f"feed/{label}"
+
+
+def feeder(label: str) -> str:
+    """The static body of a feeder, `feeder/part1`; its geoms are `feeder/part1/post` and so on."""
+    return f"feeder/{label}"
+
+
+def slider(label: str) -> str:
+    """The body in a feeder's housing that brings parts down, its joint and its actuator,
+    `feeder/part1/slider`."""
+    return f"feeder/{label}/slider"
+
+
+def pad(label: str) -> str:
+    """The geom from which a feeder's part hangs, `feeder/part1/pad`."""
+    return f"feeder/{label}/pad"
+
+
+def bin_of(robot: str) -> str:
+    """The static body of a robot's bin, `bin/r3`; its geoms are `bin/r3/bottom` and so on."""
+    return f"bin/{robot}"
+
+
+def hold(label: str) -> str:
+    """The weld by which the outfeed's tray holds a part of a finished product, `hold/part2`; it is
+    aimed at the copy it holds."""
+    return f"hold/{label}"
+
+
+def holder(body: str) -> str:
+    """What a body that holds parts is of: `r3/head` -> `r3`; itself where it is no robot's."""
+    return body.partition("/")[0] if kind(body) == "robot" else body
+
+
+def pad_of(geom: str) -> str:
+    """The holder whose pad a geom is, on which what it holds rests, "" for none: `r3/pad` -> `r3`,
+    `feeder/part1/pad` -> `feeder/part1`; the tray's own geoms are its pads."""
+    owner, _, last = geom.rpartition("/")
+    if geom.startswith(OUTFEED_TRAY):
+        return OUTFEED_TRAY
+    return holder(owner) if last == "pad" else ""
+
+
+COMPASS = "compass"
+"""The body that shows the engine's broad phase where the floor's longer side is."""
+
+OUTFEED_TRAY = "outfeed/tray"
+"""The body that takes a finished product away; also the name of its geom."""
+
+OUTFEED_SLIDE = "outfeed/slide"
+"""Its joint."""
+
+OUTFEED_DRIVE = "outfeed/drive"
+"""Its actuator."""
+
+SHUTTER = "outfeed/shutter"
+"""The body that closes the outfeed's shed, its geom, its joint and its actuator."""
+
+
+def exclusion(one: str, other: str, number: int) -> str:
+    """The exclusion of contact between two parts of one unit, `exclude/part1/part2#1`."""
+    return f"exclude/{one}/{copy(other, number)}"
+
+
+def excluded(name: str) -> tuple[str, str]:
+    """The two parts in the name of an exclusion."""
+    one, _, other = name.partition("/")[2].partition("/")
+    return one, other.rpartition("#")[0]
+
+
+def park(label: str, number: int) -> str:
+    """The weld that keeps a spare copy out of sight, `park/part1#3`."""
+    return f"park/{copy(label, number)}"
+
+
+def kind(name: str) -> str:
+    """`part` for a part's body, `robot` for a robot's, else the first word of the name."""
+    head = name.partition("/")[0]
+    return "robot" if head[:1] == "r" and head[1:].isdigit() else head
+
+
+def label_of(name: str) -> str:
+    """The label in a part's body name, `part/part1#2` -> `part1`."""
+    return name.partition("/")[2].rpartition("#")[0]
+
+
+def part_of(body: str) -> str:
+    """The part whose geoms a body has: that of `part/part1#2`, or of `shell/sub1#2/part1`."""
+    return body.rpartition("/")[2] if kind(body) == SHELL else label_of(body)
+
+
+def without_copy(name: str) -> str:
+    """The name of a geom, the same for all copies of a part and all pieces of a copy:
+    `part/part1#2/3` -> `part/part1`."""
+    body, _, rest = name.partition("#")
+    words = rest.split("/")[1:]
+    return "/".join([body, *(word for word in words if not word.isdigit())])

@@ -1,0 +1,308 @@
+"""Robots as MJCF: the file of a type, instantiated for each robot and stretched to its payload."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from copy import deepcopy
+from dataclasses import dataclass, field
+from math import atan2, cos, hypot, sin
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from factory.engine.mjcf import names
+from factory.engine.mjcf.elements import add, number, numbers
+from factory.engine.mjcf.hands import Styles, add_hand
+from factory.engine.mjcf.names import carriage, drive_across, head, slide_across
+from factory.engine.mjcf.stops import Stops
+from factory.engine.mjcf.tools import TOOL, mount_tool
+from factory.floor.layout.dimensions import FINGER_TOP, PAYLOAD
+from factory.floor.layout.hands.limbs import Limb
+from factory.floor.layout.layout import Guidepath, Point2
+from factory.theory.problem.robot_bodies import LIFT_JOINT, MAST, RobotBody
+from factory.theory.problem.robot_types import RobotType
+
+OWN_HAND = {"finger", "pin", "column", "pad"}
+"""Geoms of a type's own file that stand for a hand, where none is chosen."""
+
+CAP = "cap"
+"""The geom on top of the mast, which is none where a tower is."""
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """How a robot holds. Without a hand: `top`, how far above z0 the lowest point of its payload is
+    carried, with the lift down [m]; the finger's pad reaches up to it. With one: the `limbs` of it,
+    and what they look like, `styles`, None without."""
+
+    top: float
+    styles: Styles | None = None
+    limbs: tuple[Limb, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class RobotModel:
+    """The MJCF file of a robot type, taken apart: body, actuators, and the shared defaults and
+    assets, whose names are prefixed by the type's; `made`: what was read of it."""
+
+    name: str
+    made: RobotBody = field(repr=False)
+    body: Element = field(repr=False)
+    actuators: tuple[Element, ...] = field(repr=False)
+    defaults: Element = field(repr=False)
+    assets: tuple[Element, ...] = field(repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """Gains and limit of an actuator: kp [N/m], kv [N s/m], force [N]; its buffer, of `samples`
+    setpoints; and the `inertia` that its motor has besides what its robot type says [kg]."""
+
+    kp: float
+    kv: float
+    force: float
+    samples: int
+    inertia: float = 0.0
+
+    def attributes(self) -> dict[str, str]:
+        """As attributes of a `pid` actuator, which has three setpoints."""
+        return {
+            "input": "pos vel ff",
+            "kp": number(self.kp),
+            "kv": number(self.kv),
+            "forcerange": numbers((-self.force, self.force)),
+            "nsample": str(self.samples),
+        }
+
+
+MOTOR = 1.6
+"""Inertia that the motors of the feeders' sliders and of the shutter add, like a lift's [kg]."""
+
+
+def add_inertia(joint: Element, drive: Drive) -> None:
+    """What the motor of a joint's drive has besides."""
+    if drive.inertia:
+        joint.set("armature", number(float(joint.get("armature", 0.0)) + drive.inertia))
+
+
+def add_drive(
+    actuator: Element, joint: Element, drive: Drive, stops: Stops, name: str = ""
+) -> None:
+    """The actuator of a joint, called as that unless it has a `name`, and the joint's stops."""
+    add_inertia(joint, drive)
+    stops.limit(joint)
+    moved = joint.get("name") or ""
+    add(actuator, "pid", name=name or moved, joint=moved, **drive.attributes())
+
+
+def load_robot_model(robot: RobotType) -> RobotModel:
+    """The file of a type, whose body has been read."""
+    root = ElementTree.parse(robot.mjcf).getroot()
+    body = root.findall("worldbody/body")[0]
+    actuators = tuple(root.findall("actuator/*"))
+    defaults = Element("default", {"class": robot.name})
+    for child in root.findall("default/*"):
+        defaults.append(_prefixed(child, robot.name, names=False))
+    assets = tuple(_prefixed(a, robot.name, names=True) for a in root.findall("asset/*"))
+    return RobotModel(robot.name, robot.body, body, actuators, defaults, assets)
+
+
+def _prefixed(element: Element, prefix: str, names: bool) -> Element:
+    """A copy in which references to classes and assets are prefixed, and names too if wanted."""
+    copy = deepcopy(element)
+    for node in copy.iter():
+        for key in ("class", "childclass", "material", "mesh", "texture"):
+            if key in node.attrib:
+                node.set(key, f"{prefix}/{node.get(key)}")
+        if names and "name" in node.attrib:
+            node.set("name", f"{prefix}/{node.get('name')}")
+    return copy
+
+
+ROLES = {
+    "output": "0.07 0.45 0.40 1",
+    "carrier": "0.13 0.31 0.58 1",
+    "fed": "0.52 0.65 0.80 1",
+    "tool": "0.90 0.45 0.09 1",
+}
+"""The paint of robots by what they do: bring the product out, carry sub-assemblies, fetch parts,
+work."""
+
+
+def add_paints(asset: Element) -> None:
+    """A material for each role."""
+    for role, rgba in ROLES.items():
+        add(asset, "material", name=f"role/{role}", rgba=rgba, specular=0.35, shininess=0.45)
+
+
+@dataclass(frozen=True, slots=True)
+class Hoist:
+    """A robot's lift: how far it goes up [m], its drive, and its stops."""
+
+    stroke: float
+    drive: Drive
+    stops: Stops
+
+
+def instantiate(
+    model: RobotModel,
+    robot: str,
+    path: Guidepath,
+    drive: Drive,
+    stops: Stops,
+    held: Held,
+    role: str = "",
+    hoist: Hoist | None = None,
+) -> tuple[Element, list[Element]]:
+    """The body of one robot at its B end, its lift down, between its `stops`, and its actuators.
+
+    `held`: how it holds. `role`: one of ROLES; geometry of the material `paint` takes its colour.
+    `hoist`: for a type with a lift.
+    """
+    body = _prefixed(model.body, model.name, names=False)
+    for node in body.iter():
+        if "name" in node.attrib:
+            node.set("name", f"{robot}/{node.get('name')}")
+        if role and node.get("material") == f"{model.name}/paint":
+            node.set("material", f"role/{role}")
+    body.set("name", carriage(robot))
+    x, y = path.carriage(path.length)
+    body.set("pos", numbers((x, y, 0)))
+    body.set("quat", numbers(heading_quaternion(path)))
+    body.set("sleep", "allowed")
+    if held.styles is None:
+        _stretch(body, path, held.top, hoist)
+    else:
+        towers = any(limb.name == "tower" for limb in held.limbs)
+        _fit_arm(body, path, OWN_HAND | {CAP} if towers else OWN_HAND, model.made)
+        lifted = next((b for b in body.iter("body") if b.get("name") == head(robot)), None)
+        turning = [limb for limb in held.limbs if path.fixed and limb.name in TOOL]
+        others = [limb for limb in held.limbs if limb not in turning]
+        add_hand(body, lifted, held.styles, robot, others, model.name)
+        tool = next((b for b in body.iter("body") if b.get("name") == names.tool(robot)), None)
+        add_hand(body, tool, held.styles, robot, turning, model.name)
+    first = names.turn(robot) if path.fixed else names.slide(robot)
+    slide = next(j for j in body.iter("joint") if j.get("name") == first)
+    slide.set("ref", number(path.length))
+    stops.limit(slide)
+    if path.turn is not None:
+        mount_tool(body, slide, path.turn, held.limbs, model.made)
+    if hoist is None:
+        _lock(body, names.lift(robot))
+    actuators: list[Element] = []
+    for actuator in model.actuators:
+        kind = actuator.get("name") or ""
+        named = {"name": f"{robot}/{kind}", "joint": f"{robot}/{actuator.get('joint')}"}
+        gains = drive if kind == "drive" else hoist.drive if hoist else None
+        if gains is None:  # a lift that nothing uses
+            continue
+        actuators.append(Element("pid", {**named, **gains.attributes()}))
+        moved = next(j for j in body.iter("joint") if j.get("name") == named["joint"])
+        add_inertia(moved, gains)
+        if hoist and gains is hoist.drive:
+            hoist.stops.limit(moved)
+        if gains is drive and path.bends:
+            actuators.append(_bend(body, moved, actuators[-1], robot, path, stops))
+    return body, actuators
+
+
+def _lock(body: Element, joint: str) -> None:
+    """Take a joint out of a body."""
+    for inner in body.iter("body"):
+        for each in inner.findall("joint"):
+            if each.get("name") == joint:
+                inner.remove(each)
+
+
+def _bend(
+    body: Element, slide: Element, actuator: Element, robot: str, path: Guidepath, stops: Stops
+) -> Element:
+    """A second slide for a guidepath with bends, beside the one along the heading, which gets the
+    stops that the way has there; its actuator, which is like the first."""
+    across = deepcopy(slide)
+    across.set("name", slide_across(robot))
+    across.set("axis", numbers((0.0, path.left, 0.0)))
+    body.insert([*body].index(slide) + 1, across)
+    beyond = stops.high - path.length
+    pieces = path.framed(stops.low + beyond, stops.high - beyond)
+    ends = np.concatenate(pieces).T.tolist()
+    b_end = path.framed(path.length, path.length)[0][0].tolist()
+    for joint, values, at in zip((slide, across), ends, b_end, strict=True):
+        joint.set("ref", number(at))
+        Stops(min(values) - beyond, max(values) + beyond, stops.buffers).limit(joint)
+    second = deepcopy(actuator)
+    second.attrib.update(name=drive_across(robot), joint=slide_across(robot))
+    return second
+
+
+def heading_quaternion(path: Guidepath) -> tuple[float, float, float, float]:
+    """The orientation of a robot: its local x is the heading, one of four world directions."""
+    half = 0.5**0.5
+    east = {(1, 0): (1.0, 0.0), (0, 1): (half, half), (-1, 0): (0.0, 1.0), (0, -1): (half, -half)}
+    w, z = east[round(path.heading[0]), round(path.heading[1])]
+    return (w, 0.0, 0.0, z)
+
+
+def _fit_arm(body: Element, path: Guidepath, without: Collection[str], made: RobotBody) -> None:
+    """The arm from the mast to the rim, of a robot whose hand goes on from there, `without` some
+    geoms; a tool's head reaches a little further."""
+    rim = max(path.reach - path.arm, MAST / 2 + 0.002)
+    parents = {child: parent for parent in body.iter() for child in parent}
+    for geom in list(body.iter("geom")):
+        name = (geom.get("name") or "").rpartition("/")[2]
+        if name == "arm":
+            _span(geom, (0.0, 0.0), (rim, 0.0))
+        elif name in without:
+            parents[geom].remove(geom)
+    for lifted in body.iter("body"):
+        if (lifted.get("name") or "").endswith("/head"):
+            mass = number(made.axis(LIFT_JOINT).mass)
+            inertia = {"pos": "0 0 0.1", "mass": mass, "diaginertia": "2e-4 2e-4 2e-4"}
+            lifted.insert(1, Element("inertial", inertia))
+    for site in body.iter("site"):
+        if (site.get("name") or "").endswith("/nest"):
+            site.set("pos", numbers((path.reach, 0.0, PAYLOAD)))
+
+
+def _stretch(body: Element, path: Guidepath, top: float, hoist: Hoist | None) -> None:
+    """Arm to the rim, finger to the nest, pad up to the payload; with a lift, pin up to the column,
+    which carries the pad."""
+    rim, top = path.reach - path.arm, PAYLOAD + top
+    nest = (max(path.reach + path.nest, rim + 0.01), path.aside * path.left + 0.0)
+    lines = {"arm": ((0.0, 0.0), (rim, 0.0)), "finger": ((rim - 0.01, 0.0), nest)}
+    pin = (FINGER_TOP, top - 1e-3)
+    uprights = {"pad": pin}
+    if hoist is not None:
+        column = (top - 2e-3 - hoist.stroke, top - 2e-3)
+        uprights = {"pin": pin, "column": column, "pad": (top - 2e-3, top)}
+    for geom in body.iter("geom"):
+        name = (geom.get("name") or "").rpartition("/")[2]
+        for kind, ends in lines.items():
+            if name == kind:
+                _span(geom, *ends)
+        for kind, heights in uprights.items():
+            if name == kind:
+                _stand(geom, nest, *heights)
+    for site in body.iter("site"):
+        if (site.get("name") or "").endswith("/nest"):
+            site.set("pos", numbers((*nest, PAYLOAD)))
+
+
+def _stand(geom: Element, at: Point2, low: float, high: float) -> None:
+    """Make an upright cylinder reach from low to high, at least 2 mm."""
+    radius = (geom.get("size") or "0.006").split()[0]
+    geom.set("size", f"{radius} {number(max(high - low, 2e-3) / 2)}")
+    geom.set("pos", numbers((*at, (high + low) / 2)))
+
+
+def _span(geom: Element, start: Point2, end: Point2) -> None:
+    """Make a box reach from start to end."""
+    _, y, z = (float(v) for v in (geom.get("pos") or "0 0 0").split())
+    half = [float(v) for v in (geom.get("size") or "1 1 1").split()]
+    ahead, aside = end[0] - start[0], end[1] - start[1]
+    geom.set("pos", numbers(((start[0] + end[0]) / 2, y + (start[1] + end[1]) / 2, z)))
+    geom.set("size", numbers((hypot(ahead, aside) / 2, half[1], half[2])))
+    if aside:
+        turn = atan2(aside, ahead) / 2
+        geom.set("quat", numbers((cos(turn), 0, 0, sin(turn))))

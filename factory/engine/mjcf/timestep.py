@@ -1,0 +1,116 @@
+"""The engine's timestep: the longest with which drives stay on their references.
+
+A reference changes its acceleration at once. In the step in which it does, a drive is told the
+speed of half a step before with the new acceleration, and pushes for the new one: it gets a wrong
+speed, which it then takes away. How far off it gets meanwhile is what is predicted. Hands that meet
+are no farther apart, and welds give no more, than two drives are off (docs/decisions/timestep.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from factory.engine.mjcf.driving import (
+    ALLOWED,
+    GRAVITY,
+    HOIST_STIFFNESS,
+    STEPS,
+    DrivenAxis,
+    along,
+    heaviest,
+    lifted,
+    up,
+    weights_of,
+)
+from factory.engine.mjcf.outfeed import SHUTTER_MASS, TRAY_MASS
+from factory.engine.mjcf.robots import MOTOR
+from factory.engine.mjcf.stops import tray_clearance
+from factory.floor.layout.layout import Layout
+from factory.support.settings import AUTO, TICK, Settings
+from factory.theory.control.profile import World
+from factory.theory.plant.robot import Robot
+from factory.theory.problem.robot_bodies import LIFT_JOINT
+
+USUAL = 5
+"""Timesteps of a tick where none is good, or there are no drives: 2 ms."""
+
+DIP, DEEPEST = 1.9e-5, 2.5e-4
+"""So far [m] a part is below where a slider is to bring it as a hand comes there, for each kg and
+each m/s² of the slider, in timesteps of a tick, measured; and it may be so far: a pad then presses
+on it by half as much as it may."""
+
+CRUISES = 0.7
+"""The tray's share of a jump by twice its acceleration: between gaining speed and braking it goes
+at one speed for a while (`layout/outfeed.py`)."""
+
+
+def timed(
+    settings: Settings, layout: Layout, world: World = "mujoco", jitter: float = 0.0
+) -> Settings:
+    """Settings whose timestep and substeps are numbers: what was asked for, or with AUTO the
+    longest timestep in which nothing goes as far as the certified clearance, with which no axis is
+    predicted to get off its reference by more than ALLOWED, all end stops hold, and every robot
+    gets into its goal ball; 2 ms, or the longest below it that the clearance allows, where none
+    does that."""
+    if settings.timestep != AUTO:
+        return replace(settings, substeps=settings.steps)
+    least = settings.substeps or 1
+    counts = [n for n in STEPS if n >= least] or [least]
+    candidates = [replace(settings, timestep=TICK / n, substeps=n) for n in counts]
+    if world == "ideal":
+        return _usual(candidates)
+    fastest = max(settings.speed * (1 + jitter), settings.outfeed)
+    candidates = [s for s in candidates if fastest * s.step < layout.clearance] or candidates[-1:]
+    axes, heaviest_fed = tuple(dict.fromkeys(_axes(settings, layout, jitter))), 0.0
+    unusual = [axis for axis in axes if not axis.usual]
+    candidates = [s for s in candidates if all(a.follows(s) for a in unusual)] or candidates[-1:]
+    if any(layout.hands):
+        heaviest_fed = max(layout.product.solids[o.label].mass for o in layout.factory.leaves)
+    good = (s for s in candidates if _good(s, axes) and _dip(s, heaviest_fed) < DEEPEST)
+    return next(good, _usual(candidates))
+
+
+def _usual(candidates: Sequence[Settings]) -> Settings:
+    """Those with the usual timestep, or the next shorter one that there is."""
+    return next(s for s in candidates if s.steps >= USUAL)
+
+
+def _good(settings: Settings, axes: Sequence[DrivenAxis]) -> bool:
+    """Whether no error is beyond what is allowed, every end stop holds, and no axis is kept out of
+    its goal ball, but for one that is kept out with the usual timestep as well."""
+    usual = replace(settings, timestep=TICK / USUAL, substeps=USUAL)
+    return all(
+        axis.error(settings) < ALLOWED
+        and axis.leap(settings) < axis.room
+        and axis.rest(settings) <= max(settings.eps, axis.rest(usual))
+        for axis in axes
+    )
+
+
+def _dip(settings: Settings, load: float) -> float:
+    """How far a part is below where its feeder is to bring it, as a hand comes there [m]."""
+    return DIP * load * settings.feeder_limits[1] * (settings.step / TICK) ** 3
+
+
+def _axes(settings: Settings, layout: Layout, jitter: float) -> Iterator[DrivenAxis]:
+    """Every robot, lift and the tray with the heaviest that it carries, and the shutter."""
+    room, far = layout.clearance, tray_clearance(layout)
+    robots, masses = layout.factory.robots, weights_of(layout)
+    for robot, load in zip(robots, heaviest(layout, masses), strict=True):
+        yield replace(_carried(robot, load, settings), gain=1 - jitter, room=room)
+    for number, load in lifted(layout, masses).items():
+        lift = robots[number].body.axis(LIFT_JOINT)
+        yield replace(up(lift, load, settings), gain=1 - jitter, room=room)
+    fast = settings.outfeed_acceleration
+    product = max(masses[label] for label in layout.factory.products)
+    yield DrivenAxis.loaded(TRAY_MASS, product, fast, far, jump=CRUISES)
+    shut = settings.shutter_limits[1]
+    yield DrivenAxis(SHUTTER_MASS + MOTOR, 0.0, shut, shut + GRAVITY, HOIST_STIFFNESS)
+
+
+def _carried(robot: Robot, load: float, settings: Settings) -> DrivenAxis:
+    """The first axis of a robot; one that is fixed bears its payload as a carriage does."""
+    if robot.fixed:
+        return DrivenAxis.loaded(robot.body.mass, load, settings.acceleration)
+    return along(robot.body.first, load, settings)

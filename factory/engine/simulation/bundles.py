@@ -1,0 +1,46 @@
+"""Bundles of modes that are active together, cached."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from factory.theory.control.mode import Index, Limits, Mode
+from factory.theory.control.navigation import Bundle
+from factory.theory.control.obstacles import ranges
+
+KEPT = 500
+"""So many bundles are kept: in steady production the same modes come together again."""
+
+
+class Bundles:
+    """Bundles of `modes`, each on its axes in `axes_of`, under the limits of the axes."""
+
+    def __init__(
+        self, modes: Sequence[Mode], axes_of: Sequence[tuple[int, ...]], limits: Limits
+    ) -> None:
+        self.modes, self.axes_of = tuple(modes), tuple(axes_of)
+        self._axes = np.array([axis for axes in axes_of for axis in axes], np.intp)
+        self._kept: dict[tuple[int, ...], tuple[Bundle, Index]] = {}
+        self.limit(limits)
+
+    def with_more(self, modes: Sequence[Mode], axes_of: Sequence[tuple[int, ...]]) -> Bundles:
+        """The bundles with additional modes."""
+        return Bundles((*self.modes, *modes), (*self.axes_of, *axes_of), self.limits)
+
+    def limit(self, limits: Limits) -> None:
+        """Set the limits of the axes."""
+        self.limits = limits
+        self._all = Bundle.of(self.modes, [limits.of(axes) for axes in self.axes_of])
+        self._kept.clear()
+
+    def of(self, numbers: tuple[int, ...]) -> tuple[Bundle, Index]:
+        """The bundle of modes, by number, and their axes, mode by mode."""
+        if numbers not in self._kept:
+            if len(self._kept) == KEPT:
+                self._kept.clear()
+            chosen = np.array(numbers, np.intp)
+            slots = ranges(self._all.starts[chosen], self._all.sizes[chosen])
+            self._kept[numbers] = self._all.select(numbers), self._axes[slots]
+        return self._kept[numbers]

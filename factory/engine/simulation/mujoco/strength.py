@@ -1,0 +1,164 @@
+"""The share of hands' strength that their loads use, as measured, and hands that let go.
+
+A weld holds a body at its centre of mass. Its force and torque are equivalent to a force and a
+moment about the middle of the tips, which is what tips bear: a hand far from the centre of mass
+bears the moment of the weight too. All values belong to the start of the engine's last step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from factory.engine.mjcf.grips import grips_of
+from factory.engine.mjcf.model import Model
+from factory.engine.mjcf.weld_frames import ROWS
+from factory.engine.simulation.world import Drop
+from factory.floor.layout.hands.gauges import gauge, middle
+from factory.floor.layout.hands.hand import Hand
+from factory.floor.layout.hands.tips import TERMS, shares
+from factory.support.engine import mujoco
+from factory.support.errors import Diagnostic
+from factory.theory.control.mode import Array, Index
+
+OFTEN = 0.09
+"""Hands are not measured more often than once in this time [s]: a robot gains and loses its speed
+within a quarter of a second, a lift within a tenth."""
+
+CALM, SELDOM = 0.02, 0.5
+"""Production repeats itself: where the largest share has not risen for a while they are measured
+once in this part of that while, but in this time [s] at least."""
+
+RISE = 1.01
+"""A share that is so many times the largest before is news."""
+
+STRONGER = "let its robot accelerate less (--acceleration), or make the parts lighter"
+
+
+@dataclass(frozen=True, slots=True)
+class StrengthUse:
+    """The `share` of the strength of a hand that its load used, the name of its `robot` and the
+    `label` of what it held."""
+
+    share: float
+    robot: str
+    label: str
+
+
+class Strength:
+    """The hands of a model's robots, whose grips are `welds` by robot (index) and label of a body.
+
+    `most`: where the largest share of a hand's strength was used, None while nothing was in any
+    hand. `dropped`: the first load that was too much, None while none was.
+    """
+
+    def __init__(
+        self,
+        m: mujoco.MjModel,
+        d: mujoco.MjData,
+        model: Model,
+        welds: Mapping[tuple[int, str], int],
+    ) -> None:
+        self.most: StrengthUse | None = None
+        self.dropped: Drop | None = None
+        self._d, self._model = d, model
+        self._hands = {
+            robot: hand
+            for robot, hand in enumerate(model.layout.hands)
+            if hand is not None and hand.kind != "none"
+        }
+        self._robots = np.array([*self._hands], np.intp)
+        self._grips = [(grip, weld) for grip, weld in welds.items() if grip[0] in self._hands]
+        # the last grip is of all welds that are no grips, and of no hand
+        self._grip = np.full(m.neq, len(self._grips))
+        self._grip[[weld for _, weld in self._grips]] = np.arange(len(self._grips))
+        self._gauges = self._of_grips()
+        number = {robot: n for n, robot in enumerate(self._hands)}
+        robots = [number[robot] for (robot, _), _ in self._grips]
+        self._hand = np.array([*robots, len(self._hands)], np.intp)
+        self._next, self._risen = -np.inf, float(d.time)
+
+    def look(self) -> list[int]:
+        """Measure all hands that hold something and are awake, unless just done. Returns the welds
+        of overloaded hands."""
+        d = self._d
+        if not self._grips or not d.ne or d.time < self._next:
+            return []
+        self._next = d.time + min(SELDOM, max(OFTEN, CALM * (d.time - self._risen)))
+        grips = self._grip[d.efc_id[: d.ne : ROWS]]
+        # of all constraints only welds count: what else touches a body is a load
+        terms = self._gauges[grips] @ d.efc_force[: d.ne].reshape(-1, ROWS, 1)
+        loads = np.zeros((len(self._hands) + 1, TERMS))
+        np.add.at(loads, self._hand[grips], terms[:, :, 0])
+        use = shares(loads[:-1])
+        share = float(use.max())
+        if self.most is None or share > self.most.share:
+            self._keep(use, grips)
+        if share <= 1.0:
+            return []
+        worst = int(use.argmax())
+        if self.dropped is None:
+            self.dropped = self._drop(worst, self._use(worst, share, grips))
+        weak = np.append(use > 1.0, False)[self._hand[grips]]
+        return [self._grips[grip][1] for grip in grips[weak].tolist()]
+
+    def _keep(self, use: Array, grips: Index) -> None:
+        """Keep the largest share."""
+        holding = np.unique(self._hand[grips[grips < len(self._grips)]])
+        if len(holding):
+            worst = int(holding[use[holding].argmax()])
+            if self.most is None or use[worst] > RISE * self.most.share:
+                self._risen = float(self._d.time)
+            self.most = self._use(worst, max(0.0, float(use[worst])), grips)
+
+    def _of_grips(self) -> Array:
+        """For each grip the map from the rows of its weld to the terms of strength (grips + 1, 11,
+        6). Position rows are the opposite of the force on the body, rotation rows twice the
+        opposite of the torque: together the load at the body's centre of mass. Bodies keep the axes
+        of the world."""
+        terms = np.zeros((len(self._grips) + 1, TERMS, ROWS))
+        layout = self._model.layout
+        grips = {(grip.robot, grip.label): grip for grip in grips_of(layout, self._model.carried)}
+        for number, (key, _) in enumerate(self._grips):
+            grip, hand = grips[key], self._hands[key[0]]
+            load = np.diag([1.0, 1.0, 1.0, 0.5, 0.5, 0.5])
+            at = grip.centre - middle(hand)
+            at[:2] += grip.visit.shift
+            tour = grip.layout.factory.turns[grip.begins, grip.robot]
+            first = grip.layout.factory.robots[grip.robot].operations[0]
+            at[2] += grip.visit.height
+            at[2] -= grip.layout.visits[first, grip.robot].height
+            load[3:, :3] = np.cross(at, np.eye(3)).T
+            terms[number] = gauge(hand, layout.guidepaths[grip.robot].heading, tour) @ load
+        return terms
+
+    def _use(self, number: int, share: float, grips: Index) -> StrengthUse:
+        """The payload of the n-th hand, and the share of its strength used."""
+        factory, carried = self._model.factory, self._model.carried
+        robot = factory.robots[int(self._robots[number])]
+        held = grips[self._hand[grips] == number].tolist()
+        bodies = [self._grips[grip][0][1] for grip in held]
+        parts = {part for body in bodies for part in carried.parts(body)}
+        made = (factory.operations[operation].label for operation in robot.operations)
+        whole = (label for label in made if parts == {*factory.contents.get(label, ())})
+        return StrengthUse(share, robot.name, next(whole, bodies[0]))
+
+    def _drop(self, number: int, use: StrengthUse) -> Drop:
+        """The diagnostic of the n-th hand, which lets go."""
+        factory, now, robot = self._model.factory, float(self._d.time), int(self._robots[number])
+        bears = _told(self._hands[robot])
+        message = (
+            f"{use.robot} drops '{use.label}' at {now:.2f} s: the load is {use.share:.4g} times"
+            f" what its hand bears ({bears})"
+        )
+        source = factory.by_label.get(use.label, factory.robots[robot])
+        return Drop(now, Diagnostic("Dropped", message, source.position, STRONGER))
+
+
+def _told(hand: Hand) -> str:
+    """The grip of a hand, in words."""
+    what = {"suction": "suction pad", "pin": "pin"}[hand.tip]
+    tips = f"two {what}s" if len(hand.places) > 1 else f"a {what}"
+    return f"{tips}, radius {1e3 * hand.radius:g} mm"

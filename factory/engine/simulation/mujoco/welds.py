@@ -1,0 +1,203 @@
+"""The welds that a run switches, and bodies that it places: all changes between two steps of the
+engine, gathered and written at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from factory.engine.mjcf.pads import Pads
+from factory.engine.mjcf.weld_frames import WeldFrames
+from factory.engine.simulation.mujoco.contacts import ContactMasks
+from factory.engine.simulation.mujoco.fusing import rotations
+from factory.engine.simulation.mujoco.model_arrays import ModelArrays
+from factory.engine.simulation.mujoco.sleep import Sleep
+from factory.support.engine import mujoco
+from factory.theory.control.mode import Array, Index
+
+Place = tuple[float, float, float]
+
+
+class Takeovers:
+    """Measurements of bodies as a grip closes on them. `count`: bodies taken over; `gap` [m] and
+    `turn` [rad]: largest distance and angle between the frames that a grip joined; `off` [m]:
+    largest displacement of a vertex by its grip, turns included. `radii` (nbody,): distance of
+    vertices from their body's origin [m]. The kinematics in `d` are up to date."""
+
+    def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, radii: Array) -> None:
+        self.count, self.gap, self.turn, self.off = 0, 0.0, 0.0, 0.0
+        self._d, self._frames, self._radii = d, WeldFrames.of(m, d), radii
+        self._qpos = m.jnt_qposadr[m.body_jntadr][:, None] + np.arange(7)
+
+    def measure(self, welds: Index, bodies: Index) -> None:
+        """Measure bodies on which welds close, at their current places; `xpos` belongs to the start
+        of the last step."""
+        q, frames = self._d.qpos, self._frames.chosen(welds)
+        pose = q[self._qpos[bodies]]
+        gap = np.linalg.norm(pose[:, :3] - frames.at(q[frames.along]), axis=1)
+        turn = frames.turned(q[frames.along])
+        sine = np.sqrt(np.maximum(0.0, 1.0 - (pose[:, 3:] * turn).sum(axis=1) ** 2))
+        turned = 2 * sine * self._radii[bodies]
+        self.count += len(welds)
+        self.gap = max(self.gap, float(gap.max()))
+        self.turn = max(self.turn, 2 * float(np.arcsin(np.minimum(sine.max(), 1.0))))
+        self.off = max(self.off, float((gap + turned).max()))
+
+
+class PadGaps:
+    """Distances between holders' pads and their payloads. `largest` [m]: largest distance between
+    the pads of a holder and the nearest of its bodies; None while no holder with pads has taken
+    anything. Pads are measured at a holder's first payload: welds are rigid, so further bodies
+    bring the nearest no farther away."""
+
+    def __init__(self, m: mujoco.MjModel, d: mujoco.MjData) -> None:
+        self.largest: float | None = None
+        self._m, self._d = m, d
+        self._frames = WeldFrames.of(m, d)
+        self._pads = Pads(m)
+        self._at_zero, self._turned = d.geom_xpos.copy(), rotations(m.geom_quat)
+        self._welds = {h: np.flatnonzero(m.eq_obj1id == h) for h in self._pads.of}
+        for holder, welds in self._welds.items():
+            pads, weld = self._pads.of[holder], welds[0]
+            moved = d.qpos[self._frames.along[weld]] @ self._frames.way[weld]
+            self._at_zero[pads] = d.geom_xpos[pads] - moved
+
+    def measure(self, on: Mapping[int, int]) -> None:
+        """Measure welds that are about to close, each with its body. A holder that exchanges parts
+        for their fused body has been measured before."""
+        taken: dict[int, tuple[int, list[int]]] = {}
+        for weld, body in on.items():
+            holder = int(self._m.eq_obj1id[weld])
+            if holder in self._pads.of and body in self._pads.solid:
+                taken.setdefault(holder, (weld, []))[1].append(body)
+        for holder, (weld, bodies) in taken.items():
+            if not self._d.eq_active[self._welds[holder]].any():
+                self._pads_of(holder, weld, bodies)
+
+    def _pads_of(self, holder: int, weld: int, bodies: Sequence[int]) -> None:
+        m, d, pads, flat = self._m, self._d, self._pads.of[holder], np.empty(9)
+        along, way = self._frames.along[weld], self._frames.way[weld]
+        d.geom_xpos[pads] = self._at_zero[pads] + d.qpos[along] @ way
+        for body in bodies:
+            geoms = self._pads.solid[body]
+            at = m.jnt_qposadr[m.body_jntadr[body]] + np.arange(7)
+            mujoco.mju_quat2Mat(flat, d.qpos[at[3:]])
+            turn = flat.reshape(3, 3)
+            d.geom_xpos[geoms] = d.qpos[at[:3]] + m.geom_pos[geoms] @ turn.T
+            d.geom_xmat[geoms] = (turn @ self._turned[geoms]).reshape(-1, 9)
+        apart = self._pads.apart(d, holder, self._pads.geoms(bodies))
+        self.largest = max(self.largest or 0.0, apart)
+
+
+@dataclass(slots=True)
+class Gathered:
+    """What is to be switched `on` and `off` (welds, the former with the bodies that they hold), of
+    these what takes bodies over (`gripped`), who has what (`held`), and what is put where."""
+
+    on: dict[int, int] = field(default_factory=dict)
+    off: set[int] = field(default_factory=set)
+    gripped: dict[int, int] = field(default_factory=dict)
+    held: dict[int, int] = field(default_factory=dict)
+    placed: dict[int, Place] = field(default_factory=dict)
+
+
+class Welds:
+    """Gathers what is to be switched until `write`; the last that is said of a weld or body counts.
+
+    `radii` (nbody,): how far vertices are from their body's origin [m]; `taken`: what was measured
+    of bodies that were taken over; `pads`: how far holders' pads were from them; `closed`: when a
+    weld was switched on last [s].
+    """
+
+    def __init__(
+        self, arrays: ModelArrays, d: mujoco.MjData, masks: ContactMasks, sleep: Sleep, radii: Array
+    ) -> None:
+        self.masks, m = masks, arrays.m
+        self._frames, self._aims = arrays["eq_data"], arrays["eq_obj2id"]
+        self._m, self._d, self._sleep = m, d, sleep
+        mujoco.mj_kinematics(m, d)
+        self.taken = Takeovers(m, d, radii)
+        self.pads = PadGaps(m, d)
+        self.closed = -np.inf
+        self._next = Gathered()
+        self._bent: dict[int, Array] = {}
+
+    def loose(self, welds: Iterable[int]) -> None:
+        """Switch welds off."""
+        for weld in welds:
+            self._next.on.pop(weld, None)
+            self._next.gripped.pop(weld, None)
+            self._next.off.add(weld)
+
+    def join(self, welds: Mapping[int, int]) -> None:
+        """Switch welds on, each aimed at a body."""
+        self._next.on.update(welds)
+
+    def grip(self, welds: Mapping[int, int]) -> None:
+        """Close welds that take bodies over: their gaps are measured."""
+        self.join(welds)
+        self._next.gripped.update(welds)
+
+    def hold(self, bodies: Iterable[int], holder: int) -> None:
+        """Put parts into the hands of a holder (code)."""
+        self._next.held.update(dict.fromkeys(bodies, holder))
+
+    def place(self, body: int, at: Place) -> None:
+        """Place a free body [m], at rest, in the orientation in which it is presented."""
+        self._next.placed[body] = at
+
+    def bend(self, weld: int, place: Array) -> None:
+        """A weld holds its body at another place in its holder (7,), until it is switched on anew,
+        or straightened."""
+        self._bent.setdefault(weld, self._frames.now[weld, 3:10].copy())
+        self._frames[weld, 3:10] = place
+
+    def straighten(self, welds: Iterable[int]) -> None:
+        """Welds hold their bodies where they should."""
+        for weld in self._bent.keys() & welds:
+            self._frames[weld, 3:10] = self._bent.pop(weld)
+
+    def turn(self, body: int, quaternion: Array, aside: Array) -> None:
+        """Turn a free body, displaced by `aside` (3,) [m]."""
+        address = self._m.jnt_qposadr[self._m.body_jntadr[body]]
+        self._d.qpos[address : address + 3] += aside
+        self._d.qpos[address + 3 : address + 7] = quaternion
+        self._d.xquat[body] = quaternion
+        self._sleep.wake([body])
+
+    def write(self) -> None:
+        """Write all gathered changes into the engine, and wake the bodies concerned."""
+        if self._next == Gathered():
+            return
+        self.straighten(self._next.on)
+        self._put()
+        self.pads.measure(self._next.on)
+        if self._next.gripped:
+            welds, bodies = np.array([*self._next.gripped.items()]).T
+            self.taken.measure(welds, bodies)
+        m, d = self._m, self._d
+        off, on = np.array([*self._next.off], np.intp), np.array([*self._next.on], np.intp)
+        bodies = np.array([*self._next.on.values()], np.intp)
+        loose = {*m.eq_obj2id[off[d.eq_active[off] != 0]].tolist()} - {*bodies.tolist()}
+        touched = [m.eq_obj1id[off], m.eq_obj2id[off], m.eq_obj1id[on], bodies]
+        d.eq_active[off] = False
+        self._aims[on], d.eq_active[on] = bodies, True
+        if len(on):
+            self.closed = float(d.time)
+        self._sleep.wake({*np.concatenate(touched).tolist(), *self._next.placed})
+        self.masks.hold(self._next.held)
+        self.masks.let_go(loose - self._next.held.keys())
+        self._next = Gathered()
+
+    def _put(self) -> None:
+        """Place bodies; `xpos` too, which the engine renews in its next step."""
+        if not self._next.placed:
+            return
+        bodies, at = np.array([*self._next.placed]), np.array([*self._next.placed.values()])
+        joint, d = self._m.body_jntadr[bodies], self._d
+        address = self._m.jnt_qposadr[joint][:, None] + np.arange(7)
+        d.qpos[address] = np.hstack([at, self._m.qpos0[address[:, 3:]]])
+        d.qvel[self._m.jnt_dofadr[joint][:, None] + np.arange(6)] = 0.0
+        d.xpos[bodies] = at

@@ -1,0 +1,109 @@
+"""The gain of optimising: a layout compared with the first feasible one and with a lower bound."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from math import floor, sqrt
+
+from factory.engine.timing.cycle_time import CycleTime
+from factory.engine.timing.timed import timed
+from factory.engine.timing.timing import Timing
+from factory.floor.layout.bounds import cycle_time_bound
+from factory.floor.layout.dimensions import Clearance
+from factory.floor.layout.durations import Pace
+from factory.floor.layout.hands.choosing import Hands
+from factory.floor.layout.layout import Layout
+from factory.floor.layout.optimising import first_feasible, floor_of
+from factory.support.settings import Settings
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """The objectives: the cycle time that a run is predicted to have [s], total length of the
+    guidepaths [m], floor [m²]."""
+
+    predicted_cycle_time_s: float
+    guidepath_length_m: float
+    area_m2: float
+
+
+@dataclass(frozen=True, slots=True)
+class LayoutGain:
+    """The figures of a layout and of the first feasible one; the robot that allows no shorter cycle
+    and the least cycle time that any layout without relays could have [s]. Where there are relays:
+    the figures without them, and how many robots they add."""
+
+    chosen: Figures
+    first: Figures
+    bottleneck: str
+    bound: float
+    plain: Figures | None = None
+    added: int = 0
+
+    def as_json(self) -> dict[str, object]:
+        """As a part of a document."""
+        document: dict[str, object] = asdict(self.chosen)
+        if self.plain:
+            document["relays"] = {"robots_added": self.added, "without": asdict(self.plain)}
+        return {
+            **document,
+            "bottleneck": self.bottleneck,
+            "cycle_time_bound_s": round(self.bound, 6),
+            "first_feasible": asdict(self.first),
+        }
+
+    def __str__(self) -> str:
+        first, plain, relays, other = self.first, self.plain, "", ""
+        if plain:
+            words = f"{self.added} robot{'' if self.added == 1 else 's'} more to relay"
+            relays = f"; {words}, {plain.predicted_cycle_time_s:.2f} s without"
+            other = " without relays"
+        return (
+            f"cycle {self.chosen.predicted_cycle_time_s:.2f} s ({self.bottleneck}){relays};"
+            f" first feasible"
+            f" layout {first.predicted_cycle_time_s:.2f} s, {first.area_m2:.2f} m²,"
+            f" {first.guidepath_length_m:.2f} m; no layout{other} below"
+            f" {self.bound:.2f} s"
+        )
+
+
+def gain(layout: Layout, settings: Settings, hands: Hands, wip: int | None = None) -> LayoutGain:
+    """Compare a layout with others for the same settings, `hands` to choose from, and bound on
+    units inside; where robots are on tees, with a first one of robots that have no hands."""
+    plain = layout.plain or layout
+    factory, product, c = plain.factory, layout.product, layout.clearance
+    size, chosen = Clearance(c, factory.carriage), None if layout.stems else hands
+    first = first_feasible(factory, product, size, (), chosen)
+    cycle = _cycle(layout, settings, wip)
+    return LayoutGain(
+        _figures(layout, cycle),
+        _figures(first, _cycle(first, settings, wip)),
+        cycle.bottleneck,
+        cycle_time_bound(factory, product, c, soonest(settings)),
+        _figures(plain, _cycle(plain, settings, wip)) if layout.plain else None,
+        len(layout.factory.robots) - len(factory.robots),
+    )
+
+
+def soonest(settings: Settings) -> Pace:
+    """The pace of a run whose operations all end as soon as they can: in the tick in which its
+    robots come into their goal balls, less the tick that a dwell begins before.
+
+    A robot whose reference brakes by a·dt a tick, over c·n(n + 1) in n ticks, c = a·dt²/2, rests
+    n + 1 ticks after it is nearer to its goal than c·(n + 1)(n + 2).
+    """
+    pace, tick = Pace.of(settings), settings.tick
+    balls = 2 * settings.eps / (settings.acceleration * tick * tick)
+    early = tick * (2 + floor(sqrt(balls + 0.25) - 0.5 - 1e-9))
+    ahead = None if pace.ahead is None else pace.ahead - early
+    return replace(pace, lost=pace.lost - early, ahead=ahead)
+
+
+def _cycle(layout: Layout, settings: Settings, wip: int | None) -> CycleTime:
+    return timed(Timing(layout, settings), wip=wip).cycle
+
+
+def _figures(layout: Layout, cycle: CycleTime) -> Figures:
+    xlo, xhi, ylo, yhi = floor_of(layout)
+    area = (xhi - xlo) * (yhi - ylo)
+    return Figures(round(cycle.seconds, 6), round(layout.guidepath_length, 6), round(area, 6))

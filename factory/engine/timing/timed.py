@@ -1,0 +1,154 @@
+"""The timed net of a layout: its coordinated net with the time that a token stays in each place.
+What follows from it for a run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+from factory.engine.timing.cycle_time import CycleTime, cycle_time
+from factory.engine.timing.pool import with_wip
+from factory.engine.timing.timing import AS_IT_IS, Change, Timing
+from factory.floor.layout.layout import Layout
+from factory.support.settings import Settings
+from factory.theory.nets.cycle_ratio import CycleRatio, max_cycle_ratio
+from factory.theory.nets.marked import MarkedNet
+from factory.theory.nets.ways import Way, busiest, ways_apart, with_ways
+
+SAME = 1e-9
+"""Relative difference up to which times are equal."""
+
+OUTFEED, FEEDER = "outfeed", "feeder"
+"""What machines are called that are no robots, as a bottleneck."""
+
+
+@dataclass(frozen=True)
+class Timed:
+    """A net with the `seconds` that a token stays in each place. `ways`: the places of robots that
+    go ahead while they wait, by robot and operation; `bounds`: those of a bound `wip` on what is
+    inside; `owners`: the robots (indices) that are in a place."""
+
+    timing: Timing
+    net: MarkedNet
+    seconds: tuple[float, ...]
+    ways: Mapping[Way, int] = field(default_factory=dict, repr=False)
+    bounds: tuple[int, ...] = ()
+    wip: int | None = None
+    owners: Mapping[int, tuple[int, ...]] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def ratio(self) -> CycleRatio:
+        """The maximum cycle ratio with its proof."""
+        return max_cycle_ratio(self.net, self.seconds)
+
+    @property
+    def pace(self) -> float:
+        """The cycle time in the long run [s]."""
+        return self.ratio.seconds / self.timing.factory.period
+
+    @cached_property
+    def busiest(self) -> list[int]:
+        """The robots on the critical circuit, those first that spend most seconds on it."""
+        return busiest(self.owners, self.ratio.circuit, self.seconds)
+
+    @property
+    def waited_for(self) -> list[int]:
+        """The robots in places of their own on the critical circuit: for their hands, ways or turns
+        another waits."""
+        alone = (self.owners.get(place, ()) for place in self.ratio.circuit)
+        return [*dict.fromkeys(robots[0] for robots in alone if len(robots) == 1)]
+
+    @cached_property
+    def bottleneck(self) -> str:
+        """What allows no less: a bound on what is inside, a feeder, the outfeed, or a robot."""
+        if not set(self.bounds).isdisjoint(self.ratio.circuit):
+            return f"wip {self.wip}"
+        places = map(self.net.net.places.__getitem__, self.ratio.circuit)
+        modes = {place.mode: place.label for place in places}
+        if "tray" in modes:
+            return OUTFEED
+        if "magazine" in modes:
+            return f"{FEEDER} {modes['magazine']}"
+        return self.timing.factory.robots[self.busiest[0]].name
+
+    @property
+    def cycle(self) -> CycleTime:
+        """The cycle time and its bottleneck: a robot where its gear alone allows no less."""
+        compiled = len(self.timing.factory.net.threaded.places)
+        taken = {way: self.seconds[place] for way, place in self.ways.items()}
+        gears = cycle_time(self.timing.factory, self.seconds[:compiled], taken)
+        if gears.seconds >= self.pace * (1 - SAME):
+            return gears
+        return CycleTime(self.pace, self.bottleneck)
+
+
+def timed(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None) -> Timed:
+    """The timed net of a layout with a change of its robots and a bound on copies of each part.
+
+    In a run a transition fires a tick after those that it waits for. The net has this tick in each
+    operation, so its ends come a tick late: what else follows an end takes a tick less.
+
+    Raises InputError (BadValue) where `wip` is below 1.
+    """
+    factory, coordinated = timing.factory, timing.coordinated
+    net, count = _copied(timing, change), len(factory.net.threaded.places)
+    delays = timing.changed(change)
+    seconds = [*delays, *[0.0] * (len(net.tokens) - len(delays))]
+    owners = dict(enumerate(factory.net.slots))
+    dates = timing.passes(change)
+    dates |= {past: max(0.0, date - timing.tick) for past, date in dates.items() if past.after % 2}
+    for past, (place, before) in coordinated.passes.items():
+        seconds[place] = max(0.0, dates[past] - (dates[before] if before else 0.0))
+        owners[place] = (factory.robot_of(past.axis),)
+    for number, served in coordinated.served.items():
+        up, seconds[served.down] = timing.strokes[number]
+        seconds[served.up] = up - timing.tick
+    for place in coordinated.away.values():
+        seconds[place] = timing.outfeed - timing.tick
+    bounds: tuple[int, ...] = ()
+    if wip is not None:
+        bounded = with_wip(factory, min(wip, len(factory.robots)))
+        more, tokens = bounded.net.places[count:], bounded.tokens[count:]
+        bounds = tuple(range(len(seconds), len(seconds) + len(more)))
+        places = replace(net.net, places=(*net.net.places, *more))
+        net = MarkedNet(places, (*net.tokens, *tokens))
+        seconds += [0.0] * len(more)
+    went = ways_apart(factory.net, seconds, timing.ways(change))
+    ways = dict(zip(went, range(len(seconds), len(seconds) + len(went)), strict=True))
+    owners |= {place: (robot,) for (robot, _), place in ways.items()}
+    net = with_ways(net, factory.net, went)
+    return Timed(timing, net, (*seconds, *went.values()), ways, bounds, wip, owners)
+
+
+def _copied(timing: Timing, change: Change) -> MarkedNet:
+    """The coordinated net, in which the gear of a robot with copies has so many tokens."""
+    coordinated, factory = timing.coordinated, timing.factory
+    tokens = list(coordinated.net.tokens)
+    for robot, copies in change.copies.items():
+        tokens[factory.net.initial[robot]] += copies - 1
+    for place, beside in coordinated.beside.items():
+        tokens[place] = tokens[beside]
+    return replace(coordinated.net, tokens=tuple(tokens))
+
+
+def pace(layout: Layout, settings: Settings) -> tuple[CycleTime, tuple[float, ...]]:
+    """The cycle time of a layout in MuJoCo, and how long each operation takes [s]."""
+    timing = Timing(layout, settings)
+    return timed(timing).cycle, timing.delays
+
+
+def duration(timing: Timing, cycle: float, units: int) -> float:
+    """At most how long it takes to make so many `units` from the empty factory [s]: the first by
+    the slowest chain of operations from a part to dropoff, a `cycle` for each that follows, and for
+    each further one of a period."""
+    factory, delays = timing.factory, timing.delays
+    ready = [0.0] * len(factory.robots)
+    for number in factory.order:
+        operation = factory.operations[number]
+        if factory.drops(number) or operation.turn:
+            continue
+        done = max(ready[robot] for robot in operation.robots) + delays[operation.index]
+        for robot in operation.robots:
+            ready[robot] = done
+    return max(ready) + delays[-1] + (units + factory.period - 2) * cycle

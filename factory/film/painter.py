@@ -1,0 +1,239 @@
+"""Pictures of a model's state, drawn by MuJoCo's classic renderer without a screen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+
+import numpy as np
+
+from factory.engine.mjcf import names
+from factory.engine.mjcf.loose_parts import loose_parts
+from factory.engine.mjcf.replica import SHOWN, Replica
+from factory.engine.record.subject import MonitorSubject
+from factory.film.action import Fading, Snapshot
+from factory.film.following import Viewpoint
+from factory.film.ink import Pixels
+from factory.film.marks import Mark, Marks
+from factory.film.picture import Camera, Size
+from factory.floor.geometry.meshes import Array, Indices
+from factory.floor.geometry.sight import Framing, View
+from factory.support import gl
+from factory.support.engine import mujoco
+from factory.support.resource import Closing
+
+MANY = 110
+"""Robots above which a film has no shadows: they cost a second pass over all geometry."""
+
+SOFT = 0.11
+"""Radius of the sun as a still sees it [rad]: the softness of shadows."""
+
+LOOSE_SAMPLES = 12
+"""A still of loose parts, which is drawn while a user waits, is the mean of so many pictures."""
+
+Sample = tuple[int, int]
+"""The number of one of several pictures that a still is the mean of, and how many there are."""
+
+
+class Painter(Closing):
+    """Draws one model from one camera; it has a model and data of its own, so a run is not
+    disturbed.
+
+    `caption`: height of the strip below that is kept free, as a fraction of the picture's.
+    `samples`: above 1 a picture is the mean of so many, each with the key light and the pixels'
+    grid moved a little: soft shadows and smooth edges, for stills. Raises MissingError where there
+    is no GL."""
+
+    def __init__(
+        self,
+        m: mujoco.MjModel,
+        size: Size,
+        camera: Camera,
+        subject: MonitorSubject,
+        caption: float = 0.0,
+        samples: int = 1,
+    ) -> None:
+        gl.probe()
+        self.replica, self.samples = Replica(m), samples
+        _facet(self.replica.m)
+        quality = self.replica.m.vis
+        quality.global_.offwidth, quality.global_.offheight = size
+        if samples > 1:
+            quality.quality.offsamples = 1
+        framing = Framing(size[0] / size[1], below=0.03 + caption)
+        self.viewpoint = Viewpoint(self.replica, camera, framing, subject)
+        self.fading = Fading(self.replica)
+        joints = (names.kind(m.joint(n).name) for n in range(m.njnt))
+        self.shadows = sum(kind == "robot" for kind in joints) <= MANY
+        self.renderer = Renderer(self.replica, size)
+
+    def close(self) -> None:
+        """Gives the GL context back."""
+        self.renderer.close()
+
+    def paint(
+        self,
+        shown: Snapshot,
+        elapsed: float = 0.0,
+        time: float = 0.0,
+        marks: Marks | None = None,
+    ) -> Pixels:
+        """One picture (height, width, 3) at a time [s], with `marks` on the floor. `elapsed` [s]
+        since the last one: a camera that follows glides; with 0 it is at its goal at once."""
+        self.replica.place(shown.qpos)
+        self.renderer.marks = [] if marks is None else [*marks.at(shown, time)]
+        mujoco.mj_camlight(self.replica.m, self.replica.d)
+        view = self.viewpoint.view(shown, elapsed, time)
+        self.fading.fade(view, self.viewpoint.watched)
+        if self.samples == 1:
+            return np.ascontiguousarray(self.renderer.draw(view, self.shadows)[::-1])
+        return self.renderer.mean(view, self.samples)
+
+
+class Renderer(Closing):
+    """Draws a replica as a view has it, with a GL context of its own."""
+
+    def __init__(self, replica: Replica, size: Size) -> None:
+        self.replica, m = replica, replica.m
+        self.held = gl.context(*size)
+        self.scene = mujoco.MjvScene(m, maxgeom=m.ngeom + 100)
+        self.drawing = mujoco.MjrContext(m, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self.drawing)
+        self.options, self.free = mujoco.MjvOption(), mujoco.MjvCamera()
+        mujoco.mjv_defaultFreeCamera(m, self.free)
+        self.rectangle = mujoco.MjrRect(0, 0, *size)
+        self.pixels = np.empty((size[1], size[0], 3), np.uint8)
+        self.marks: list[Mark] = []
+
+    def close(self) -> None:
+        """Gives the GL context back."""
+        if self.held is not None:
+            self.held.make_current()
+            self.drawing.free()
+            self.held.free()
+            self.held = None
+
+    def draw(self, view: View, shadows: bool, sample: Sample | None = None) -> Pixels:
+        """The pixels, from the lowest row up; they are written over by the next picture."""
+        scene, everything = self.scene, mujoco.mjtCatBit.mjCAT_ALL.value
+        m, d, nothing = self.replica.m, self.replica.d, None
+        mujoco.mjv_updateScene(m, d, self.options, nothing, self.free, everything, scene)
+        for mark in self.marks:
+            mark.add_to(scene)
+        flags = mujoco.mjtRndFlag
+        scene.flags[flags.mjRND_SHADOW], scene.flags[flags.mjRND_SKYBOX] = shadows, view.has_sky
+        for unused in (flags.mjRND_REFLECTION, flags.mjRND_HAZE, flags.mjRND_POST_PROCESSING):
+            scene.flags[unused] = False
+        self._aim(view, _spread(sample[1])[sample[0]] - 0.5 if sample else np.zeros(2))
+        self._light(view, sample)
+        self.held.make_current()
+        mujoco.mjr_render(self.rectangle, scene, self.drawing)
+        mujoco.mjr_readPixels(self.pixels, None, self.rectangle, self.drawing)
+        return self.pixels
+
+    def mean(self, view: View, samples: int) -> Pixels:
+        """The mean of so many pictures, from the highest row down: a still."""
+        total = np.zeros(self.pixels.shape, np.float32)
+        for n in range(samples):
+            total += self.draw(view, True, (n, samples))
+        return np.ascontiguousarray((total / samples + 0.5).astype(np.uint8)[::-1])
+
+    def _aim(self, view: View, shift: Array) -> None:
+        """Set the scene's cameras to a view, moved by a fraction of a pixel."""
+        near, far = view.range
+        dx = shift[0] * 2 * view.wide / self.rectangle.width
+        dy = shift[1] * 2 * view.tall / self.rectangle.height
+        for camera in self.scene.camera:
+            camera.pos, camera.forward, camera.up = view.position, view.axes[2], view.axes[1]
+            camera.frustum_near, camera.frustum_far = near, far
+            camera.frustum_width = near * view.wide
+            camera.frustum_center = near * dx
+            camera.frustum_bottom = near * (dy - view.tall)
+            camera.frustum_top = near * (dy + view.tall)
+
+    def _light(self, view: View, sample: Sample | None) -> None:
+        """The headlight shines from the camera, the key light over what is seen; a still moves
+        it."""
+        middle = view.position + view.distance * view.axes[2]
+        self.drawing.shadowClip = 1.25 * view.distance * max(view.wide, view.tall) + view.depth
+        for light in self.scene.lights[: self.scene.nlight]:
+            if light.headlight:
+                light.pos, light.dir = view.position, view.axes[2]
+            elif light.castshadow:
+                if sample is not None:
+                    light.dir = _moved(np.asarray(light.dir, float), sample)
+                light.pos = middle - sum(view.range) / 2 * np.asarray(light.dir, float)
+
+
+class LooseParts(Closing):
+    """Draws the parts of a product alone, moved from their places, with a GL context of its own.
+    Its arguments are those of `loose_parts`. Raises MissingError where there is no GL."""
+
+    def __init__(
+        self,
+        surfaces: Mapping[str, tuple[Array, Indices]],
+        colours: Sequence[tuple[float, ...]],
+        floor: float,
+        extent: float,
+        size: Size,
+    ) -> None:
+        gl.probe()
+        model = loose_parts(surfaces, colours, floor, extent)
+        model.vis.global_.offwidth, model.vis.global_.offheight = size
+        self.replica = Replica(model)
+        self.framing = Framing(size[0] / size[1], 0.06, 0.06, 0.06)
+        self.renderer = Renderer(self.replica, size)
+
+    def close(self) -> None:
+        """Give the GL context back."""
+        self.renderer.close()
+
+    def move(self, offsets: Array) -> None:
+        """Move each part by an offset (n, 3) [m] from its place in the product."""
+        upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(offsets), 1))
+        self.replica.place(np.hstack([offsets, upright]).ravel())
+        mujoco.mj_camlight(self.replica.m, self.replica.d)
+
+
+ROUND = (
+    mujoco.mjtGeom.mjGEOM_SPHERE,
+    mujoco.mjtGeom.mjGEOM_CAPSULE,
+    mujoco.mjtGeom.mjGEOM_ELLIPSOID,
+)
+"""Shapes that are curved in both directions."""
+
+
+def _facet(m: mujoco.MjModel) -> None:
+    """Let the engine draw no more facets than are seen: flat faces whole, cylinders of two rings.
+    By itself it cuts a face into 16, and a cylinder into 16 rings."""
+    m.vis.quality.numquads = 1
+    if not np.isin(m.geom_type[m.geom_group < SHOWN], ROUND).any():
+        m.vis.quality.numstacks = 2
+
+
+def _moved(direction: Array, sample: Sample) -> Array:
+    """A direction moved inside a disc of radius SOFT, the samples evenly spread over it."""
+    n, count = sample
+    radius, angle = SOFT * ((n + 0.5) / count) ** 0.5, n * 2.399963
+    side = np.cross(direction, (0.0, 0.0, 1.0))
+    side /= np.linalg.norm(side)
+    other = np.cross(direction, side)
+    moved = direction + radius * (np.cos(angle) * side + np.sin(angle) * other)
+    return np.asarray(moved / np.linalg.norm(moved))
+
+
+@cache
+def _spread(count: int) -> Array:
+    """Halton points (count, 2): spread evenly over the unit square, all within it. (Those of SciPy
+    are the same, but its statistics take longer to import than a still takes to draw.)"""
+    return np.array([[_inverse(n, base) for base in (2, 3)] for n in range(1, count + 1)])
+
+
+def _inverse(number: int, base: int) -> float:
+    """The radical inverse: the digits of a number in a base, mirrored at the point."""
+    mirrored, place = 0.0, 1.0 / base
+    while number:
+        number, digit = divmod(number, base)
+        mirrored += digit * place
+        place /= base
+    return mirrored

@@ -1,0 +1,82 @@
+"""The triangles of a mesh file, separated by bodies, and the reason why a file has none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from factory.floor.geometry.meshes import Array, Indices, normals_of
+from factory.floor.geometry.pieces import joined
+
+EXPECTED = {
+    ".obj": "an OBJ file (lines 'v x y z' for vertices, 'f 1 2 3' for faces)",
+    ".stl": "an STL file (84 bytes and 50 more a triangle, or a text that begins with 'solid')",
+    ".ply": "a PLY file (a header from 'ply' to 'end_header', then all its vertices and faces)",
+    ".glb": "a GLB file (binary glTF 2.0, complete, with triangles that are not compressed)",
+    ".off": "an OFF file (a line 'OFF', numbers of vertices, faces and edges, then these)",
+    ".3mf": "a 3MF file (a ZIP archive with 3D/3dmodel.model)",
+    ".step": "a STEP file (ISO 10303-21, which begins with 'ISO-10303-21;', with solids in it)",
+}
+"""A description of each file format."""
+
+ANEW = "export it again as .obj, .stl, .ply or .glb with triangles"
+"""The hint for a file that cannot be read."""
+
+
+class UnreadableMesh(Exception):
+    """The reason why a file is not a mesh, as a sentence about the file: "it has no triangles"."""
+
+
+@dataclass(frozen=True, slots=True)
+class MeshFile:
+    """The triangles of a file by body: vertices (n, 3) and faces (m, 3) of each, in the file's
+    unit."""
+
+    bodies: tuple[tuple[Array, Indices], ...] = field(repr=False)
+
+    def merged(self) -> tuple[Array, Indices]:
+        """All triangles, with vertices merged; degenerate triangles are omitted, unless all are."""
+        return _merged(*joined(self.bodies))
+
+    def areas(self) -> Array:
+        """The area of each body."""
+        return np.array([areas_of(*body).sum() for body in self.bodies])
+
+
+def areas_of(vertices: Array, faces: Indices) -> Array:
+    """The area of each triangle (m,)."""
+    return np.asarray(np.linalg.norm(normals_of(vertices, faces), axis=1) / 2)
+
+
+def checked(bodies: Iterable[tuple[Array, Indices]], suffix: str) -> MeshFile:
+    """The bodies that have triangles. Raises UnreadableMesh if none has, or one is invalid."""
+    meshes = [(vertices, faces) for vertices, faces in bodies if len(faces)]
+    if not meshes:
+        raise UnreadableMesh(f"it has no triangles; it should be {EXPECTED[suffix]}")
+    for vertices, faces in meshes:
+        if not 0 <= faces.min() <= faces.max() < len(vertices):
+            raise UnreadableMesh("a triangle refers to a vertex that does not exist")
+        if not np.isfinite(vertices[faces]).all():
+            raise UnreadableMesh("it has vertices that are not finite (nan or inf)")
+    return MeshFile(tuple(meshes))
+
+
+def obj_of(vertices: Array, faces: Indices, comment: str) -> bytes:
+    """An OBJ file with a comment in its first line."""
+    lines = [f"# {comment}"]
+    lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in (np.round(vertices, 9) + 0.0).tolist()]
+    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces.tolist()]
+    return ("\n".join(lines) + "\n").encode()
+
+
+@np.errstate(all="ignore")
+def _merged(vertices: Array, faces: Indices) -> tuple[Array, Indices]:
+    import trimesh
+
+    body = trimesh.Trimesh(vertices, faces, process=False)
+    body.merge_vertices()
+    merged = np.asarray(body.faces)
+    whole = (merged != np.roll(merged, 1, axis=1)).all(axis=1)
+    return np.asarray(body.vertices), merged[whole] if whole.any() else merged

@@ -1,0 +1,271 @@
+"""The overlap of two solids as drawn: exact, by boolean operations on their surfaces.
+
+The convex bodies that collide for a part (`pieces`) may be larger than the part as drawn: the hull
+of a plate closes its holes. Here a part is the volume that its own surface bounds. The *depth* of
+an overlap of A and B is the least distance by which one of the two must be eroded so that they are
+disjoint: 0.4 mm for a peg of 40.8 mm in a hole of 40 mm, the radius of a pin in a plate that has no
+hole for it. It is attained in the common volume,
+
+    depth = min over S in {A, B} of max over p in A ∩ B of |p, ∂S|,
+
+and is sampled at the corners of the common volume and along chords that are normal to its faces. A
+common volume may be a film that is thinner than rounding, as that of a rod in a bore of the same
+diameter. A chord may then begin outside the film and cross the bore, so its middle counts only if
+it is in A and in B.
+
+The volume that A sweeps when it is shifted by v is the union of A and the prisms over its triangles
+that face v. They form one body that may overlap itself: it is solid wherever A passes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any
+from weakref import finalize
+
+import numpy as np
+
+from factory.floor.geometry.meshes import Array, Indices, is_closed, normals_of
+from factory.floor.geometry.pieces import closed_bodies
+from factory.floor.geometry.solids import Solid, rotation
+
+ROUND = 5e-6
+"""The largest deviation of the polytope that represents a round body [m]."""
+
+SIDES = (24, 1024)
+"""The fewest and the most sides of the polygon that represents a circle."""
+
+FACING = 1e-9
+"""Triangles with a cosine of at most this between normal and shift slide along themselves."""
+
+SAMPLES = 128
+"""The most corners, and the most chords, of a common volume at which its depth is sampled."""
+
+LEAST = 1e-15
+"""Smaller common volumes are rounding errors [m³]: a millionth of a cubic millimetre."""
+
+BEYOND = 1e-9
+"""The distance behind its face at which a chord begins [m]."""
+
+RAY = np.sqrt([2.0, 3.0, 5.0]) / np.sqrt(10.0)
+"""The direction of rays that tell inside from outside: no special one."""
+
+CHUNK = 400_000
+"""The most distances between points and triangles that are computed at a time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Common:
+    """The common volume [m³] of two solids, and its depth [m]; both 0 if they are disjoint.
+    `deepest` (3,): a point at that depth; `box` (2, 3): the corners of its box."""
+
+    volume: float
+    depth: float
+    deepest: Array = field(default_factory=lambda: np.zeros(3), compare=False, repr=False)
+    box: Array = field(default_factory=lambda: np.zeros((2, 3)), compare=False, repr=False)
+
+
+APART = Common(0.0, 0.0)
+"""The result for disjoint solids."""
+
+
+_DRAWN: dict[int, Any] = {}
+"""The volumes of existing solids, by identity."""
+
+
+def drawn(solid: Solid) -> Any:
+    """The volume that a part's surface bounds, as a `manifold3d.Manifold` in the frame of the
+    finished product, computed once; None for a mesh that bounds none."""
+    key = id(solid)
+    if key not in _DRAWN:
+        _DRAWN[key] = _made(solid)
+        finalize(solid, _DRAWN.pop, key, None)
+    return _DRAWN[key]
+
+
+def _made(solid: Solid) -> Any:
+    from manifold3d import Manifold
+
+    turn = rotation(solid.quaternion)
+    if solid.kind == "mesh":
+        mesh = solid.mesh
+        if mesh is None or not is_closed(mesh.faces):
+            return None
+        return bounded(mesh.vertices @ turn.T + solid.position, mesh.faces)
+    if solid.kind == "box":
+        body = Manifold.cube(2 * np.array(solid.size), True)
+    elif solid.kind == "cylinder":
+        radius, half = solid.size[:2]
+        sides = _sides(radius)
+        between = radius * (1 + 1 / np.cos(np.pi / sides)) / 2
+        body = Manifold.cylinder(2 * half, between, -1.0, sides, True)
+    else:
+        sides = 2 * _sides(solid.size[0])
+        body = Manifold.sphere(solid.size[0], sides)
+    return body.transform(np.column_stack([turn, solid.position]))
+
+
+def _sides(radius: float) -> int:
+    needed = np.pi / np.sqrt(2 * ROUND / max(radius, ROUND))
+    return int(np.clip(np.ceil(needed), *SIDES))
+
+
+def bounded(vertices: Array, faces: Indices) -> Any:
+    """The volume that a closed mesh bounds; None if it bounds none. Its bodies that share an edge
+    are separated, then united."""
+    from manifold3d import Error, Manifold, OpType
+
+    whole = _surface(vertices, faces)
+    if whole.status() != Error.NoError:
+        bodies = [_surface(*body) for body in closed_bodies(vertices, faces)]
+        if not bodies or any(body.status() != Error.NoError for body in bodies):
+            return None
+        filled = Manifold.batch_boolean([b for b in bodies if b.volume() > 0], OpType.Add)
+        cavities = [body for body in bodies if body.volume() < 0]
+        whole = filled + Manifold.batch_boolean(cavities, OpType.Add) if cavities else filled
+    return whole if whole.volume() > 0 else None
+
+
+def _surface(vertices: Array, faces: Indices) -> Any:
+    from manifold3d import Manifold, Mesh64
+
+    return Manifold(Mesh64(np.ascontiguousarray(vertices), faces.astype(np.uint64)))
+
+
+def swept(body: Any, shift: Array) -> Any:
+    """The volume that a body sweeps when it is shifted by `shift` (3,) [m]."""
+    from manifold3d import Error, Manifold
+
+    mesh = body.to_mesh64()
+    vertices, faces = merged(mesh)
+    normals = normals_of(vertices, faces)
+    lengths = np.linalg.norm(normals, axis=1) * np.linalg.norm(shift)
+    front = faces[normals @ shift > FACING * lengths]
+    if not len(front):
+        return body
+    used, inverse = np.unique(front, return_inverse=True)
+    near, count = inverse.reshape(-1, 3), len(used)
+    start, end = near.ravel(), np.roll(near, -1, axis=1).ravel()
+    rim = ~np.isin(start * count + end, end * count + start)
+    start, end = start[rim], end[rim]
+    walls = np.concatenate(
+        [
+            np.column_stack([start, end, end + count]),
+            np.column_stack([start, end + count, start + count]),
+        ]
+    )
+    points = np.concatenate([vertices[used], vertices[used] + shift])
+    ahead = _surface(points, np.concatenate([near[:, ::-1], near + count, walls]))
+    if ahead.status() != Error.NoError:  # the front touches itself in an edge: prism by prism
+        tips = vertices[front]
+        prisms = [Manifold.hull_points(np.concatenate([t, t + shift])) for t in tips]
+        ahead = Manifold.compose(prisms)
+    return Manifold.compose([body, ahead])
+
+
+def merged(mesh: Any) -> tuple[Array, Indices]:
+    """The vertices (n, 3) and faces (m, 3) of a manifold mesh, with vertices merged."""
+    vertices = np.asarray(mesh.vert_properties)[:, :3]
+    target = np.arange(len(vertices))
+    target[np.asarray(mesh.merge_from_vert, np.int64)] = np.asarray(mesh.merge_to_vert, np.int64)
+    return vertices, target[np.asarray(mesh.tri_verts, np.int64)]
+
+
+def united(bodies: Iterable[Any]) -> float:
+    """The volume of the union of bodies [m³]."""
+    from manifold3d import Manifold, OpType
+
+    return float(Manifold.batch_boolean([*bodies], OpType.Add).volume())
+
+
+def common(one: Any, other: Any, both: bool = True, samples: int = SAMPLES) -> Common:
+    """The overlap of two bodies. `both`: the depth is the lesser of the two erosions; otherwise
+    that of the `other`. With few `samples` the depth is a lower bound, computed faster."""
+    shared = one ^ other
+    volume = float(shared.volume())
+    if shared.is_empty() or volume <= LEAST:
+        return APART
+    points = _within(shared, one, other, samples)
+    bodies = (one, other) if both else (other,)
+    depths = min((_distances(points, body, shared) for body in bodies), key=np.max)
+    box = np.array(shared.bounding_box()).reshape(2, 3)
+    return Common(volume, float(depths.max()), points[depths.argmax()], box)
+
+
+def _within(shared: Any, one: Any, other: Any, samples: int) -> Array:
+    """Sample points (n, 3) of the volume that two bodies share: corners, and the ends and middles
+    of chords from the centres of triangles, the larger triangles first. A volume with few triangles
+    is subdivided."""
+    fine = max(1, int(np.sqrt(samples / shared.num_tri())))
+    vertices, faces = merged(shared.refine(fine).to_mesh64())
+    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
+    normals = np.cross(b - a, c - a)
+    areas = np.linalg.norm(normals, axis=1)
+    reach = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    points = [vertices[np.unique(faces)]]
+    points[0] = points[0][:: -(-len(points[0]) // samples)]
+    for row in np.argsort(-areas, kind="stable")[:samples].tolist():
+        if areas[row] > 0:
+            begin, inward = (a[row] + b[row] + c[row]) / 3, -normals[row] / areas[row]
+            hits = shared.ray_cast(begin + BEYOND * inward, begin + reach * inward)
+            ends = [np.asarray(hit.position) for hit in hits[:1]]
+            middles = [(begin + end) / 2 for end in ends]
+            inside = [m for m in middles if _is_inside(m, one) and _is_inside(m, other)]
+            points.append(np.array([begin, *ends, *inside]))
+    return np.concatenate(points)
+
+
+def _is_inside(point: Array, body: Any) -> bool:
+    """Whether a point is inside a body: a ray from it leaves the body more often than it enters."""
+    box = np.array(body.bounding_box()).reshape(2, 3)
+    beyond = point + RAY * 2 * (np.linalg.norm(box[1] - box[0]) + np.abs(point - box).max())
+    return bool(sum(np.sign(hit.normal @ RAY) for hit in body.ray_cast(point, beyond)) > 0)
+
+
+def _distances(points: Array, body: Any, shared: Any) -> Array:
+    """The distances (n,) [m] of points from the surface of a body, at most the longest edge of the
+    box of the common volume."""
+    vertices, faces = merged(body.to_mesh64())
+    box = np.array(shared.bounding_box()).reshape(2, 3)
+    most = float((box[1] - box[0]).max())
+    corners = vertices[faces]
+    near = (corners.max(axis=1) >= box[0] - most).all(axis=1)
+    near &= (corners.min(axis=1) <= box[1] + most).all(axis=1)
+    triangles = corners[near]
+    distances = np.full(len(points), most)
+    step = max(1, CHUNK // max(1, len(triangles)))
+    for first in range(0, len(points) if len(triangles) else 0, step):
+        rows = slice(first, first + step)
+        distances[rows] = np.minimum(most, _to_triangles(points[rows], triangles))
+    return distances
+
+
+def _to_triangles(points: Array, triangles: Array) -> Array:
+    """The distance (n,) of each point from the nearest of triangles (m, 3, 3). Candidates are the
+    triangles whose bounding balls are as near as the nearest centre."""
+    middles = triangles.mean(axis=1)
+    balls = np.linalg.norm(triangles - middles[:, None], axis=2).max(axis=1)
+    squared = (points**2).sum(axis=1)[:, None] + (middles**2).sum(axis=1)
+    apart = np.sqrt(np.maximum(squared - 2 * points @ middles.T, 0.0))
+    row, column = np.nonzero(apart - balls <= apart.min(axis=1)[:, None] + BEYOND)
+    distances = np.full(len(points), np.inf)
+    np.minimum.at(distances, row, _to_each(points[row], triangles[column]))
+    return distances
+
+
+def _to_each(points: Array, triangles: Array) -> Array:
+    """The distance (n,) of each point from its own triangle (n, 3, 3)."""
+    edges = np.roll(triangles, -1, axis=1) - triangles
+    normals = np.cross(edges[:, 0], -edges[:, 2])
+    area = np.einsum("ij,ij->i", normals, normals)
+    inside, squared = area > 0, np.full(len(points), np.inf)
+    height = np.einsum("ij,ij->i", points - triangles[:, 0], normals) ** 2
+    for corner in range(3):
+        off, edge = points - triangles[:, corner], edges[:, corner]
+        length = np.maximum(np.einsum("ij,ij->i", edge, edge), 1e-300)
+        share = np.clip(np.einsum("ij,ij->i", off, edge) / length, 0.0, 1.0)
+        beside = off - share[:, None] * edge
+        squared = np.minimum(squared, np.einsum("ij,ij->i", beside, beside))
+        inside &= np.einsum("ij,ij->i", off, np.cross(normals, edge)) >= 0
+    return np.asarray(np.sqrt(np.where(inside, height / np.where(area > 0, area, 1.0), squared)))

@@ -1,0 +1,166 @@
+"""The place of a suction pad on a part: on its upper surface, as near as possible to the vertical
+through its centre of mass.
+
+A part leaves sideways from under its pad, so no point of it that passes under the pad may be higher
+than the pad's place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from factory.floor.geometry.meshes import Array
+from factory.floor.geometry.solids import Solid, rotation
+
+GAP = 1e-4
+"""The gap between a pad and the part [m]."""
+
+WIDEST = 0.008
+"""Radius of the largest pad [m]."""
+
+NARROWEST = 1e-5
+"""Radius of the smallest [m]."""
+
+SHARE = 0.25
+"""The largest radius of a pad as a share of the part's least extent in plan."""
+
+PLACES = 9
+"""The number of candidate places along each side of a part."""
+
+EVEN = GAP / 2
+"""The tolerance for equal heights [m]."""
+
+Corner = Array
+"""A corner of a rectangle in plan (2,) [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class PadPlace:
+    """The middle of a pad's lower face (3,), in the frame of the product, and its radius [m]."""
+
+    at: Array = field(repr=False)
+    radius: float
+
+
+def pad_place(
+    solid: Solid, heading: tuple[float, float], taken: tuple[Corner, Corner] | None = None
+) -> PadPlace:
+    """The place of a pad on a part that leaves with a heading, a horizontal direction along an
+    axis. The pad stays out of the rectangle that is `taken`, and is smaller if necessary. Among
+    equal places the one nearest to the centre of mass is chosen; places with material under the
+    middle are preferred."""
+    low, high, ahead = solid.low[:2], solid.high[:2], np.array(heading)
+    widest = max(min(WIDEST, SHARE * float((high - low).min())), NARROWEST)
+    faces, drawn = _pieces(solid), drawn_triangles(solid)
+    for radius in (widest, widest / 2, widest / 4):
+        places = _grid(solid, radius)
+        centre = places[0]
+        if taken is not None:
+            out = (places + radius <= taken[0]) | (places - radius >= taken[1])
+            places = places[out.any(axis=1)]
+        if len(places):
+            break
+    best, worst = None, (np.inf, np.inf)
+    for place in places:
+        under = place - radius, place + radius
+        top = min(height_in(faces, *under), float(solid.high[2]))  # of a ball what is round it
+        way = np.minimum(under[0], np.where(ahead > 0, low, under[0]))
+        end = np.maximum(under[1], np.where(ahead < 0, high, under[1]))
+        if height_in(faces, way, end) > top + EVEN or not np.isfinite(top):
+            continue
+        empty = top - height_in(drawn, place - radius / 4, place + radius / 4)
+        off = top - height_in(drawn, *under), min(empty, radius) if empty > EVEN else 0.0
+        if off[0] < EVEN and not off[1]:
+            return _at(place, top, radius)
+        if off < worst:
+            best, worst = _at(place, top, radius), off
+    if best is None:  # of a part that is nowhere level the highest place
+        return _at(places[0] if len(places) else centre, float(solid.high[2]), radius)
+    return best
+
+
+def _grid(solid: Solid, radius: float) -> Array:
+    """Candidate middles (n, 2) of pads within a part in plan, the nearest to its centre of mass
+    first."""
+    low, high = solid.low[:2], solid.high[:2]
+    room = np.maximum((high - low) / 2 - radius, 0.0)
+    shares = np.linspace(-1.0, 1.0, PLACES)
+    grid = np.stack(np.meshgrid(shares, shares), axis=-1).reshape(-1, 2)
+    centre = np.clip(solid.centre[:2], (low + high) / 2 - room, (low + high) / 2 + room)
+    places = np.concatenate([[centre], (low + high) / 2 + grid * room])
+    order = np.argsort(np.linalg.norm(places - solid.centre[:2], axis=1), kind="stable")
+    return np.asarray(places[order])
+
+
+def _at(place: Corner, top: float, radius: float) -> PadPlace:
+    return PadPlace(np.array([*place, top + GAP]), radius)
+
+
+def height_in(triangles: Array, low: Corner, high: Corner) -> float:
+    """The greatest height of triangles (n, 3, 3) over a rectangle in plan, -inf if there are none:
+    at the corners of the rectangle, at theirs, and where edges cross its sides."""
+    a, b, c = triangles[:, 0, :2], triangles[:, 1, :2], triangles[:, 2, :2]
+    kept = (np.minimum(np.minimum(a, b), c) <= high) & (np.maximum(np.maximum(a, b), c) >= low)
+    near = triangles[kept.all(axis=1)]
+    if not len(near):
+        return -np.inf
+    points = [near.reshape(-1, 3), _over_corners(near, low, high)]
+    begin, way = near.reshape(-1, 3), (np.roll(near, -1, axis=1) - near).reshape(-1, 3)
+    for axis in (0, 1):
+        for side in (low[axis], high[axis]):
+            with np.errstate(divide="ignore", invalid="ignore"):
+                share = (side - begin[:, axis]) / way[:, axis]
+            crosses = (share >= 0) & (share <= 1)
+            at = begin[crosses] + share[crosses, None] * way[crosses]
+            at[:, axis] = side
+            points.append(at)
+    every = np.concatenate(points)
+    inside = ((every[:, :2] >= low) & (every[:, :2] <= high)).all(axis=1)
+    return float(every[inside, 2].max(initial=-np.inf))
+
+
+def _over_corners(triangles: Array, low: Corner, high: Corner) -> Array:
+    """The points (n, 3) of triangles over the corners of a rectangle."""
+    a, u, v = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    flat = np.abs(area) > 1e-18
+    a, u, v, area = a[flat], u[flat], v[flat], area[flat]
+    points = []
+    for x in (low[0], high[0]):
+        for y in (low[1], high[1]):
+            dx, dy = x - a[:, 0], y - a[:, 1]
+            s = (dx * v[:, 1] - dy * v[:, 0]) / area
+            t = (u[:, 0] * dy - u[:, 1] * dx) / area
+            over = (s >= 0) & (t >= 0) & (s + t <= 1)
+            z = (a[:, 2] + s * u[:, 2] + t * v[:, 2])[over]
+            points.append(np.column_stack([np.full(len(z), x), np.full(len(z), y), z]))
+    return np.concatenate(points)
+
+
+def _pieces(solid: Solid) -> Array:
+    """The triangles (n, 3, 3) of the convex bodies of a part."""
+    return np.concatenate([_hull(piece) for piece in solid.pieces])
+
+
+def _hull(points: Array) -> Array:
+    """The triangles (n, 3, 3) of the convex hull of points (k, 3); if they are coplanar, the two
+    triangles of the top of their box."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        hull = ConvexHull(points, qhull_options="QbB Pp Qt")
+    except QhullError:
+        (x, y, _), (far, wide, top) = points.min(axis=0), points.max(axis=0)
+        corners = np.array([[x, y, top], [far, y, top], [far, wide, top], [x, wide, top]])
+        return corners[[[0, 1, 2], [0, 2, 3]]]
+    return np.asarray(hull.points[hull.simplices])
+
+
+def drawn_triangles(solid: Solid) -> Array:
+    """The triangles (n, 3, 3) of a part as drawn."""
+    if solid.mesh is None:
+        return _pieces(solid)
+    vertices = solid.mesh.vertices @ rotation(solid.quaternion).T + solid.position
+    return vertices[solid.mesh.faces]

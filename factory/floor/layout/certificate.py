@@ -1,0 +1,249 @@
+"""The clearance certificate of a layout, as a value: the regions compared, the pairs that share
+floor, and the faults."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from factory.floor.layout.dimensions import Clearance
+from factory.floor.layout.guidepath import Box, Point2
+from factory.support.errors import Diagnostic, Position
+from factory.theory.nets.coordinated import Past
+from factory.theory.plant.factory import Factory
+
+MILLI = 1000.0
+
+NAMES = ("carriages", "masts and arms", "payloads")
+"""The layers' names."""
+
+KINDS = (
+    *("carriage", "mast", "arm", "payload", "post", "boom", "outfeed"),
+    *("housing", "shed", "hand", "bin"),
+)
+"""What a region is swept by."""
+
+CARRIAGE_BODY, MAST_BODY, ARM_BODY, PAYLOAD_BODY, POST_BODY, BOOM, OUTFEED = range(7)
+HOUSING, SHED, HAND_BODY, BIN_BODY = range(7, len(KINDS))
+STATIONS = (POST_BODY, BOOM, OUTFEED, HOUSING, SHED, BIN_BODY)
+RAISED = (BOOM, HOUSING)
+"""Stations that stand clear of the floor: payloads go below them."""
+
+LOADS = (PAYLOAD_BODY, HAND_BODY)
+"""What robots carry, and hold it with."""
+
+ALWAYS = -1
+"""The mode of a region that is uncoupled."""
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """A rectangle in one layer: its robot (a station counts to the robot it serves), body, label
+    carried, heights from z low to z high [m] with a lift up, and the operation in whose mode the
+    robot is, ALWAYS for an uncoupled region."""
+
+    robot: int
+    layer: int
+    kind: int
+    box: Box
+    z: tuple[float, float]
+    label: str = ""
+    mode: int = ALWAYS
+
+    def named(self, factory: Factory) -> str:
+        """The region in words."""
+        if self.kind in (OUTFEED, SHED):
+            return "the outfeed" if self.kind == OUTFEED else "the outfeed's shed"
+        if self.kind in STATIONS and self.kind != BIN_BODY:
+            return f"the {KINDS[self.kind]} of '{self.label}''s feeder"
+        label = f" '{self.label}'" if self.label else ""
+        return f"{factory.robots[self.robot].name}'s {KINDS[self.kind]}{label}"
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """A violation of the certificate: the robots, the labels they carry, the distance `lacking`
+    [m], the layer ("" for the guidepaths themselves), and the position in the user's file."""
+
+    message: str
+    robots: tuple[str, ...]
+    labels: tuple[str, ...] = ()
+    lacking: float = 0.0
+    layer: str = ""
+    positions: tuple[Position | None, ...] = ()
+
+    def diagnostic(self) -> Diagnostic:
+        """The fault as an error (Layout) at the first robot's line."""
+        places = [str(place) for place in self.positions[1:] if place is not None]
+        hint = f"the other robot comes from {', '.join(places)}" if places else ""
+        first = self.positions[0] if self.positions else None
+        return Diagnostic("Layout", self.message, first, hint)
+
+    def as_json(self) -> dict[str, object]:
+        """The fault as the certificate's document lists it."""
+        return {
+            "message": self.message,
+            "robots": list(self.robots),
+            "labels": list(self.labels),
+            "lacking_mm": round(self.lacking * MILLI, 3),
+            "layer": self.layer,
+            "positions": [None if p is None else str(p) for p in self.positions],
+        }
+
+
+def fault(factory: Factory, message: str, *machines: Region | int, lacking: float = 0.0) -> Fault:
+    """A fault of robots, each given by a region in which it is or by its number."""
+    regions = [region for region in machines if isinstance(region, Region)]
+    numbers = (region.robot if isinstance(region, Region) else region for region in machines)
+    robots = [factory.robots[number] for number in numbers]
+    return Fault(
+        message,
+        tuple(robot.name for robot in robots),
+        tuple(dict.fromkeys(region.label for region in regions if region.label)),
+        lacking,
+        NAMES[regions[0].layer] if regions else "",
+        tuple(robot.position for robot in robots),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Shared:
+    """Two robots whose regions meet, and why the robots do not: `operations` are the modes in which
+    they are there, and `point` the junction. One operation: both are in that mode, which joins
+    their payloads. Two: the modes have a robot in common, which can be in one of them only."""
+
+    robots: tuple[str, str]
+    operations: tuple[str, ...]
+    point: Point2
+
+    def as_json(self) -> dict[str, object]:
+        """The pair as the certificate's document lists it."""
+        return {
+            "robots": list(self.robots),
+            "operations": list(self.operations),
+            "point": [round(v, 6) for v in self.point],
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Excluded:
+    """Two machines that would come near in two places of the coordinated net: the `bodies`, and the
+    places of a `circuit` with one token through both places, so that they are never marked
+    together."""
+
+    machines: tuple[str, str]
+    places: tuple[str, str]
+    bodies: tuple[str, str]
+    circuit: tuple[str, ...]
+
+    def as_json(self) -> dict[str, object]:
+        """The pair as the certificate's document lists it."""
+        return {
+            "machines": list(self.machines),
+            "places": list(self.places),
+            "bodies": list(self.bodies),
+            "circuit": list(self.circuit),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Precedence:
+    """An order place by `name` that keeps machines apart: `start` fires at most `tokens` times more
+    often than `before` (names of transitions of the coordinated net)."""
+
+    name: str
+    before: str
+    start: str
+    tokens: int
+
+    def as_json(self) -> dict[str, object]:
+        """The order place as the certificate's document lists it."""
+        return {"place": self.name, "tokens": self.tokens}
+
+
+@dataclass(frozen=True, slots=True)
+class Exclusions:
+    """What keeps the machines of a layout apart: the pairs that come near, each with its circuit;
+    the order places and passes needed for that; the robots (index) that return by themselves, each
+    to an arc length [m]; and the pairs that nothing keeps apart."""
+
+    excluded: tuple[Excluded, ...] = field(default=(), repr=False)
+    orders: tuple[Precedence, ...] = field(default=(), repr=False)
+    passes: tuple[Past, ...] = field(default=(), repr=False)
+    backs: tuple[tuple[int, float], ...] = field(default=(), repr=False)
+    faults: tuple[Fault, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """That no two robots which are not coupled by a mode can touch, nor their payloads.
+
+    Uncoupled regions of different robots in one layer are at least `clearance` [m] apart in plan;
+    end stops are beyond the regions by less than half of that. `layers` gives each layer's z range
+    and `gaps` the vertical distance to the one below [m]; where a coupled region is nearer to
+    another robot's, `shared` names the junction. `apart`: what keeps machines apart
+    that come near; `crossing`: the robots that share floor without a common operation, as faults
+    but for that. It holds if there is no fault; at most `clearance.MOST` faults are listed.
+    """
+
+    clearance: float
+    layers: tuple[tuple[str, float, float], ...]
+    gaps: tuple[tuple[str, float], ...]
+    robots: tuple[str, ...] = field(repr=False)
+    operations: tuple[str, ...] = field(repr=False)
+    regions: tuple[Region, ...] = field(repr=False)
+    shared: tuple[Shared, ...] = field(repr=False)
+    faults: tuple[Fault, ...] = ()
+    pairs: int = 0
+    apart: Exclusions = field(default_factory=Exclusions, repr=False)
+    crossing: tuple[Fault, ...] = field(default=(), repr=False)
+
+    @property
+    def holds(self) -> bool:
+        """Whether there is no fault."""
+        return not self.faults
+
+    def is_of(self, factory: Factory) -> bool:
+        """Whether the certificate is of a factory with these operations and robots."""
+        names = tuple(robot.name for robot in factory.robots)
+        return (names, tuple(o.label for o in factory.operations)) == (self.robots, self.operations)
+
+    def as_json(self) -> dict[str, object]:
+        """The certificate as a document that another program can check."""
+        return {
+            "schema": 1,
+            "holds": self.holds,
+            "clearance_m": self.clearance,
+            "stops_beyond_m": round(Clearance(self.clearance).stop, 6),
+            "layers": [
+                {"layer": name, "z_low_m": round(low, 6), "z_high_m": round(high, 6)}
+                for name, low, high in self.layers
+            ],
+            "vertical_gaps_m": {name: round(gap, 6) for name, gap in self.gaps},
+            "regions": [self._region(region) for region in self.regions],
+            "shared": [shared.as_json() for shared in self.shared],
+            "excluded": [excluded.as_json() for excluded in self.apart.excluded],
+            "orders": [order.as_json() for order in self.apart.orders],
+            "faults": [fault.as_json() for fault in self.faults],
+        }
+
+    def summary(self) -> dict[str, object]:
+        """Its figures: whether it holds, the clearance [m], the number of regions compared and of
+        pairs of robots that share a junction."""
+        return {
+            "holds": self.holds,
+            "clearance_m": self.clearance,
+            "regions": len(self.regions),
+            "shared": len(self.shared),
+            "excluded": len(self.apart.excluded),
+        }
+
+    def _region(self, region: Region) -> dict[str, object]:
+        return {
+            "robot": self.robots[region.robot],
+            "layer": NAMES[region.layer],
+            "of": KINDS[region.kind],
+            "label": region.label or None,
+            "box": [round(v, 6) for v in region.box],
+            "z": [round(v, 6) for v in region.z],
+            "operation": None if region.mode == ALWAYS else self.operations[region.mode],
+        }

@@ -1,0 +1,225 @@
+"""Guidepaths: lines on the floor, and how robots are stretched to their payloads.
+
+Every part is carried in its place in the finished product, relative to the product's middle. Where
+that middle is in the world is the robot's *station*: at a mate the middles of all robots coincide,
+so the parts are assembled when they meet. A guidepath is the line of that point: straight, or with
+bends, along which the robot goes without turning.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+
+from factory.floor.layout.way import Array, Bend, way_of
+
+Box = tuple[float, float, float, float]
+"""(xlo, xhi, ylo, yhi) [m]."""
+
+Extent = tuple[float, float, float, float]
+"""(ulo, uhi, tlo, thi): a box in a robot's frame, about the product's middle [m]."""
+
+Point2 = tuple[float, float]
+
+LEVER = 0.1
+"""At the end of an arm of this length [m] what turns is as fast as other robots are."""
+
+
+def project(box: Box, u: Point2, t: Point2) -> Extent:
+    """A box of the world in the frame (u, t), both along world axes."""
+    along = sorted((box[0] * u[0] + box[2] * u[1], box[1] * u[0] + box[3] * u[1]))
+    across = sorted((box[0] * t[0] + box[2] * t[1], box[1] * t[0] + box[3] * t[1]))
+    return along[0], along[1], across[0], across[1]
+
+
+def hull(boxes: Sequence[Box]) -> Box:
+    """The bounding box of boxes."""
+    xlo, xhi, ylo, yhi = zip(*boxes, strict=True)
+    return float(min(xlo)), float(max(xhi)), float(min(ylo)), float(max(yhi))
+
+
+def moved(box: Box, by: Point2) -> Box:
+    """A box, moved; its numbers are those of the axes in which `by` is given [m]."""
+    return box[0] + by[0], box[1] + by[0], box[2] + by[1], box[3] + by[1]
+
+
+@dataclass(frozen=True, slots=True)
+class Guidepath:
+    """The guidepath of one robot and how the robot is stretched to its payload.
+
+    `heading` u, a unit vector towards A, and `side` t, to the left or right of it; `a`: the
+    product's middle when the robot delivers (x, y); `travel`: how far before that it receives (the
+    station at its B end); `reach` = 2r: how far the carriage stays behind the product's middle;
+    `offset`: how far the carriage's line is to the side t; `arm`: how far behind the middle the arm
+    ends; `nest`: where ahead of the middle the payload's own middle is, reached by the finger;
+    `aside`: how far to the side t of the carriage's line that is, in a lane beside another's. All
+    lengths in [m].
+
+    A robot that is fixed goes nowhere: `turn` is the angle [rad] by which it turns what it holds
+    about the vertical, from where it receives to where it delivers, None for all others. Its x is
+    an angle too, and `travel` how far it turns; carriage and middle stay where they are.
+
+    Arc length x of the carriage runs from A = 0; delivering at x = reach, receiving at B = reach +
+    travel. `bends`: where the guidepath goes on beside its line, to the side t, its corners of a
+    `rounding`; then x is the coordinate of `factory.floor.layout.way`.
+    """
+
+    heading: Point2
+    side: Point2
+    a: Point2
+    travel: float
+    reach: float
+    offset: float
+    arm: float
+    nest: float
+    aside: float = 0.0
+    bends: tuple[Bend, ...] = ()
+    rounding: float = 0.0
+    turn: float | None = None
+
+    @property
+    def fixed(self) -> bool:
+        """Whether the robot stands at its station, and turns."""
+        return self.turn is not None
+
+    @property
+    def lever(self) -> float:
+        """How far [m] the robot goes along for each unit of x: 1, or LEVER where x is an angle."""
+        return LEVER if self.fixed else 1.0
+
+    @property
+    def length(self) -> float:
+        """B - A [m]."""
+        return self.reach + self.travel
+
+    def fastest(self, speed: float, acceleration: float) -> float:
+        """The greatest speed [m/s] of a robot with these limits, for which all corners are round
+        enough."""
+        return min(speed, sqrt(2 * acceleration * self.rounding)) if self.bends else speed
+
+    @property
+    def corners(self) -> list[float]:
+        """The arc lengths of its corners, were they not round."""
+        every = (at for bend in self.bends for at in (bend.at, bend.end))
+        return [at for at in every if at < self.length]
+
+    @property
+    def sideways(self) -> float:
+        """+1 where it leads from B to the side t, -1 to the other side, 0 straight ahead."""
+        odd = len(self.corners) % 2
+        return -float(np.sign(self.bends[-1].across)) if odd else 0.0
+
+    @property
+    def r(self) -> float:
+        """The robot's width r [m], of which the templates' goals are multiples."""
+        return self.reach / 2
+
+    @property
+    def left(self) -> float:
+        """+1 where the side t is to the left of the heading u, -1 where it is to the right."""
+        return self.heading[0] * self.side[1] - self.heading[1] * self.side[0]
+
+    def middle(self, x: float) -> Point2:
+        """Where the product's middle is when the carriage is at arc length x."""
+        if self.bends:
+            back, across = self._bent(x)
+            return self._placed(back - self.reach, across)
+        back = 0.0 if self.fixed else x - self.reach
+        return self.a[0] - self.heading[0] * back, self.a[1] - self.heading[1] * back
+
+    def carriage(self, x: float) -> Point2:
+        """f: where the carriage's centre is at arc length x."""
+        if self.bends:
+            back, across = self._bent(x)
+            return self._placed(back, across + self.offset)
+        x = self.reach if self.fixed else x
+        return (
+            self.a[0] - self.heading[0] * x + self.side[0] * self.offset,
+            self.a[1] - self.heading[1] * x + self.side[1] * self.offset,
+        )
+
+    def corner(self, at: float) -> Point2:
+        """Where the carriage's line would have the corner at an arc length, were it not round."""
+        place, _, second = way_of(self.bends, self.rounding).at(np.array([0]), np.array([at]))
+        back, across = (place - second * self.rounding**2 / 2)[0].tolist()
+        return self._placed(back, across + self.offset)
+
+    def world(self, extent: Extent, middle: Point2) -> Box:
+        """A box given in the robot's frame (u, t), as it lies in the world about `middle`."""
+        ulo, uhi, tlo, thi = extent
+        u, t = self.heading, self.side
+        x = sorted((u[0] * ulo + t[0] * tlo, u[0] * uhi + t[0] * thi))
+        y = sorted((u[1] * ulo + t[1] * tlo, u[1] * uhi + t[1] * thi))
+        return middle[0] + x[0], middle[0] + x[1], middle[1] + y[0], middle[1] + y[1]
+
+    def frame(self, box: Box) -> Extent:
+        """A box about the product's middle, in the world's directions, in the robot's frame."""
+        return project(box, self.heading, self.side)
+
+    def sweeps(self, box: Box, start: float, end: float) -> list[Box]:
+        """What a box about the product's middle sweeps while the carriage goes from one arc length
+        to another, a box for each piece of the way."""
+        if self.bends:
+            (x, y), pieces = self.middle(0.0), self.pieces(min(start, end), max(start, end))
+            at = np.array([x, y])
+            ends = [(p.min(axis=0) + at, p.max(axis=0) + at) for p in pieces]
+        else:
+            (x0, y0), (x1, y1) = self.middle(start), self.middle(end)
+            ends = [((min(x0, x1), min(y0, y1)), (max(x0, x1), max(y0, y1)))]
+        return [
+            (float(x0 + box[0]), float(x1 + box[1]), float(y0 + box[2]), float(y1 + box[3]))
+            for (x0, y0), (x1, y1) in ends
+        ]
+
+    def swept(self, foot: Extent, start: float, end: float) -> list[Box]:
+        """What a box in the robot's frame about its carriage sweeps on such a way."""
+        if not self.bends:
+            return [hull([self.world(foot, self.carriage(x)) for x in (start, end)])]
+        at, middle = self.carriage(0.0), self.middle(0.0)
+        about = self.world(foot, (at[0] - middle[0], at[1] - middle[1]))
+        return self.sweeps(about, start, end)
+
+    def pieces(self, low: float, high: float) -> list[Array]:
+        """The guidepath between two arc lengths piece by piece, relative to where it is at 0: each
+        lies in the hull of its points (k, 2) [m]."""
+        frame = np.array([np.negative(self.heading), self.side])
+        return [points @ frame for points in self.framed(low, high)]
+
+    def framed(self, low: float, high: float) -> list[Array]:
+        """The same points as distances back from A and to the side t [m]."""
+        if not self.bends:
+            return [np.array([[low, 0.0], [high, 0.0]])]
+        return [*way_of(self.bends, self.rounding).pieces(0, low, high)]
+
+    def _bent(self, x: float) -> Point2:
+        """How far back and to the side a robot is from where it is at 0."""
+        place, _, _ = way_of(self.bends, self.rounding).at(np.array([0]), np.array([x]))
+        back, across = place[0].tolist()
+        return back, across
+
+    def _placed(self, back: float, across: float) -> Point2:
+        """What is so far back from A, and to the side."""
+        (u, v), (s, t) = self.heading, self.side
+        return self.a[0] - u * back + s * across, self.a[1] - v * back + t * across
+
+
+@dataclass(frozen=True, slots=True)
+class Feeder:
+    """A magazine, from which a part comes down to where it is presented. About the product's
+    middle, in the frame (u, t) of the robot: the post is at `back`, `across` from the middle, and
+    `inside` is the box that the housing's walls are round. In the world: the boxes of `post`,
+    `boom` and `housing`; from what height to what height the housing reaches, `low` and `high`,
+    and the `stroke` by which the part is higher in it than where it is presented [m]."""
+
+    back: float
+    across: float
+    inside: Extent
+    post: Box
+    boom: Box
+    housing: Box
+    low: float
+    high: float
+    stroke: float

@@ -1,0 +1,123 @@
+"""Hands that meet hands: those of robots that deliver to one carrier, and the carrier's own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from factory.floor.geometry.meshes import Array
+from factory.floor.layout.dimensions import FINGER, FINGER_TOP, PAYLOAD
+from factory.floor.layout.hands.hand import BEAM, Hand, Kind
+from factory.floor.layout.hands.holding import Holding
+from factory.floor.layout.hands.places import Places
+from factory.floor.layout.hands.reach import back, halves, reach
+from factory.floor.layout.hands.surfaces import Way, swept
+from factory.theory.control.mode import Truth
+from factory.theory.problem.pag import NOPART
+from factory.theory.problem.robot_bodies import MAST
+
+Swept = tuple[Array, Array, Array]
+"""Boxes that hands sweep, from `low` to `high` (n, 3), and boxes (m, 2, 3) that could be in the
+way [m]."""
+
+BESIDE = 0.001
+"""How far a hand stays to its own side of the line of another [m]."""
+
+OVER, LEVEL = 0.01, 0.003
+"""How far above everything the beam of a hand above is, and how far those of robots that lie across
+each other are apart [m]."""
+
+UNDER = (PAYLOAD - FINGER_TOP) / 2
+"""How far a hand behind reaches down under the plane of payloads at the most, to the fingers of
+those below [m]."""
+
+
+class HandsApart:
+    """Hands of a factory's robots that could meet. `hand_of`: that of a carrier with a heading."""
+
+    def __init__(self, holding: Holding, hand_of: Callable[[int, Way], Hand]) -> None:
+        self.holding, self.hand_of = holding, hand_of
+
+    def over_fingers(self, kind: Kind, places: Places) -> Truth:
+        """Whether a hand behind stays over the fingers of those below (n,)."""
+        if kind != "behind":
+            return np.ones(len(places), bool)
+        least = self.holding.product.low[2] - UNDER
+        return np.asarray(places.at[:, 2] - halves(places.radius) >= least)
+
+    def own_side(self, robot: int, kind: Kind, places: Places, u: Way, t: Way) -> Truth:
+        """Whether a hand at a place stays on its own side: of the carrier's line if the carrier is
+        held from below too, otherwise of the payload of another robot that comes from the opposite
+        side."""
+        carrier, free = self.holding.on[robot], np.ones(len(places), bool)
+        if carrier < 0 or self.holding.serves_fixed(robot):
+            return free
+        axis, side = (0, u[0]) if u[0] else (1, u[1])
+        hand = self.hand_of(carrier, t)
+        if hand.kind == "below" and kind == "below":
+            half = max(FINGER / 2, hand.radius) + BESIDE
+            free &= (hand.places[0][axis] - places.at[:, axis]) * side >= halves(
+                places.radius
+            ) + half
+        last = self.holding.last(robot)
+        brought = [label for label in last.before if label != NOPART]
+        if last.pile == NOPART and len(brought) > 1:
+            boxes = [self.holding.box(label) for label in brought]
+            middle = float(np.mean([(box[0] + box[1])[axis] / 2 for box in boxes]))
+            free &= (middle - places.at[:, axis]) * side >= halves(places.radius) + BESIDE / 2
+        return free
+
+    def crossing(self, robot: int, places: Places, u: Way, t: Way) -> Array:
+        """Distance that a hand reaches over the line of a carrier whose tall mast comes along
+        there, or over a broader part of its hand (n,) [m]."""
+        carrier = self.holding.on[robot]
+        if carrier < 0 or not (hand := self.hand_of(carrier, t)).tall:
+            return np.zeros(len(places))
+        axis, side = (0, u[0]) if u[0] else (1, u[1])
+        over = (places.at[:, axis] - hand.places[0][axis]) * side
+        half = max(MAST / 2, float(halves(np.array(hand.radius))))
+        return np.maximum(0.0, over + halves(places.radius) + half + BESIDE)
+
+    def beam(self, robot: int, at: Places, frames: Sequence[tuple[Way, Way]]) -> float:
+        """Height of the lower edge of the beam of a hand above, by place [m]: over everything that
+        its payload is joined to, and over its carrier's beam if it reaches over the carrier's
+        line."""
+        height = self.holding.top(self.holding.last(robot)) + OVER
+        height += self.holding.axis[robot] * (BEAM + LEVEL)
+        for u, t in frames:
+            if self.crossing(robot, at, u, t).any():
+                carriers = self.hand_of(self.holding.on[robot], t)
+                if carriers.kind == "above":
+                    height = max(height, carriers.beam + BEAM + LEVEL)
+        return height
+
+    def carriers_hand(
+        self, robot: int, kind: Kind, places: Places, u: Way, t: Way
+    ) -> Iterator[Swept]:
+        """The sweep of a hand with everything behind it, against the carrier's hand: a tall one, as
+        its lift rises, with everything behind it, since both are there at once; one below the
+        column, with all its way ahead."""
+        carrier = self.holding.on[robot]
+        if carrier < 0 or self.holding.serves_fixed(robot):
+            return
+        if (hand := self.hand_of(carrier, t)).kind == "none":
+            return
+        if kind == hand.kind == "below":  # fingers keep to their sides
+            return
+        way_out = swept(*reach(self.holding.product, kind, places.at, places.radius, u), back(u))
+        way_out[1][:, 2] += self.holding.factory.strokes.get(robot, 0.0)
+        at, radius = np.array(hand.places), np.full(len(hand.places), hand.radius)
+        low, high = reach(self.holding.product, hand.kind, at, radius, t)
+        if hand.kind == "behind":
+            low[:, 2] -= self.holding.factory.strokes.get(carrier, 0.0)
+        if hand.kind == "above":
+            yield (*way_out, np.stack((low, high), axis=1))
+            half = max(FINGER, hand.width) / 2
+            low, high = at - half, at + half
+            low[:, 2], high[:, 2] = hand.beam, hand.beam + BEAM
+        ways = [back(t) if hand.tall else t]
+        if carrier in self.holding.turning and not hand.tall:
+            ways.append(back(t))
+        for way in ways:
+            yield (*way_out, np.stack(swept(low, high, way), axis=1))

@@ -1,0 +1,86 @@
+"""A hand: where and how a robot holds what it carries.
+
+It touches places of the payload's surface with pads, and reaches there in one of three ways.
+*Below*: a finger under the plane of payloads, and a column from it up to the place. *Behind*: a
+tower behind the payload, and a bar from it ahead to the place. *Above*: a tower, a beam over all
+that there is, and a stem from it down to the place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from factory.floor.geometry.meshes import Array
+from factory.floor.layout.dimensions import FINGER
+from factory.floor.layout.hands.tips import TipName
+
+Point3 = tuple[float, float, float]
+
+Kind = Literal["below", "behind", "above", "none"]
+
+AIR = 2e-4
+"""How far a pad stays off the surface that it holds [m]: it slides along it without touching."""
+
+SLENDER = 0.001
+"""Least width of a finger [m]."""
+
+STEM = 0.006
+"""Diameter of the thinnest column or stem [m]."""
+
+ROOT = 0.01
+"""How far a finger begins before the end of its arm [m]."""
+
+BEAM = 0.012
+"""How high a beam is [m]."""
+
+PAD = 0.0015
+"""Thickness of a pad [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hand:
+    """How a robot holds its payload.
+
+    `places`: points of the payload's surface at the middles of its tips, in the frame of the
+    finished product [m]: one, or, from below, two on one line along its heading; `radius` of a tip
+    [m]; `beam`: height of the lower edge of the beam of a hand above, in that frame [m]; `covered`:
+    share of a tip's face that the surface covers, for each tour, with suction; `share`: predicted
+    share of the tips' strength used by weight and acceleration; `tip`: kind of tip; `first`:
+    whether it has to be in place before its payload comes; `wait`: predicted distance that it has
+    to go back until its carrier's next operation may start [m]. Of the kind `none` if nothing can
+    hold.
+    """
+
+    kind: Kind
+    places: tuple[Point3, ...]
+    radius: float = 0.003
+    beam: float = 0.0
+    share: float = 0.0
+    tip: TipName = "suction"
+    first: bool = False
+    wait: float = 0.0
+    covered: tuple[float, ...] = (1.0,)
+
+    @property
+    def tall(self) -> bool:
+        """Whether its mast reaches up among the payloads."""
+        return self.kind in ("behind", "above")
+
+    @property
+    def width(self) -> float:
+        """Width of its finger, or of the bar to its stem [m]."""
+        return float(widths(np.array(self.radius)))
+
+    @property
+    def column(self) -> float:
+        """Diameter of its column or stem [m]: half the pad's, within STEM and FINGER."""
+        return min(2 * self.radius, max(STEM, min(self.radius, FINGER)))
+
+
+def widths(radius: Array) -> Array:
+    """Widths (n,) of the fingers of pads of some radii (n,) [m]: no wider than the pads, within
+    bounds."""
+    return np.clip(2 * radius, SLENDER, FINGER)

@@ -1,0 +1,141 @@
+"""The payloads of robots, the places at which they can be held, and what surrounds them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product as pairs
+from types import MappingProxyType
+
+import numpy as np
+
+from factory.floor.geometry.meshes import Array
+from factory.floor.geometry.solids import Product
+from factory.floor.geometry.turning import axis_of, fed_of
+from factory.floor.layout.hands.hand import Kind, Point3
+from factory.floor.layout.hands.places import ASKED, PUSH, Loads, Places, places, resized
+from factory.floor.layout.hands.surfaces import Surfaces, Way
+from factory.floor.layout.layout import carriers
+from factory.theory.plant.factory import Factory, Operation
+
+
+class Holding:
+    """The robots of a factory and the surfaces of what they hold. `on`: the carrier that each
+    delivers to, -1 for none; `axis`: along which each lies, 0 for x; `push`: their acceleration
+    [m/s²]; `turning`: robots that go on either way after what is delivered to them.
+    `wanted`: by label points at which it is to be held where it can be [m]."""
+
+    def __init__(
+        self,
+        factory: Factory,
+        product: Product,
+        push: float = PUSH,
+        turning: frozenset[int] = frozenset(),
+        wanted: Mapping[str, Sequence[Point3]] = MappingProxyType({}),
+    ) -> None:
+        self.factory, self.product, self.push, self.turning = factory, product, push, turning
+        self.surfaces, self.wanted = product.kept(Surfaces), wanted
+        self.on = carriers(factory)
+        self.axis = [0] * len(factory.robots)
+        for robot, carrier in enumerate(self.on):
+            if carrier >= 0:
+                self.axis[robot] = 1 - self.axis[carrier]
+        self._places: dict[tuple[str, Kind, int, int, float], Places] = {}
+        self._boxes: dict[str, Array] = {}
+        self._loads: dict[str, Loads] = {}
+
+    def frames(self, robot: int) -> Iterator[tuple[Way, Way]]:
+        """The frames of a robot on the floor."""
+        if self.on[robot] < 0:
+            yield (1.0, 0.0), (0.0, 1.0)
+            return
+        for one, other in pairs((-1.0, 1.0), (-1.0, 1.0)):
+            along, across = (one, 0.0), (0.0, other)
+            yield (along, across) if self.axis[robot] == 0 else (along[::-1], across[::-1])
+
+    def is_carrier(self, robot: int) -> bool:
+        """Whether other robots come to a robot, with an input or to work on its payload."""
+        return any(len(operation.robots) > 1 for operation in self.made(robot))
+
+    def is_fed(self, robot: int) -> bool:
+        """Whether a robot takes parts from a feeder."""
+        first = self.factory.first(robot)
+        return len(first.robots) == 1
+
+    def serves_fixed(self, robot: int) -> bool:
+        """Whether a fixed robot takes what a robot brings, while no carrier is there."""
+        return self.factory.robots[self.last(robot).carrier].fixed
+
+    def made(self, robot: int) -> list[Operation]:
+        """The operations of which a robot is the carrier."""
+        operations = (self.factory.operations[o] for o in self.factory.robots[robot].operations)
+        return [operation for operation in operations if operation.carrier == robot]
+
+    def last(self, robot: int) -> Operation:
+        """The operation that a robot delivers to."""
+        return self.factory.last(robot)
+
+    def places(self, label: str, kind: Kind, axis: int, way: int, radius: float = 0.0) -> Places:
+        """The places on a side of a sub-assembly, cached: with the best pad at each, or with one of
+        a `radius` [m]."""
+        key = label, kind, axis, way, radius
+        if key not in self._places:
+            of, loads = (tuple(self.factory.contents[label]), (axis, way)), self.loads(label)
+            if radius:
+                of_any_size = self.places(label, kind, axis, way)
+                candidates = self.product.kept(resized, *of, loads, of_any_size, radius)
+            else:
+                asked, mix = tuple(self.wanted.get(label, ())), self.factory.pag.mix is not None
+                asked += tuple(self._axis(of[0]))
+                candidates = self.product.kept(places, *of, kind, loads, mix, asked)
+                candidates = self._about_axis(of[0], candidates)
+            self._places[key] = candidates
+        return self._places[key]
+
+    def _axis(self, parts: Sequence[str]) -> Iterator[Point3]:
+        """The axis of a part that is presented turned: hands hold it there, so that it turns about
+        their pads."""
+        if fed_of(self.product, parts):
+            x, y, _ = axis_of(self.product.solids[parts[0]]).tolist()
+            yield x, y, 0.0
+
+    def _about_axis(self, parts: Sequence[str], places: Places) -> Places:
+        """The places from which a part can be turned: on its axis."""
+        for x, y, _ in self._axis(parts):
+            places = places.chosen(np.abs(places.at[:, :2] - (x, y)).max(axis=1) < ASKED)
+        return places
+
+    def loads(self, label: str) -> Loads:
+        """The loads of the robot that takes a sub-assembly: that, and everything that it becomes
+        while others bring the rest."""
+        if label not in self._loads:
+            made = self.made(self.factory.by_label[label].carrier)
+            labels = [label, *(o.label for o in made if not self.factory.drops(o.index))]
+            held = tuple(dict.fromkeys(tuple(self.factory.contents[held]) for held in labels))
+            self._loads[label] = self.product.kept(Loads.of, held, self.push)
+        return self._loads[label]
+
+    def boxes(self, label: str) -> Array:
+        """The boxes (n, 2, 3) of a sub-assembly's bodies."""
+        if label not in self._boxes:
+            self._boxes[label] = self.surfaces.boxes(self.factory.contents[label])
+        return self._boxes[label]
+
+    def box(self, label: str) -> Array:
+        """The box (2, 3) of a sub-assembly."""
+        boxes = self.boxes(label)
+        return np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+
+    def top(self, operation: Operation) -> float:
+        """Height of the result of an operation [m]."""
+        parts = self.factory.contents[self.factory.result(operation)]
+        return float(max(self.product.solids[part].high[2] for part in parts))
+
+
+def held(factory: Factory, robot: int, at_last: bool = False) -> str:
+    """The label that a robot takes first and holds by one place ever after, or its last one
+    (`at_last`); "" for a tool."""
+    for number in factory.robots[robot].operations[:: -1 if at_last else 1]:
+        operation = factory.operations[number]
+        if operation.carrier == robot and not factory.drops(number):
+            return operation.label
+    return ""

@@ -1,0 +1,350 @@
+"""Obstacles of hands: parts, and the hands of robots that they deliver to.
+
+Parts are boxes, swept along every way on which one passes the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from factory.floor.geometry.meshes import Array
+from factory.floor.layout.dimensions import SLOT
+from factory.floor.layout.hands.apart import BESIDE, HandsApart, Swept
+from factory.floor.layout.hands.hand import Hand, Kind
+from factory.floor.layout.hands.holding import Holding, held
+from factory.floor.layout.hands.places import SMALL, Places
+from factory.floor.layout.hands.reach import back, halves, reach, under_beam
+from factory.floor.layout.hands.surfaces import TOUCH, Way, hit, retreat, swept
+from factory.floor.layout.hands.tips import STRONG
+from factory.floor.layout.presence import ACROSS, ALONG
+from factory.theory.control.mode import Truth
+from factory.theory.plant.factory import Operation
+from factory.theory.problem.pag import NOPART
+
+IN_THE_WAY = {
+    "weak": "not even a pin bears the load",
+    "joined": "parts that it is joined to are in the way",
+    "brought": "parts that are brought to it are in the way",
+    "lowered": "parts that are lowered onto it are in the way",
+    "own": "other surfaces of its own are in the way",
+    "hands": "hands that hold beside it are in the way",
+    "feeder": "there is no room beside its feeder's pad",
+    "tray": "the outfeed's tray is in the way, or nothing would be left of it",
+}
+"""What can be in the way of a hand."""
+
+PLAY = 1e-6
+"""Places are no further than this beside the box of a sub-assembly [m]."""
+
+ROD = 0.008
+"""Radius of the pad by which a feeder holds a part, at most [m]."""
+
+ROOM = ACROSS + 2 * ALONG + TOUCH
+"""A hand's face comes no nearer than this to what other robots hold [m]: two robots are off their
+references."""
+
+DIP, PUSHED = 0.02, 0.01
+"""A product dips so deep into the slot of the outfeed's tray at the most, which begins so far ahead
+of the hand [m]."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Passed:
+    """Contacts of a hand at each place (n,) with parts, whichever way its carrier goes: whether it
+    has to be there `first`, before its payload; whether its delivery and what is `lowered` are in
+    its way; whether inputs are, `early` if the hand is there first, `later` in any case."""
+
+    first: Truth
+    joined: Truth
+    lowered: Truth
+    early: Truth
+    later: Truth
+
+
+class InTheWay:
+    """Obstacles of a factory's hands. `hand_of`: the hand of a carrier with a heading."""
+
+    def __init__(self, holding: Holding, hand_of: Callable[[int, Way], Hand]) -> None:
+        self.holding, self.apart = holding, HandsApart(holding, hand_of)
+        self._checked: dict[tuple[object, ...], tuple[dict[str, Truth], Truth]] = {}
+        self._passed: dict[tuple[object, ...], Passed] = {}
+        self._onward: dict[int, Array] = {}
+
+    def possible(
+        self, robot: int, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]
+    ) -> bool:
+        """Whether any of a sub-assembly is on the side of its carrier's line on which a hand stays,
+        in every frame; if not, none of its places needs to be computed."""
+        box, none = self.holding.box(label) + np.array([[-PLAY], [PLAY]]), np.zeros(2)
+        ends = Places(box, none, none, none, none)
+        sides = (self.apart.own_side(robot, kind, ends, u, t) for u, t in frames)
+        return all(bool(side.any()) for side in sides)
+
+    def on_side(
+        self, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]], radius: float = 0.0
+    ) -> Places:
+        """The places on the side of a sub-assembly that a kind of hand holds, with the best pad at
+        each or, if it fits, with one of a `radius` [m]."""
+        axis, way = (2, -1 if kind == "below" else 1)
+        if kind == "behind":
+            u, _ = frames[0]
+            axis, way = (0, -round(u[0])) if u[0] else (1, -round(u[1]))
+        return self.holding.places(label, kind, axis, way, radius)
+
+    def checks(
+        self, robot: int, label: str, kind: Kind, places: Places, frames: Sequence[tuple[Way, Way]]
+    ) -> tuple[dict[str, Truth], Truth]:
+        """For each obstacle whether a hand at each place (n,) is clear of it in every frame; and
+        whether it has to be there before its payload. Cached."""
+        key = robot, kind, tuple(frames), places.at.tobytes()
+        if key not in self._checked:
+            self._checked[key] = self._looked_at(robot, label, kind, places, frames)
+        return self._checked[key]
+
+    def waits(
+        self, robot: int, kind: Kind, places: Places, frames: Sequence[tuple[Way, Way]]
+    ) -> Array:
+        """Distance that a hand at each place (n,) goes back, in any frame, until its carrier's next
+        operation may start [m]."""
+        waits = np.zeros(len(places))
+        for u, t in frames if len(places) else ():
+            going = self._going_on(robot, kind, places, u, t)
+            waits = np.maximum.reduce([waits, going, self.apart.crossing(robot, places, u, t)])
+        return waits
+
+    def _looked_at(
+        self, robot: int, label: str, kind: Kind, places: Places, frames: Sequence[tuple[Way, Way]]
+    ) -> tuple[dict[str, Truth], Truth]:
+        free = {why: np.ones(len(places), bool) for why in IN_THE_WAY}
+        free["weak"] &= places.pinned <= STRONG
+        for u, t in frames:
+            free["hands"] &= self.apart.own_side(robot, kind, places, u, t)
+            free["hands"] &= ~_any(self.apart.carriers_hand(robot, kind, places, u, t), places)
+            free["joined"] &= ~_any(self._raised(robot, kind, places, u, t), places)
+        free["hands"] &= self.apart.over_fingers(kind, places)
+        headings = dict.fromkeys((u, (abs(x), abs(y))) for u, (x, y) in frames)
+        passing = [self._passing(robot, label, kind, places, u, t) for u, t in headings]
+        first = np.logical_or.reduce([passed.first for passed in passing])
+        if self.holding.is_fed(robot) and kind != "below":
+            free["own"] &= ~first
+        if self.holding.is_fed(robot) and kind == "above":
+            free["feeder"] &= self._beside_rod(label, places, *frames[0])
+        if self.holding.factory.drops(self.holding.last(robot).index):
+            free["tray"] &= (
+                self._beside_slot(places, frames[0][0])
+                if kind == "below"
+                else self.reach(kind, places, frames[0][0])[0][:, 2] >= self.holding.product.low[2]
+            )
+        if kind == "behind" or (kind == "above" and not self.holding.is_fed(robot)):
+            first |= True
+        for passed in passing:
+            free["joined"] &= ~passed.joined
+            free["lowered"] &= ~passed.lowered
+            free["brought"] &= ~(passed.later | (first & passed.early))
+        return free, first
+
+    def _passing(
+        self, robot: int, label: str, kind: Kind, places: Places, u: Way, t: Way
+    ) -> Passed:
+        """Contacts of the hand of a robot that heads along u. Cached: the sense of its carrier
+        along t does not matter."""
+        key = robot, kind, u, places.at.tobytes()
+        if key not in self._passed:
+            self._passed[key] = self._looked_past(robot, label, kind, places, u, t)
+        return self._passed[key]
+
+    def _looked_past(
+        self, robot: int, label: str, kind: Kind, places: Places, u: Way, t: Way
+    ) -> Passed:
+        joined = list(self.joined(robot, kind, places, u, t))
+        return Passed(
+            _any(self.coming(robot, label, kind, places, u, t), places),
+            _any(self._leaving(robot, kind, places, u), places),
+            _any(self._lowered(robot, kind, places, u), places),
+            _any((ways for later, ways in joined if not later), places),
+            _any((ways for later, ways in joined if later), places),
+        )
+
+    def met(
+        self, robot: int, kind: Kind, places: Places, u: Way, t: Way
+    ) -> Iterator[tuple[str, Swept]]:
+        """The obstacles of a hand at each place, each with its reason."""
+        for ways in (
+            *self._leaving(robot, kind, places, u),
+            *self._raised(robot, kind, places, u, t),
+        ):
+            yield "joined", ways
+        for ways in self.apart.carriers_hand(robot, kind, places, u, t):
+            yield "hands", ways
+        for ways in self._lowered(robot, kind, places, u):
+            yield "lowered", ways
+
+    def reach(self, kind: Kind, places: Places, u: Way) -> tuple[Array, Array]:
+        """The boxes (n, 3) of pad and column, of pad and stem, or of pad and bar."""
+        return reach(self.holding.product, kind, places.at, places.radius, u)
+
+    def _facing(self, kind: Kind, places: Places, u: Way) -> tuple[Array, Array]:
+        """The same among what other robots hold, with ROOM ahead of a face behind or above."""
+        low, high = self.reach(kind, places, u)
+        axis, ahead = (2, -1.0) if kind == "above" else (0, u[0]) if u[0] else (1, u[1])
+        if kind != "below":
+            (high if ahead > 0 else low)[:, axis] += ahead * ROOM
+        return low, high
+
+    def _beside_rod(self, label: str, places: Places, u: Way, t: Way) -> Truth:
+        """Whether a part has room for its feeder's rod: behind a hand above it, or on the side away
+        from its tower, which stands against t."""
+        solid, room = self.holding.product.solids[label], np.zeros(len(places), bool)
+        for (x, y), far in ((u, -1.0), (t, 1.0)):
+            axis, way = (0, x) if x else (1, y)
+            end = float((solid.high if way * far > 0 else solid.low)[axis])
+            left = abs(end - places.at[:, axis]) - halves(places.radius)
+            width = float((solid.high - solid.low)[:2].min())
+            least = min(ROD, width / (8 if width <= SMALL else 4))
+            room |= left >= least + BESIDE
+        return room
+
+    def _beside_slot(self, places: Places, u: Way) -> Truth:
+        """Whether something low of the product rests on the rest of the tray: beside the slot
+        through which a hand comes, or ahead of it."""
+        along, ahead = (0, u[0]) if u[0] else (1, u[1])
+        boxes = self.holding.boxes(held(self.holding.factory, 0, at_last=True))
+        boxes = boxes[boxes[:, 0, 2] < self.holding.product.low[2] + DIP]
+        half, at = halves(places.radius) + SLOT + BESIDE, places.at[:, 1 - along]
+        sides = boxes[:, 0, 1 - along].min() < at - half, boxes[:, 1, 1 - along].max() > at + half
+        end = (boxes[:, :, along] * ahead).max() - PUSHED
+        return np.asarray(sides[0] | sides[1] | (end > places.at[:, along] * ahead + half))
+
+    def _leaving(self, robot: int, kind: Kind, places: Places, u: Way) -> Iterator[Swept]:
+        """The sweep of a hand relative to the parts that it has delivered to, with their boxes, as
+        it comes and leaves: along its heading, and downwards if it lowers its payload."""
+        last, (low, high) = self.holding.last(robot), self.reach(kind, places, u)
+        if self.holding.factory.drops(last.index):
+            if kind != "behind":
+                whole = held(self.holding.factory, robot, at_last=True)
+                yield (*swept(low, high, back(u)), self.holding.boxes(whole))
+            return
+        broad = under_beam(kind, low, high, places.radius)
+        for boxes in self._from_above(last, robot, (u,)):
+            yield (*swept(*broad, back(u)), boxes)
+        lifted = robot in self.holding.factory.strokes
+        gone = swept(low, high) if kind == "above" and lifted else swept(low, high, back(u))
+        if kind == "below":
+            gone[1][:, 2] += self.holding.factory.strokes.get(robot, 0.0)
+        if kind != "behind":
+            yield (*gone, self.holding.boxes(last.label))
+            return
+        # its payload comes along the same way, or takes the bar down with it, which then rises
+        gone = swept(*self._facing(kind, places, u), back(u))
+        gone[1][:, 2] += 10.0 * lifted
+        for other, guest in zip(last.before, last.robots, strict=True):
+            if other != NOPART and (guest != robot or lifted):
+                yield (*gone, self.holding.boxes(other))
+
+    def _raised(self, robot: int, kind: Kind, places: Places, u: Way, t: Way) -> Iterator[Swept]:
+        """The same for a hand above whose lift is up: it goes home over what it has delivered to,
+        which may go on along t meanwhile, or either way if its carrier turns."""
+        if kind == "above" and self.holding.factory.lowers(robot):
+            low, high = self.reach(kind, places, u)
+            low[:, 2] += self.holding.factory.strokes[robot]
+            boxes = self.holding.boxes(self.holding.last(robot).label)
+            for side in (back(t), t)[: 1 + (self.holding.on[robot] in self.holding.turning)]:
+                yield (*swept(low, high, back(u), side), boxes)
+
+    def _going_on(self, robot: int, kind: Kind, places: Places, u: Way, t: Way) -> Array:
+        """Distance that a hand has to go back (n,) [m], as its lift rises, until its carrier's next
+        operation may start, which leaves along t, or either way if it turns."""
+        if self.holding.factory.drops(self.holding.last(robot).index):
+            return np.zeros(len(places))
+        low, high = self.reach(kind, places, u)
+        high[:, 2] += self.holding.factory.strokes.get(robot, 0.0)
+        onward = self._met_onward(robot)
+        past = retreat(low, high, onward, (back(u), back(t)))
+        if self.holding.on[robot] in self.holding.turning:
+            past = np.maximum(past, retreat(low, high, onward, (back(u), t)))
+        return np.asarray(past.max(axis=1, initial=0.0))
+
+    def _met_onward(self, robot: int) -> Array:
+        """The boxes (m, 2, 3) that a hand could meet in its carrier's next operation: everything
+        there at its end, and what is lowered there."""
+        factory, last = self.holding.factory, self.holding.last(robot)
+        if last.index not in self._onward:
+            made = [o for o in self.holding.made(last.carrier) if not factory.drops(o.index)]
+            then = made[made.index(last) + 1 :][:1] if last in made else ()
+            boxes = [self.holding.boxes(last.label)]
+            for o in then:
+                above = self._from_above(o, last.carrier, ())
+                boxes = [self.holding.surfaces.boxes(factory.contents[o.label]), *above]
+            self._onward[last.index] = np.concatenate(boxes)
+        return self._onward[last.index]
+
+    def coming(
+        self, robot: int, label: str, kind: Kind, places: Places, u: Way, t: Way
+    ) -> Iterator[Swept]:
+        """The sweep of a hand relative to what it takes, which is there before it comes home
+        against u: a part, or inputs from either side."""
+        low, high = self.reach(kind, places, u)
+        part_boxes = self.holding.boxes(label)
+        if not self.holding.is_fed(robot):
+            for side in (t, back(t)):
+                yield (*swept(low, high, u, side), part_boxes)
+        elif kind == "behind":
+            # the part comes down along the pad, its widest place too, and no nearer than may be
+            axis, ahead = (0, u[0]) if u[0] else (1, u[1])
+            (high if ahead > 0 else low)[:, axis] += ahead * (ACROSS + TOUCH)
+            low[:, 2] -= 10.0
+            yield low, high, part_boxes
+        else:
+            yield (*swept(low, high, u), part_boxes)
+
+    def joined(
+        self, robot: int, kind: Kind, places: Places, u: Way, t: Way
+    ) -> Iterator[tuple[bool, Swept]]:
+        """The sweep of a hand relative to each input of its operations, which comes from either
+        side while the hand is there, and as its lift rises; with whether that is so in any case,
+        since it has a pile by then and the lift is up."""
+        low, high = self._facing(kind, places, u)
+        rising = low
+        if kind == "behind":
+            low, high = swept(low, high, back(u))
+            rising = low - [0.0, 0.0, self.holding.factory.strokes.get(robot, 0.0)]
+        for operation in self.holding.made(robot):
+            later = operation.pile != NOPART
+            for guest, label in zip(operation.robots, operation.before, strict=True):
+                if guest != robot and label != NOPART:
+                    parts = self.holding.boxes(label)
+                    for side in (t, back(t)):
+                        yield later, (*swept(low if later else rising, high, side), parts)
+
+    def _lowered(self, robot: int, kind: Kind, places: Places, u: Way) -> Iterator[Swept]:
+        """The sweep of a hand relative to each input that is lowered to a carrier."""
+        low, high = under_beam(kind, *self.reach(kind, places, u), places.radius)
+        if kind != "below":
+            low, high = swept(low, high, back(u))
+        for operation in self.holding.made(robot):
+            for boxes in self._from_above(operation, robot, [(u[1], u[0]), (-u[1], -u[0])]):
+                yield low, high, boxes
+
+    def _from_above(
+        self, operation: Operation, robot: int, sides: Sequence[Way]
+    ) -> Iterator[Array]:
+        """The boxes (n, 2, 3) of what is lowered to a robot in an operation: on the way down, and
+        before that as it comes from some sides over everything that stands there."""
+        slot = operation.lowered
+        if slot < 0 or operation.robots[slot] == robot:
+            return
+        boxes = self.holding.boxes(operation.before[slot]).copy()
+        boxes[:, 1, 2] = np.inf
+        yield boxes.copy()
+        boxes[:, 0, 2] += self.holding.factory.strokes[operation.robots[slot]]
+        for side in sides:
+            yield np.stack(swept(boxes[:, 0], boxes[:, 1], side), axis=1)
+
+
+def _any(sweeps: Iterable[Swept], places: Places) -> Truth:
+    """Whether any sweep meets its boxes, for each place (n,)."""
+    met = [np.zeros(len(places), bool), *(hit(*ways) for ways in sweeps)]
+    return np.asarray(np.logical_or.reduce(met))

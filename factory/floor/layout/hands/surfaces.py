@@ -1,0 +1,227 @@
+"""The surfaces of sub-assemblies, seen from below, above and behind.
+
+Everything is derived from the convex bodies of the parts. Lines meet bodies exactly; obstacles of
+hands are boxed, which is exact for boxes and conservative for others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import combinations
+from itertools import product as pairs
+
+import numpy as np
+
+from factory.floor.geometry.meshes import Array
+from factory.floor.geometry.solids import Product, Solid
+from factory.floor.mating.depth import polytope
+from factory.theory.control.mode import Index, Truth
+
+Way = tuple[float, float]
+"""A direction of the world in the plane."""
+
+TOUCH = 1e-5
+"""Boxes that overlap by no more only touch [m]."""
+
+FLAT = 1e-9
+"""A face whose normal has a smaller share along a line is parallel to it."""
+
+
+BLOCK = 256
+"""Of so many points it is looked at together where they are on a body of many faces: what is worked
+out for each point and face stays in the processor's cache."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Faces:
+    """Some faces of a body as seen along an axis: their outward normals' shares `along` (f,) and
+    `across` (2, f) it, and how far they reach along those, `offsets` (f,) [m]."""
+
+    along: Array
+    across: Array
+    offsets: Array
+
+    def room(self, at: Array) -> Array:
+        """How far points (n, 2) across the axis, at its origin, are inside of each (n, f) [m]."""
+        return np.asarray(self.offsets - at @ self.across)
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A convex body: its box `low`, `high` (3,) and its `vertices` (n, 3) [m]; those of a `ball`
+    are of a polytope round it, and not looked at."""
+
+    low: Array
+    high: Array
+    vertices: Array = field(repr=False)
+    ball: bool = False
+
+    @classmethod
+    def of(cls, solid: Solid) -> Iterator[Body]:
+        """The bodies of a solid."""
+        ball = solid.kind == "sphere"
+        for piece in solid.pieces:
+            low, high = (solid.low, solid.high) if ball else (piece.min(axis=0), piece.max(axis=0))
+            yield cls(low, high, piece, ball)
+
+    @cached_property
+    def faces(self) -> tuple[Array, Array]:
+        """The outward normals (f, 3) of its faces and how far they reach along them (f,) [m]."""
+        hull = polytope(self.vertices)
+        return hull.normals, hull.reach
+
+    @cached_property
+    def facing(self) -> tuple[tuple[Faces, Faces, Faces], ...]:
+        """For each axis those of its faces that are parallel to it, face against it, and face along
+        it."""
+        normals, offsets = self.faces
+        by_axis = []
+        for axis, along in enumerate(normals.T):
+            across = normals[:, [a for a in range(3) if a != axis]]
+            sides = np.abs(along) < FLAT, along < -FLAT, along > FLAT
+            one, two, three = (Faces(along[s], across[s].T, offsets[s]) for s in sides)
+            by_axis.append((one, two, three))
+        return tuple(by_axis)
+
+    @cached_property
+    def edges(self) -> Array:
+        """The ends (e, 2, 3) of its edges, and of lines across faces [m]; of what is too thin for
+        faces those of its box."""
+        from scipy.spatial import ConvexHull, QhullError
+
+        try:
+            corners, faces = self.vertices, ConvexHull(self.vertices).simplices
+        except QhullError:
+            corners = np.array([[*p] for p in pairs(*zip(self.low, self.high, strict=True))])
+            return np.asarray(corners[list(combinations(range(8), 2))])
+        sorted_ends = np.sort(
+            np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [0, 2]]])
+        )
+        return np.asarray(corners[np.unique(sorted_ends, axis=0)])
+
+    @cached_property
+    def boxed(self) -> bool:
+        """Whether it is a box along the axes."""
+        corners = (self.vertices == self.low) | (self.vertices == self.high)
+        return len(np.unique(self.vertices, axis=0)) == 8 and bool(corners.all())
+
+    def out(self, side: tuple[int, int]) -> float:
+        """Extent on a side, an axis and a way (+1, -1) along it [m]."""
+        axis, way = side
+        return way * float((self.high if way > 0 else self.low)[axis])
+
+    def dome(self, points: Array, axis: int, near: Array | float = 0.0) -> Array:
+        """How far out of its middle a ball is along an axis, at the points (n,) of discs across
+        that about some (n, 3) that are nearest to it, of radii `near` (n,) [m]; -1 for nowhere."""
+        across = [a for a in range(3) if a != axis]
+        middle, radius = (self.low + self.high) / 2, float((self.high - self.low)[axis]) / 2
+        away = np.maximum(np.hypot(*(points - middle)[:, across].T) - near, 0.0)
+        return np.where(away > radius, -1.0, np.sqrt(np.maximum(radius**2 - away**2, 0.0)))
+
+    def crossed(self, points: Array, axis: int) -> tuple[Array, Array]:
+        """The intervals in which lines along an axis through points (n, 3), within its box across
+        it, are inside (n,); (inf, -inf) for lines that miss it."""
+        if self.ball:
+            half = self.dome(points, axis)
+            middle = (self.low + self.high)[axis] / 2
+            return np.where(half < 0, np.inf, middle - half), np.where(
+                half < 0, -np.inf, middle + half
+            )
+        beside, back, out = self.facing[axis]
+        at = points[:, [a for a in range(3) if a != axis]]
+        inside = (beside.room(at) >= -FLAT).all(axis=1)
+        first = (back.room(at) / back.along).max(axis=1, initial=-np.inf)
+        last = (out.room(at) / out.along).min(axis=1, initial=np.inf)
+        inside &= first <= last
+        return np.where(inside, first, np.inf), np.where(inside, last, -np.inf)
+
+
+class Surfaces:
+    """The bodies of a product's parts, and what lines through them meet."""
+
+    def __init__(self, product: Product) -> None:
+        self.bodies = {label: tuple(Body.of(solid)) for label, solid in product.solids.items()}
+
+    def boxes(self, parts: Iterable[str]) -> Array:
+        """The boxes (n, 2, 3) of the bodies of some parts."""
+        corners = [(body.low, body.high) for part in parts for body in self.bodies[part]]
+        return np.array(corners).reshape(-1, 2, 3)
+
+    def outermost(self, parts: Sequence[str], points: Array, side: tuple[int, int]) -> Array:
+        """Extent of some parts on a side, an axis and a way (+1, -1) along it, where lines along
+        the axis through points (n, 3) meet them (n,) [m]; -inf for lines that miss them."""
+        (axis, way), reach = side, np.full(len(points), -np.inf)
+        one, other = (a for a in range(3) if a != axis)
+        x, y = points[:, one].copy(), points[:, other].copy()
+        bodies = [(body.out(side), body) for part in parts for body in self.bodies[part]]
+        for out, body in sorted(bodies, key=lambda pair: -pair[0]):
+            low, high = body.low, body.high
+            beside = (x >= low[one]) & (x <= high[one]) & (y >= low[other]) & (y <= high[other])
+            if body.boxed:
+                np.maximum(reach, out, out=reach, where=beside)
+                continue
+            # what ends further in than what is known is not looked at
+            for near in blocks(np.flatnonzero(beside & (reach < out + FLAT))):
+                enter, leave = body.crossed(points[near], axis)
+                reach[near] = np.maximum(reach[near], leave if way > 0 else -enter)
+        return reach
+
+
+def blocks(numbers: Index) -> Iterator[Index]:
+    """Numbers (n,) in blocks of BLOCK."""
+    for begin in range(0, len(numbers), BLOCK):
+        yield numbers[begin : begin + BLOCK]
+
+
+def swept(low: Array, high: Array, *ways: Way) -> tuple[Array, Array]:
+    """Boxes from `low` to `high` (n, 3) [m] extended by their sweep any distance along each of some
+    world directions in the plane, and along them together."""
+    low, high = low.copy(), high.copy()
+    for x, y in ways:
+        for axis, way in ((0, x), (1, y)):
+            if way < -0.5:
+                low[:, axis] = -np.inf
+            elif way > 0.5:
+                high[:, axis] = np.inf
+    return low, high
+
+
+def hit(low: Array, high: Array, boxes: Array, spare: float = TOUCH) -> Truth:
+    """Which boxes (n,) from `low` to `high` (n, 3) overlap any of `boxes` (m, 2, 3), by more than
+    `spare` [m]."""
+    return np.asarray(_overlap(low, high, boxes[near(low, high, boxes)], spare).any(axis=1))
+
+
+def retreat(low: Array, high: Array, boxes: Array, ways: tuple[Way, Way]) -> Array:
+    """Distance that boxes from `low` to `high` (n, 3) have to go along the first of two directions
+    until each of `boxes` (m, 2, 3) is not in their way along the second (n, m) [m]; 0 if it is
+    not."""
+    wide, ((x, y), _) = swept(low, high, *ways), ways
+    distances, kept = np.zeros((len(low), len(boxes))), near(*wide, boxes)
+    axis, side = (0, x) if x else (1, y)
+    if side < 0:
+        past = high[:, None, axis] - boxes[kept, 0, axis]
+    else:
+        past = boxes[kept, 1, axis] - low[:, None, axis]
+    distances[:, kept] = np.where(_overlap(*wide, boxes[kept], TOUCH), np.maximum(past, 0.0), 0.0)
+    return distances
+
+
+def near(low: Array, high: Array, boxes: Array) -> Truth:
+    """Which of `boxes` (m,) meet the box round boxes from `low` to `high` (n, 3)."""
+    if not len(low):
+        return np.zeros(len(boxes), bool)
+    kept = (boxes[:, 1] > low.min(axis=0)) & (boxes[:, 0] < high.max(axis=0))
+    return np.asarray(kept.all(axis=1))
+
+
+def _overlap(low: Array, high: Array, boxes: Array, spare: float) -> Truth:
+    """Which boxes from `low` to `high` (n, 3) overlap which of `boxes` (m, 2, 3) by more than
+    `spare` [m] (n, m)."""
+    overlapping = np.ones((len(low), len(boxes)), bool)
+    for axis in range(3):
+        overlapping &= low[:, None, axis] < boxes[:, 1, axis] - spare
+        overlapping &= high[:, None, axis] > boxes[:, 0, axis] + spare
+    return overlapping

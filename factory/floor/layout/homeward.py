@@ -1,0 +1,102 @@
+"""Ways home: the passes at which robots become clear of other machines, and lifts that are adjusted
+only at home."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Iterator, Sequence
+from dataclasses import replace
+
+from factory.floor.layout.certificate import Precedence
+from factory.floor.layout.coordinating import HOME
+from factory.floor.layout.hands.leaving import SPARE
+from factory.floor.layout.hands.limbs import rises_first
+from factory.floor.layout.layout import Layout
+from factory.floor.layout.presence import Near, Nearness, Presence, alike, nearest
+from factory.theory.nets.coordinated import CoordinatedNet, Past
+from factory.theory.nets.exclusion import marked_after
+from factory.theory.nets.marked import MarkedNet
+
+BISECTIONS = 12
+"""Bisection steps to the point from which on a way home is clear."""
+
+
+class Homeward(Nearness):
+    """The ways home of a layout's robots, and the nearness of its machines."""
+
+    def __init__(self, layout: Layout) -> None:
+        super().__init__(layout.clearance)
+        self._layout, self._cuts = layout, dict[Hashable, float | None]()
+
+    def nearer(self, pair: Near) -> Near | None:
+        """As `Nearness.nearer`; for two robots on one stem by the boxes of their bodies."""
+        robots = [side.robot for side in (pair.one, pair.other) if not side.bears]
+        if len({*robots}) == 2 and self._layout.share_stem(*robots):
+            one, other = (replace(p, bodies=p.bodies.as_boxes) for p in (pair.one, pair.other))
+            pair = replace(pair, one=one, other=other)
+        return super().nearer(pair)
+
+    def _cut(self, one: Presence, other: Presence) -> Past | None:
+        """The pass at which a robot that goes home becomes clear of another machine; None if it
+        never does, or always is."""
+        begin = self._layout.visits[one.since // 2, one.robot].at
+        pair = one.robot, other.robot, begin, alike(one, other)
+        if pair not in self._cuts:
+            self._cuts[pair] = self._bisected(one, other, begin)
+        at = self._cuts[pair]
+        return None if at is None else Past(one.since, one.robot, at)
+
+    def _bisected(self, one: Presence, other: Presence, begin: float) -> float | None:
+        robot, layout = one.robot, self._layout
+        home = layout.guidepaths[robot].length
+        heights = [z for _, span in one.sweeps for z in span]
+        low, high = min(heights), max(heights)
+        if rises_first(layout, robot) and round(high - low, 6) > SPARE:
+            low = high  # unless it counts as up from the beginning
+
+        def clear(at: float) -> bool:
+            there = replace(one, sweeps=(((at, home), (low, high)),))
+            pair = nearest(there, other, layout.clearance)
+            return pair is None or self.nearer(pair) is None
+
+        short, far = begin, home - SPARE
+        if layout.guidepaths[robot].fixed or begin >= home or not clear(far) or clear(short):
+            return None
+        for _ in range(BISECTIONS):
+            middle = (short + far) / 2
+            short, far = (short, middle) if clear(middle) else (middle, far)
+        return round(min(far + SPARE, home - SPARE), 6)
+
+    def cuts(self, net: MarkedNet, when: Sequence[int], pairs: Iterable[Near]) -> list[Past]:
+        """The passes at which ways home become clear of what they come near, for each pair that
+        allows one: on the shorter way of the two."""
+        cuts = list[Past]()
+        for pair in pairs:
+            sides = ((pair.one, pair.other), (pair.other, pair.one))
+            ways = [
+                cut
+                for one, other in sides
+                if one.since >= 0
+                and not all(marked_after(net, when, place, one.since) for place in other.places)
+                and (cut := self._cut(one, other)) is not None
+            ]
+            if ways:
+                visits = self._layout.visits
+                cuts.append(
+                    min(ways, key=lambda past: past.at - visits[past.after // 2, past.axis].at)
+                )
+        return cuts
+
+    def adjusted_at_home(self, net: CoordinatedNet, pairs: Iterable[Near]) -> Iterator[Precedence]:
+        """The order places by which lifts that are adjusted for each tour are adjusted at home, for
+        robots that go there by themselves and would come near a machine of a pair on the way."""
+        layout, factory, transitions = self._layout, self._layout.factory, net.net.net.transitions
+        for one in (side for pair in pairs for side in (pair.one, pair.other)):
+            home = Past(one.since, one.robot, layout.guidepaths[one.robot].length - HOME)
+            if one.robot not in factory.adjusted or home not in net.passes:
+                continue
+            gear = factory.robots[one.robot].operations
+            then = factory.operations[gear[(gear.index(one.since // 2) + 1) % len(gear)]]
+            if then.place in one.places and factory.begins(one.robot, then.index):
+                before = transitions[net.net.right[net.passes[home][0]]].name
+                start, tokens = transitions[then.start].name, int(then.index == gear[0])
+                yield Precedence(f"order:{before}:{start}", before, start, tokens)

@@ -1,0 +1,151 @@
+"""The outfeed: the duration of its cycle (the tray carries a product into the shed, waits until
+that is shut, and comes back), and the slot in the tray for a round bottom."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from math import sqrt
+
+import numpy as np
+
+from factory.floor.geometry.meshes import Array
+from factory.floor.geometry.solids import Solid
+from factory.floor.layout.dimensions import BEHIND, PLAY, SLOT, Clearance
+from factory.floor.layout.guidepath import Box, Point2
+from factory.floor.layout.hands.limbs import limbs
+from factory.floor.layout.hands.surfaces import Body
+from factory.floor.layout.layout import Layout
+from factory.support.settings import Settings
+from factory.theory.control.governed import GovernedAxis, Trajectory
+from factory.theory.control.profile import SpeedProfile
+
+CRUISE = 1.2
+"""The tray's way is at least so many times what it takes to reach its speed and to brake: a drive
+whose acceleration is reversed at once gets half as far again off its reference."""
+
+NEAR = 1e-3
+"""The tray is somewhere when it is within this [m]."""
+
+FLAT = 1e-5
+"""What dips no deeper stands flat [m]."""
+
+HalfSpace = tuple[int, float, int]
+"""All that is beyond a bound [m] on an axis, one way (+1, -1) along it."""
+
+
+def tray_profile(layout: Layout, settings: Settings) -> SpeedProfile:
+    """Speed and acceleration of the tray: below the limits on a short way, so that it moves at
+    constant speed for a while."""
+    acceleration = settings.outfeed_acceleration
+    reached = sqrt(layout.outfeed_way * acceleration / CRUISE)
+    return SpeedProfile(min(settings.outfeed, reached), acceleration)
+
+
+def leaving(layout: Layout, settings: Settings) -> float:
+    """Time from a dropoff until the product is out of sight [s]: the tray sets out a tick later,
+    and the shutter comes down once the product is past it."""
+    tray, shutter = _drives(layout, settings)
+    way = tray.way(layout.outfeed_way)
+    past = way.passes(BEHIND - PLAY)
+    shut = past + _arrives(shutter.way(layout.shutter_stroke), settings)
+    return (1 + max(_arrives(way, settings), shut)) * settings.tick
+
+
+def away(layout: Layout, settings: Settings) -> float:
+    """Time from one dropoff until the next may begin [s]."""
+    tray, shutter = _drives(layout, settings)
+    ways = tray.way(layout.outfeed_way), shutter.way(layout.shutter_stroke)
+    back = max(_arrives(way, settings) for way in ways)
+    return leaving(layout, settings) + back * settings.tick
+
+
+def _drives(layout: Layout, settings: Settings) -> tuple[GovernedAxis, GovernedAxis]:
+    """The drives of tray and shutter."""
+    tray = tray_profile(layout, settings)
+    limits = (tray.speed, tray.acceleration), settings.shutter_limits
+    one, other = (GovernedAxis(speed, most, settings.tick, settings.lag) for speed, most in limits)
+    return one, other
+
+
+def _arrives(way: Trajectory, settings: Settings) -> int:
+    """The tick in which the tray or its shutter is where it goes."""
+    return way.rests(NEAR, NEAR / settings.tick)
+
+
+def slot_of(layout: Layout) -> tuple[float, float, float] | None:
+    """The slot through which the output robot's hand comes up to the product, about the product's
+    middle: its end, as far as the robot can be pushed, and its sides [m]; None if the hand is not
+    below."""
+    path, hand = layout.guidepaths[0], layout.hand(0)
+    upright = [limb for limb in limbs(layout, 0) if limb.name.endswith(("column", "pad"))]
+    if hand is None or hand.kind != "below":
+        return None
+    ends = max(limb.high[0] for limb in upright) - path.reach + SLOT
+    ends += Clearance(layout.clearance).stop
+    low = min(limb.low[1] for limb in upright) + path.offset - SLOT
+    return ends, low, max(limb.high[1] for limb in upright) + path.offset + SLOT
+
+
+def dip_of(layout: Layout, slot: tuple[float, float, float] | None, label: str = "") -> float:
+    """Depth of the product in the tray's slot [m]; in a mix of what touches the tray first, or of
+    one product, by its label."""
+    if slot is None:
+        return 0.0
+    (_, xhi, ylo, yhi), (end, low, high) = layout.outgoing, slot
+    x, y = layout.product.middle[:2].tolist()
+    beside = (1, y + low, -1, low - ylo), (1, y + high, 1, yhi - high), (0, x + end, 1, xhi - end)
+    plates = [(axis, at, way) for axis, at, way, room in beside if room > SLOT]
+    solids, bottom = layout.product.solids, float(layout.product.low[2])
+    if label:
+        solids = {part: solids[part] for part in layout.factory.contents[label]}
+        bottom = float(min(solid.low[2] for solid in solids.values()))
+    return dip(solids.values(), bottom, plates)
+
+
+def slotted(plate: Box, slot: tuple[float, float, float] | None) -> list[tuple[Point2, Point2]]:
+    """The rectangles, middles and half sizes, that make up a plate with a slot from its rear."""
+    xlo, xhi, ylo, yhi = plate
+    boxes = [plate]
+    if slot is not None:
+        end, low, high = slot
+        boxes = [
+            (xlo, xhi, ylo, low),
+            (xlo, xhi, high, yhi),
+            (end, xhi, max(low, ylo), min(high, yhi)),
+        ]
+        boxes = [box for box in boxes if min(box[1] - box[0], box[3] - box[2]) > SLOT] or [plate]
+    return [
+        (((x0 + x1) / 2, (y0 + y1) / 2), ((x1 - x0) / 2, (y1 - y0) / 2)) for x0, x1, y0, y1 in boxes
+    ]
+
+
+def dip(solids: Iterable[Solid], bottom: float, plates: list[HalfSpace]) -> float:
+    """Height difference between the `bottom` of a product and the lowest point of its solids over
+    some level plates [m]; 0 where they are over none."""
+    bodies = [body for solid in solids for body in Body.of(solid)]
+    least = np.inf
+    for body in sorted(bodies, key=lambda body: float(body.low[2])):
+        if float(body.low[2]) >= least:
+            break
+        least = min(least, *(_lowest(body, *plate) for plate in plates), np.inf)
+    deep = least - bottom
+    return deep if FLAT < deep < np.inf else 0.0
+
+
+def _lowest(body: Body, axis: int, bound: float, way: int) -> float:
+    """Lowest point of a body beyond a bound [m]; inf if it is not there."""
+    beyond = way * (np.array([body.low, body.high])[:, axis] - bound)
+    if beyond.max() <= 0:
+        return np.inf
+    if body.ball:
+        middle, radius = (body.low + body.high) / 2, (body.high - body.low)[2] / 2
+        short = max(0.0, -way * float(middle[axis] - bound))
+        return float(middle[2] - np.sqrt(max(radius**2 - short**2, 0.0)))
+    ends = body.edges
+    far = way * (ends[:, :, axis] - bound)
+    heights: Array = ends[:, :, 2]
+    lowest = heights[far >= 0].min(initial=np.inf)
+    crossing = far.prod(axis=1) < 0
+    share = far[crossing, 0] / (far[crossing, 0] - far[crossing, 1])
+    at = heights[crossing, 0] + share * (heights[crossing, 1] - heights[crossing, 0])
+    return float(min(lowest, at.min(initial=np.inf)))

@@ -1,0 +1,25 @@
+"""Where the axes of a factory are in a marking."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from factory.floor.layout.hands.limbs import rises_first
+from factory.floor.layout.layout import Layout
+from factory.theory.nets.petri import Marking
+
+
+def start_positions(layout: Layout, marking: Marking) -> np.ndarray:
+    """Every axis in a marking. A robot is where its last operation left it, or at its B end if it
+    waits without a payload at the beginning of its cycle; then its lift is where its last tour left
+    it, unless it is adjusted by then or its hand is above what it takes."""
+    factory, net = layout.factory, layout.factory.net
+    positions, lifts = np.zeros(len(factory.robots) + len(layout.strokes)), factory.lift_axis
+    for robot, gear in zip(factory.robots, net.gears, strict=True):
+        step = next(i for i, place in enumerate(gear.places) if place in marking) // 2
+        positions[robot.index] = layout.home(robot.index, robot.operations[step])
+        always = robot.index in factory.adjusted or rises_first(layout, robot.index)
+        if robot.index in lifts:
+            before, visit = layout.ways[robot.operations[step], robot.index]
+            positions[lifts[robot.index]] = visit.up if step or always else before.lift
+    return positions

@@ -1,0 +1,325 @@
+"""The pairs of parts that come to overlap when the inputs of operations come along an axis.
+
+Candidates are the bodies whose boxes overlap across the axis. Boxes bound the depth, and for boxes
+they give it; for the others it is computed from the facets of the Minkowski difference. Bodies of
+two shapes are computed together, wherever they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from factory.floor.geometry import overlap
+from factory.floor.geometry.meshes import Array
+from factory.floor.mating.bodies import BodyShapes, ConvexBodies
+from factory.floor.mating.drawn import DrawnWays
+from factory.floor.mating.meetings import Ints, Meetings
+from factory.floor.mating.paths import (
+    CLEAR,
+    LAST,
+    MANY,
+    SIGNS,
+    TOLERANCE,
+    Depths,
+    depths_of,
+    sought,
+)
+from factory.support.cache import digest, load_arrays, program, store_arrays
+
+FOLDER = "overlaps"
+"""Where overlaps are kept, in the user's cache."""
+
+KEYS = ("meeting", "moving", "standing", "finished", "path", "shift", "graze", "cuts")
+DRAWN, ROUGH = tuple(f"drawn_{key}" for key in KEYS), "rough"
+"""The arrays of an entry: of bodies, of parts as they are drawn, and of all parts."""
+
+Flags = NDArray[np.bool_]
+
+CHUNK = 4096
+"""Bodies whose candidates are sought at a time."""
+
+
+@dataclass(frozen=True)
+class BodyPairs:
+    """Pairs of convex bodies: their numbers among those of their parts, and their depths (m,)."""
+
+    one: Ints
+    other: Ints
+    depths: Depths = field(repr=False)
+
+    def receding(self, rows: slice, side: int) -> list[tuple[int, int, float]]:
+        """Those of `rows` that overlap or scrape on the way from a side, and how far [m] they must
+        recede from each other so that they do not."""
+        depths = self.depths.at(rows)
+        chosen = np.flatnonzero(depths.faulty[:, side])
+        pairs = self.one[rows][chosen].tolist(), self.other[rows][chosen].tolist()
+        return list(zip(*pairs, depths.receding[chosen, side].tolist(), strict=True))
+
+
+@dataclass(frozen=True)
+class Overlaps:
+    """Pairs of parts that overlap by more than the tolerance in some place of a path, or scrape, by
+    meeting. `meeting`, `one` < `other` (n,): numbers of the meeting and the parts; `depths` as they
+    are drawn, `colliding` as their bodies collide; `rough` (n,): whether one of them is known by
+    its hull alone; `bodies`: what overlaps of them, those of row i from `starts[i]` to
+    `starts[i + 1]` (n + 1,)."""
+
+    meeting: Ints
+    one: Ints
+    other: Ints
+    depths: Depths = field(repr=False)
+    colliding: Depths = field(repr=False)
+    rough: NDArray[np.bool_] = field(repr=False)
+    bodies: BodyPairs = field(repr=False)
+    starts: Ints = field(repr=False)
+
+    def of(self, meeting: int) -> Overlaps:
+        """Those of one meeting."""
+        first, end = np.searchsorted(self.meeting, [meeting, meeting + 1]).tolist()
+        rows = slice(first, end)
+        at = self.meeting[rows], self.one[rows], self.other[rows]
+        depths = self.depths.at(rows), self.colliding.at(rows), self.rough[rows]
+        return Overlaps(*at, *depths, self.bodies, self.starts[first : end + 1])
+
+    @cached_property
+    def deeper(self) -> NDArray[np.bool_]:
+        """Which pairs (n, 2) get deeper into each other on the way from either side than they are
+        in the finished product, or cut more out of each other."""
+        return np.asarray(self._passing | self.depths.cuts)
+
+    @property
+    def _passing(self) -> Flags:
+        """Which of them get deeper, or cut although they share nothing in the end."""
+        finished = self.depths.finished[:, None]
+        apart = finished <= TOLERANCE
+        return (self.depths.path > finished + TOLERANCE) | (self.depths.cuts & apart)
+
+    @cached_property
+    def cutting(self) -> Flags:
+        """Which of those (n, 2) do no more than cut: they get no deeper."""
+        return np.asarray(self.depths.cuts & ~self._passing)
+
+    @cached_property
+    def clashing(self) -> NDArray[np.bool_]:
+        """Which of those (n, 2) pass through each other: all but those that do no more than cut,
+        and those of which a hull shows no more than that they are drawn into each other."""
+        unknown = self.rough & (self.depths.finished > TOLERANCE)
+        return self._passing & ~unknown[:, None]
+
+
+Pairs = tuple[Ints, Ints, Ints, Depths]
+"""Pairs of bodies, or of parts: their meetings, what moves and what stands, and their depths."""
+
+
+class Finder:
+    """Finds overlaps in one product; shapes are kept with it, what is found in the user's cache."""
+
+    def __init__(self, convex: ConvexBodies, where: Meetings) -> None:
+        self.bodies, self.meetings = convex, where
+        self.drawn = DrawnWays(convex)
+        self._shapes = convex.product.kept(BodyShapes)
+
+    def along(self, axis: int, wanted: NDArray[np.bool_]) -> Overlaps:
+        """The overlaps of the wanted meetings when their inputs come along an axis: x, y or z."""
+        if self.bodies.boxes.all() and not self._meshes:  # found at once
+            return self._by_parts(*self._search(axis, wanted))
+        name = digest(self._product, axis, wanted)
+        kept = load_arrays(FOLDER, name)
+        if kept is None:
+            bodies, parts, rough = self._search(axis, wanted)
+            arrays = [a for rows in (bodies, parts) for a in (*rows[:3], *rows[3].columns)]
+            kept = dict(zip((*KEYS, *DRAWN, ROUGH), (*arrays, rough), strict=True))
+            store_arrays(FOLDER, name, kept)
+        return self._by_parts(_pairs(kept, KEYS), _pairs(kept, DRAWN), kept[ROUGH])
+
+    @cached_property
+    def _meshes(self) -> list[Array | Ints]:
+        """The surfaces of parts, and where they are."""
+        meshed = [(s, s.mesh) for s in self.bodies.solids if s.mesh is not None]
+        each = {id(mesh): mesh for _, mesh in meshed}.values()
+        places = [array for solid, _ in meshed for array in (solid.position, solid.quaternion)]
+        return [*places, *(array for mesh in each for array in (mesh.vertices, mesh.faces))]
+
+    @cached_property
+    def _product(self) -> str:
+        """A digest of all that overlaps depend on."""
+        where = self.meetings.borders, self.meetings.levels, self.meetings.splits
+        code = program(Path(__file__).parent, "numpy", "scipy", "shapely", "manifold3d")
+        exact = program(Path(overlap.__file__).parent)
+        return digest(code, exact, self.bodies.part, *where, *self.bodies.vertices, *self._meshes)
+
+    def _search(self, axis: int, wanted: NDArray[np.bool_]) -> tuple[Pairs, Pairs, Flags]:
+        """The bodies, moving and standing, that overlap or scrape, and the meetings at which they
+        do; the parts that were tested as they are drawn; and which are known by hulls alone."""
+        parts = [self._near(axis, wanted, *pairs) for pairs in self._chunks(axis)]
+        moving, standing, meeting = np.concatenate([np.zeros((3, 0), np.int64), *parts], axis=1)
+        depths = _box_depths(self.bodies, moving, standing, axis)
+        self._refine(moving, standing, axis, depths)
+        part = self.bodies.part
+        idle = part[moving] < self.meetings.splits[meeting]
+        depths.path[idle], depths.shift[idle] = depths.finished[idle, None], 0.0
+        depths.graze[idle] = -np.inf
+        kept = np.array(depths.faulty.any(axis=1))
+        tested = np.flatnonzero(self.drawn.tested(part[moving], part[standing]))
+        key = self._key_of(meeting[tested], part[moving[tested]], part[standing[tested]])
+        first = tested[np.unique(key, return_index=True)[1]]  # of each pair of parts
+        kept[first] = True
+        by_parts = part[moving[first]], part[standing[first]]
+        exact = self.drawn.depths(*by_parts, idle[first], axis)
+        by_bodies = meeting[kept], moving[kept], standing[kept], depths.at(np.flatnonzero(kept))
+        return by_bodies, (meeting[first], *by_parts, exact), self.drawn.rough
+
+    def _key_of(self, meeting: Ints, moving: Ints, standing: Ints) -> Ints:
+        """A number (n,) of each pair of parts at a meeting, ascending as they are sorted."""
+        count = len(self.bodies.solids)
+        return (meeting * count + standing) * count + moving
+
+    def _chunks(self, axis: int, apart: float = CLEAR) -> Iterator[tuple[Ints, Ints]]:
+        """Pairs (moving, standing) of bodies whose boxes overlap or are at most so far `apart`
+        across the axis, the part of the moving one being the later, in chunks."""
+        from shapely import STRtree, box
+
+        u, v = (i for i in range(3) if i != axis)
+        low, high, part = self.bodies.low, self.bodies.high, self.bodies.part
+        c = apart / 2
+        flat = box(low[:, u] - c, low[:, v] - c, high[:, u] + c, high[:, v] + c)
+        tree = STRtree(flat)
+        for start in range(0, len(flat), CHUNK):
+            one, other = tree.query(flat[start : start + CHUNK])
+            one = one + start
+            later = part[one] > part[other]
+            yield one[later], other[later]
+
+    def near(self, gap: float) -> tuple[Ints, Ints]:
+        """Pairs of parts that are at most so far [m] from each other in the finished product, the
+        later one first. Bodies that meet with corners may be a little further apart."""
+        one, other, depths = self.passing(2, gap, still=True)
+        close = depths.finished >= -gap
+        bodies = self.bodies.part[np.stack([one, other])[:, close]]
+        one, other = np.unique(bodies, axis=1)
+        tested = np.flatnonzero(self.drawn.tested(one, other))
+        near = np.ones(len(one), bool)
+        near[tested] = self.drawn.near(one[tested], other[tested], gap)
+        return one[near], other[near]
+
+    def passing(self, axis: int, gap: float, still: bool = False) -> tuple[Ints, Ints, Depths]:
+        """Pairs of bodies (moving, standing) of two parts, the later one moving, whose boxes are at
+        most so far [m] from each other in some place of the way along an axis, `still` in the
+        finished product, with their depths."""
+        pairs = [self._beside(axis, gap, still, *pair) for pair in self._chunks(axis, gap)]
+        one, other = np.concatenate([np.zeros((2, 0), np.int64), *pairs], axis=1)
+        depths = _box_depths(self.bodies, one, other, axis)
+        self._refine(one, other, axis, depths)
+        return one, other, depths
+
+    def rooms(self, axis: int, most: float) -> tuple[Ints, Ints, Array]:
+        """Pairs of parts (moving, standing), the later one moving, that come near on the way along
+        an axis, and the least room (n, 2) [m] on it from either side, but for the last bit; less
+        than 0 where they overlap."""
+        one, other, depths = self.passing(axis, most)
+        moving, standing = self.bodies.part[one], self.bodies.part[other]
+        apart = moving != standing
+        moving, standing, least = moving[apart], standing[apart], depths.room[apart]
+        key = moving * len(self.bodies.solids) + standing
+        _, first, pair = np.unique(key, return_index=True, return_inverse=True)
+        room = np.full((len(first), 2), np.inf)
+        np.minimum.at(room, pair, least)
+        moving, standing = moving[first], standing[first]
+        tested = np.flatnonzero(self.drawn.tested(moving, standing) & (room < most).any(axis=1))
+        room[tested] = self.drawn.room(moving[tested], standing[tested], axis, most)
+        return moving, standing, room
+
+    def _beside(self, axis: int, gap: float, still: bool, moving: Ints, standing: Ints) -> Ints:
+        depths = _box_depths(self.bodies, moving, standing, axis)
+        near = depths.finished if still else depths.path.max(axis=1)
+        return np.asarray(np.stack([moving, standing])[:, near >= -gap])
+
+    def _near(self, axis: int, wanted: NDArray[np.bool_], moving: Ints, standing: Ints) -> Ints:
+        """Those that meet at a wanted meeting and whose boxes come to overlap there: rows moving,
+        standing, meeting (3, n)."""
+        meeting = self.meetings.of(self.bodies.part[standing], self.bodies.part[moving])
+        pairs = np.stack([moving, standing, meeting])[:, wanted[meeting]]
+        depths = _box_depths(self.bodies, pairs[0], pairs[1], axis)
+        return np.asarray(pairs[:, depths.faulty.any(axis=1)])
+
+    def _refine(self, moving: Ints, standing: Ints, axis: int, depths: Depths) -> None:
+        """Replaces the depths of boxes by those of the bodies where these are no boxes."""
+        groups: dict[tuple[bytes, bytes], list[int]] = {}
+        keys = [key for solid in self.bodies.solids for key in self._shapes.keys[solid.label]]
+        both = self.bodies.boxes[moving] & self.bodies.boxes[standing]
+        for row in np.flatnonzero(~both).tolist():
+            groups.setdefault((keys[moving[row]], keys[standing[row]]), []).append(row)
+        low = self.bodies.low
+        for pair, members in groups.items():
+            rows = np.array(members)
+            apart = low[moving[rows]] - low[standing[rows]]
+            one, other = (self._shapes.vertices[key] for key in pair)
+            if len(one) * len(other) > MANY:
+                depths.put(rows, sought(one, other, apart, axis))
+            else:
+                difference = self._shapes.difference(pair)
+                heights, slopes = difference.heights(apart), difference.normals[:, axis]
+                depths.put(rows, depths_of(heights, slopes)[0])
+
+    def _by_parts(self, by_bodies: Pairs, exact: Pairs, rough: Flags) -> Overlaps:
+        """Of all bodies of two parts the deepest, and how deep they are as drawn."""
+        meeting, moving, standing, depths = by_bodies
+        part = self.bodies.part
+        order = np.lexsort((part[moving], part[standing], meeting))
+        meeting, one, other = meeting[order], part[standing[order]], part[moving[order]]
+        depths, first = depths.at(order), np.searchsorted(part, part)
+        standing, moving = standing[order], moving[order]
+        bodies = BodyPairs(standing - first[standing], moving - first[moving], depths)
+        new = np.ones(len(order), bool)
+        new[1:] = (np.diff(one) != 0) | (np.diff(other) != 0)
+        starts = np.flatnonzero(new)
+        ends = np.append(starts, len(order))
+        if not len(starts):
+            none = np.zeros(0, bool)
+            return Overlaps(meeting, one, other, depths, depths, none, bodies, ends)
+        path = np.maximum.reduceat(depths.path, starts)
+        at = np.where(depths.path >= path[np.cumsum(new) - 1], depths.shift, np.inf)
+        colliding = Depths(
+            np.maximum(np.maximum.reduceat(depths.finished, starts), 0.0),
+            path,
+            np.minimum.reduceat(at, starts),
+            np.maximum.reduceat(depths.graze, starts),
+            np.logical_or.reduceat(depths.cuts, starts),
+        )
+        meeting, one, other = meeting[starts], one[starts], other[starts]
+        as_drawn = colliding.at(np.arange(len(starts)))
+        rows = np.searchsorted(self._key_of(meeting, other, one), self._key_of(*exact[:3]))
+        as_drawn.put(rows, exact[3])
+        hulls = rough[one] | rough[other]
+        return Overlaps(meeting, one, other, as_drawn, colliding, hulls, bodies, ends)
+
+
+def _pairs(kept: Mapping[str, NDArray[Any]], keys: Sequence[str]) -> Pairs:
+    meeting, moving, standing, *rest = (kept[key] for key in keys)
+    return meeting, moving, standing, Depths(*rest)
+
+
+def _box_depths(bodies: ConvexBodies, moving: Ints, standing: Ints, axis: int) -> Depths:
+    """The depths of bounding boxes (see `depth.py`), in closed form."""
+    low, high = bodies.low, bodies.high
+    up, down = high[standing] - low[moving], high[moving] - low[standing]
+    depth = np.minimum(up, down)
+    across = np.delete(depth, axis, axis=1).min(axis=1)[:, None]
+    half = ((up[:, axis] + down[:, axis]) / 2)[:, None]
+    ahead = (up[:, axis] - down[:, axis])[:, None] * np.array(SIGNS) / 2
+
+    def most(ahead: Array) -> Array:
+        along = np.where(ahead > 0, half, half - np.abs(ahead))
+        return np.asarray(np.minimum(across, along))
+
+    path = most(ahead)
+    shift = np.where(ahead > 0, np.maximum(ahead - (half - path), 0.0), 0.0)
+    finished = np.minimum(across[:, 0], depth[:, axis])
+    return Depths(finished, path, shift, most(ahead - LAST), np.zeros(path.shape, bool))

@@ -1,6 +1,0 @@
-"""Relays: a guidepath that sets the pace is shared by several robots, which hand over to each
-other."""
-
-from factory.layout.relaying.relaying import relayed
-
-__all__ = ["relayed"]

@@ -1,1 +1,0 @@
-"""Runs shown to people: the report and the live page."""

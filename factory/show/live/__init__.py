@@ -1,6 +1,0 @@
-"""A running factory in the browser, with commands to pause, push, slow down, kill and block."""
-
-from factory.show.live.server import Server
-from factory.show.live.session import LiveFrame, Session
-
-__all__ = ["LiveFrame", "Server", "Session"]

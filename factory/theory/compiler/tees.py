@@ -1,0 +1,99 @@
+"""Tees: two robots that deliver at one place, in turns, from one side.
+
+Where the guidepath of a carrier begins, it has one station, and a station has room for one robot on
+each side. Two robots that deliver there from the same side share the last stretch of their
+guidepaths, the *stem*. So do two that could be one robot on a line, if the plan says so (`tees`).
+Each has an *arm* of its own, with a branch of its own behind. In everything but who does which
+tour, the two are one robot that does the tours of both: the factory *on stems*, whose layout is
+that of the tee with both arms in one.
+
+Guarantees: the net is that of the factory without tees, or of a branch that is there twice, live,
+safe and reversible (`parallel`). Both robots are never at the end of the stem at once: what they
+deliver there is in operations of one carrier, whose gear has one token.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from factory.support.errors import Diagnostic, InputError
+from factory.theory.compiler.assigning import assigned
+from factory.theory.compiler.folding import Line, line_faults, lines_of_labels
+from factory.theory.plant.factory import Factory, Operation
+from factory.theory.problem.pag import NOPART
+from factory.theory.problem.plan import Plan
+from factory.theory.problem.robot_types import Catalogue
+
+ROOM = 2
+"""Robots that share a stem."""
+
+HINT = "a tee has two labels that come to one carrier, from one side, by one kind of robot"
+
+
+def heads(factory: Factory) -> tuple[int, ...]:
+    """For each robot the first of those that bring, or help to bring, the same over one stem as it
+    does; itself for all that share none. Linear."""
+    head, alike = [*range(len(factory.robots))], dict[str, list[Operation]]()
+    for one, other in factory.plan.tees:
+        head[max(one, other)] = min(one, other)
+    for o in factory.making:
+        alike.setdefault(o.written, []).append(o)
+    for same in alike.values():  # carriers come before those that deliver to them
+        begins = len(same[0].robots) > 1 and same[0].pile == NOPART
+        firsts = dict[int, Operation]()
+        for o in same:
+            first = firsts.setdefault(head[o.carrier], o)
+            if begins or o.carrier != first.carrier:
+                for robot, other in zip(first.robots, o.robots, strict=True):
+                    head[other] = head[robot]
+    return tuple(head)
+
+
+def with_tees(factory: Factory, stems: Sequence[Sequence[str]], catalogue: Catalogue) -> Plan:
+    """The plan in which the two robots that bring the labels of each of `stems` share one. Raises
+    InputError (BadTee) with every reason why they cannot."""
+    lines = lines_of_labels(factory, stems)
+    faults = [f for both in zip(lines, stems, strict=True) for f in _faults(factory, *both)]
+    for line in lines if not faults else ():
+        for fault in line_faults(factory, line, lines, catalogue):
+            message = fault.message.replace("share a robot", "share a stem")
+            faults.append(replace(fault, code="BadTee", message=message, hint=HINT))
+    if faults:
+        raise InputError(faults)
+    return replace(factory.plan, tees=tuple((line[0], line[1]) for line in lines))
+
+
+def _faults(factory: Factory, line: Line, labels: Sequence[str]) -> Iterator[Diagnostic]:
+    """Why the robots of two labels cannot share a stem, whatever else."""
+    names = " and ".join(f"'{label}'" for label in labels)
+    if len(line) != ROOM or len(labels) != ROOM:
+        message = f"{names}: a stem has room for {ROOM} robots, each with a label of its own"
+        yield Diagnostic("BadTee", message, None, HINT)
+        return
+    ends = [factory.last(robot) for robot in line]
+    if ends[0] is ends[1]:
+        message = f"{names} are both needed in '{ends[0].label}'"
+        message += ": one stem has room for one at its end"
+        hint = "let them be brought to different operations of one carrier"
+        yield Diagnostic("BadTee", message, ends[0].position, hint)
+    if factory.period > 1:
+        message = f"{names} are brought by several robots in turn"
+        yield Diagnostic("BadTee", message, ends[0].position, "leave out --parallel, or the tee")
+
+
+def on_stems(factory: Factory) -> tuple[Factory, tuple[int, ...]]:
+    """The factory in which the robots of each tee are one, and those of their branches too; and for
+    each robot the one there that does its tours. The same factory where there is no tee."""
+    head = heads(factory)
+    if head == (every := tuple(range(len(head)))):
+        return factory, every
+    kept = sorted({*head})
+    number = {robot: n for n, robot in enumerate(kept)}
+    place = tuple(number[robot] for robot in head)
+    robots = [
+        replace(factory.robots[robot], index=n, name=f"r{n + 1}") for robot, n in number.items()
+    ]
+    turns = tuple(tuple(place[robot] for robot in turn) for turn in factory.plan.turns)
+    plan = replace(factory.plan, turns=turns, names=(), tees=())
+    return replace(assigned(factory, robots, [place]), plan=plan), place

@@ -1,0 +1,91 @@
+"""Gears and gear nets: Definitions 3.5 and 3.6, as values. `factory.theory.nets.verify` checks them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from heapq import heappop, heappush
+from itertools import count, pairwise
+
+from factory.support.showing import Pictured
+from factory.theory.nets.petri import Marking
+from factory.theory.nets.threaded import Slot, ThreadedNet
+
+
+@dataclass(frozen=True, slots=True)
+class Gear:
+    """The cycle of places and transitions that is one robot's program (Definition 3.5).
+
+    `places[i]` leads from `transitions[i]` to `transitions[i + 1]`, cyclically; the first place is
+    `wait(nopart)`. `robot` is its name, r1, r2, ...; `type` the robot's type.
+    """
+
+    robot: str
+    type: str
+    places: tuple[int, ...]
+    transitions: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class GearNet(Pictured):
+    """A threaded net that is claimed to be composed of gears, one for each robot (Definition 3.6).
+
+    `initial` is the marked place of each gear, in the gears' order; slot i of an operation's place
+    belongs to robot `slots[place][i]` (an index into `gears`). A claim only: `verify` proves it.
+    """
+
+    threaded: ThreadedNet
+    gears: tuple[Gear, ...]
+    initial: tuple[int, ...]
+    slots: tuple[tuple[int, ...], ...] = field(repr=False)
+
+    def __repr__(self) -> str:
+        net = self.threaded.net
+        counts = f"{len(net.places)} places, {len(net.transitions)} transitions"
+        return f"<GearNet: {len(self.gears)} gears, {counts}>"
+
+    @cached_property
+    def initial_marking(self) -> Marking:
+        """m_0."""
+        return frozenset(self.initial)
+
+    @cached_property
+    def is_tree(self) -> bool:
+        """Whether the incidence graph of gears and the places that they share is a tree, if it
+        hangs together: that of a gear net is, of any other gear train not."""
+        gears = sum(bool(gear.places) for gear in self.gears)
+        return sum(len(on) - 1 for on in self.slots if on) == gears - 1
+
+    def threads_of(self, marked: Marking) -> dict[Slot, int]:
+        """f_m of a marking: every slot holds the robot that owns it (Definition 3.3)."""
+        return {(p, i): robot for p in sorted(marked) for i, robot in enumerate(self.slots[p])}
+
+
+def ascending(programs: Iterable[Sequence[int]], turns: Sequence[int]) -> tuple[int, ...]:
+    """The operations, numbered from 0, in an order in which every program of operations ascends,
+    those of earlier `turns` first. Raises ValueError where there is none: then the gears of these
+    programs are not live."""
+    waits, onward = [0] * len(turns), [list[int]() for _ in turns]
+    for program in programs:
+        for before, number in pairwise(program):
+            onward[before].append(number)
+            waits[number] += 1
+    came, ordered, ready = count(), list[int](), list[tuple[int, int, int]]()
+
+    def free(number: int) -> None:
+        heappush(ready, (turns[number], next(came), number))
+
+    for number, left in enumerate(waits):
+        if not left:
+            free(number)
+    while ready:
+        *_, number = heappop(ready)
+        ordered.append(number)
+        for after in onward[number]:
+            waits[after] -= 1
+            if not waits[after]:
+                free(after)
+    if len(ordered) < len(turns):
+        raise ValueError("the robots' programs wait for each other: the net is not live")
+    return tuple(ordered)

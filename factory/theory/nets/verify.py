@@ -1,0 +1,135 @@
+"""The proof that a net is a gear net or a gear train, live, safe, reversible and legally marked, in
+linear time.
+
+Definitions 3.5 and 3.6 are checked gear by gear (`composition`), and 3.6' for a gear train
+(`train`). Then every place lies on a gear, which is a circuit, and a legal marking gives each gear
+one token: so the net is safe. It is live where the places without token can be put in an order,
+each after those it waits for (Commoner et al. 1971, Theorem 1), and a live marked graph that
+consists of circuits is reversible (Murata 1989, Theorem 21). Theorems 3.1 and 3.2 are not used, but
+tested. `factory.apps.foreign_nets` decides the properties of nets that are not composed in this way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import islice
+
+from factory.support.collector import collector_paused
+from factory.support.errors import Diagnostic, Position, RunError
+from factory.theory.nets.composition import MOST, Composition, compose, named
+from factory.theory.nets.gears import GearNet
+from factory.theory.nets.marked import MarkedNet, marked, token_free
+from factory.theory.nets.train import dead_train_defects, train_defects
+from factory.theory.nets.verdict import Defect, Verdict, listing, verdict
+
+
+def proved(net: GearNet) -> Verdict:
+    """The verdict on a net all of whose properties hold. Raises RunError (NotProved) with a witness
+    for each that does not."""
+    proof = verify(net)
+    if not proof.holds:
+        raise RunError(
+            Diagnostic("NotProved", str(witness), None, "see factory check")
+            for witness in proof.faults
+        )
+    return proof
+
+
+@collector_paused()
+def verify(net: GearNet | MarkedNet, sources: Mapping[str, Position] | None = None) -> Verdict:
+    """Prove the claim that `net` is composed of its gears, and everything that follows.
+
+    Linear in the net. `sources` gives source positions of robots by name, for the witnesses. Live,
+    safe and reversible are undecided (None) where the claim or the marking fails.
+    """
+    subject = marked(net)
+    against, train = shape_defects(net, subject, compose(subject))
+    illegal = legality_defects(net, subject)
+    defects: Iterable[Defect] = ()
+    if illegal or not train:
+        text = "undecided: it is proved of gear nets with a legal marking only"
+        defects = (Defect(name, "undecided", text) for name in ("live", "safe", "reversible"))
+    elif stuck := token_free(subject).stuck:
+        defects = dead_train_defects(subject, stuck)
+    return verdict(subject, (*against, *defects, *illegal), train, sources)
+
+
+def shape_defects(
+    net: GearNet | MarkedNet, subject: MarkedNet, composition: Composition
+) -> tuple[tuple[Defect, ...], bool]:
+    """The defects of a gear net or gear train, in its composition and in slots that change their
+    robot, and whether the net is a gear train. `subject`: the net with its tokens."""
+    moved = tuple(islice(_changed_slots(net), MOST)) if isinstance(net, GearNet) else ()
+    untrained = train_defects(subject, composition)
+    more = (defect for defect in untrained if defect.property == "gear_train")
+    return (*composition.defects, *moved, *more), not untrained and not moved
+
+
+def legality_defects(net: GearNet | MarkedNet, subject: MarkedNet) -> tuple[Defect, ...]:
+    """The defects of the initial marking; `subject`: the net with its tokens."""
+    return tuple(islice(_illegal(net, subject), MOST))
+
+
+def _changed_slots(net: GearNet) -> Iterator[Defect]:
+    """Events that move a robot into another robot's slot."""
+    slots = net.slots
+    for event, pairs in enumerate(net.threaded.redistribution):
+        for (p, i), (q, j) in pairs:
+            if i >= len(slots[p]) or j >= len(slots[q]) or slots[p][i] != slots[q][j]:
+                names = net.threaded.places
+                text = (
+                    f"{net.threaded.transitions[event].name} moves slot {i + 1} of {names[p].name}"
+                    f" to slot {j + 1} of {names[q].name}, which belongs to another robot"
+                )
+                yield Defect("gear_net", "slots", text, (), (p, q), (event,))
+
+
+def _illegal(net: GearNet | MarkedNet, subject: MarkedNet) -> Iterator[Defect]:
+    """Gears that are not marked exactly once, and reasons for which f_m is no bijection."""
+    miscounted = tuple(_miscounted(subject))
+    yield from miscounted
+    if isinstance(net, GearNet) and len(net.initial) != len(net.gears):
+        text = f"{len(net.initial)} initial places are given for {len(net.gears)} robots"
+        kind = "lost token" if len(net.initial) < len(net.gears) else "doubled token"
+        yield Defect("legal", kind, text)
+    elif subject.slots and not miscounted:
+        yield from _unthreaded(net, subject)
+
+
+def _miscounted(subject: MarkedNet) -> Iterator[Defect]:
+    """Gears that are not marked exactly once, and marked places in none."""
+    tokens, names = subject.tokens, subject.net.places
+    for number, gear in enumerate(subject.gears):
+        on = [p for p in dict.fromkeys(gear.places) if tokens[p]]
+        count = sum(tokens[p] for p in on)
+        if count == 0:
+            text = f"the gear of {gear.robot} carries no token: it never moves"
+            yield Defect("legal", "lost token", text, (number,), gear.places[:1])
+        elif count > 1:
+            where = listing(names[p].name for p in on)
+            text = f"the gear of {gear.robot} carries {count} tokens, at {where}"
+            yield Defect("legal", "doubled token", text, (number,), tuple(on))
+    for place, owners in enumerate(subject.owners):
+        if tokens[place] and not owners:
+            text = f"place {names[place].name} is marked and in no gear"
+            yield Defect("legal", "place in no gear", text, (), (place,))
+
+
+def _unthreaded(net: GearNet | MarkedNet, subject: MarkedNet) -> Iterator[Defect]:
+    """Marked places whose slots are not those of the robots that start there."""
+    if isinstance(net, GearNet):
+        initial = net.initial
+    else:
+        initial = tuple(next(p for p in g.places if net.tokens[p]) for g in net.gears)
+    starting: dict[int, list[int]] = {}
+    for robot, place in enumerate(initial):
+        starting.setdefault(place, []).append(robot)
+    for place, robots in sorted(starting.items()):
+        slots, at = subject.slots[place], subject.net.places[place]
+        if at.size != len(robots) or sorted(slots) != robots:
+            text = (
+                f"place {at.name} acts on {at.size} robots with slots for"
+                f" {named(subject, slots)}, but the robots that start there are"
+                f" {named(subject, robots)}"
+            )
+            yield Defect("legal", "slots", text, tuple(robots), (place,))

@@ -1,0 +1,326 @@
+"""A factory F = (R, ~, N) (paper, section 4.4): robots, identifications, gear net.
+
+Operations are the instances of templates; their places and transitions in the net are found by
+number: operation i has start 2i, end 2i + 1 and operation place i.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+
+from factory.support.errors import Position
+from factory.support.showing import Pictured
+from factory.theory.nets.gears import GearNet, ascending
+from factory.theory.nets.undone import Joins
+from factory.theory.plant.approaches import Approach
+from factory.theory.plant.robot import Robot
+from factory.theory.problem.pag import NOPART, PAG
+from factory.theory.problem.plan import Plan, out_of_turn
+from factory.theory.problem.template import Template
+
+
+@dataclass(frozen=True, slots=True)
+class Operation:
+    """A template instantiated: O(r_1, ..., r_k) (section 4.3).
+
+    `label` is that of the result, `dropoff` for the last. `robots` are indices into
+    `Factory.robots`, in the template's order; `before` and `after` the labels each carries when it
+    starts and ends (NOPART for none); `dwell` [s]; `approach`: how its inputs come together, None
+    where that is free; `turn`: for which unit of a period it is, from 0.
+    """
+
+    index: int
+    label: str
+    template: Template
+    robots: tuple[int, ...]
+    before: tuple[str, ...]
+    after: tuple[str, ...]
+    dwell: float = 0.0
+    position: Position | None = field(default=None, compare=False)
+    approach: Approach | None = field(default=None, repr=False)
+    turn: int = 0
+
+    @property
+    def written(self) -> str:
+        """The label without its turn: as the PAG has it, or one pile of such a label."""
+        return out_of_turn(self.label, self.turn)
+
+    @property
+    def carrier(self) -> int:
+        """The robot that holds the result (index into `Factory.robots`)."""
+        return self.robots[self.template.carrier - 1]
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The labels brought, in the order of the robots."""
+        return tuple(label for label in self.before if label != NOPART)
+
+    @property
+    def pile(self) -> str:
+        """The label that the carrier holds before, NOPART for none."""
+        return self.before[self.template.carrier - 1]
+
+    def awaits_empty(self, slot: int) -> bool:
+        """Whether the robot in a slot waits for others and carries nothing."""
+        return len(self.robots) > 1 and self.before[slot] == NOPART
+
+    @property
+    def lowered(self) -> int:
+        """The slot of the robot that lowers what it brings, -1 for none."""
+        if self.approach is None or not self.approach.lowered:
+            return -1
+        return self.before.index(self.approach.lowered)
+
+    @property
+    def last(self) -> int:
+        """The slot of the robot that brings the last input, -1 for none."""
+        inputs = self.template.inputs
+        return self.template.before.index(inputs[-1]) if inputs else -1
+
+    @property
+    def start(self) -> int:
+        """Index of the transition X_s."""
+        return 2 * self.index
+
+    @property
+    def end(self) -> int:
+        """Index of the transition X_e."""
+        return 2 * self.index + 1
+
+    @property
+    def place(self) -> int:
+        """Index of the operation place [X_s; X_e]."""
+        return self.index
+
+
+@dataclass(frozen=True)
+class Factory(Pictured):
+    """F = (R, ~, N) with the operations it is made of; the last operation is dropoff.
+
+    ~ is the union of the templates' identifications over `operations`. `parents[i]` is the
+    operation that takes the result of operation i (dropoff has none, -1). `plan`: the variant that
+    it is. `adjusted`: robots with a lift that is set for each of their tours, to where the one hand
+    holds what they bring. `period`: how many units are made in one cycle of the net, with
+    operations of their own; the last so many operations are their dropoffs, in that order.
+    """
+
+    pag: PAG
+    robots: tuple[Robot, ...]
+    operations: tuple[Operation, ...]
+    net: GearNet
+    parents: tuple[int, ...] = field(repr=False)
+    plan: Plan = field(default_factory=Plan, repr=False)
+    adjusted: frozenset[int] = frozenset()
+    period: int = 1
+
+    def __repr__(self) -> str:
+        counts = f"{len(self.robots)} robots, {len(self.operations)} operations"
+        return f"<Factory of {self.pag.title}: {counts}>"
+
+    @cached_property
+    def by_label(self) -> Mapping[str, Operation]:
+        """The operation that makes each label; dropoff under its own name."""
+        return MappingProxyType({operation.label: operation for operation in self.operations})
+
+    @cached_property
+    def carriage(self) -> float:
+        """W, the width and length that each carriage has to itself: that of the largest [m]."""
+        return max(robot.body.carriage for robot in self.robots)
+
+    @cached_property
+    def leaves(self) -> tuple[Operation, ...]:
+        """The operations that make a part out of nothing, in the order of their numbers."""
+        return tuple(operation for operation in self.making if not operation.inputs)
+
+    @property
+    def making(self) -> tuple[Operation, ...]:
+        """All operations but dropoff."""
+        return self.operations[: -self.period]
+
+    @property
+    def dropoffs(self) -> tuple[Operation, ...]:
+        """The dropoff of each unit of a period."""
+        return self.operations[-self.period :]
+
+    @property
+    def dropoff(self) -> Operation:
+        """The output robot's last operation, for the first unit of a period."""
+        return self.operations[-self.period]
+
+    def drops(self, operation: int) -> bool:
+        """Whether an operation (index) is a dropoff."""
+        return operation >= len(self.operations) - self.period
+
+    @property
+    def products(self) -> tuple[str, ...]:
+        """The label of the finished product, for each unit of a period."""
+        return tuple(dropoff.inputs[0] for dropoff in self.dropoffs)
+
+    def result(self, operation: Operation) -> str:
+        """What an operation makes; what it drops off."""
+        return operation.inputs[0] if self.drops(operation.index) else operation.label
+
+    @property
+    def sequence(self) -> tuple[str, ...]:
+        """The product of each unit of a period, as the PAG has it."""
+        return tuple(out_of_turn(label, turn) for turn, label in enumerate(self.products))
+
+    def unit(self, operation: Operation, count: int) -> int:
+        """For which unit an operation is that has been started, or ended, so often before."""
+        return count * self.period + operation.turn
+
+    def units(self, counts: Mapping[int, int]) -> int:
+        """How many products have been dropped off, by how often each transition has fired."""
+        return sum(counts.get(dropoff.end, 0) for dropoff in self.dropoffs)
+
+    @cached_property
+    def tours(self) -> tuple[tuple[tuple[int, ...], ...], ...]:
+        """For each robot the operations of its tours, in the order of its gear: a tour leads from
+        empty hands to empty hands. A robot that serves one label has one, one on a line several."""
+        by_robot = []
+        for robot in self.robots:
+            tours, tour = list[tuple[int, ...]](), list[int]()
+            for number in robot.operations:
+                operation = self.operations[number]
+                tour.append(number)
+                if operation.after[operation.robots.index(robot.index)] == NOPART:
+                    tours.append(tuple(tour))
+                    tour = []
+            by_robot.append(tuple(tours))
+        return tuple(by_robot)
+
+    @cached_property
+    def folded(self) -> bool:
+        """Whether some robot has more than one tour."""
+        return any(len(tours) > 1 for tours in self.tours)
+
+    @cached_property
+    def order(self) -> tuple[int, ...]:
+        """The operations in an order in which every robot's program ascends, unit by unit, each
+        unit's dropoff last: so units can be made one after the other. Raises ValueError where there
+        is none: then the net is not live."""
+        if not self.folded:
+            return (*reversed(range(len(self.operations) - 1)), len(self.operations) - 1)
+        turns = [operation.turn for operation in self.operations]
+        return ascending([robot.operations for robot in self.robots], turns)
+
+    @cached_property
+    def postorder(self) -> tuple[int, ...]:
+        """When each operation comes as one period is made operation by operation, what its carrier
+        holds first. It does not depend on the robots' programs."""
+        when, count = [-1] * len(self.operations), len(self.operations)
+        stack = [o.index for o in self.dropoffs]
+        while stack:  # backwards: an operation, then the last that it waits for
+            o = self.operations[stack.pop()]
+            count -= 1
+            when[o.index] = count
+            inputs = sorted(o.inputs, key=o.pile.__ne__)
+            stack += [self.by_label[label].index for label in inputs]
+        return tuple(when)
+
+    @cached_property
+    def strokes(self) -> Mapping[int, float]:
+        """How far [m] each robot (index) with a lift lowers what it delivers, robot by robot: one
+        with several tours the farthest that one of them asks for, one that is adjusted 0."""
+        strokes: dict[int, float] = dict.fromkeys(self.adjusted, 0.0)
+        for o in self.operations:
+            if o.approach is not None and o.lowered >= 0:
+                robot = o.robots[o.lowered]
+                strokes[robot] = max(strokes.get(robot, 0.0), o.approach.stroke)
+        return MappingProxyType(dict(sorted(strokes.items())))
+
+    @cached_property
+    def axes(self) -> tuple[tuple[int, ...], ...]:
+        """For each operation the axes that its mode moves: the carriages of its robots, which have
+        their robots' numbers, and the lifts that are raised or lowered in it, numbered from R on in
+        the order of `strokes`. A lift is up but for the operations that it delivers to; one that is
+        adjusted stays where it is on a tour."""
+        moved = [list(operation.robots) for operation in self.operations]
+        for robot, axis in self.lift_axis.items():
+            for tour in self.tours[robot]:
+                ends = (tour[0],) if robot in self.adjusted else (tour[0], tour[-1])
+                for number in dict.fromkeys(ends):
+                    moved[number].append(axis)
+        return tuple(map(tuple, moved))
+
+    @cached_property
+    def lift_axis(self) -> Mapping[int, int]:
+        """The axis of the lift of each robot (index) that has one."""
+        return {robot: len(self.robots) + n for n, robot in enumerate(self.strokes)}
+
+    def robot_of(self, axis: int) -> int:
+        """The robot (index) of an axis: of its carriage, or of its lift."""
+        count = len(self.robots)
+        return axis if axis < count else [*self.strokes][axis - count]
+
+    def lowers(self, robot: int) -> bool:
+        """Whether a robot (index) lowers what it delivers."""
+        return robot in self.strokes and robot not in self.adjusted
+
+    def first(self, robot: int) -> Operation:
+        """The first operation of a robot's program."""
+        return self.operations[self.robots[robot].operations[0]]
+
+    def last(self, robot: int) -> Operation:
+        """The last operation of a robot's program: what it brings is delivered there."""
+        return self.operations[self.robots[robot].operations[-1]]
+
+    def begins(self, robot: int, operation: int) -> bool:
+        """Whether a robot (index) begins a tour with an operation (index)."""
+        return any(tour[0] == operation for tour in self.tours[robot])
+
+    def delivers(self, robot: int, operation: int) -> bool:
+        """Whether a robot (index) ends a tour with an operation (index)."""
+        return any(tour[-1] == operation for tour in self.tours[robot])
+
+    def tour_of(self, robot: int, operation: int) -> tuple[int, ...]:
+        """The tour of a robot (index) that an operation (index) is in."""
+        return next(tour for tour in self.tours[robot] if operation in tour)
+
+    @cached_property
+    def turns(self) -> Mapping[tuple[int, int], int]:
+        """Which of the tours of a robot (index) an operation (index) is in, by (operation,
+        robot)."""
+        return {
+            (operation, robot): number
+            for robot, tours in enumerate(self.tours)
+            for number, tour in enumerate(tours)
+            for operation in tour
+        }
+
+    def deliveries(self, robot: int) -> tuple[str, ...]:
+        """The labels a robot (index) carries to its A end, tour by tour; none for a tool."""
+        labels = []
+        for tour in self.tours[robot]:
+            operation = self.operations[tour[-1]]
+            labels.append(operation.before[operation.robots.index(robot)])
+        return tuple(label for label in labels if label != NOPART)
+
+    def tour_with(self, robot: int, label: str) -> int:
+        """Which of its tours a robot (index) holds a part on, or what it makes of parts."""
+        if len(self.tours[robot]) == 1:
+            return 0
+        parts = {*self.contents.get(label, (label,))}
+        brought = [{*self.contents[label]} for label in self.deliveries(robot)]
+        return next(number for number, inside in enumerate(brought) if parts <= inside)
+
+    @cached_property
+    def joins(self) -> Joins:
+        """For the end of each operation its start and the ends of the operations that made its
+        inputs: the transitions that are undone as often as the end, since nothing is taken apart
+        (the material rule of `factory.theory.nets.undo`)."""
+        made = self.by_label
+        return {o.end: (o.start, *(made[x].end for x in o.inputs)) for o in self.operations}
+
+    @cached_property
+    def contents(self) -> Mapping[str, tuple[str, ...]]:
+        """For each label that is carried: the labels of its parts. Quadratic in a chain; only for
+        factories that are built in the engine."""
+        parts: dict[str, tuple[str, ...]] = {}
+        for operation in reversed(self.making):
+            joined = tuple(part for label in operation.inputs for part in parts[label])
+            parts[operation.label] = joined or (operation.label,)
+        return MappingProxyType(parts)

@@ -1,0 +1,38 @@
+"""A robot of a factory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from factory.support.errors import Position
+from factory.theory.problem.robot_bodies import RobotBody
+from factory.theory.problem.robot_types import RobotType
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """A robot identifier: name r1, r2, ..., of which type (`kind`), and its operations in the
+    gear's order. `position` is that of the operation that made it necessary (for diagnostics: the
+    user's line)."""
+
+    index: int
+    name: str
+    kind: RobotType = field(repr=False)
+    operations: tuple[int, ...]
+    position: Position | None = field(default=None, compare=False)
+
+    @property
+    def type(self) -> str:
+        """The name of its type."""
+        return self.kind.name
+
+    @property
+    def body(self) -> RobotBody:
+        """What it is made of, without its hand."""
+        return self.kind.body
+
+    @property
+    def fixed(self) -> bool:
+        """Whether it stands at the station of the robot that it delivers to; its first axis turns
+        what it holds about the vertical."""
+        return self.kind.fixed
