@@ -22,8 +22,8 @@ from factory.apps.log import Log, read_log
 from factory.apps.log.reader import digest_of
 from factory.apps.log.writer import LogWriter
 from factory.apps.monitor.record import recorded_subject, verdict_on, watch_log
-from factory.apps.monitor.watched import watched
 from factory.apps.resume.remade import forged, model_faults
+from factory.apps.runs.watched import watched
 from factory.engine.mjcf import names
 from factory.engine.record.verdict import RunVerdict
 from factory.engine.simulation.mujoco import world as mujoco_world

@@ -11,7 +11,7 @@ import pytest
 
 import factory
 from factory.apps.fidelity.hidden import HiddenPenetrations
-from factory.apps.monitor.watched import watched
+from factory.apps.runs.watched import watched
 from factory.engine.mjcf import names
 from factory.engine.mjcf.pads import Pads
 from factory.engine.simulation.request import RunRequest

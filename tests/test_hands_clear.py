@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from factory.apps.fidelity.hidden import HiddenPenetrations
-from factory.apps.monitor.watched import watched
+from factory.apps.runs.watched import watched
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout import clearance

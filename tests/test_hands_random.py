@@ -11,7 +11,7 @@ import pytest
 from factory.apps.few_robots.aim import Aim
 from factory.apps.few_robots.search import allocated
 from factory.apps.fidelity.hidden import HiddenPenetrations
-from factory.apps.monitor.watched import watched
+from factory.apps.runs.watched import watched
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.certificate import fault

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from factory.apps.fidelity.hidden import HiddenPenetrations
-from factory.apps.monitor.watched import watched
+from factory.apps.runs.watched import watched
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.run import Run
 from factory.engine.simulation.simulation import Simulation

@@ -158,14 +158,14 @@ def test_robots_that_lower_what_they_bring_are_explained() -> None:
 
 def test_it_reads_neither_the_supervisor_nor_the_world() -> None:
     imported = set()
-    paths = sorted((ROOT / "factory" / "record" / "monitor").glob("*.py"))
+    paths = sorted((ROOT / "factory" / "apps" / "monitor").glob("*.py"))
     assert len(paths) > 5
     for path in paths:
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             if isinstance(node, ast.ImportFrom):
                 imported.add(node.module or "")
-    rooms = {name.split(".")[1] for name in imported if name.startswith("factory.")}
-    assert not rooms & {"simulation", "control", "modes", "commands"}
+    rooms = {".".join(name.split(".")[1:3]) for name in imported if name.startswith("factory.")}
+    assert not rooms & {"engine.simulation", "theory.control", "floor.modes"}
 
 
 # --- planted faults -------------------------------------------------------------------------------

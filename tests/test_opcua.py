@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.apps.monitor.watched import watched
 from factory.apps.plc.driven import DrivenSupervisor
 from factory.apps.plc.signals import Sensed
+from factory.apps.runs.watched import watched
 from factory.engine.record.state import State
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.run import Run

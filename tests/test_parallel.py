@@ -16,8 +16,8 @@ from factory.apps.analyze.analysing import least_wip
 from factory.apps.analyze.timed import flow, timed_net
 from factory.apps.exports.certificate.check import check_certificate
 from factory.apps.exports.certificate.writer import certificate
-from factory.apps.monitor.watched import watched
 from factory.apps.report.drawings import about, labels_of, links
+from factory.apps.runs.watched import watched
 from factory.engine.simulation.request import RunRequest, WorldName
 from factory.engine.simulation.run import Run
 from factory.engine.simulation.simulation import Simulation

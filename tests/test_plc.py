@@ -15,9 +15,9 @@ from lark.exceptions import LarkError
 
 from factory.apps.exports.iec.cell import cell, scan_time
 from factory.apps.exports.iec.structured_text import write
-from factory.apps.monitor.watched import watched
 from factory.apps.plc.driven import DrivenSupervisor, drive
 from factory.apps.plc.signals import Commands, Sensed
+from factory.apps.runs.watched import watched
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.run import Run
 from factory.engine.simulation.simulation import Simulation

@@ -14,8 +14,8 @@ import pytest
 from benches.speed.factories import cube
 from factory.apps.few_robots.aim import Aim
 from factory.apps.few_robots.search import allocated
-from factory.apps.monitor.watched import watched
 from factory.apps.recovery import Campaign, WorldFault, recover
+from factory.apps.runs.watched import watched
 from factory.engine.record.state import Event, State
 from factory.engine.simulation.mujoco.passing import Passing
 from factory.engine.simulation.mujoco.sliders import NEVER

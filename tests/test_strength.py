@@ -17,7 +17,7 @@ from factory.apps.live import Session
 from factory.apps.live.commands import Command
 from factory.apps.log import read_log
 from factory.apps.monitor.record import verdict_on, watch_log
-from factory.apps.monitor.watched import watched
+from factory.apps.runs.watched import watched
 from factory.engine.mjcf import names
 from factory.engine.record.state import State
 from factory.engine.simulation.mujoco import strength

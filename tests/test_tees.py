@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from factory.apps.monitor.watched import watched
+from factory.apps.runs.watched import watched
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.run import Run
 from factory.engine.simulation.simulation import Simulation

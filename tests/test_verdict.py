@@ -19,7 +19,7 @@ from factory.apps.log import read_log
 from factory.apps.log.writer import LogWriter
 from factory.apps.monitor import beside
 from factory.apps.monitor.record import verdict_on, watch_log
-from factory.apps.monitor.watched import watched
+from factory.apps.runs.watched import watched
 from factory.engine.mjcf import loading, names
 from factory.engine.mjcf.model import Model
 from factory.engine.record.findings import Report, Violation

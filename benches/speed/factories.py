@@ -169,7 +169,7 @@ def judge(simulation: Simulation) -> None:
     world = simulation.physical
     supervisor, factory = simulation.supervisor, simulation.layout.factory
     entries = entries_of(supervisor.events)
-    refines = replay(factory.net, entries, simulation.start, factory.joins, []).refines
+    refines = replay(factory.net, entries, simulation.start, factory.joins).refines
     require(judged(None, refines, kept_figures(world.figures()), None))
 
 

@@ -117,9 +117,9 @@ def language() -> str:
             "The parameters of `atomic`, and of every operation with `parameters = geometry`.",
             table(("parameter", "value", "for example"), rows),
             heading(2, "Grammar of a PAG"),
-            code((PACKAGE / "lang" / "pag.lark").read_text("utf-8")),
+            code((PACKAGE / "theory" / "lang" / "pag.lark").read_text("utf-8")),
             heading(2, "Grammar of a template"),
-            code((PACKAGE / "lang" / "template.lark").read_text("utf-8")),
+            code((PACKAGE / "theory" / "lang" / "template.lark").read_text("utf-8")),
             "Both are read by [Lark](https://github.com/lark-parser/lark), in the form given here.",
         ]
     )

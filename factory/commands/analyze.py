@@ -148,7 +148,7 @@ def _run(
 ) -> tuple[RunRecord, int]:
     """A run without fused parts, and its exit status."""
     from factory.apps.analyze.measured import record_of
-    from factory.apps.monitor.watched import watched
+    from factory.apps.runs.watched import watched
     from factory.engine.simulation.executing import carry_out
     from factory.engine.simulation.simulation import Simulation
 

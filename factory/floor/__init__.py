@@ -1,1 +1,1 @@
-"""What stands on the floor: shapes, how parts come together, layouts with hands, modes and their times."""
+"""What stands on the floor: shapes, how parts come together, layouts with hands, and modes."""

@@ -72,8 +72,9 @@ class Settings:
     used only to predict; `outfeed` speed [m/s]; `stage`: 1 where robots that wait empty-handed go
     ahead to where their next operation needs them.
 
-    With AUTO a tick is TICK, whatever is chosen for a layout (`factory.engine.mjcf.timestep`): so layouts
-    and predictions need not know. Raises InputError (BadValue) with every value out of its range.
+    With AUTO a tick is TICK, whatever is chosen for a layout (`factory.engine.mjcf.timestep`): so
+    layouts and predictions need not know. Raises InputError (BadValue) with every value out of its
+    range.
     """
 
     speed: float = 0.5

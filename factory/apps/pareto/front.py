@@ -17,7 +17,7 @@ from factory.apps.few_robots.candidate import Candidate
 from factory.apps.few_robots.estimating import Estimate
 from factory.apps.importing.mesh_files import MeshStore
 from factory.apps.log.plan_file import PLAN_NAME, plan_files
-from factory.apps.monitor.watched import watched
+from factory.apps.runs.watched import watched
 from factory.engine.record.state import Observer
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.run import steady_from

@@ -166,7 +166,7 @@ def _policy(scripts: list[str], connects: str) -> str:
 
 def _asset(name: str) -> str:
     room, _, file = name.partition("/")
-    return (files(f"factory.apps.plc.{room}") / "assets" / file).read_text("utf-8")
+    return (files(f"factory.apps.{room}") / "assets" / file).read_text("utf-8")
 
 
 HEIGHT = 800

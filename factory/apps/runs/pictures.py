@@ -11,8 +11,8 @@ from typing import NamedTuple
 from factory.apps.log import Log
 from factory.apps.log.model import model_of
 from factory.apps.monitor.record import recorded_subject
-from factory.apps.monitor.watched import watched
 from factory.apps.runs.options import RunOptions
+from factory.apps.runs.watched import watched
 from factory.engine.simulation.executing import Tell, carry_out
 from factory.engine.simulation.run import Run
 from factory.engine.simulation.simulation import Simulation

@@ -8,10 +8,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from factory.apps.monitor.watched import watched
 from factory.apps.recovery.fault_file import check_names, read_campaign
 from factory.apps.recovery.faults import SWAP, Campaign
 from factory.apps.runs.options import RunOptions
+from factory.apps.runs.watched import watched
 from factory.engine.simulation.executing import Go, Opening, Tell, carry_out
 from factory.engine.simulation.run import Run
 from factory.engine.simulation.simulation import Simulation

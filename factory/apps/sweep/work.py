@@ -11,8 +11,8 @@ from functools import lru_cache
 from time import perf_counter
 from typing import Any, TypeVar
 
-from factory.apps.monitor.watched import watched
 from factory.apps.recovery import Campaign, WorldFault, recover
+from factory.apps.runs.watched import watched
 from factory.apps.sweep.grid import FAULT_RATE, SETTINGS, Point
 from factory.apps.sweep.recipe import Recipe
 from factory.engine.mjcf.timestep import timed

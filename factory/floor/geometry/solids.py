@@ -42,8 +42,8 @@ class Solid:
     and `quaternion` (4,) place it; `mass` [kg], `centre` (3,) of mass, `inertia` (3, 3) about it
     [kg m²]; `low`, `high` (3,) its bounding box; `corners` (n, 3): surface points whose
     displacements bound that of the whole; `pieces`: the vertices (n, 3) of the convex bodies that
-    represent it in collisions (`factory.floor.geometry.pieces` states how exactly): one for most; `fed`:
-    the angle about the vertical by which it is turned where it is presented [rad].
+    represent it in collisions (`factory.floor.geometry.pieces` states how exactly): one for most;
+    `fed`: the angle about the vertical by which it is turned where it is presented [rad].
     """
 
     label: str

@@ -1,8 +1,8 @@
 """Lays out a factory: the best layout found, certified, on the given floor.
 
-Guarantees what `factory.floor.layout.clearance` proves, and carries the proof: no two robots that are not
-coupled by a mode can touch, nor their payloads. All lengths are whole millimetres, so a written
-model loses nothing.
+Guarantees what `factory.floor.layout.clearance` proves, and carries the proof: no two robots that
+are not coupled by a mode can touch, nor their payloads. All lengths are whole millimetres, so a
+written model loses nothing.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Pack one robot: stations, sides and travels of all that deliver to it, for the least time.
 
-Guarantees what `factory.floor.layout.stretching` does, with contours in place of boxes. Stops are placed
-from the B end forward; of all the ways to place the ones so far the best few are kept (a beam),
-since where a station is best depends on the next.
+Guarantees what `factory.floor.layout.stretching` does, with contours in place of boxes. Stops are
+placed from the B end forward; of all the ways to place the ones so far the best few are kept (a
+beam), since where a station is best depends on the next.
 """
 
 from __future__ import annotations

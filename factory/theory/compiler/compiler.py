@@ -1,8 +1,8 @@
 """Compile and CompileNode (paper, section 5): from a PAG to a factory F = (R, ~, N).
 
 Guarantees: the net is composed of one gear per robot and is a gear net (Theorem 5.1);
-`factory.theory.nets.verify` proves it again, independently. What would break that is refused here. Linear
-in the PAG.
+`factory.theory.nets.verify` proves it again, independently. What would break that is refused here.
+Linear in the PAG.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Gears and gear nets: Definitions 3.5 and 3.6, as values. `factory.theory.nets.verify` checks them."""
+"""Gears and gear nets as values: Definitions 3.5, 3.6; `factory.theory.nets.verify` checks them."""
 
 from __future__ import annotations
 

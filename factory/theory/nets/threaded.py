@@ -1,7 +1,8 @@
 """Threaded Petri Nets and their legal markings (Definitions 3.2 to 3.4).
 
 The dynamics F_p, domain D_p and goal G_p of a place are found by its mode and label in the factory
-(`factory.theory.plant.factory`); the net itself keeps what the theory needs: sizes and redistribution.
+(`factory.theory.plant.factory`); the net itself keeps what the theory needs: sizes and
+redistribution.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ def undo(
     """n': how often each transition still has fired, where each that is `asked` for is undone as
     often as it stands there, or oftener.
 
-    `fired` is n, counted from m_0: from another marking on, `factory.theory.nets.history.firings` is to be
+    `fired` is n, counted from m_0: from another marking on, those of `history.firings` are to be
     added. Linear in what is undone, but for the order. Raises ValueError where a transition has not
     fired so often as is asked, or no transition is asked for.
     """

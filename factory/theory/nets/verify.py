@@ -6,7 +6,8 @@ Definitions 3.5 and 3.6 are checked gear by gear (`composition`), and 3.6' for a
 one token: so the net is safe. It is live where the places without token can be put in an order,
 each after those it waits for (Commoner et al. 1971, Theorem 1), and a live marked graph that
 consists of circuits is reversible (Murata 1989, Theorem 21). Theorems 3.1 and 3.2 are not used, but
-tested. `factory.apps.foreign_nets` decides the properties of nets that are not composed in this way.
+tested. `factory.apps.foreign_nets` decides the properties of nets that are not composed in this
+way.
 """
 
 from __future__ import annotations

@@ -88,9 +88,9 @@ class Mix:
 @dataclass(frozen=True)
 class PAG(Pictured):
     """A product assembly graph: one tree over its labels, in the order of the text, which
-    `factory.theory.lang.read_pag` checks; with a `mix`, a tree for each product, which share labels, and
-    `root` is the first product. `count` is the number in `N parts`, None without it; `folder` is
-    where mesh paths start; `allowed`: overlaps that are meant."""
+    `factory.theory.lang.read_pag` checks; with a `mix`, a tree for each product, which share
+    labels, and `root` is the first product. `count` is the number in `N parts`, None without it;
+    `folder` is where mesh paths start; `allowed`: overlaps that are meant."""
 
     root: str
     nodes: tuple[Assembly, ...]
