@@ -255,7 +255,7 @@ def test_junk_is_no_certificate(junk: object) -> None:
 
 
 def test_the_checker_uses_nothing_that_made_the_certificate() -> None:
-    folder = Path(factory.exporting.certificate.__file__ or "").parent
+    folder = Path(factory.apps.exports.certificate.__file__ or "").parent
     checker = {path.stem: path for path in folder.glob("*.py")}
     assert set(checker) == {"__init__", "writer", "proof_file", "check", "listing"}
     allowed = {f"factory.apps.exports.certificate.{name}" for name in ("check", "listing")}

@@ -61,7 +61,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_they_are_found_by_directory() -> None:
     found = exporters()
-    folder = Path(factory.exporting.__file__ or "").parent
+    folder = Path(factory.apps.exports.__file__ or "").parent
     texts = [p.read_text("utf-8") for p in folder.glob("*.py")]
     assert len(found) == sum(bool(re.search(r"^FORMAT\b", text, re.M)) for text in texts)
     assert list(found) == sorted(found)
