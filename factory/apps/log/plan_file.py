@@ -25,7 +25,7 @@ from factory.theory.problem.pag import PAG
 
 PLAN_NAME, LAYOUT_NAME = "plan.json", "layout.json"
 
-SCHEMA, LAYOUT_SCHEMA = "factory.plan.1", "factory.floor.layout.2"
+SCHEMA, LAYOUT_SCHEMA = "factory.plan.1", "factory.layout.2"
 
 MISFIT = "no factory has this plan: its turns, forms and templates do not fit each other"
 
