@@ -118,8 +118,8 @@ def cases() -> Iterator[Case]:
     for form in FORMATS:
         words = ("export", example("paper"), "--format", form, "-o", f"out.{form}")
         yield Case(f"export {form}", (words,))
-    drawn = ("export", example("shelf"), "--format", "gltf", "-o", "shelf.glb")
-    yield Case("plan", (drawn, ("plan", "shelf.glb", "-o", "out")))
+    drawn = ("export", example("peg"), "--format", "gltf", "-o", "peg.glb")
+    yield Case("plan", (drawn, ("plan", "peg.glb", "-o", "out")))
 
 
 def outputs(case: Case) -> dict[str, str]:
