@@ -94,7 +94,8 @@ class DrivenSupervisor:
         world.settle()
 
     def coast(self, ticks: int = 1) -> None:
-        """Advance by a tick without scans."""
+        """Advance by a tick without scans, after a part was dropped: the plant has stopped."""
+        self._trip()
         self.interlock.world.advance(self._steps)
         self.interlock.world.settle()
 
