@@ -40,12 +40,12 @@ WIDENED = 3
 """So often the layout is made anew to have room for relays on guidepaths that got longer."""
 
 
-@collector_paused()
 def relay(layout: Layout, ground: Ground, settings: Settings, hands: Hands) -> Layout:
     """The variant of a layout with relays that a ground asks for. Raises RunError (Layout)."""
     return relayed(layout, settings, ground.cycle, ground.floor, hands)
 
 
+@collector_paused()
 def relayed(
     plain: Layout,
     settings: Settings,

@@ -142,10 +142,10 @@ def _unsaid(log: Log, made: Simulation) -> list[Diagnostic]:
         for code, words in said
         if code in OF_MODEL and (code, words) not in right
     ]
-    if kept.get(RESERVATIONS, []) != doubts:
-        unlike.append(
-            f"the log does not say what its run leaves open: {'; '.join(doubts) or 'nothing'}"
-        )
+    if (left := kept.get(RESERVATIONS, [])) != doubts:
+        never = "does not say what its run leaves open"
+        falsely = "says that its run leaves open what it does not"
+        unlike.append(f"the log {never if doubts else falsely}: {'; '.join(doubts or left)}")
     return [*(Diagnostic("Record", words) for words in unlike), *faults]
 
 

@@ -89,7 +89,8 @@ class World(Protocol):
 
     A supervisor calls `step`; robots with programs of their own are driven by `move`, `advance` and
     `settle`. `supplied`: an operation may have become prepared; reset by the reader. `instant`:
-    whether robots have any speed at once, so that none is governed (ẋ = F_p(x)).
+    whether robots have any speed at once, so that none is governed (ẋ = F_p(x)). `dropoffs`: time
+    at which each product left the factory [s].
     """
 
     supplied: bool

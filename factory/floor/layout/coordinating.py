@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import groupby
 
 from factory.floor.layout.certificate import Precedence
@@ -40,12 +41,22 @@ class Served:
 @dataclass(frozen=True)
 class Coordinated(CoordinatedNet):
     """The coordinated net of a layout. `served`: by the operation (index) that takes a part;
-    `away`: by dropoff (index), the place in which the tray is away; `rising`: by the operation
-    (index) that waits for it, those after whose parts a slider is to be up."""
+    `away`: by dropoff (index), the place in which the tray is away."""
 
     served: Mapping[int, Served] = field(default_factory=dict, repr=False)
     away: Mapping[int, int] = field(default_factory=dict, repr=False)
-    rising: Mapping[int, tuple[int, ...]] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def rising(self) -> Mapping[int, tuple[int, ...]]:
+        """By the start of an operation that waits for sliders to be up, the operations (index)
+        after whose parts they go up."""
+        net, waits = self.net, dict[int, tuple[int, ...]]()
+        above = {net.right[one.up]: one.before for one in self.served.values()}
+        tops = {one.top for one in self.served.values()}
+        for place, (before, after) in enumerate(zip(net.left, net.right, strict=True)):
+            if before in above and place not in tops:
+                waits[after] = (*waits.get(after, ()), above[before])
+        return waits
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,29 +99,7 @@ def with_machines(
         away[dropoff.index] = build.place(name, ends, int(then.turn == 0), "tray", dropoff.label)
     for order in orders:
         build.precede(order.name, (order.before, order.start), order.tokens)
-    return replace(_of(build, served, away), rising=_rising(layout, build, served, orders))
-
-
-def _rising(
-    layout: Layout,
-    build: Coordination,
-    served: Mapping[int, Served],
-    orders: Iterable[Precedence],
-) -> dict[int, tuple[int, ...]]:
-    """By the operation (index) that waits, those after whose parts a slider is to be up."""
-    operations, rising = layout.factory.operations, dict[int, tuple[int, ...]]()
-    before = {_up(operations[one.before]): one.before for one in served.values()}
-    start = {build.transitions[o.start].name: o.index for o in operations}
-    for order in orders:
-        if order.before in before and order.start in start:
-            number = start[order.start]
-            rising[number] = (*rising.get(number, ()), before[order.before])
-    return rising
-
-
-def _up(before: Operation) -> str:
-    """The name of the transition by which a slider is up after the part of an operation."""
-    return f"up:{before.label}"
+    return _of(build, served, away)
 
 
 def without_bodies(net: GearNet) -> Coordinated:
@@ -206,7 +195,7 @@ def _served(layout: Layout, build: Coordination, feeding: _Feeding) -> Served:
     before, leaf, past = feeding.before, feeding.leaf, feeding.past
     tour = layout.factory.tour_of(leaf.carrier, before.index)
     down = build.transition(f"down:{leaf.label}")
-    above = build.transition(_up(before))
+    above = build.transition(f"up:{before.label}")
     label, clear = leaf.label, layout.factory.operations[tour[-1]].end
     up = build.place(f"magazine up:{label}", (before.end, above), 0, "magazine", label)
     top = build.place(f"magazine top:{label}", (above, down), 0, "magazine", label)

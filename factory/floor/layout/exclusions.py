@@ -54,7 +54,11 @@ ROUNDS = 8
 
 
 def coordinated(layout: Layout) -> Coordinated:
-    """The coordinated net of a layout, with everything that keeps its machines apart."""
+    """The coordinated net of a layout, with everything that keeps its machines apart; made once."""
+    return layout.kept(_coordinated)
+
+
+def _coordinated(layout: Layout) -> Coordinated:
     apart = kept(layout)
     return with_machines(layout, apart.passes, apart.orders)
 

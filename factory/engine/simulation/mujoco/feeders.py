@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -63,18 +62,14 @@ class Feeders:
         self.lacking = set[str]()
         self.due = NEVER
         self._spent = dict[int, int]()
-        operations = model.factory.operations
+        self._number = {station.label: n for n, station in enumerate(self._stations)}
+        operations, rising = model.factory.operations, coordinated(model.layout).rising
         self._rising = {
-            waits: [operations[number].label for number in numbers]
-            for waits, numbers in coordinated(model.layout).rising.items()
+            start: [self._number[operations[number].label] for number in before]
+            for start, before in rising.items()
         }
         lines = ([self._number[outlet.label] for outlet in line] for line in lines_of(model.layout))
         self._lines = {self._stations[line[0]].code: line for line in lines if line}
-
-    @cached_property
-    def _number(self) -> dict[str, int]:
-        """The number of the feeder of each label."""
-        return {station.label: n for n, station in enumerate(self._stations)}
 
     def _turn(self, line: Sequence[int], rounds: Mapping[str, int]) -> int:
         """Whose turn it is in a line after given rounds of each label: the first that is behind."""
@@ -133,14 +128,11 @@ class Feeders:
             return False
         return True
 
-    def finds_risen(self, operation: Operation) -> bool:
-        """Whether the sliders that an operation waits for are up after their parts, or already come
-        down with the next."""
-        ready = True
-        for number in (self._number[label] for label in self._rising.get(operation.index, ())):
-            if self._sliders.rises(number):
-                self.due, ready = min(self.due, float(self._sliders.ends[number])), False
-        return ready
+    def sliders_are_up(self, operation: Operation) -> bool:
+        """Whether no slider that an operation waits for is on its way up."""
+        moving = [n for n in self._rising.get(operation.start, ()) if self._sliders.rises(n)]
+        self.due = min((self.due, *(float(self._sliders.ends[number]) for number in moving)))
+        return not moving
 
     def taken(self, label: str) -> None:
         """The robot takes the presented part."""

@@ -129,18 +129,15 @@ class MujocoWorld:
     def prepared(self, operation: Operation, unit: int) -> bool:
         """Whether a feeder presents the part of that unit, if it is made; whether the outfeed is
         free, and the sliders are up under which its robots go."""
-        if not self.hooks.admit(operation, unit) or not self.is_passable(operation):
+        feeders = self.parts.feeders
+        if not self.hooks.admit(operation, unit) or not feeders.sliders_are_up(operation):
             return False
-        if self.parts.feeders.serves(operation.label) and self.word.is_made(unit):
-            return self.parts.feeders.presents(operation.label, unit)
+        if feeders.serves(operation.label) and self.word.is_made(unit):
+            return feeders.presents(operation.label, unit)
         if not self.model.factory.drops(operation.index):
             return True
         outfeed = self.motion.outfeed
         return self.parts.on_tray is None and (not outfeed.busy or outfeed.rests())
-
-    def is_passable(self, operation: Operation) -> bool:
-        """Whether the sliders are up that an operation waits for."""
-        return self.parts.feeders.finds_risen(operation)
 
     def apply(self, started: Sequence[Job], ended: Sequence[Job]) -> None:
         """Hand the parts of ended operations over: welds off and on in one tick."""
