@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from factory.apps.disturbance import Mass, disturb
 from factory.apps.plc.corridors import Corridors
 from factory.apps.plc.driven import DrivenSupervisor, drive
 from factory.apps.plc.signals import NOBODY, Commands, Sensed
@@ -245,6 +246,18 @@ def test_machines_that_touch_stop_for_good(monkeypatch: pytest.MonkeyPatch) -> N
     assert "touch: all axes stand until the plant is started anew" in stop.message
     assert supervisor.tripped
     assert np.abs(simulation.world.sense()[1]).max() < 1e-3
+
+
+def test_a_plant_in_which_a_part_is_dropped_says_that_it_stopped() -> None:
+    simulation = disturb(Simulation(with_hands("lamp"), RunRequest(units=2)), Mass(2.0))
+    plc = Plc(text("lamp"))
+    supervisor = drive(simulation, plc, plc.interval)
+    simulation.run(max_time=10.0)
+    assert simulation.world.dropped is not None
+    assert supervisor.tripped
+    stop = supervisor.refusals[-1]
+    assert stop.robot == NOBODY and stop.message.startswith("r3 drops 'shade'")
+    assert "all axes stand until the plant is started anew" in stop.message
 
 
 def test_parts_change_hands_at_rest_only() -> None:
