@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from factory.apps.deviations import Campaign, Deviation
 from factory.apps.log import Log, LogWriter, read_log
-from factory.apps.recovery import Campaign, WorldFault, recover
+from factory.apps.recovery import recover
 from factory.engine.simulation.request import RunRequest, WorldName
 from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.layout import Layout
@@ -39,10 +40,10 @@ unit = 3
 
 CAMPAIGN = Campaign(
     (
-        WorldFault("bad_part", label="part1", unit=1),
-        WorldFault("drop", label="part2", unit=2),
-        WorldFault("bad_joint", label="sub1", unit=3, metres=2e-3),
-        WorldFault("dead", robot="r2", unit=3),
+        Deviation("bad_part", label="part1", unit=1),
+        Deviation("drop", label="part2", unit=2),
+        Deviation("bad_joint", label="sub1", unit=3, metres=2e-3),
+        Deviation("dead", robot="r2", unit=3),
     ),
     clear=2.0,
     spares=1,

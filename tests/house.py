@@ -37,8 +37,8 @@ FLOORS = (
 beside it. Above them are the apps, then the commands."""
 
 APPS = (
-    ("foreign_nets", "importing", "few_robots", "relay", "platen", "revise", "log", "recovery"),
-    ("monitor", "disturbance", "planning", "analyze", "exports"),
+    ("foreign_nets", "importing", "few_robots", "relay", "platen", "revise", "log", "deviations"),
+    ("monitor", "recovery", "planning", "analyze", "exports"),
     ("runs", "resume"),
     ("sweep",),
     ("fidelity",),
@@ -69,7 +69,7 @@ VAGUE = frozenset({"found", "told", "given", "known", "own"})
 ENGINE_WRITERS = (
     "engine/simulation/mujoco",
     "engine/mjcf",
-    "apps/disturbance",
+    "apps/deviations",
     "apps/recovery",
 )
 """Where the engine's model and data are written: those of a run, and those of a replica that no run

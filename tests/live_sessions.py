@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
+from factory.apps.deviations import Campaign
 from factory.apps.live import LiveFrame, Session
-from factory.apps.recovery import Campaign
 from factory.engine.record.state import State
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation

@@ -17,7 +17,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from factory.apps.disturbance.interference import Interference
+from factory.apps.deviations.interference import Interference
 from factory.apps.log import Log, read_log
 from factory.apps.log.reader import digest_of
 from factory.apps.log.writer import LogWriter

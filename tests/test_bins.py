@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 import factory.engine.simulation.modelling as modelling
-from factory.apps.recovery import WorldFault
+from factory.apps.deviations import Deviation
 from factory.commands.monitor import say_failures
 from factory.engine.record.failures import Failures
 from factory.engine.simulation.request import RunRequest
@@ -79,7 +79,7 @@ def test_runs_without_faults_have_none() -> None:
     assert "bin/" not in plain and recovering.count('name="bin/r6"') == 1
 
 
-SLIPS = tuple(WorldFault("bad_joint", label="sub1", unit=2, metres=2e-3) for _ in range(3))
+SLIPS = tuple(Deviation("bad_joint", label="sub1", unit=2, metres=2e-3) for _ in range(3))
 """Done again twice, then the inputs are scrapped."""
 
 

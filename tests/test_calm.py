@@ -7,19 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from factory.apps.deviations import Campaign, Deviation
 from factory.apps.log import Log
 from factory.apps.log.model import model_of
 from factory.apps.monitor.calm import spells
 from factory.apps.monitor.record import recorded_subject, verdict_on, watch_log
-from factory.apps.recovery import Campaign, WorldFault
 from factory.theory.nets.undone import Undone
 from tests.failing_runs import CAMPAIGN, failing
 
 SECOND = Campaign(
     (
-        WorldFault("misplaced", label="part2", unit=2, metres=4e-3),
-        *(WorldFault("bad_joint", label="sub1", unit=3, metres=2e-3) for _ in range(3)),
-        WorldFault("down", robot="r2", unit=5),
+        Deviation("misplaced", label="part2", unit=2, metres=4e-3),
+        *(Deviation("bad_joint", label="sub1", unit=3, metres=2e-3) for _ in range(3)),
+        Deviation("down", robot="r2", unit=5),
     ),
     clear=2.0,
 )

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.apps.disturbance.interventions import Interventions
+from factory.apps.live.interventions import Interventions
 from factory.engine.simulation.mujoco import courses, motion
 from factory.engine.simulation.mujoco.courses import Course, Follower, planned
 from factory.engine.simulation.mujoco.fast import strides

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
+from factory.apps.deviations import Campaign, Deviation
 from factory.apps.log import read_log
 from factory.apps.monitor import beside
 from factory.apps.monitor.record import watch_log, word_of
 from factory.apps.recovery import recover
-from factory.apps.recovery.faults import Campaign, WorldFault
 from factory.apps.runs.watched import watched
 from factory.engine.simulation.demand_file import demand_of, read_demand
 from factory.engine.simulation.mujoco.supply import Supply
@@ -240,10 +240,10 @@ def test_a_log_keeps_the_word_and_is_resumed(run: Terminal, tmp_path: Path) -> N
 
 
 FAULTS = (
-    WorldFault("drop", label="x", unit=2),
-    WorldFault("drop", label="base", unit=4),
-    WorldFault("bad_part", label="z", unit=3),
-    WorldFault("no_part", label="base", unit=5, seconds=2.0),
+    Deviation("drop", label="x", unit=2),
+    Deviation("drop", label="base", unit=4),
+    Deviation("bad_part", label="z", unit=3),
+    Deviation("no_part", label="base", unit=5, seconds=2.0),
 )
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.apps.disturbance.interventions import Interventions
+from factory.apps.live.interventions import Interventions
 from factory.engine.simulation.mujoco.courses import AHEAD
 from factory.engine.simulation.mujoco.fast import neighbours
 from factory.engine.simulation.mujoco.world import MujocoWorld

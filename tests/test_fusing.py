@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import factory
-from factory.apps.disturbance import Mass, disturb
+from factory.apps.deviations import Deviation, deviate
 from factory.apps.monitor import beside
 from factory.engine.mjcf.masks import robot_code
 from factory.engine.simulation.modelling import physical_model
@@ -99,7 +99,7 @@ def test_what_has_become_heavier_keeps_its_momentum() -> None:
     simulation = Simulation(layout_of("truck"), RunRequest(units=1, fuse=True))
     world, parts = simulation.physical, simulation.physical.parts
     m, d, of_label, fed = world.m, world.d, parts.holdings.body, [*parts.feeders.welds]
-    disturb(simulation, Mass(2.0, tuple(fed[:2])))
+    deviate(simulation, *(Deviation("mass", label=label, factor=2.0) for label in fed[:2]))
     whole = int(next(of_label[label][0] for label in of_label if label not in fed))
     bodies = [int(of_label[label][0]) for label in fed[:2]]
     for body in bodies:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.apps.disturbance import Friction, disturb
+from factory.apps.deviations import Deviation, deviate
 from factory.engine.mjcf.driving import GRAVITY, ROLLING
 from factory.engine.record.state import State
 from factory.engine.simulation.simulation import Simulation
@@ -60,7 +60,7 @@ def test_a_run_that_begins_under_way_begins_with_it() -> None:
 
 
 def test_what_is_rubbed_rubs_more_under_a_load() -> None:
-    simulation = disturb(ready("paper"), Friction(0.5, ("r1",)))
+    simulation = deviate(ready("paper"), Deviation("friction", robot="r1", newtons=0.5))
     followed(simulation, np.array([0.5, *[FRICTION] * (len(simulation.physical.motion.axes) - 1)]))
 
 

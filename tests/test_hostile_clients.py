@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.apps.disturbance import Mass, disturb
+from factory.apps.deviations import Deviation, deviate
 from factory.apps.plc.corridors import Corridors
 from factory.apps.plc.driven import DrivenSupervisor, drive
 from factory.apps.plc.signals import NOBODY, Commands, Sensed
@@ -249,7 +249,9 @@ def test_machines_that_touch_stop_for_good(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_a_plant_in_which_a_part_is_dropped_says_that_it_stopped() -> None:
-    simulation = disturb(Simulation(with_hands("lamp"), RunRequest(units=2)), Mass(2.0))
+    simulation = deviate(
+        Simulation(with_hands("lamp"), RunRequest(units=2)), Deviation("mass", factor=2.0)
+    )
     plc = Plc(text("lamp"))
     supervisor = drive(simulation, plc, plc.interval)
     simulation.run(max_time=10.0)

@@ -17,9 +17,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from factory.apps.disturbance.interventions import Interventions
 from factory.apps.live import Server, Session
 from factory.apps.live.commands import FAULTS, KEYS, Command, command_of
+from factory.apps.live.interventions import Interventions
 from factory.apps.live.page import page, stage_of
 from factory.apps.monitor import beside
 from factory.apps.report.drawings import floor_plan, labels_of
@@ -142,11 +142,6 @@ def test_a_run_with_interventions_refines_the_net(pushed: bool) -> None:
     assert run.products == 12 and run.trouble is None and run.refines_net
     assert pushed or watcher.report().refines_net, watcher.report().violations[:3]
     assert run.physics is not None and run.physics.product_error_max_mm < 0.1
-
-
-def test_the_ideal_world_has_nothing_to_push() -> None:
-    with pytest.raises(InputError, match="nothing to push"):
-        Interventions(Simulation(paper_layout(), RunRequest("ideal")))
 
 
 # --- a session ---------------------------------------------------------------------------------

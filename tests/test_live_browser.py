@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
+from factory.apps.deviations import Campaign, Deviation
 from factory.apps.live import Server
 from factory.apps.live.page import page
-from factory.apps.recovery import Campaign, WorldFault
 from tests.live_sessions import Running, a_session
 from tests.waiting import until
 
@@ -142,7 +142,7 @@ def assert_marked(watched: Watched, state: str, *marks: str) -> None:
 
 
 def test_what_is_out_of_order_is_marked_and_said(browser: Any) -> None:
-    drop = WorldFault("drop", robot="r6", at=5.0)
+    drop = Deviation("drop", robot="r6", at=5.0)
     watched = Watched(browser, Campaign((drop,), clear=10.0, spares=1, swap=60.0))
     watched.until("f.outages.zones.length && f.outages.closed.includes('r6')")
     watched.press("Pause")
@@ -179,11 +179,11 @@ def test_what_is_out_of_order_is_marked_and_said(browser: Any) -> None:
 def test_a_robot_is_paused_and_other_faults_are_shown(browser: Any) -> None:
     """A robot by a click; a part, what is joined, a feeder and all sensors by a list of faults."""
     faults = (
-        WorldFault("blackout", at=4.0, seconds=2.0),
-        WorldFault("no_part", label="part1", at=8.0, seconds=5.0),
-        WorldFault("bad_part", label="part1", at=20.0),
-        WorldFault("misplaced", label="part1", at=30.0),
-        WorldFault("bad_joint", label="sub1", at=40.0),
+        Deviation("blackout", at=4.0, seconds=2.0),
+        Deviation("no_part", label="part1", at=8.0, seconds=5.0),
+        Deviation("bad_part", label="part1", at=20.0),
+        Deviation("misplaced", label="part1", at=30.0),
+        Deviation("bad_joint", label="sub1", at=40.0),
     )
     campaign = Campaign(faults, clear=1.0, spares=1, swap=2.0)
     watched = Watched(browser, campaign)

@@ -15,13 +15,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.apps.disturbance.interventions import Interventions
+from factory.apps.deviations import KINDS, Campaign, Deviation, FaultInjector
 from factory.apps.live import Server
 from factory.apps.live.commands import FAULTS, KEYS, LASTS, Command, command_of
+from factory.apps.live.interventions import Interventions
 from factory.apps.live.outages import Outages, Watch
 from factory.apps.live.page import page
-from factory.apps.recovery import Campaign, Recovery, WorldFault
-from factory.apps.recovery.faults import KINDS
 from factory.engine.record.state import State
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.run import entries_of
@@ -42,7 +41,7 @@ websockets = pytest.importorskip("websockets.sync.client", reason="pip install w
 PARTS = ("part1", "part2", "part3")
 LOST = "r6 lost part2: made again"
 CAMPAIGN = Campaign(clear=1.0, spares=1, swap=2.0)
-DROPS = replace(CAMPAIGN, faults=(WorldFault("drop", robot="r6", at=5.0),))
+DROPS = replace(CAMPAIGN, faults=(Deviation("drop", robot="r6", at=5.0),))
 
 
 @pytest.fixture
@@ -87,11 +86,11 @@ def test_each_fault_by_hand_is_found(
     simulation = Simulation(layout, RunRequest(units=4, recovers=True))
     hands, told = Interventions(simulation, CAMPAIGN), set[str]()
     assert hands.recovery is not None
-    watch = Watch(hands.recovery)
+    watch, lasts = Watch(hands.recovery), "seconds" in KINDS[kind].keys
 
     def act(state: State) -> None:
         if state.time == pytest.approx(3.0):
-            hands.fail(kind, robot, label, 6.0)
+            hands.fail(kind, robot, label, **({"seconds": 6.0} if lasts else {}))
         told.update(mark for mark, _ in watch.now().messages())
 
     run = simulation.run([act])
@@ -108,8 +107,8 @@ def test_each_fault_by_hand_is_found(
 
 def test_every_command_strikes_what_it_names(monkeypatch: pytest.MonkeyPatch) -> None:
     """The robot, for as long as the page says."""
-    struck = list[WorldFault]()
-    monkeypatch.setattr(Recovery, "strike", lambda recovery, fault: struck.append(fault))
+    struck = list[Deviation]()
+    monkeypatch.setattr(FaultInjector, "strike", lambda _, fault, now: struck.append(fault))
     running = Running(campaign=CAMPAIGN)
     try:
         for name in FAULTS:
@@ -117,8 +116,10 @@ def test_every_command_strikes_what_it_names(monkeypatch: pytest.MonkeyPatch) ->
         running.until(lambda f: len(struck) == len(FAULTS))
     finally:
         running.close()
-    for fault, name in zip(struck, FAULTS, strict=True):
-        assert (fault.kind, fault.robot, fault.label, fault.seconds) == (name, "r3", "", LASTS)
+    assert struck == [
+        Deviation("down", robot="r3", at=0.0, seconds=LASTS),
+        Deviation("dead", robot="r3", at=0.0),
+    ]
 
 
 def test_how_long_it_lasts_still_is_told() -> None:
@@ -152,8 +153,8 @@ def test_what_lasts_longest_counts(order: tuple[float, float]) -> None:
         hands.fail("blackout", seconds=seconds)
         hands.fail("down", 1, seconds=seconds)
         hands.fail("no_part", label="part2", seconds=seconds)
-    striking = hands.recovery.striking
-    assert (striking.dark, striking.standing, striking.empty) == (5.0, {1: 5.0}, {"part2": 5.0})
+    now = hands.recovery.condition
+    assert (now.dark, now.standing, now.empty) == (5.0, {1: 5.0}, {"part2": 5.0})
 
 
 def test_a_run_that_is_made_to_fail_goes_on() -> None:
@@ -179,7 +180,7 @@ def test_a_run_that_is_made_to_fail_goes_on() -> None:
     assert run.products == 6 and run.trouble is None and run.refines_net
     assert hands.recovery is not None
     report = hands.recovery.report()
-    assert report.struck == {"bad_part": 1, "drop": 1, "down": 1, "dead": 1}
+    assert report.struck == {"bad_part": 1, "drop": 1, "down": 1, "dead": 1, "slow": 2}
     assert {one.test for one in report.found} == {"rejected", "lost", "jammed"}
     assert report.spares == 1 and report.missed == report.false_alarms == 0
 

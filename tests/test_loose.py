@@ -6,8 +6,8 @@ from itertools import combinations
 
 import pytest
 
+from factory.apps.deviations import Campaign, Deviation
 from factory.apps.recovery import recover
-from factory.apps.recovery.faults import Campaign, WorldFault
 from factory.engine.record.state import State
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
@@ -22,7 +22,7 @@ PRESSED = -0.008
 def test_parts_of_what_was_dropped_do_not_lie_in_each_other(label: str) -> None:
     """The lamp's sub-assemblies fell into heaps whose parts lay 24 to 50 mm in each other."""
     simulation = Simulation(with_hands("lamp"), RunRequest(recovers=True))
-    recover(simulation, Campaign(faults=(WorldFault("drop", label=label, unit=1),), clear=2))
+    recover(simulation, Campaign(faults=(Deviation("drop", label=label, unit=1),), clear=2))
     world = simulation.physical
     m, d, geoms = world.m, world.d, world.parts.masks.solid
     deepest, seen = 0.0, 0

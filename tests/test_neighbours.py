@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.apps.disturbance import Push, disturb
-from factory.apps.disturbance.interventions import Interventions
+from factory.apps.deviations import Deviation, deviate
+from factory.apps.live.interventions import Interventions
 from factory.engine.mjcf.masks import NOBODY
 from factory.engine.simulation.mujoco.contacts import ContactMasks
 from factory.engine.simulation.mujoco.fast import neighbours
@@ -155,8 +155,11 @@ def test_a_small_factory_is_looked_at_as_a_whole(monkeypatch: pytest.MonkeyPatch
 # --- what is pushed, touched or off its way -------------------------------------------------------
 
 
+PUSH = Deviation("push", body="r1/carriage", force=(0.0, 1.0, 0.0), at=0.1, seconds=0.1)
+
+
 def test_everything_is_looked_at_while_something_is_pushed() -> None:
-    pushed = disturb(ready("paper"), Push("r1/carriage", (0.0, 1.0, 0.0), 0.1, 0.1))
+    pushed = deviate(ready("paper"), PUSH)
     handled = ready("paper")
     Interventions(handled).push(0, 0.5, 0.1)
     for simulation in (pushed, handled):

@@ -12,8 +12,9 @@ from typing import Any
 import pytest
 
 import factory.apps.recovery.responding as responding
-from factory.apps.recovery import Campaign, WorldFault, recover
-from factory.apps.recovery.faults import ASKEW, KINDS, SLIPPED
+from factory.apps.deviations import Campaign, Deviation
+from factory.apps.deviations.deviation import ASKEW, KINDS, SLIPPED
+from factory.apps.recovery import recover
 from factory.apps.recovery.mujoco.plant import MujocoPlant, Senses
 from factory.apps.recovery.standing import Standing
 from factory.engine.record.failures import Failures
@@ -47,7 +48,7 @@ def ready(name: str, asked: RunRequest) -> Any:
 
 
 def run_with(
-    *faults: WorldFault,
+    *faults: Deviation,
     world: Any = "mujoco",
     layout: Layout | None = None,
     units: int = UNITS,
@@ -77,23 +78,24 @@ def assert_recovered(run: Run, failures: Failures, struck: dict[str, int]) -> No
 
 # --- each kind ------------------------------------------------------------------------------------
 
-EACH: dict[str, tuple[WorldFault, str, str]] = {
-    "drop": (WorldFault("drop", label="sub2", unit=2), "lost", "scrap"),
-    "askew": (WorldFault("misplaced", label="part2", unit=1, metres=4e-3), "misplaced", "scrap"),
-    "flipped": (WorldFault("misplaced", label="part2", unit=1, degrees=180), "misplaced", "scrap"),
-    "bad_part": (WorldFault("bad_part", label="part1", unit=2), "rejected", "scrap"),
-    "no_part": (WorldFault("no_part", label="part3", unit=2), "", ""),
-    "bad_joint": (WorldFault("bad_joint", label="sub1", unit=2), "residual", "again"),
-    "blackout": (WorldFault("blackout", at=3.0), "", ""),
-    "down": (WorldFault("down", robot="r2", unit=2), "", ""),
-    "dead": (WorldFault("dead", robot="r3", unit=2), "jammed", "spare"),
+EACH: dict[str, tuple[Deviation, str, str]] = {
+    "drop": (Deviation("drop", label="sub2", unit=2), "lost", "scrap"),
+    "askew": (Deviation("misplaced", label="part2", unit=1, metres=4e-3), "misplaced", "scrap"),
+    "flipped": (Deviation("misplaced", label="part2", unit=1, degrees=180), "misplaced", "scrap"),
+    "bad_part": (Deviation("bad_part", label="part1", unit=2), "rejected", "scrap"),
+    "no_part": (Deviation("no_part", label="part3", unit=2), "", ""),
+    "bad_joint": (Deviation("bad_joint", label="sub1", unit=2), "residual", "again"),
+    "blackout": (Deviation("blackout", at=3.0), "", ""),
+    "down": (Deviation("down", robot="r2", unit=2), "", ""),
+    "dead": (Deviation("dead", robot="r3", unit=2), "jammed", "spare"),
 }
 """A fault, the test that finds it, and what is done; "" for faults that are waited out. A robot
 that dies on its way is to go back first."""
 
 
 def test_every_kind_is_here() -> None:
-    assert {fault.kind for fault, *_ in EACH.values()} == KINDS.keys()
+    faults = {kind.name for kind in KINDS.values() if not kind.is_disturbance}
+    assert {fault.kind for fault, *_ in EACH.values()} == faults
 
 
 @pytest.mark.parametrize("world", WORLDS)
@@ -118,14 +120,14 @@ def test_each_kind_of_fault(name: str, world: str) -> None:
 @pytest.mark.parametrize(
     ("fault", "way"),
     [
-        (WorldFault("misplaced", label="part2", unit=1), ASKEW),
-        (WorldFault("misplaced", label="part2", unit=1, degrees=180), SLIPPED),
-        (WorldFault("misplaced", label="part2", unit=1, degrees=180, metres=0.0), 0.0),
-        (WorldFault("bad_joint", label="sub1", unit=1), SLIPPED),
-        (WorldFault("bad_joint", label="sub1", unit=1, metres=2e-3), 2e-3),
+        (Deviation("misplaced", label="part2", unit=1), ASKEW),
+        (Deviation("misplaced", label="part2", unit=1, degrees=180), SLIPPED),
+        (Deviation("misplaced", label="part2", unit=1, degrees=180, metres=0.0), 0.0),
+        (Deviation("bad_joint", label="sub1", unit=1), SLIPPED),
+        (Deviation("bad_joint", label="sub1", unit=1, metres=2e-3), 2e-3),
     ],
 )
-def test_how_far_a_part_is_off(fault: WorldFault, way: float) -> None:
+def test_how_far_a_part_is_off(fault: Deviation, way: float) -> None:
     """As is asked for, or so far that a test finds it; where it is turned that is enough."""
     assert fault.way == way
 
@@ -149,9 +151,9 @@ def test_an_empty_campaign_changes_nothing(world: Any) -> None:
 def test_a_truck_with_several_faults() -> None:
     """Tools, further inputs, and three faults one after the other; parts are fused."""
     faults = (
-        WorldFault("drop", label="cab", unit=1),
-        WorldFault("bad_part", label="log2", unit=1),
-        WorldFault("bad_joint", label="axles", unit=1),
+        Deviation("drop", label="cab", unit=1),
+        Deviation("bad_part", label="log2", unit=1),
+        Deviation("bad_joint", label="axles", unit=1),
     )
     run, failures = run_with(*faults, layout=layout_of("truck"), units=1, fuse=True, jitter=0.2)
     assert_recovered(run, failures, {"drop": 1, "bad_part": 1, "bad_joint": 1})
@@ -162,7 +164,7 @@ def test_what_comes_after_a_part_that_lies_askew_hangs_straight() -> None:
     """However many lie askew at once: the next ones touch no housing."""
     layout = with_hands("truck")
     leaves = layout.factory.leaves
-    faults = tuple(WorldFault("misplaced", label=leaf.label, unit=1) for leaf in leaves)
+    faults = tuple(Deviation("misplaced", label=leaf.label, unit=1) for leaf in leaves)
     run, failures = run_with(*faults, layout=layout, units=1)
     assert_recovered(run, failures, {"misplaced": len(leaves)})
 
@@ -178,7 +180,7 @@ def test_no_robot_dies_of_what_lies_askew(name: str, label: str, off: dict[str, 
     """A seat below the hand that waits for it as a run begins, and a board wider than its housing
     once it is turned: both go back, and what they touched is counted. What is only shifted touches
     no robot."""
-    fault = WorldFault("misplaced", label=label, unit=1, **off)
+    fault = Deviation("misplaced", label=label, unit=1, **off)
     layout = with_hands(name)
     simulation = Simulation(layout, RunRequest("mujoco", 1, recovers=True, shown=False))
     recovery = recover(simulation, replace(CAMPAIGN, faults=(fault,)))
@@ -202,14 +204,14 @@ OFFS = ({"metres": 3e-4}, {"metres": 1.5e-3}, {"degrees": 0.02, "metres": 0.0}, 
 @pytest.mark.parametrize("off", OFFS)
 def test_what_no_camera_finds_no_verdict_condemns(off: dict[str, Any]) -> None:
     """Cameras and verdict have one set of limits: 1.5 mm or 2° passed, and failed the run."""
-    run, failures = run_with(WorldFault("misplaced", label="part1", unit=1, **off), units=1)
+    run, failures = run_with(Deviation("misplaced", label="part1", unit=1, **off), units=1)
     assert run.succeeded, run.verdict.failures
     assert failures.missed == len(failures.unseen) == 1 - len(failures.found)
 
 
 def test_a_fault_that_no_sensor_finds_is_named_first(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Senses, "is_askew", lambda *_: False)
-    fault = WorldFault("misplaced", label="part1", unit=1, degrees=2.0)
+    fault = Deviation("misplaced", label="part1", unit=1, degrees=2.0)
     run, failures = run_with(fault, units=1)
     run = replace(run, failures=failures)
     first, *others = run.verdict.failures
@@ -221,10 +223,10 @@ def test_a_fault_that_no_sensor_finds_is_named_first(monkeypatch: pytest.MonkeyP
 def test_a_folded_factory(fuse: bool) -> None:
     """Robots with several labels, whose magazines show again what was lost."""
     faults = (
-        WorldFault("drop", label="part3", unit=1),
-        WorldFault("bad_part", label="part2", unit=2),
-        WorldFault("bad_joint", label="sub3", unit=2),
-        WorldFault("dead", robot="r2", at=12.0),
+        Deviation("drop", label="part3", unit=1),
+        Deviation("bad_part", label="part2", unit=2),
+        Deviation("bad_joint", label="sub3", unit=2),
+        Deviation("dead", robot="r2", at=12.0),
     )
     spare = Campaign(spares=1, swap=2.0)
     run, failures = run_with(
@@ -254,16 +256,21 @@ high = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( 0, 0.03, 0.1 ) );
 low = atomic ( box = ( 0.02, 0.02, 0.08 ), pos = ( 0, 0.03, 0.04 ) )""")
     layout = with_lines(read(file), [("high", "low")]).layout
     assert layout.factory.adjusted
-    run, failures = run_with(WorldFault("drop", label="s1", unit=1), layout=layout, units=1)
+    run, failures = run_with(Deviation("drop", label="s1", unit=1), layout=layout, units=1)
     assert_recovered(run, failures, {"drop": 1})
+
+
+OFTEN = {"metres": 3e-3, "seconds": 2.0}
+"""The parameters of kinds that have them."""
 
 
 @pytest.mark.parametrize(("world", "seed"), [("mujoco", 1), *(("ideal", n) for n in range(4))])
 def test_faults_at_rates(world: Any, seed: int) -> None:
     """All kinds at once, drawn; the same draw gives the same run."""
     faults = [
-        WorldFault(kind, rate=0.04, metres=3e-3, seconds=2.0)
+        Deviation(kind, rate=0.04, **{name: OFTEN[name] for name in OFTEN if name in kept})
         for kind in ("drop", "misplaced", "bad_part", "no_part", "bad_joint", "blackout")
+        if (kept := KINDS[kind].keys)
     ]
     asked = {"world": world, "units": 8, "jitter": 0.3, "campaign": Campaign(seed=seed, clear=3.0)}
     run, failures = run_with(*faults, **asked)
@@ -292,7 +299,7 @@ def with_failures(name: str, *failures: Failure) -> Layout:
 @pytest.mark.parametrize("world", WORLDS)
 def test_what_no_test_looks_for_is_not_seen(world: Any) -> None:
     """A joint 3 mm off, in a template without a test of its residual."""
-    fault = WorldFault("bad_joint", label="sub1", unit=2, metres=3e-3)
+    fault = Deviation("bad_joint", label="sub1", unit=2, metres=3e-3)
     test = layout_of("paper").factory.by_label["sub1"].template.failures[0].test
     assert test == "residual"
     run, failures = run_with(fault, world=world, layout=with_failures("mate"))
@@ -310,7 +317,7 @@ def test_again_twice_then_scrap(world: Any, monkeypatch: pytest.MonkeyPatch) -> 
     most = 3 if world == "mujoco" else responding.SCRAPS
     monkeypatch.setattr(responding, "SCRAPS", most)
     run, failures = run_with(
-        WorldFault("bad_joint", label="sub1", rate=1.0),
+        Deviation("bad_joint", label="sub1", rate=1.0),
         world=world,
         campaign=Campaign(clear=0.5),
         max_time=2000,
@@ -326,7 +333,7 @@ def test_again_twice_then_scrap(world: Any, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_a_feeder_that_gives_bad_parts_only() -> None:
-    run, failures = run_with(WorldFault("bad_part", label="part3", rate=1.0), max_time=2000)
+    run, failures = run_with(Deviation("bad_part", label="part3", rate=1.0), max_time=2000)
     assert run.trouble is not None
     assert run.trouble.message == "'part3' was scrapped 20 times on end"
     assert failures.scrapped == 20 and failures.missed == 0
@@ -334,7 +341,7 @@ def test_a_feeder_that_gives_bad_parts_only() -> None:
 
 def test_scraps_that_are_not_on_end_do_not_stop_a_run() -> None:
     """Each in a unit of its own."""
-    bad = (WorldFault("bad_part", label="part3", unit=unit) for unit in range(1, 26))
+    bad = (Deviation("bad_part", label="part3", unit=unit) for unit in range(1, 26))
     run, failures = run_with(*bad, world="ideal", units=25)
     assert_recovered(run, failures, {"bad_part": 25})
 
@@ -342,7 +349,7 @@ def test_scraps_that_are_not_on_end_do_not_stop_a_run() -> None:
 @pytest.mark.parametrize("world", WORLDS)
 def test_a_dead_robot_without_a_spare(world: Any) -> None:
     """What can be finished without it is, and then the run says which it was."""
-    dead = WorldFault("dead", robot="r6", unit=3)
+    dead = Deviation("dead", robot="r6", unit=3)
     assert layout_of("paper").factory.robots[5].name == "r6"
     run, failures = run_with(dead, world=world, units=6)
     assert run.trouble is not None and run.trouble.code == "Failed"
@@ -353,7 +360,7 @@ def test_a_dead_robot_without_a_spare(world: Any) -> None:
 
 def test_a_tool_that_is_never_asked_to_move_is_not_missed() -> None:
     """It stays at its station from its first operation on."""
-    run, failures = run_with(WorldFault("dead", robot="r4", unit=3))
+    run, failures = run_with(Deviation("dead", robot="r4", unit=3))
     robot = layout_of("paper").factory.robots[3]
     assert robot.type == "tool"
     assert_recovered(run, failures, {"dead": 1})
@@ -371,7 +378,7 @@ def test_robots_with_programs_of_their_own_do_not_recover() -> None:
 def test_one_transition_too_few_undone_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a record of a run with a failure, whichever it is; and no run comes to its end in which
     the net itself goes back too little."""
-    fault = WorldFault("drop", label="sub2", unit=2)
+    fault = Deviation("drop", label="sub2", unit=2)
     events = run_with(fault, world="ideal")[0].events
     made = layout_of("paper").factory
     at, undone = next((n, e) for n, e in enumerate(events) if isinstance(e, Undone))
@@ -447,9 +454,31 @@ WRONG: dict[str, tuple[str, str, str]] = {
     "no label": ("[[fault]]\nkind = 'drop'\nunit = 1", "BadFault", "'drop' needs a 'label'"),
     "no robot": ("[[fault]]\nkind = 'dead'\nat = 1", "BadFault", "'dead' needs a 'robot'"),
     "a robot for nothing": (
-        "[[fault]]\nkind = 'bad_part'\nrobot = 'r1'\nunit = 1",
+        "[[fault]]\nkind = 'bad_part'\nlabel = 'part1'\nrobot = 'r1'\nunit = 1",
         "BadFault",
         "'bad_part' concerns no 'robot'",
+    ),
+    "a number for nothing": ("UNIT\nmetres = 1e-3", "BadFault", "'drop' takes no 'metres'"),
+    "no size": ("[[fault]]\nkind = 'mass'", "BadFault", "'mass' needs a 'factor'"),
+    "no direction": (
+        "[[fault]]\nkind = 'push'\nbody = 'r1/carriage'\nforce = [1.0, 0.0]",
+        "BadValue",
+        "force must be a list of three numbers",
+    ),
+    "a factor of 0": (
+        "[[fault]]\nkind = 'gain'\nfactor = 0.0",
+        "BadFault",
+        "'factor' is 0.0: a positive number is needed",
+    ),
+    "a time for what always holds": (
+        "[[fault]]\nkind = 'mass'\nfactor = 2.0\nat = 1.0",
+        "BadFault",
+        "'mass' takes no 'at'",
+    ),
+    "bodies that are not there": (
+        "[[fault]]\nkind = 'noise'\nmetres = 1e-4",
+        "BadFault",
+        "the ideal world has none",
     ),
     "no such label": ("UNIT\nlabel = 'sub9'", "BadFault", "'drop' names 'sub9'"),
     "no such robot": (
@@ -493,7 +522,7 @@ def test_all_that_is_wrong_is_said_at_once_and_where(run: Terminal, tmp_path: Pa
     (tmp_path / "f.toml").write_text("sed = 1\n[[fault]]\nkind = 'dorp'\nunit = 1\n")
     done = run("run", PAPER, "--faults", tmp_path / "f.toml", "--json")
     assert done.codes == ["UnknownParameter", "BadFault"]
-    assert [error["line"] for error in done.json["errors"]] == [1, 2]
+    assert [error["line"] for error in done.json["errors"]] == [1, 3]
     assert "drop" in done.json["errors"][1]["hint"]
 
 

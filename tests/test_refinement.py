@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 from benches.speed.factories import cube
+from factory.apps.deviations import Campaign, Deviation
 from factory.apps.few_robots.aim import Aim
 from factory.apps.few_robots.search import allocated
-from factory.apps.recovery import Campaign, WorldFault, recover
+from factory.apps.recovery import recover
 from factory.apps.runs.watched import watched
 from factory.engine.record.state import Event, State
 from factory.engine.simulation.mujoco.passing import Passing
@@ -201,7 +202,7 @@ def relayed(folder: Path) -> Layout:
 
 def starved(run: Simulation) -> None:
     """A feeder is empty for some time before the last unit."""
-    recover(run, Campaign((WorldFault("no_part", label="part3", unit=3, seconds=2.0),)))
+    recover(run, Campaign((Deviation("no_part", label="part3", unit=3, seconds=2.0),)))
 
 
 Variant = tuple[Callable[[Path], Layout], Change, dict[str, object]]

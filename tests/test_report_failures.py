@@ -10,11 +10,12 @@ from pathlib import Path
 
 import pytest
 
+from factory.apps.deviations import Campaign
 from factory.apps.exports import Subject, exporters
 from factory.apps.exports.csv import rows
 from factory.apps.log import LogWriter
 from factory.apps.log.failed import failures_of
-from factory.apps.recovery import Campaign, recover
+from factory.apps.recovery import recover
 from factory.apps.report import page, recording_of
 from factory.apps.report.failures import failures_data, failures_section
 from factory.apps.report.pace import measured

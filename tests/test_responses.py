@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from factory.apps.recovery import Campaign, Recovery, WorldFault, recover
+from factory.apps.deviations import Campaign, Deviation
+from factory.apps.recovery import Recovery, recover
 from factory.apps.recovery.recovery import summed
 from factory.engine.record.failures import Failing
 from factory.engine.record.state import State
@@ -49,7 +50,7 @@ def laid_out(folder: Path, template: str, failure: str) -> Layout:
 def stopped(
     layout: Layout,
     world: WorldName,
-    *faults: WorldFault,
+    *faults: Deviation,
     spares: int = 0,
     late: int = 8,
     label: str = "sub1",
@@ -71,7 +72,7 @@ def stopped(
     return simulation.run([strike], 200.0), recovery
 
 
-STANDS = WorldFault("down", robot="r5", at=0.0, seconds=12.0)
+STANDS = Deviation("down", robot="r5", at=0.0, seconds=12.0)
 """For longer than a robot that is not dead may be late."""
 
 
@@ -133,7 +134,7 @@ def test_a_robot_that_does_not_go_back_is_dead(
 ) -> None:
     """One that had not begun to move is taken for dead at once: going back would tell nothing."""
     layout = laid_out(tmp_path, "mate", "jammed : again 2 then scrap, lost : scrap")
-    dead = WorldFault("dead", robot="r5", at=0.0)
+    dead = Deviation("dead", robot="r5", at=0.0)
     run, recovery = stopped(layout, world, dead, spares=1, late=late)
     assert (run.products, run.trouble, run.refines_net) == (4, None, True)
     assert [(one.test, one.robot) for one in recovery.found] == [("jammed", r) for r in found]
@@ -144,7 +145,7 @@ def test_a_robot_that_does_not_go_back_is_dead(
 @pytest.mark.parametrize("responses", ["stop", "again 1"])
 def test_the_run_stops_where_the_template_says_so(tmp_path: Path, responses: str) -> None:
     layout = laid_out(tmp_path, "mate", f"jammed : {responses}, lost : scrap")
-    long = WorldFault("down", robot="r5", at=0.0, seconds=500.0 if responses == "stop" else 12.0)
+    long = Deviation("down", robot="r5", at=0.0, seconds=500.0 if responses == "stop" else 12.0)
     run, recovery = stopped(layout, "ideal", long)
     if responses == "stop":
         assert [str(one) for one in recovery.found] == ["sub1 is jammed: the run ends"]
@@ -170,7 +171,7 @@ def test_what_lies_askew_stops_the_run_where_the_template_says_so(
 ) -> None:
     """Failures on end count, and what is good ends them."""
     layout = laid_out(tmp_path, "atomic", f"misplaced > 2e-3 : {responses}, lost : scrap")
-    faults = tuple(WorldFault("misplaced", label="part1", unit=unit) for unit in units)
+    faults = tuple(Deviation("misplaced", label="part1", unit=unit) for unit in units)
     simulation = Simulation(layout, RunRequest(world, 4, recovers=True))
     recovery = recover(simulation, Campaign(faults, clear=1.0))
     run = simulation.run(max_time=200.0)
@@ -215,7 +216,7 @@ def test_a_robot_that_dies_where_it_went_ahead(steps: Layout) -> None:
     def strike(_: State) -> None:
         world = simulation.physical
         if not recovery.found and world.parts.holdings.hand(2) and world.sense()[0][4] < 0.01:
-            recovery.strike(WorldFault("dead", robot="r3", at=0.0))
+            recovery.strike(Deviation("dead", robot="r3", at=0.0))
 
     run = simulation.run([strike], max_time=60.0)
     assert (run.products, run.trouble, run.refines_net) == (6, None, True)

@@ -12,9 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from factory.apps.deviations import Campaign, Deviation, Sensors
+from factory.apps.deviations.campaign import campaign_of
+from factory.apps.deviations.deviation import KINDS
 from factory.apps.log import LogWriter
-from factory.apps.recovery import Campaign, Recovery, Sensors, WorldFault, recover
-from factory.apps.recovery.faults import KINDS, OF_ROBOT, campaign_of
+from factory.apps.recovery import Recovery, recover
 from factory.engine.simulation.request import RunRequest, WorldName
 from factory.engine.simulation.simulation import Simulation
 from tests.command_line import PAPER, Terminal, spawn
@@ -51,8 +53,11 @@ unit = 3
 def campaign(seed: int) -> Campaign:
     """Faults of many kinds, often, and a robot that dies."""
     rates = {"bad_joint": 0.1, "drop": 0.08, "bad_part": 0.05, "misplaced": 0.05, "no_part": 0.05}
-    faults = [WorldFault(kind, rate=rate, seconds=1.0) for kind, rate in rates.items()]
-    death = WorldFault("dead", robot="r6", unit=2)
+    faults = [
+        Deviation(kind, rate=rate, seconds=1.0 if kind == "no_part" else None)
+        for kind, rate in rates.items()
+    ]
+    death = Deviation("dead", robot="r6", unit=2)
     return Campaign((*faults, death), seed, clear=1.0, spares=1, swap=2.0)
 
 
@@ -79,14 +84,14 @@ def test_a_run_with_faults_goes_on_the_same(tmp_path: Path, world: WorldName) ->
         assert other.report() == recovery.report()
 
 
-KIND = st.sampled_from([kind for kind in KINDS if kind not in OF_ROBOT])
+KIND = st.sampled_from([kind.name for kind in KINDS.values() if "rate" in kind.times])
 
 
 @given(st.lists(KIND), st.floats(0, 1), st.floats(0, 100), st.integers(0, 9))
 def test_campaigns_are_read_as_they_are_written(
     kinds: list[str], rate: float, clear: float, spares: int
 ) -> None:
-    faults = tuple(WorldFault(kind, rate=rate) for kind in kinds)
+    faults = tuple(Deviation(kind, rate=rate) for kind in kinds)
     whole = Campaign(faults, 3, clear, Sensors(noise=rate), spares)
     assert campaign_of(loads(dumps(asdict(whole)))) == whole
 

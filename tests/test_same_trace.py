@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from factory.apps.disturbance import Gain, Noise, Push, disturb
+from factory.apps.deviations import Deviation, deviate
 from factory.apps.fidelity.measuring import Measurement
 from factory.apps.log import LogWriter
 from factory.apps.monitor import beside
@@ -160,7 +160,11 @@ SETTINGS = (
     Settings(timestep=0.001, substeps=12),
     Settings(timestep=0.005, substeps=11),
 )
-DISTURBANCES = (Gain(0.5), Noise(1e-4, 0.0, 1), Push("r1/carriage", (3.0, 3.0, 0.0), 0.5, 0.2))
+DISTURBANCES = (
+    Deviation("gain", factor=0.5),
+    Deviation("noise", metres=1e-4),
+    Deviation("push", body="r1/carriage", force=(3.0, 3.0, 0.0), at=0.5, seconds=0.2),
+)
 PRODUCTS = ("paper", "truck", "chest", "lamp", "20", "shelf", "fence", "hands", "random")
 
 
@@ -177,7 +181,7 @@ class Case:
         simulation = ready(self.layout, **asked)
         if self.given.get("distributed"):
             return simulation
-        return disturb(simulation, *self.disturbed)
+        return deviate(simulation, *self.disturbed, seed=1)
 
 
 def drawn(seed: int) -> Case:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import factory
-from factory.apps.disturbance import Mass, disturb
+from factory.apps.deviations import Deviation, deviate
 from factory.apps.live import Session
 from factory.apps.live.commands import Command
 from factory.apps.log import read_log
@@ -266,7 +266,7 @@ def test_a_tip_of_a_tenth_of_its_pull(monkeypatch: pytest.MonkeyPatch, more: Any
     ("name", "robot", "label"), [("lamp", "r3", "shade"), ("stool", "r4", "legs/2")]
 )
 def test_a_payload_twice_as_heavy(name: str, robot: str, label: str) -> None:
-    dropped(watched(disturb(ready(name), Mass(2.0))), robot, label)
+    dropped(watched(deviate(ready(name), Deviation("mass", factor=2.0))), robot, label)
 
 
 @pytest.mark.parametrize(

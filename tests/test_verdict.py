@@ -13,8 +13,8 @@ import pytest
 
 import factory
 from benches.speed.factories import balanced
-from factory.apps.disturbance import Gain, Mass, Noise, disturb
-from factory.apps.disturbance.interference import Interference
+from factory.apps.deviations import Deviation, deviate
+from factory.apps.deviations.interference import Interference
 from factory.apps.log import read_log
 from factory.apps.log.writer import LogWriter
 from factory.apps.monitor import beside
@@ -86,11 +86,17 @@ def test_an_honest_run_with_relays_succeeds(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "disturbance", [Mass(1.5), Mass(0.5), Gain(1.3), Gain(0.7), Noise(5e-5)], ids=str
+    "disturbance",
+    [
+        *(Deviation("mass", factor=factor) for factor in (1.5, 0.5)),
+        *(Deviation("gain", factor=factor) for factor in (1.3, 0.7)),
+        Deviation("noise", metres=5e-5),
+    ],
+    ids=lambda deviation: f"{deviation.kind} {deviation.factor or ''}",
 )
 def test_an_honest_run_that_is_disturbed_succeeds(paper: Layout, disturbance: Any) -> None:
     simulation = Simulation(paper, RunRequest(units=2, seed=1, jitter=0.3, shown=False))
-    run = watched(disturb(simulation, disturbance))
+    run = watched(deviate(simulation, disturbance))
     assert run.succeeded, run.verdict.failures
 
 

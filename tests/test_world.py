@@ -9,8 +9,8 @@ from typing import Any, Literal, get_type_hints
 import numpy as np
 import pytest
 
-from factory.apps.disturbance import Slowed, disturb
-from factory.apps.disturbance.interventions import Interventions
+from factory.apps.deviations import Deviation, deviate
+from factory.apps.live.interventions import Interventions
 from factory.engine.simulation.ideal import IdealWorld
 from factory.engine.simulation.mujoco.world import MujocoWorld
 from factory.engine.simulation.request import RunRequest
@@ -178,8 +178,8 @@ def test_hooks_are_each_worlds_own() -> None:
 
 
 def test_interventions_are_into_bodies() -> None:
-    with pytest.raises(InputError, match="nothing to push"):
-        Interventions(run_in("ideal"))
+    with pytest.raises(InputError, match="the ideal world has none"):
+        Interventions(run_in("ideal")).slow(0, 0.5)
 
 
 def test_a_blocked_feeder_gives_nothing_until_it_is_free() -> None:
@@ -244,5 +244,7 @@ def slower(make: Callable[[Simulation], object]) -> float:
 
 def test_slowing_is_the_same_by_hand_and_as_a_disturbance() -> None:
     by_hand = slower(lambda simulation: Interventions(simulation).slow(2, 0.3))
-    assert by_hand == slower(lambda simulation: disturb(simulation, Slowed("r3", 0.3)))
+    assert by_hand == slower(
+        lambda simulation: deviate(simulation, Deviation("slow", robot="r3", factor=0.3))
+    )
     assert by_hand > slower(lambda simulation: None)

@@ -8,7 +8,7 @@ from typing import Any
 
 from benches.faults.trials import JITTER, Kept, Trial, is_good, project, tried_so_far
 from benches.tables import table
-from factory.apps.recovery import WorldFault
+from factory.apps.deviations import Deviation
 from factory.theory.plant.factory import Factory
 
 PRODUCTS = ("paper", "truck", "chest")
@@ -26,17 +26,17 @@ KINDS = {
 UNITS, SEEDS = 3, 20
 
 
-def fault(kind: str, factory: Factory, unit: int, draw: random.Random) -> WorldFault:
+def fault(kind: str, factory: Factory, unit: int, draw: random.Random) -> Deviation:
     """One of a kind, of a robot or label that is drawn."""
     if kind == "down":
-        return WorldFault(kind, robot=draw.choice(factory.robots).name, unit=unit)
+        return Deviation(kind, robot=draw.choice(factory.robots).name, unit=unit)
     known = [*factory.making]
     if kind in ("bad_part", "misplaced", "no_part"):
         known = [*factory.leaves]
     if kind == "bad_joint":
         known = [operation for operation in known if len(operation.inputs) > 1]
     label = draw.choice(known).label
-    return WorldFault(kind, label=label, unit=unit, degrees=180.0 * (kind == "misplaced"))
+    return Deviation(kind, label=label, unit=unit, degrees=180.0 * (kind == "misplaced"))
 
 
 def trial(product: str, kind: str, seed: int) -> Trial:

@@ -8,7 +8,7 @@ from typing import Any
 from benches.faults.campaigns import PRODUCTS
 from benches.faults.trials import JITTER, Kept, Trial, is_good, project, tried_so_far
 from benches.tables import table
-from factory.apps.recovery import WorldFault
+from factory.apps.deviations import Deviation
 from factory.engine.simulation.request import WorldName
 
 UNITS, SWAP = 14, 10.0
@@ -28,7 +28,7 @@ def measure(quick: bool = False, kept: Kept = None) -> Iterator[dict[str, Any]]:
     trials = [
         Trial(
             product,
-            (WorldFault("dead", robot=robot.name, at=at),),
+            (Deviation("dead", robot=robot.name, at=at),),
             UNITS,
             turn,
             f"{world} {robot.name} {at:g}",

@@ -7,14 +7,14 @@ from typing import Any
 
 from benches.faults.trials import JITTER, Kept, Trial, is_good, tried_so_far
 from benches.tables import table
-from factory.apps.recovery import WorldFault
+from factory.apps.deviations import Deviation
 from factory.engine.simulation.request import WorldName
 
 UNITS = 2000
 """Units of each run."""
 
 REDONE, LOST = 0.05, 0.01
-FAULTS = WorldFault("bad_joint", rate=REDONE), WorldFault("drop", rate=LOST)
+FAULTS = Deviation("bad_joint", rate=REDONE), Deviation("drop", rate=LOST)
 ROWS: tuple[tuple[WorldName, float], ...] = (("ideal", 0.0), ("mujoco", 0.0), ("mujoco", 10.0))
 """The world, and how long what has fallen lies until it is taken away [s]."""
 

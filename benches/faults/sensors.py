@@ -10,7 +10,7 @@ from benches.faults.production import FAULTS
 from benches.faults.trials import JITTER, Trial, all_tried
 from benches.reporting import DOCS
 from benches.tables import table
-from factory.apps.recovery import Sensors
+from factory.apps.deviations import Sensors
 
 BEFORE = {
     "campaigns": "each kind of fault",

@@ -8,7 +8,8 @@ from functools import cache
 from typing import Any
 
 from benches.fidelity.products import EXAMPLES
-from factory.apps.recovery import Campaign, Sensors, WorldFault, recover
+from factory.apps.deviations import Campaign, Deviation, Sensors
+from factory.apps.recovery import recover
 from factory.apps.sweep.pool import cores, over_processes
 from factory.engine.simulation.request import RunRequest, WorldName
 from factory.engine.simulation.simulation import Simulation
@@ -23,7 +24,7 @@ class Trial:
     """A run of a `product` of the examples, of at most `max_time` [s], and what it is `about`."""
 
     product: str
-    faults: tuple[WorldFault, ...]
+    faults: tuple[Deviation, ...]
     units: int = 3
     seed: int = 0
     about: str = ""

@@ -14,18 +14,7 @@ import numpy as np
 
 from benches.fidelity.products import SMALL, layout
 from benches.tables import table
-from factory.apps.disturbance import (
-    Delay,
-    Disturbance,
-    Dragged,
-    Friction,
-    Gain,
-    Mass,
-    Noise,
-    Push,
-    Slowed,
-    disturb,
-)
+from factory.apps.deviations import Deviation, deviate
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.run import Run
 from factory.engine.simulation.simulation import Simulation
@@ -50,8 +39,18 @@ PUSH = 0.1
 BETWEEN = 0.5
 """From one push to the next [s]."""
 
-Make = Callable[[Simulation, float, int], Sequence[Disturbance]]
-"""The disturbances of a simulation at a magnitude, by a seed."""
+Make = Callable[[Simulation, float, int], Sequence[Deviation]]
+"""The deviations of a simulation at a magnitude; the seed chooses bodies, or is a robot."""
+
+
+def factor_of(kind: str, inverse: bool = False) -> Make:
+    """Makes a deviation of a kind that has a factor: a magnitude, or the inverse of one."""
+    return lambda _, times, seed: [Deviation(kind, factor=1 / times if inverse else times)]
+
+
+def robot_by(kind: str) -> Make:
+    """Makes a deviation of a kind of one robot: its factor is the inverse of a magnitude."""
+    return lambda s, times, robot: [Deviation(kind, robot=_robots(s)[robot], factor=1 / times)]
 
 
 @dataclass(frozen=True)
@@ -83,7 +82,7 @@ def geometric(first: float, last: float, ratio: float = 2**0.25) -> tuple[float,
     return tuple(float(first * ratio**n) for n in range(count + 1))
 
 
-def pushes(bodies: Sequence[str], newtons: float, seed: int, until: float) -> list[Push]:
+def pushes(bodies: Sequence[str], newtons: float, seed: int, until: float) -> list[Deviation]:
     """A push every BETWEEN seconds on a body drawn at random, along x and y at once with random
     signs, so that it acts along any guidepath."""
     draw = np.random.default_rng(seed)
@@ -91,7 +90,8 @@ def pushes(bodies: Sequence[str], newtons: float, seed: int, until: float) -> li
     for at in np.arange(BETWEEN, until, BETWEEN):
         x, y = newtons * draw.choice([-1.0, 1.0], size=2)
         body = bodies[draw.integers(len(bodies))]
-        found.append(Push(body, (float(x), float(y), 0.0), float(at + draw.uniform(0, 0.2)), PUSH))
+        force, start = (float(x), float(y), 0.0), float(at + draw.uniform(0, 0.2))
+        found.append(Deviation("push", body=body, force=force, at=start, seconds=PUSH))
     return found
 
 
@@ -99,12 +99,12 @@ def _robots(simulation: Simulation) -> list[str]:
     return [robot.name for robot in simulation.layout.factory.robots]
 
 
-def _push_robots(simulation: Simulation, newtons: float, seed: int) -> Sequence[Disturbance]:
+def _push_robots(simulation: Simulation, newtons: float, seed: int) -> Sequence[Deviation]:
     bodies = [f"{robot}/carriage" for robot in _robots(simulation)]
     return pushes(bodies, newtons, seed, 60.0)
 
 
-def _push_parts(simulation: Simulation, newtons: float, seed: int) -> Sequence[Disturbance]:
+def _push_parts(simulation: Simulation, newtons: float, seed: int) -> Sequence[Deviation]:
     m = simulation.world.m
     bodies = [name for n in range(m.nbody) if (name := m.body(n).name).startswith("part/")]
     return pushes(bodies, newtons, seed, 60.0)
@@ -113,43 +113,36 @@ def _push_parts(simulation: Simulation, newtons: float, seed: int) -> Sequence[D
 KINDS = (
     Kind("pushes on robots", "N for 0.1 s", geometric(1, 512), _push_robots),
     Kind("pushes on parts", "N for 0.1 s", geometric(1, 512), _push_parts),
-    Kind("heavier parts", "times", geometric(1, 32)[1:], lambda s, times, seed: [Mass(times)]),
-    Kind("lighter parts", "times", geometric(1, 128)[1:], lambda s, times, seed: [Mass(1 / times)]),
-    Kind("stronger drives", "times", geometric(1, 16)[1:], lambda s, times, seed: [Gain(times)]),
-    Kind("weaker drives", "times", geometric(1, 32)[1:], lambda s, times, seed: [Gain(1 / times)]),
-    Kind("dry friction", "N", geometric(0.25, 64), lambda s, newtons, seed: [Friction(newtons)]),
+    Kind("heavier parts", "times", geometric(1, 32)[1:], factor_of("mass")),
+    Kind("lighter parts", "times", geometric(1, 128)[1:], factor_of("mass", inverse=True)),
+    Kind("stronger drives", "times", geometric(1, 16)[1:], factor_of("gain")),
+    Kind("weaker drives", "times", geometric(1, 32)[1:], factor_of("gain", inverse=True)),
+    Kind(
+        "dry friction",
+        "N",
+        geometric(0.25, 64),
+        lambda s, newtons, seed: [Deviation("friction", newtons=newtons)],
+    ),
     Kind(
         "noise of position",
         "mm",
         geometric(0.0125, 3.2),
-        lambda s, mm, seed: [Noise(mm / 1e3, 0.0, seed)],
+        lambda s, mm, seed: [Deviation("noise", metres=mm / 1e3)],
     ),
     Kind(
         "noise of speed",
         "mm/s",
         geometric(1, 256),
-        lambda s, mm, seed: [Noise(0.0, mm / 1e3, seed)],
+        lambda s, mm, seed: [Deviation("noise", speed=mm / 1e3)],
     ),
     Kind(
         "delay",
         "ms",
         tuple(2.0 * n for n in range(1, 26)),
-        lambda s, ms, seed: [Delay(ms / 1e3)],
+        lambda s, ms, seed: [Deviation("delay", seconds=ms / 1e3)],
     ),
-    Kind(
-        "a robot slowed",
-        "times",
-        geometric(2, 64, 2**0.5),
-        lambda s, times, robot: [Slowed(_robots(s)[robot], 1 / times)],
-        True,
-    ),
-    Kind(
-        "a robot held back",
-        "times",
-        geometric(2, 64, 2**0.5),
-        lambda s, times, robot: [Dragged(_robots(s)[robot], 1 / times)],
-        True,
-    ),
+    Kind("a robot slowed", "times", geometric(2, 64, 2**0.5), robot_by("slow"), True),
+    Kind("a robot held back", "times", geometric(2, 64, 2**0.5), robot_by("drag"), True),
 )
 
 REQUIRED: tuple[tuple[str, float], ...] = (
@@ -187,7 +180,7 @@ def trial(plan: Layout, make: Make | None, magnitude: float, seed: int, each: bo
     seed_of_run = 0 if each else seed
     request = RunRequest(units=UNITS, seed=seed_of_run, jitter=JITTER, settings=SETTINGS)
     simulation = Simulation(plan, request)
-    disturb(simulation, *(make(simulation, magnitude, seed) if make else ()))
+    deviate(simulation, *(make(simulation, magnitude, seed) if make else ()), seed=seed)
     run = simulation.run()
     assert run.physics is not None
     return Trial(

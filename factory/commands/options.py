@@ -279,7 +279,7 @@ RUN = options(
     RUNS,
 )
 FAULTS = options(
-    click.option("--faults", type=PATH, help="Faults to inject into the run (.toml)."),
+    click.option("--faults", type=PATH, help="What goes wrong: faults and disturbances (.toml)."),
     click.option("--spares", type=bounded("spares"), default=0, help="Number of spare robots."),
     click.option("--swap", type=SECONDS, help="Time to replace a dead robot [s]."),
 )

@@ -13,6 +13,9 @@ from factory.apps.recovery import Recovery
 from factory.film.marks import Zone, Zones
 from factory.theory.nets.verdict import listing
 
+LONG = 1e8
+"""A feeder that is empty for so long [s] is blocked by hand, which is shown elsewhere."""
+
 Message = tuple[str, str]
 """A mark of the page, `dead`, `closed`, `standing`, `dark` or `empty`, and its text."""
 
@@ -72,7 +75,7 @@ class Watch:
         """The present outages."""
         recovery, world = self._recovery, self._world
         dead, closed, lying = recovery.responding.dead, recovery.plant.closed, recovery.plant.lying
-        striking, time = recovery.striking, world.time
+        condition, time = recovery.condition, world.time
         names = [robot.name for robot in recovery.simulation.layout.factory.robots]
         kept = tuple(names[robot] for robot in sorted(closed - dead.keys()))
         held = world.m.eq_obj2id[np.flatnonzero(world.d.eq_active)]
@@ -84,8 +87,8 @@ class Watch:
             max(lying, default=time) - time,
             tuple(name for name in stood if name not in by_name and name not in kept),
             tuple(self._zones.at(world.d, held)) if lying else (),
-            max(striking.dark - time, 0.0),
-            {label: until - time for label, until in striking.empty.items()},
+            max(condition.dark - time, 0.0),
+            {label: t - time for label, t in condition.empty.items() if t - time < LONG},
         )
 
 

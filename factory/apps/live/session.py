@@ -12,10 +12,10 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.apps.disturbance.interventions import Interventions
+from factory.apps.deviations import Campaign
 from factory.apps.live.commands import LASTS, PUSH, Command
+from factory.apps.live.interventions import Interventions
 from factory.apps.live.outages import Outages, Watch
-from factory.apps.recovery import Campaign
 from factory.engine.record.failures import Failing
 from factory.engine.record.state import Observer
 from factory.engine.simulation.simulation import FALL, Simulation
@@ -247,8 +247,10 @@ class Session:
                 hands.slow(command.robot, command.factor)
             case "block":
                 (hands.block if command.blocked else hands.free)(command.part)
-            case kind:
-                hands.fail(kind, command.robot, seconds=LASTS)
+            case "down":
+                hands.fail("down", command.robot, seconds=LASTS)
+            case "dead":
+                hands.fail("dead", command.robot)
         self._clock.start(self.simulation.world.time)
 
     def _publish(self) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
 
+from factory.apps.deviations.deviation import Deviation
 from factory.apps.recovery.books import Books
-from factory.apps.recovery.faults import WorldFault
 from factory.apps.recovery.plant import Plant
 from factory.engine.simulation.ideal import IdealWorld
 from factory.engine.simulation.simulation import Simulation
@@ -20,7 +20,7 @@ class IdealPlant(Plant):
         self._simulation, self._books = simulation, books
         self._gone: set[int] = set()
         self._slipped: dict[int, float] = {}
-        self._bad: dict[str, WorldFault] = {}
+        self._bad: dict[str, Deviation] = {}
         self._shown: dict[str, int] = {}
 
     def lose(self, robot: int) -> bool:
@@ -44,7 +44,7 @@ class IdealPlant(Plant):
         self._shown = now
         return shown
 
-    def spoil(self, label: str, fault: WorldFault) -> None:
+    def spoil(self, label: str, fault: Deviation) -> None:
         self._bad[label] = fault
 
     def supplied(self) -> None:

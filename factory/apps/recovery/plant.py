@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence, Set
 
-from factory.apps.recovery.faults import WorldFault
+from factory.apps.deviations.deviation import Deviation
 from factory.theory.plant.factory import Operation
 
 
@@ -34,7 +34,7 @@ class Plant(ABC):
         """Parts (label, unit) that feeders have begun to present since the last call."""
 
     @abstractmethod
-    def spoil(self, label: str, fault: WorldFault) -> None:
+    def spoil(self, label: str, fault: Deviation) -> None:
         """Make the part that a feeder presents defective, or misplace it."""
 
     @abstractmethod

@@ -9,19 +9,19 @@ from dataclasses import replace
 
 import numpy as np
 
+from factory.apps.deviations.campaign import Campaign
+from factory.apps.deviations.deviation import KINDS, Deviation
+from factory.apps.deviations.injector import FaultInjector, Hit
 from factory.apps.recovery.books import Books
-from factory.apps.recovery.faults import Campaign, WorldFault
 from factory.apps.recovery.plant import Plant
 from factory.apps.recovery.responding import Responding
 from factory.apps.recovery.standing import patience
-from factory.apps.recovery.striking import Hit, Striking
 from factory.engine.record.failures import Failing, Failures, Stood
 from factory.engine.record.state import Event
 from factory.engine.simulation.simulation import Simulation
 from factory.engine.simulation.supervisor import Supervisor
 from factory.support.errors import Diagnostic, InputError
 from factory.support.tables import table_of
-from factory.theory.control.mode import Array
 from factory.theory.nets.undone import Undone
 from factory.theory.plant.factory import Factory, Operation
 from factory.theory.problem.template import Failure
@@ -30,14 +30,7 @@ IN_VAIN = 2.0
 """Nothing more will happen when nothing fires for so many times the longest delay of all."""
 
 
-CAUSES = {
-    "drop": "lost",
-    "knocked": "lost",
-    "misplaced": "misplaced",
-    "bad_part": "rejected",
-    "bad_joint": "residual",
-    "dead": "jammed",
-}
+CAUSES = {"knocked": "lost"} | {kind.name: kind.test for kind in KINDS.values() if kind.test}
 """The test that finds each kind of fault, of those that some test finds."""
 
 
@@ -53,7 +46,8 @@ def summed(
 ) -> Failures:
     """The failures of a run. A dead robot that was never asked to move does not count as missed. A
     robot that is stuck in its operation does not count as a false alarm: it indicates an input that
-    has slipped."""
+    has slipped. Where there are disturbances, any failure may follow from them, and none is a false
+    alarm."""
     stuck = sum(one.test == "jammed" and not one.is_death for one in failures)
     tests, wanted = Counter(one.test for one in failures), Counter[str]()
     tests["jammed"] -= stuck
@@ -63,6 +57,8 @@ def summed(
     wanted["jammed"] = min(wanted["jammed"], tests["jammed"])
     missed, alarms = wanted - tests, tests - wanted
     missed["residual"] -= min(stuck, missed["residual"])
+    if any(kind in KINDS and KINDS[kind].is_disturbance for kind in struck):
+        alarms.clear()
     return Failures(
         tuple(failures),
         {kind: count for kind, count in struck.items() if count},
@@ -90,21 +86,21 @@ def _unseen(failures: Failures, hits: Sequence[Hit]) -> Iterator[str]:
 
 
 class Recovery:
-    """The faults of a simulation, their detection and the responses; see `recover`. `pending`:
+    """The detection of failures in a simulation and the responses; see `recover`. `pending`:
     operations at their goals that have failed a test, with the name of the test."""
 
     def __init__(self, simulation: Simulation, books: Books, plant: Plant, campaign: Campaign):
         self.simulation, self.books, self.plant = simulation, books, plant
-        names = tuple(robot.name for robot in simulation.layout.factory.robots)
-        self.striking = Striking(campaign, plant, names, tuple(simulation.delays))
+        self.injector = FaultInjector(simulation, campaign, plant)
+        self.condition = self.injector.condition
         self.responding = Responding(simulation, books, plant, campaign)
+        self.condition.limit = self.responding.standing.limit
         self.pending: dict[int, str] = {}
         self._campaign = campaign
         self._seen = 0
         hooks = simulation.world.hooks
         hooks.gates.append(self._admits)
         hooks.judges.append(self._judge)
-        hooks.sensors.append(self._sensed)
         hooks.ticks.append(self._tick)
         hooks.account = self
 
@@ -127,21 +123,12 @@ class Recovery:
         return float(self.simulation.world.time)
 
     @property
-    def _is_dark(self) -> bool:
-        return self._now < self.striking.dark
-
-    @property
     def _stopped(self) -> frozenset[int]:
         """Robots that may not start an operation."""
         busy = self.responding
         return frozenset({*self.plant.closed, *busy.dead, *busy.returning.ways})
 
-    def _sensed(self, x: Array, v: Array) -> tuple[Array, Array]:
-        return (np.full_like(x, np.nan), np.full_like(v, np.nan)) if self._is_dark else (x, v)
-
     def _admits(self, operation: Operation, unit: int) -> bool:
-        if self._is_dark or operation.label in self.striking.empty:
-            return False
         return self._stopped.isdisjoint(operation.robots)
 
     def _judge(self, operation: Operation, unit: int) -> bool:
@@ -168,13 +155,12 @@ class Recovery:
         """Act after a tick of the world."""
         now = self._now
         self._take_notice(now)
-        self.striking.tick(now)
+        self.injector.tick()
         for label, unit in self.plant.fresh():
             number = self.books.supervisor.word.number(unit)
-            if fault := self.striking.shown(label, number, now):
-                self.plant.spoil(label, fault)
+            self.injector.presented(self._factory.by_label[label], number, now)
         self.plant.tick()
-        if not self._is_dark:
+        if not self.condition.is_dark:
             self._sense(now)
         self._go_on(now)
 
@@ -193,7 +179,7 @@ class Recovery:
                 continue
             if number == operation.start:
                 self.responding.standing.begun(operation, now)
-                self.striking.started(operation, supervisor.word.number(unit), now)
+                self.injector.started(operation, supervisor.word.number(unit), now)
             for label in operation.inputs if number == operation.end else ():
                 self.responding.used(label)
 
@@ -205,7 +191,7 @@ class Recovery:
             respond.refused(by_label[label], test)
         for robot in self.plant.lost():
             if self.plant.knocked(robot):
-                self.striking.count("knocked")
+                self.injector.count("knocked")
             respond.lost(robot)
         for number, test in [*self.pending.items()]:
             del self.pending[number]
@@ -218,16 +204,16 @@ class Recovery:
             if robot not in respond.dead:
                 respond.died(robot)
         for kind in (*self.plant.unseen(), *["bad_joint"] * len(untested - self.plant.slipped)):
-            self.striking.count(kind, -1)
+            self.injector.count(kind, -1)
 
     def _go_on(self, now: float) -> None:
         """Update which robots stand, return and are replaced."""
         respond = self.responding
         for robot in respond.replaced(now):
-            self.striking.standing.pop(robot, None)
+            self.condition.standing.pop(robot, None)
         respond.make_way()
         closed = self.plant.closed
-        respond.standing.let_stand({*closed, *self.striking.standing, *respond.dead})
+        respond.standing.let_stand({*closed, *self.condition.standing, *respond.dead})
         respond.returning.tick({*closed, *respond.dead}, now)
         self.books.supervisor.enabled |= not self._stopped
         self.simulation.world.hooks.busy = max(self.simulation.world.hooks.busy, self._ends(now))
@@ -237,9 +223,9 @@ class Recovery:
 
     def _ends(self, now: float) -> float:
         """Time until which a standstill is excused [s]."""
-        striking, respond = self.striking, self.responding
-        ends = [*self.plant.lying, *striking.empty.values(), striking.dark]
-        ends += [*respond.dead.values(), *striking.standing.values()]
+        condition, respond = self.condition, self.responding
+        ends = [*self.plant.lying, *condition.empty.values(), condition.dark]
+        ends += [*respond.dead.values(), *condition.standing.values()]
         ends += [now] * bool(respond.returning.ways) + [respond.standing.latest(now)]
         return max((end for end in ends if np.isfinite(end)), default=0.0)
 
@@ -248,16 +234,16 @@ class Recovery:
         """The campaign as JSON values."""
         return dict(table_of(self._campaign))
 
-    def strike(self, fault: WorldFault) -> None:
-        """Apply a fault as soon as possible, whatever time or unit it names."""
-        self.striking.strike(fault, self._now)
+    def strike(self, fault: Deviation) -> None:
+        """Apply a deviation as soon as possible, whatever time or unit it names."""
+        self.injector.strike(fault, self._now)
 
     def report(self) -> Failures:
         """Summary of faults and failures so far."""
         undone = (e for e in self.books.supervisor.events if isinstance(e, Undone))
         failures = summed(
             self.responding.found,
-            self.striking.struck,
+            self.injector.struck,
             sum(len(event.transitions) for event in undone),
             self.responding.used_spares,
             self.plant.contacts,
@@ -265,15 +251,15 @@ class Recovery:
             self.plant.binned,
             tuple(dict.fromkeys(self.plant.spilled)),
         )
-        return replace(failures, unseen=tuple(_unseen(failures, self.striking.hits)))
+        return replace(failures, unseen=tuple(_unseen(failures, self.injector.hits)))
 
 
 def recover(simulation: Simulation, campaign: Campaign = Campaign()) -> Recovery:  # noqa: B008
     """Enable recovery in a simulation, and apply the faults of a campaign to it. Call it once,
     before `run`.
 
-    Raises InputError (BadFault) if a fault names an unknown robot or label, or if the robots run
-    their own programs.
+    Raises InputError (BadFault) if a deviation names what is not there or needs bodies in the ideal
+    world, or if the robots run their own programs.
     """
     supervisor = simulation.supervisor
     if not isinstance(supervisor, Supervisor):

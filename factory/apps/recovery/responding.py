@@ -8,8 +8,8 @@ from functools import partial
 
 import numpy as np
 
+from factory.apps.deviations.campaign import Campaign
 from factory.apps.recovery.books import Books
-from factory.apps.recovery.faults import Campaign
 from factory.apps.recovery.plant import Plant
 from factory.apps.recovery.returning import Goal, Returning, WayBack, order_of
 from factory.apps.recovery.standing import Standing

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field, replace
 from io import FileIO
 from pathlib import Path
 
+from factory.apps.deviations.campaign import campaign_of
 from factory.apps.log.blocks import bad_log
 from factory.apps.log.project_table import check_names, of_its_factory, project_of
 from factory.apps.log.reader import Log, read_log
 from factory.apps.log.writer import rows_of_a_block, versions
-from factory.apps.recovery.faults import campaign_of
 from factory.apps.recovery.recovery import recover
 from factory.apps.resume.continued import Continued, last_full
 from factory.apps.resume.remade import request_of

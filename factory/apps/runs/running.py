@@ -8,8 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from factory.apps.recovery.fault_file import check_names, read_campaign
-from factory.apps.recovery.faults import SWAP, Campaign
+from factory.apps.deviations.campaign import SWAP, Campaign
+from factory.apps.deviations.campaign_file import read_campaign
 from factory.apps.runs.options import RunOptions
 from factory.apps.runs.watched import watched
 from factory.engine.simulation.executing import Go, Opening, Tell, carry_out
@@ -32,17 +32,16 @@ def check_run(project: Project, asked: RunOptions) -> None:
     that. Files are read, but for pipes, which are read once."""
     asked.check(project)
     if asked.faults is not None and not asked.faults.is_fifo():
-        read_campaign(asked.faults)
+        read_campaign(asked.faults, has_bodies=asked.world != "ideal")
 
 
 def campaign_of(asked: RunOptions, factory: Factory) -> Campaign:
-    """The faults and the spares of a run of a factory. Raises InputError."""
+    """The deviations and the spares of a run of a factory. Raises InputError."""
     swap = SWAP if asked.swap is None else asked.swap
     if asked.faults is None:
         return Campaign(seed=asked.seed, spares=asked.spares, swap=swap)
-    campaign = read_campaign(asked.faults, asked.spares, swap)
-    check_names(campaign, factory)
-    return campaign
+    has_bodies = asked.world != "ideal"
+    return read_campaign(asked.faults, asked.spares, swap, factory, has_bodies)
 
 
 def run_project(

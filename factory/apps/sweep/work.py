@@ -11,7 +11,8 @@ from functools import lru_cache
 from time import perf_counter
 from typing import Any, TypeVar
 
-from factory.apps.recovery import Campaign, WorldFault, recover
+from factory.apps.deviations import Campaign, Deviation
+from factory.apps.recovery import recover
 from factory.apps.runs.watched import watched
 from factory.apps.sweep.grid import FAULT_RATE, SETTINGS, Point
 from factory.apps.sweep.recipe import Recipe
@@ -129,7 +130,7 @@ class Runner:
         simulation = Simulation(layout, request, shared)
         if rate is None:
             return watched(simulation, max_time=self.recipe.max_time)
-        faults = tuple(WorldFault(kind, rate=rate) for kind in ("drop", "bad_joint"))
+        faults = tuple(Deviation(kind, rate=rate) for kind in ("drop", "bad_joint"))
         recovery = recover(simulation, Campaign(faults, values["seed"]))
         run = watched(simulation, max_time=self.recipe.max_time)
         return replace(run, failures=recovery.report())

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.apps.recovery.faults import WorldFault
+from factory.apps.deviations.deviation import Deviation
 from factory.apps.recovery.mujoco.fallen import Fallen
 from factory.engine.mjcf.masks import robot_code
 from factory.engine.simulation.mujoco.pressing import PRESSED
@@ -86,7 +86,7 @@ class Mishaps:
         shown, back.fresh = [*back.fresh.items()], {}
         return shown
 
-    def spoil(self, label: str, fault: WorldFault) -> None:
+    def spoil(self, label: str, fault: Deviation) -> None:
         """Make the part that a feeder presents defective, or misplace it."""
         parts, m = self._world.parts, self._world.m
         unit = parts.feeders.shown().get(label)
@@ -98,7 +98,7 @@ class Mishaps:
         if fault.kind == "bad_part":
             self.bad[body] = fault.hidden
             return
-        half, place = np.radians(fault.degrees) / 2, m.eq_data[weld, 3:10].copy()
+        half, place = np.radians(fault.number("degrees")) / 2, m.eq_data[weld, 3:10].copy()
         about_x, turn, pose = np.array([np.cos(half), np.sin(half), 0, 0]), np.zeros(4), np.zeros(4)
         mujoco.mju_mulQuat(turn, place[3:], about_x)
         slider = self._world.d.xquat[m.eq_obj1id[weld]]

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
+from math import radians
 
 import numpy as np
 
-from factory.apps.recovery.faults import SHIFTED, TURNED, Campaign, WorldFault
+from factory.apps.deviations.campaign import Campaign
+from factory.apps.deviations.deviation import Deviation
 from factory.apps.recovery.mujoco.fallen import Fallen
 from factory.apps.recovery.mujoco.mishaps import Mishaps
 from factory.apps.recovery.plant import Plant
 from factory.engine.mjcf.masks import robot_code
 from factory.engine.mjcf.weld_frames import WeldFrames
+from factory.engine.record.verdict import MOST
 from factory.engine.simulation.mujoco.holdings import Holdings
 from factory.engine.simulation.mujoco.world import MujocoWorld
 from factory.floor.layout.bins import Bin
@@ -22,6 +25,16 @@ from factory.theory.problem.pag import NOPART
 SCRAP = 1 << 20
 """Bodies that are scrap count for units from this one on."""
 
+
+SHARE = 0.5
+"""A feeder's camera finds what is off by this share of what a hand-off may be (`verdict.LIMITS`):
+the rest is left to its noise and to the robot that takes the part."""
+
+SHIFTED = SHARE * MOST["handoff_gap_max_mm"] / 1e3
+"""Largest displacement that no camera finds [m]; a template may ask for less."""
+
+TURNED = SHARE * radians(MOST["handoff_angle_max_deg"])
+"""Largest angle that no camera finds [rad]."""
 
 LOST = 5e-3
 """A part further than this from its place in the hand is lost [m]."""
@@ -130,7 +143,7 @@ class MujocoPlant(Plant):
     def fresh(self) -> Sequence[tuple[str, int]]:
         return self._mishaps.fresh()
 
-    def spoil(self, label: str, fault: WorldFault) -> None:
+    def spoil(self, label: str, fault: Deviation) -> None:
         self._mishaps.spoil(label, fault)
 
     def supplied(self) -> None:

@@ -1,4 +1,4 @@
-"""Disturbances in the engine: forces, masses, drives, friction, measurements.
+"""How disturbances act in the engine: forces, masses, drives, friction, measurements.
 
 Masses, friction and limits are written into the model at once. Pushes, measurement errors and weak
 drives act before every timestep. A drive's force is kp (reference - measured) + ...; a measurement
@@ -98,7 +98,7 @@ class Interference:
         if not self._hooked:
             self._hooked = True
             self._world.hooks.before_step.append(self._act)
-            self._world.hooks.sensors.append(lambda x, v: self._measured or (x, v))
+            self._world.hooks.sensors.insert(0, lambda x, v: self._measured or (x, v))
 
     def _act(self) -> None:
         """Act before a timestep."""
