@@ -28,8 +28,9 @@ from factory.support.explanations import explain
 from factory.support.settings import MOST
 from factory.support.tables import table_of
 from factory.theory.lang.failures import TESTS
-from tests.command_line import PAPER as EXAMPLE
-from tests.command_line import ROOT, Terminal
+from tests.command_line import Terminal
+from tests.paths import PAPER as EXAMPLE
+from tests.paths import ROOT
 from tests.simulation_values import FINE, read_by, stepping
 
 
