@@ -34,7 +34,7 @@ def change_of(
         if name not in robots:
             hint = did_you_mean(name, list(robots), "robots")
             raise usage_error(f"there is no robot '{name}'", hint)
-    copies = {robots[name]: 1 + second.count(name) for name in second}
+    copies: dict[int, int] = {robots[name]: 1 + second.count(name) for name in second}
     speed, way = _shares("faster", faster), _shares("shorter", shorter)
     words = [f"{count} × {factory.robots[r].name}" for r, count in copies.items()]
     words += [f"{name} {100 * share:g} % faster" for name, share in speed.items()]

@@ -164,10 +164,10 @@ def _gears(
     """The slowest circuit in each gear."""
     gears = []
     for robot, gear in zip(timing.factory.robots, timing.factory.net.gears, strict=True):
-        slowest = list(gear.places)
+        slowest: list[int] = list(gear.places)
         for step, number in enumerate(robot.operations):
             way = ways.get((robot.index, number), number)
-            if way != number and seconds[way] > seconds[gear.places[2 * step]] + seconds[number]:
+            if way != number and seconds[way] > seconds[gear.waiting(step)] + seconds[number]:
                 slowest[2 * step], slowest[2 * step + 1] = way, NONE
         places = tuple(p for p in slowest if p != NONE)
         gears.append(_circuit(gear.robot, places, seconds, tokens, timing.factory.period))

@@ -18,6 +18,7 @@ from factory.apps.log.project_table import factory_of
 from factory.support.errors import one_line
 from factory.theory.nets.undone import Undone
 from factory.theory.plant.factory import Factory
+from factory.theory.problem.ids import is_end
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,12 +63,12 @@ def rows(log: Log) -> Iterator[EventRow]:
 
 
 def _row(factory: Factory, time: float, number: int, unit: int, undone: str = "") -> EventRow:
-    operation = factory.operations[number // 2]
+    operation = factory.operation_of(number)
     at = operation.position
     return EventRow(
         round(time, 9),
         factory.net.threaded.transitions[number].name,
-        ("end" if number % 2 else "start") + undone,
+        ("end" if is_end(number) else "start") + undone,
         operation.label,
         operation.template.name,
         unit,

@@ -192,8 +192,8 @@ def _spans(
         for event in {*shape.left, *shape.right}:
             if not net.owners[place] or event in alone:
                 rows[event].append(down[place])
-    for event, height in _spread(alone, rows, x).items():
-        rows[event] = [height]
+    for lone, height in _spread(alone, rows, x).items():
+        rows[lone] = [height]
     return [(min(row, default=TOP) - OVERHANG, max(row, default=TOP) + OVERHANG) for row in rows]
 
 

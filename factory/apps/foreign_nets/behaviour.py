@@ -148,7 +148,7 @@ def overfill(net: MarkedNet, place: int, stuck: frozenset[int] = frozenset()) ->
         return Bound(None)
     left, tokens, preset = net.left, net.tokens, net.net.preset
     distance: dict[int, int] = {}
-    onward = {producer: place}
+    onward: dict[int, int] = {producer: place}
     levels: list[list[tuple[int, int]]] = [[(producer, place)], []]
     work = 0
     for level in range(needed):

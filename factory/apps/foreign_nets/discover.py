@@ -16,6 +16,7 @@ from factory.theory.nets.composition import MOST, no_gear_net, notation
 from factory.theory.nets.gears import Gear
 from factory.theory.nets.marked import MANY, NONE, MarkedNet
 from factory.theory.nets.verdict import Defect, listing
+from factory.theory.problem.ids import PlaceId, TransitionId
 
 
 def discover(net: MarkedNet) -> tuple[tuple[Gear, ...], tuple[Defect, ...]]:
@@ -111,7 +112,7 @@ def _no_circuit(net: MarkedNet, part: nx.DiGraph) -> Defect:
 
 def _gear(
     net: MarkedNet, circuit: list[int], shared: frozenset[int]
-) -> tuple[tuple[int, ...], tuple[int, ...]]:
+) -> tuple[tuple[PlaceId, ...], tuple[TransitionId, ...]]:
     """Places and transitions of a gear, with the shared places put back, a marked place first."""
     places = []
     for place in circuit:
@@ -119,4 +120,4 @@ def _gear(
         places += [q for q in net.net.postset[net.right[place]] if q in shared]
     first = next((i for i, p in enumerate(places) if net.tokens[p]), places.index(min(places)))
     places = places[first:] + places[:first]
-    return tuple(places), tuple(net.left[p] for p in places)
+    return tuple(map(PlaceId, places)), tuple(net.left[p] for p in places)

@@ -9,6 +9,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from factory.theory.nets.marked import MarkedNet
+from factory.theory.problem.ids import TransitionId
 
 LIMIT = 200_000
 """Greatest number of markings that are explored."""
@@ -73,7 +74,7 @@ class StateSpace:
     def _enabled(self, marking: bytes) -> list[int]:
         net, places = self.net.net, self.net.net.places
         near = {e for p, count in enumerate(marking) if count for e in places[p].right}
-        near.update(e for e, needs in enumerate(net.preset) if not needs)
+        near.update(TransitionId(e) for e, needs in enumerate(net.preset) if not needs)
         ready = (e for e in near if all(marking[p] for p in net.preset[e]))
         return sorted(e for e in ready if e not in self.net.blocked)
 

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import TypeVar
 
 from factory.support.collector import collector_paused
 from factory.support.errors import Position, did_you_mean
@@ -18,9 +19,12 @@ from factory.support.xml_tree import Element, XmlDocument
 from factory.theory.lang.source import read_text
 from factory.theory.nets.composition import compose
 from factory.theory.nets.gears import Gear, GearNet
-from factory.theory.nets.marked import MarkedNet
+from factory.theory.nets.marked import NONE, MarkedNet
 from factory.theory.nets.petri import PetriNet, Place, Transition
 from factory.theory.nets.threaded import Redistribution, ThreadedNet
+from factory.theory.problem.ids import PlaceId, RobotId, TransitionId
+
+N = TypeVar("N", bound=int)
 
 DRAWN = frozenset({"graphics"})
 """Elements that describe the drawing of a net, and are not read."""
@@ -98,9 +102,9 @@ class _Reader:
         place a slot for each robot that its size speaks of; a MarkedNet where arcs, tokens or notes
         are missing. Raises InputError where notes contradict a net that is whole.
         """
-        place_index, event_index = _numbers(places), _numbers(events)
+        place_index, event_index = _numbers(places, PlaceId), _numbers(events, TransitionId)
         gears = tuple(_gear(element, place_index, event_index) for element in elements)
-        robots = _numbers(gear.robot for gear in gears)
+        robots = _numbers((gear.robot for gear in gears), RobotId)
         for element, gear in zip(elements, gears, strict=True):
             if len(gear.robot.split()) != 1 or len(robots) < len(gears):
                 message = f"the robots of the gears need names of their own; found '{gear.robot}'"
@@ -197,11 +201,11 @@ class _Reader:
 
     def _connect(
         self, places: Iterable[str], events: Iterable[str], targets: dict[str, str]
-    ) -> tuple[dict[str, list[int]], dict[str, list[int]]]:
+    ) -> tuple[dict[str, list[TransitionId]], dict[str, list[TransitionId]]]:
         """For each place its producers and consumers, in the order of the arcs."""
-        left: dict[str, list[int]] = {name: [] for name in places}
-        right: dict[str, list[int]] = {name: [] for name in left}
-        number = {name: i for i, name in enumerate(events)}
+        left: dict[str, list[TransitionId]] = {name: [] for name in places}
+        right: dict[str, list[TransitionId]] = {name: [] for name in left}
+        number = _numbers(events, TransitionId)
         seen: set[tuple[str, str]] = set()
         for arc in self.arcs:
             ends = self._ends(arc, targets)
@@ -264,7 +268,9 @@ class _Reader:
                 return Position(notes.get("file", "?"), int(line), int(column))
         return self.document.at(element)
 
-    def _place(self, key: str, name: str, left: list[int], right: list[int]) -> Place:
+    def _place(
+        self, key: str, name: str, left: list[TransitionId], right: list[TransitionId]
+    ) -> Place:
         element = self.nodes[key]
         mode = next(_notes(element, "mode"), None)
         notes = {} if mode is None else mode.attributes
@@ -290,28 +296,30 @@ def _notes(element: Element, name: str) -> Iterator[Element]:
             yield from tool.all(name)
 
 
-def _numbers(names: Iterable[str]) -> dict[str, int]:
-    return {name: number for number, name in enumerate(names)}
+def _numbers(names: Iterable[str], kind: Callable[[int], N]) -> dict[str, N]:
+    return {name: kind(number) for number, name in enumerate(names)}
 
 
-def _gear(element: Element, places: Mapping[str, int], events: Mapping[str, int]) -> Gear:
+def _gear(
+    element: Element, places: Mapping[str, PlaceId], events: Mapping[str, TransitionId]
+) -> Gear:
     """A gear; a place that is gone is left out together with the transition before it."""
     notes = element.attributes
-    through = [places.get(name, -1) for name in notes.get("places", "").split()]
-    turns = [events.get(name, -1) for name in notes.get("transitions", "").split()]
+    through = [places.get(name, PlaceId(-1)) for name in notes.get("places", "").split()]
+    turns = [events.get(name, NONE) for name in notes.get("transitions", "").split()]
     if len(through) == len(turns):
         turns = [e for p, e in zip(through, turns, strict=True) if p >= 0]
     present = tuple(p for p in through if p >= 0)
     return Gear(notes.get("robot", ""), notes.get("type", ""), present, tuple(turns))
 
 
-def _slots(place: Element, robots: Mapping[str, int]) -> tuple[int, ...]:
+def _slots(place: Element, robots: Mapping[str, RobotId]) -> tuple[RobotId, ...]:
     """The robots that a place acts on, by number; -1 for one that has no gear."""
     named = (mode.attributes.get("slots", "") for mode in _notes(place, "mode"))
-    return tuple(robots.get(robot, -1) for robot in next(named, "").split())
+    return tuple(robots.get(robot, RobotId(-1)) for robot in next(named, "").split())
 
 
-def _initial(net: MarkedNet) -> tuple[int, ...] | None:
+def _initial(net: MarkedNet) -> tuple[PlaceId, ...] | None:
     """The marked place of each gear, None where some has none or several."""
     marked = [[p for p in gear.places if net.tokens[p]] for gear in net.gears]
     if any(len(on) != 1 for on in marked):
@@ -322,7 +330,7 @@ def _initial(net: MarkedNet) -> tuple[int, ...] | None:
     return None if stray or lost else tuple(on[0] for on in marked)
 
 
-def _redistribution(event: Element, places: Mapping[str, int]) -> Redistribution | None:
+def _redistribution(event: Element, places: Mapping[str, PlaceId]) -> Redistribution | None:
     """d_e of an event, None where it is missing or names what is not there."""
     note = next(_notes(event, "redistribution"), None)
     if note is None:

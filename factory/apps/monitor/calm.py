@@ -9,7 +9,7 @@ least possible is checked separately, from the record (`factory.theory.nets.repl
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from itertools import islice
 from typing import Any
@@ -122,7 +122,7 @@ def _troubles(log: Log, factory: Factory, m: Any) -> Iterator[Span]:
     by_robot = {robot.name: robot.index for robot in factory.robots}
     number = factory.net.threaded.net.transition_index
     for _, undone in log.undone:
-        back = {factory.operations[number[name] // 2] for name in undone.transitions}
+        back = {factory.operation_of(number[name]) for name in undone.transitions}
         robots = {robot for operation in back for robot in operation.robots}
         yield _since(log, undone.t, undone.operation), _gone_on(log, factory, robots, undone.t, end)
     failures = log.failures
@@ -150,11 +150,11 @@ def _since(log: Log, t: float, label: str) -> float:
     )
 
 
-def _gone_on(log: Log, factory: Factory, robots: set[int], t: float, end: float) -> float:
+def _gone_on(log: Log, factory: Factory, robots: Collection[int], t: float, end: float) -> float:
     """Time at which each of the robots has fired again after t [s]."""
     number, left = factory.net.threaded.net.transition_index, set(robots)
     for when, name in islice(log.events, int(np.searchsorted(log.fired_t, t, "right")), None):
-        left -= {*factory.operations[number[name] // 2].robots}
+        left -= {*factory.operation_of(number[name]).robots}
         if not left:
             return when + FELT
     return end + FELT

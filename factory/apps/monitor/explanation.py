@@ -68,7 +68,7 @@ class _Solver:
         self.net = marked(factory.net) if wip is None else with_wip(factory, wip)
         self.names = [t.name for t in factory.net.threaded.transitions]
         self.dwell = {
-            o.place: max(0.0, o.dwell - observed.slack) for o in factory.operations if o.dwell
+            int(o.place): max(0.0, o.dwell - observed.slack) for o in factory.operations if o.dwell
         }
         self.done = [counts.get(e, 0) for e in range(len(self.names))]
         self.count = self._counts()
@@ -120,7 +120,7 @@ class _Solver:
         as observed afterwards, so that one fault gives one violation."""
         violations, subject = [], self.observed.subject
         seen_when_over = {
-            o.end: o for o in subject.factory.operations if subject.moves_parts[o.index]
+            int(o.end): o for o in subject.factory.operations if subject.moves_parts[o.index]
         }
         for event, unit in self.order:
             early, cause = self.begin, -1
@@ -143,7 +143,7 @@ class _Solver:
     def _violation(
         self, event: int, unit: int, noted: _Seen, cause: int, early: float
     ) -> Violation:
-        operation = self.observed.subject.factory.operations[event // 2]
+        operation = self.observed.subject.factory.operation_of(event)
         name, other = self.names[event], self.names[cause]
         never = f"{other} must come first, and was not observed"
         why = f"could not fire before {early:.3f} s, since {other} must come first"

@@ -130,7 +130,7 @@ class _Contacts:
 
     def __init__(self, subject: MonitorSubject, anatomy: Anatomy, m: Any) -> None:
         self._replica, self._anatomy = Replica(m), anatomy
-        self._operations = {o.place: o for o in subject.factory.operations}
+        self._operations = {int(o.place): o for o in subject.factory.operations}
         self._replica.exclude_nothing()
         self._apart = {frozenset(names.excluded(m.exclude(e).name)) for e in range(m.nexclude)}
         self._trunk, self._solid = trunks(m), Pads(m).solid

@@ -38,7 +38,7 @@ class Corridors:
 
     def __init__(self, layout: Layout, net: Coordinated, modes: Sequence[Mode]) -> None:
         self._factory, self._modes = layout.factory, modes
-        ended = {place: past for past, (place, _) in net.passes.items()}
+        ended = {int(place): past for past, (place, _) in net.passes.items()}
         self._ways = dict[tuple[int, int], list[WayPart]]()
         for presence in Staying(layout, net, awaited_positions(layout)).presences():
             ends = tuple(ended[place] for place in presence.places[1:] if place in ended)

@@ -76,7 +76,7 @@ class DrivenSupervisor:
     def awaited(self) -> list[Operation]:
         """The operations all of whose robots wait for them."""
         possible = self.interlock.threads.possible
-        return [self.factory.operations[event // 2] for event in sorted(possible)]
+        return [self.factory.operation_of(event) for event in sorted(possible)]
 
     def limit(self, limits: Limits) -> None:
         """Set the limits of the axes."""

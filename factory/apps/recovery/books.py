@@ -22,24 +22,22 @@ class Books:
         """The marked places."""
         return frozenset(place for place, is_so in enumerate(self.supervisor.marked) if is_so)
 
-    def step_of(self, robot: int, marking: Marking | None = None) -> int:
-        """The position of a robot (index) in its gear: 2k before the k-th operation of its program,
-        2k + 1 in it."""
-        marked = self.marking if marking is None else marking
-        places = self.factory.net.gears[robot].places
-        return next(step for step, place in enumerate(places) if place in marked)
+    def step_of(self, robot: int, marking: Marking | None = None) -> tuple[int, bool]:
+        """Which operation of its program, counted from 0, a robot waits for or is in; whether it is
+        in it."""
+        return self.factory.net.gears[robot].step_in(self.marking if marking is None else marking)
 
     def operation_of(self, robot: int, marking: Marking | None = None) -> Operation:
         """The operation that a robot (index) takes part in or waits for."""
-        step = self.step_of(robot, marking)
-        return self.factory.operations[self.factory.robots[robot].operations[step // 2]]
+        step, _ = self.step_of(robot, marking)
+        return self.factory.operations[self.factory.robots[robot].operations[step]]
 
     def holds(
         self, robot: int, marking: Marking | None = None, fired: Sequence[int] | None = None
     ) -> str:
         """The label that a robot (index) holds, NOPART for none. `fired`: firing counts of the
         transitions, for another marking."""
-        operation, is_in_it = self.operation_of(robot, marking), self.step_of(robot, marking) % 2
+        operation, (_, is_in_it) = self.operation_of(robot, marking), self.step_of(robot, marking)
         counts = self.supervisor.fired if fired is None else fired
         unit = self.factory.unit(operation, counts[operation.start] - is_in_it)
         is_made = self.supervisor.word.is_made(unit)

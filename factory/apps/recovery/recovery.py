@@ -173,7 +173,7 @@ class Recovery:
         for transition in firings:
             later[transition] -= 1
             number = factory.net.threaded.net.transition_index[transition]
-            operation = factory.operations[number // 2]
+            operation = factory.operation_of(number)
             unit = factory.unit(operation, supervisor.fired[number] - 1 - later[transition])
             if not supervisor.word.is_made(unit):
                 continue

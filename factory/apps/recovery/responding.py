@@ -22,6 +22,7 @@ from factory.theory.nets.petri import Marking
 from factory.theory.nets.undo import marking_after, undo
 from factory.theory.nets.undone import Undone
 from factory.theory.plant.factory import Operation
+from factory.theory.problem.ids import start_of
 from factory.theory.problem.pag import NOPART
 
 SCRAPS = 20
@@ -84,10 +85,10 @@ class Responding:
     def make_way(self) -> None:
         """Send robots that block a late part at their feeders out of its way."""
         books, supervisor = self._books, self._books.supervisor
-        away = supervisor.ordering.axes(2 * number for number in supervisor.active.operations)
+        away = supervisor.ordering.axes(map(start_of, supervisor.active.operations))
         late = self._plant.in_the_way(away)
         for robot in late - self.returning.ways.keys() - self.dead.keys():
-            if books.step_of(robot) % 2 or books.operation_of(robot).inputs:
+            if books.step_of(robot)[1] or books.operation_of(robot).inputs:
                 continue
             books.supervisor.recall(self.standing.axes([robot]))
             self.returning.send(robot, WayBack(self.returning.rest(robot, books.marking)))

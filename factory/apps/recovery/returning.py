@@ -104,7 +104,7 @@ class Returning:
         comes down before it may go there."""
         layout, gear = self._layout, self._layout.factory.net.gears[robot]
         marking = self._without_skipped(robot, marking)
-        step = next(i for i, place in enumerate(gear.places) if place in marking) // 2
+        step, _ = gear.step_in(marking)
         at, lift = start_positions(layout, marking), self._layout.factory.lift_axis.get(robot)
         goals = [(robot, _waiting(layout, robot, step))]
         if lift is None:
@@ -119,14 +119,14 @@ class Returning:
         """The marking after a robot has skipped the units that are not made, at the beginning of
         its tour."""
         factory, word = self._layout.factory, self._supervisor.word
-        gear, program = factory.net.gears[robot].places, factory.robots[robot].operations
-        step = next(i for i, place in enumerate(gear) if place in marking) // 2
+        gear, program = factory.net.gears[robot], factory.robots[robot].operations
+        step, _ = gear.step_in(marking)
         operation = factory.operations[program[step]]
         unit = factory.unit(operation, self._supervisor.fired[operation.start])
         if word.upcoming(unit) == unit:
             return marking
         first = program.index(factory.tour_of(robot, operation.index)[0])
-        return marking.difference(gear) | {gear[2 * first]}
+        return marking.difference(gear.places) | {gear.waiting(first)}
 
     def has_left(self, robot: int, marking: Marking) -> bool:
         """Whether a robot is away from where it would wait if its current operation had not

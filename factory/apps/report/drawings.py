@@ -44,8 +44,9 @@ def links(factory: Factory) -> dict[str, list[Link]]:
         "robot": [_of_robot(factory, labels, r.index) for r in factory.robots],
         "label": [_of_label(factory, labels, label) for label in labels],
         "transition": [
-            {**_of_operation(factory, labels, operations[t // 2]), "transitions": [t]}
-            for t in range(2 * len(operations))
+            {**_of_operation(factory, labels, operation), "transitions": [transition]}
+            for operation in operations
+            for transition in (operation.start, operation.end)
         ],
         "place": [_of_place(factory, labels, p) for p in range(len(factory.net.threaded.places))],
     }

@@ -153,7 +153,7 @@ def owner(geom: str) -> str:
     return geom.rpartition("/")[0]
 
 
-def stands_for(name: str, robots: dict[str, int], labels: dict[str, int]) -> dict[str, int]:
+def stands_for(name: str, robots: Mapping[str, int], labels: Mapping[str, int]) -> dict[str, int]:
     """What a body, or a geom of the world, is about: a robot, or a part with its feeder and what
     moves in that."""
     head, _, rest = name.partition("/")

@@ -26,6 +26,7 @@ from factory.floor.layout.layout import Layout
 from factory.support.errors import Diagnostic, FactoryError
 from factory.support.tables import misfit, value_of
 from factory.theory.plant.demand import Demand
+from factory.theory.problem.ids import is_end, operation_of
 
 TAG = re.compile(r"<[^>]+>")
 
@@ -158,7 +159,7 @@ def _unlike(log: Log, made: Simulation) -> str:
     ends = (
         float(t)
         for t, event in zip(log.fired_t, log.fired.tolist(), strict=True)
-        if event % 2 and len(operations[event // 2].robots) > 1
+        if is_end(event) and len(operations[operation_of(event)].robots) > 1
     )
     until = min(REPEATED, float(log.time[-1]), next(ends, REPEATED))
 

@@ -3,6 +3,7 @@ names in the model and its kinematic tree."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -131,7 +132,7 @@ class Anatomy:
         )
 
 
-def _holder(words: list[str], robots: dict[str, int]) -> Holder | None:
+def _holder(words: list[str], robots: Mapping[str, int]) -> Holder | None:
     kind = KINDS.get(words[0])
     if kind != GRIP:
         return None if kind is None else (kind, -1)

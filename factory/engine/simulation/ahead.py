@@ -31,7 +31,7 @@ class Ahead:
             else:
                 self.after[gear[step - 1]].append(number)
             self.follows[number] = gear[step - 1]
-            self.place[number] = factory.net.gears[stage.robot].places[2 * step]
+            self.place[number] = factory.net.gears[stage.robot].waiting(step)
 
     def going(self, active: Iterable[int]) -> dict[int, HeadStart]:
         """The stages among the active modes, by number."""

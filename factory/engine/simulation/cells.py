@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from factory.engine.simulation.world import World
 from factory.theory.control.mode import Array
 from factory.theory.plant.factory import Factory, Operation
+from factory.theory.problem.ids import operation_of
 
 
 @dataclass(slots=True)
@@ -28,7 +29,7 @@ class Cells:
         self._cells = [Cell(label) for label in labels]
         self._operations = factory.operations
         self._length = [len(robot.operations) for robot in factory.robots]
-        self._place = {
+        self._place: dict[tuple[int, int], int] = {
             (robot.index, number): place
             for robot in factory.robots
             for place, number in enumerate(robot.operations)
@@ -45,7 +46,7 @@ class Cells:
     def fired(self, transition: int) -> int:
         """Number of times that an operation has been ended by its carrier, or entered by its first
         robot."""
-        operation = self._operations[transition // 2]
+        operation = self._operations[operation_of(transition)]
         if transition == operation.end:
             return self._past(operation.carrier, self[operation.carrier].turn, operation)
         return max(self._past(r, self[r].entered, operation) for r in operation.robots)

@@ -17,6 +17,7 @@ from factory.support.errors import Diagnostic, RunError
 from factory.support.showing import drawn
 from factory.theory.nets.undone import Entry, Undone, lasting
 from factory.theory.plant.factory import Factory
+from factory.theory.problem.ids import is_end, operation_of
 
 
 def entries_of(events: Iterable[Event | Undone]) -> Iterator[Entry]:
@@ -51,8 +52,8 @@ def busy_times(factory: Factory, events: Iterable[Event | Undone]) -> tuple[floa
     numbers = {t.name: number for number, t in enumerate(factory.net.threaded.transitions)}
     begun, spent = dict[int, float](), [0.0] * len(factory.robots)
     for t, transition in (event for event in events if isinstance(event, Event)):
-        operation, is_end = divmod(numbers[transition], 2)
-        if not is_end:
+        operation, ends = operation_of(numbers[transition]), is_end(numbers[transition])
+        if not ends:
             begun[operation] = t
             continue
         lasted = t - begun.pop(operation, 0.0)

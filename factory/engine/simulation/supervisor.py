@@ -161,7 +161,7 @@ class Supervisor:
 
     def awaited(self) -> list[Operation]:
         """The operations all of whose robots wait for them."""
-        return [self.factory.operations[event // 2] for event in sorted(self.threads.possible)]
+        return [self.factory.operation_of(event) for event in sorted(self.threads.possible)]
 
     def _startable(self) -> list[int]:
         """Operations X with X_s enabled: waits marked (their goals are everything), the robots in

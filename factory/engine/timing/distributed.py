@@ -20,6 +20,7 @@ from factory.theory.control.mode import STILL
 from factory.theory.nets.coordinated import Past
 from factory.theory.nets.marked import token_free
 from factory.theory.plant.factory import Operation
+from factory.theory.problem.ids import is_end, operation_of
 
 PERIODS = (0.006, 0.02)
 """Control periods are drawn from so long to so long [s], in whole timesteps, one at least."""
@@ -70,9 +71,9 @@ class ScannedTimes:
         """When each unit is dropped off."""
         net, timing = self.timed.net, self.timing
         factory, coordinated = timing.factory, timing.coordinated
-        passes = {net.right[place]: past for past, (place, _) in coordinated.passes.items()}
-        starts = {o.start: o for o in factory.operations}
-        ends = {o.end: o for o in factory.operations}
+        passes = {int(net.right[place]): past for past, (place, _) in coordinated.passes.items()}
+        starts = {int(o.start): o for o in factory.operations}
+        ends = {int(o.end): o for o in factory.operations}
         shows = {net.right[served.top] for served in coordinated.served.values()}
         waits = self._waits()
         dates, left = dict[tuple[int, int], float](), list[int]()
@@ -91,7 +92,7 @@ class ScannedTimes:
                     date = self._enters(starts[event], date)
                 elif event in ends:
                     date = self._ends(ends[event])
-                    if factory.drops(event // 2):
+                    if factory.drops(operation_of(event)):
                         left.append(int(date))
                 dates[event, period] = date
         return left
@@ -124,9 +125,9 @@ class ScannedTimes:
     def _passed(self, past: Past) -> float:
         """When a robot comes past a point: it sets out in the tick after it has begun to wait, or
         in that in which it enters its operation."""
-        robot, number = self.timing.factory.robot_of(past.axis), past.after // 2
+        robot, number = self.timing.factory.robot_of(past.axis), operation_of(past.after)
         begun = self.acted[robot] + self.scans[robot].period
-        if past.after % 2 == 0:
+        if not is_end(past.after):
             begun = self.entered[number, robot]
         return begun + self._passes[past] / self._step
 

@@ -99,7 +99,7 @@ class WordTimes:
         turns = [operation.turn for operation in factory.operations for _ in range(2)]
         turns += [0] * (len(self.timed.net.net.transitions) - len(turns))
         for past, (place, _) in coordinated.passes.items():
-            turns[self.timed.net.right[place]] = factory.operations[past.after // 2].turn
+            turns[self.timed.net.right[place]] = factory.operation_of(past.after).turn
         for number, served in coordinated.served.items():
             turns[self.timed.net.right[served.top]] = factory.operations[number].turn
             turns[self.timed.net.right[served.up]] = factory.operations[served.before].turn

@@ -15,6 +15,7 @@ from factory.support.settings import Settings
 from factory.theory.nets.cycle_ratio import CycleRatio, max_cycle_ratio
 from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.ways import Way, busiest, ways_apart, with_ways
+from factory.theory.problem.ids import is_end
 
 SAME = 1e-9
 """Relative difference up to which times are equal."""
@@ -95,17 +96,19 @@ def timed(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None) -> 
     net, count = _copied(timing, change), len(factory.net.threaded.places)
     delays = timing.changed(change)
     seconds = [*delays, *[0.0] * (len(net.tokens) - len(delays))]
-    owners = dict(enumerate(factory.net.slots))
+    owners: dict[int, tuple[int, ...]] = dict(enumerate(factory.net.slots))
     dates = timing.passes(change)
-    dates |= {past: max(0.0, date - timing.tick) for past, date in dates.items() if past.after % 2}
+    dates |= {
+        past: max(0.0, date - timing.tick) for past, date in dates.items() if is_end(past.after)
+    }
     for past, (place, before) in coordinated.passes.items():
         seconds[place] = max(0.0, dates[past] - (dates[before] if before else 0.0))
         owners[place] = (factory.robot_of(past.axis),)
     for number, served in coordinated.served.items():
         up, seconds[served.down] = timing.strokes[number]
         seconds[served.up] = up - timing.tick
-    for place in coordinated.away.values():
-        seconds[place] = timing.outfeed - timing.tick
+    for away in coordinated.away.values():
+        seconds[away] = timing.outfeed - timing.tick
     bounds: tuple[int, ...] = ()
     if wip is not None:
         bounded = with_wip(factory, min(wip, len(factory.robots)))
@@ -116,7 +119,7 @@ def timed(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None) -> 
         seconds += [0.0] * len(more)
     went = ways_apart(factory.net, seconds, timing.ways(change))
     ways = dict(zip(went, range(len(seconds), len(seconds) + len(went)), strict=True))
-    owners |= {place: (robot,) for (robot, _), place in ways.items()}
+    owners |= {way: (robot,) for (robot, _), way in ways.items()}
     net = with_ways(net, factory.net, went)
     return Timed(timing, net, (*seconds, *went.values()), ways, bounds, wip, owners)
 

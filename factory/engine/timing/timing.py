@@ -26,6 +26,7 @@ from factory.theory.control.mode import ROUNDING, Array, Limits, Mode
 from factory.theory.control.profile import SpeedProfile, World
 from factory.theory.nets.coordinated import Past
 from factory.theory.plant.factory import Factory
+from factory.theory.problem.ids import carriage_axis, operation_of
 
 CALM = 3
 """So many ticks after its stroke a slider is at rest."""
@@ -124,9 +125,10 @@ class Timing:
 
     def _past(self, past: Past, change: Change) -> int:
         """The ticks until an axis comes past a point, from rest."""
-        layout, robot, number = self.layout, self.factory.robot_of(past.axis), past.after // 2
+        robot, number = self.factory.robot_of(past.axis), operation_of(past.after)
+        layout = self.layout
         drive = self.axis_drive(past.axis, change)
-        if past.axis != robot:
+        if past.axis != carriage_axis(robot):
             stroke = layout.strokes[robot]
             return drive.way(stroke).passes(stroke - past.at)
         visit, factor = layout.visits[number, robot], change.way.get(robot, 1.0)

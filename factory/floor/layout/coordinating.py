@@ -21,6 +21,7 @@ from factory.floor.layout.layout import Layout
 from factory.theory.nets.coordinated import CoordinatedNet, Coordination, Past
 from factory.theory.nets.gears import GearNet
 from factory.theory.plant.factory import Operation
+from factory.theory.problem.ids import carriage_axis, start_of
 
 HOME = 1e-3
 """A robot is at home within this [m]."""
@@ -84,15 +85,15 @@ def with_machines(
     names = _named(layout, every)
     for (after, robot, _), along in groupby(by_way, key=lambda past: _way_of(layout, past)[:3]):
         passes = {past: names[past] for past in along}
-        _chain(layout, build, (factory.operations[after // 2], robot), passes, orders)
+        _chain(layout, build, (factory.operation_of(after), robot), passes, orders)
     for past, number in lifted:
-        before, operation = factory.operations[past.after // 2], factory.operations[number]
+        before, operation = factory.operation_of(past.after), factory.operations[number]
         robot = layout.factory.robot_of(past.axis)
         name = f"order:{before.label}:{_axis(layout, past)}:{operation.label}"
         first = factory.robots[robot].operations[0]
         build.order(name, past, operation.start, int(first == number))
-    served = {one.leaf.index: _served(layout, build, one) for one in feedings}
-    away = {}
+    served: dict[int, Served] = {one.leaf.index: _served(layout, build, one) for one in feedings}
+    away = dict[int, int]()
     for step, dropoff in enumerate(factory.dropoffs):
         then = factory.dropoffs[(step + 1) % factory.period]
         name, ends = f"tray:{dropoff.label}", (dropoff.end, then.start)
@@ -116,7 +117,7 @@ def _way_of(layout: Layout, past: Past) -> tuple[int, int, bool, float]:
     """The transition that a pass follows, its robot, and the order in which the robot passes
     points: its lift first if that has to be up before it goes home."""
     robot = layout.factory.robot_of(past.axis)
-    return past.after, robot, past.axis == robot, past.at * past.direction
+    return past.after, robot, past.axis == carriage_axis(robot), past.at * past.direction
 
 
 def _lifted(layout: Layout) -> Iterator[tuple[Past, int]]:
@@ -131,7 +132,7 @@ def _lifted(layout: Layout) -> Iterator[tuple[Past, int]]:
 def _axis(layout: Layout, past: Past) -> str:
     """The name of a pass's axis: that of its robot, with `up` for a lift."""
     robot = layout.factory.robots[layout.factory.robot_of(past.axis)]
-    return robot.name if past.axis == robot.index else f"{robot.name} up"
+    return robot.name if past.axis == carriage_axis(robot.index) else f"{robot.name} up"
 
 
 def _named(layout: Layout, passes: Iterable[Past]) -> dict[Past, str]:
@@ -139,7 +140,7 @@ def _named(layout: Layout, passes: Iterable[Past]) -> dict[Past, str]:
     further ones change no name."""
     names, count = dict[Past, str](), Counter[tuple[str, str]]()
     for past in passes:
-        axis, label = _axis(layout, past), layout.factory.operations[past.after // 2].label
+        axis, label = _axis(layout, past), layout.factory.operation_of(past.after).label
         count[axis, label] += 1
         names[past] = f"past:{axis}:{count[axis, label]}:{label}"
     return names
@@ -164,7 +165,7 @@ def _chain(
     kind = "hand", f"of {name} over {operation.label}"
     gear = factory.robots[robot].operations
     step = (gear.index(operation.index) + 1) % len(gear)
-    then, wait = factory.operations[gear[step]], factory.net.gears[robot].places[2 * step]
+    then, wait = factory.operations[gear[step]], factory.net.gears[robot].waiting(step)
     goals = dict(zip(factory.axes[then.index], layout.goals(then.index), strict=True))
     start, events = build.transitions[then.start].name, {*names.values()}
     waits = any(order.start == start and order.before in events for order in orders)
@@ -182,11 +183,11 @@ def _feedings(layout: Layout) -> Iterator[_Feeding]:
             before, leaf = tours[fed[step - 1]], factory.operations[tours[turn][0]]
             if hand is not None and hand.first:
                 last = factory.operations[tours[turn - 1][-1]]
-                past: Past | None = Past(last.end, robot, length - HOME)
+                past: Past | None = Past(last.end, carriage_axis(robot), length - HOME)
             else:
                 clear = length - passing(layout, leaf)
-                legs = (2 * n for n in before if layout.visits[n, robot].at <= clear)
-                past = next((Past(start, robot, clear, -1) for start in legs), None)
+                legs = (start_of(n) for n in before if layout.visits[n, robot].at <= clear)
+                past = next((Past(start, carriage_axis(robot), clear, -1) for start in legs), None)
             yield _Feeding(factory.operations[before[0]], leaf, not step, past)
 
 

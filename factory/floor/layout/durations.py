@@ -86,7 +86,7 @@ def slowest(layout: Layout, pace: Pace) -> tuple[float, list[int]]:
     delays, legs = operation_times(layout, pace), _ways(layout)
     paces = [*map(pace.on, layout.guidepaths)]
     ahead = {
-        (robot, o.place): paces[robot].rest(legs[o.index, robot]) + (pace.ahead or 0.0)
+        (int(robot), int(o.place)): paces[robot].rest(legs[o.index, robot]) + (pace.ahead or 0.0)
         for o in layout.factory.operations
         for slot, robot in enumerate(o.robots)
         if pace.goes_ahead(o, slot)

@@ -103,10 +103,10 @@ def _parted(layout: Layout, certificate: Certificate) -> dict[int, float]:
             if loads and passing:
                 further = path.frame(hull(loads))[1] - path.frame(hull(passing))[0]
                 ways.append((further + layout.clearance, robot))
-        further, robot = min((way for way in ways if way[0] > 0), default=(0.0, -1))
+        further, longer = min((way for way in ways if way[0] > 0), default=(0.0, -1))
         if further:
-            travel = up(layout.guidepaths[robot].travel + further)
-            travels[robot] = max(travel, travels.get(robot, 0.0))
+            travel = up(layout.guidepaths[longer].travel + further)
+            travels[longer] = max(travel, travels.get(longer, 0.0))
     return travels
 
 

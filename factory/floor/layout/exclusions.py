@@ -36,6 +36,7 @@ from factory.theory.nets.exclusion import Circuit, Pair, excluding, ordered, ove
 from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.verdict import listing
 from factory.theory.plant.factory import Factory
+from factory.theory.problem.ids import end_of, operation_of, start_of
 
 
 @dataclass(frozen=True)
@@ -157,7 +158,7 @@ def _met(layout: Layout, robots: Staying) -> Iterator[Fault]:
 def _stuck(layout: Layout, net: CoordinatedNet) -> Fault:
     """A circuit of the coordinated net without a token: its machines never move."""
     operations, circuit = layout.factory.operations, net.deadlock
-    events = (net.net.right[place] // 2 for place in circuit)
+    events = (operation_of(net.net.right[place]) for place in circuit)
     robots = sorted({operations[n].carrier for n in events if n < len(operations)})
     names = listing(net.net.net.places[place].name for place in circuit)
     return fault(layout.factory, f"these wait for each other for ever: {names}", *robots)
@@ -206,7 +207,7 @@ def one_unit(net: MarkedNet, factory: Factory) -> list[int]:
     operation by operation and everything else fires as soon as it can."""
     when = [-1] * len(net.net.transitions)
     for step, number in enumerate(factory.order):
-        when[2 * number], when[2 * number + 1] = 2 * step, 2 * step + 1
+        when[start_of(number)], when[end_of(number)] = 2 * step, 2 * step + 1
     waits = [0] * len(when)
     for tokens, after in zip(net.tokens, net.right, strict=True):
         waits[after] += not tokens
@@ -234,9 +235,9 @@ def _orderable(net: MarkedNet, when: Sequence[int], pair: Near) -> Pair | None:
 def _starts(net: CoordinatedNet, factory: Factory) -> Mapping[int, int]:
     """For each transition that comes by itself, an end of an operation or a pass: the start of the
     operation that leads to it."""
-    starts = {o.end: o.start for o in factory.operations}
+    starts: dict[int, int] = {o.end: o.start for o in factory.operations}
     for past, (place, _) in net.passes.items():
-        starts[net.net.right[place]] = past.after - past.after % 2
+        starts[net.net.right[place]] = factory.operation_of(past.after).start
     return starts
 
 

@@ -15,6 +15,7 @@ from factory.floor.layout.presence import Near, Nearness, Presence, alike, neare
 from factory.theory.nets.coordinated import CoordinatedNet, Past
 from factory.theory.nets.exclusion import marked_after
 from factory.theory.nets.marked import MarkedNet
+from factory.theory.problem.ids import TransitionId, carriage_axis, operation_of
 
 BISECTIONS = 12
 """Bisection steps to the point from which on a way home is clear."""
@@ -35,15 +36,20 @@ class Homeward(Nearness):
             pair = replace(pair, one=one, other=other)
         return super().nearer(pair)
 
+    def _since_visit(self, past: Past) -> float:
+        """How far a pass is from where its operation was visited [m], backwards below 0."""
+        visits, robot = self._layout.visits, self._layout.factory.robot_of(past.axis)
+        return past.at - visits[operation_of(past.after), robot].at
+
     def _cut(self, one: Presence, other: Presence) -> Past | None:
         """The pass at which a robot that goes home becomes clear of another machine; None if it
         never does, or always is."""
-        begin = self._layout.visits[one.since // 2, one.robot].at
+        begin = self._layout.visits[operation_of(one.since), one.robot].at
         pair = one.robot, other.robot, begin, alike(one, other)
         if pair not in self._cuts:
             self._cuts[pair] = self._bisected(one, other, begin)
         at = self._cuts[pair]
-        return None if at is None else Past(one.since, one.robot, at)
+        return None if at is None else _pass(one, at)
 
     def _bisected(self, one: Presence, other: Presence, begin: float) -> float | None:
         robot, layout = one.robot, self._layout
@@ -80,10 +86,7 @@ class Homeward(Nearness):
                 and (cut := self._cut(one, other)) is not None
             ]
             if ways:
-                visits = self._layout.visits
-                cuts.append(
-                    min(ways, key=lambda past: past.at - visits[past.after // 2, past.axis].at)
-                )
+                cuts.append(min(ways, key=self._since_visit))
         return cuts
 
     def adjusted_at_home(self, net: CoordinatedNet, pairs: Iterable[Near]) -> Iterator[Precedence]:
@@ -91,12 +94,17 @@ class Homeward(Nearness):
         robots that go there by themselves and would come near a machine of a pair on the way."""
         layout, factory, transitions = self._layout, self._layout.factory, net.net.net.transitions
         for one in (side for pair in pairs for side in (pair.one, pair.other)):
-            home = Past(one.since, one.robot, layout.guidepaths[one.robot].length - HOME)
+            home = _pass(one, layout.guidepaths[one.robot].length - HOME)
             if one.robot not in factory.adjusted or home not in net.passes:
                 continue
             gear = factory.robots[one.robot].operations
-            then = factory.operations[gear[(gear.index(one.since // 2) + 1) % len(gear)]]
+            then = factory.operations[gear[(gear.index(operation_of(one.since)) + 1) % len(gear)]]
             if then.place in one.places and factory.begins(one.robot, then.index):
                 before = transitions[net.net.right[net.passes[home][0]]].name
                 start, tokens = transitions[then.start].name, int(then.index == gear[0])
                 yield Precedence(f"order:{before}:{start}", before, start, tokens)
+
+
+def _pass(one: Presence, at: float) -> Past:
+    """The pass at which a robot that goes home has come as far as `at` [m]."""
+    return Past(TransitionId(one.since), carriage_axis(one.robot), at)

@@ -24,6 +24,7 @@ from factory.floor.layout.starting import start_positions
 from factory.floor.layout.staying import Staying, Sweep, comes_last
 from factory.support.errors import InputError
 from factory.theory.nets.petri import Marking
+from factory.theory.problem.ids import OperationId
 
 
 def on_demand(layout: Layout) -> Layout:
@@ -72,7 +73,7 @@ def resting(layout: Layout, coordinated: Coordinated, awaited: Mapping[int, floa
 def _robot(layout: Layout, robots: Staying, robot: int) -> Iterator[tuple[Presence, int]]:
     """A robot in the waits before its tours, and in their first operations, to which it comes from
     wherever it rests; and in which turn of a period a unit is not made then, -1 for any."""
-    factory, tours = layout.factory, list[tuple[int, int, tuple[Sweep, ...]]]()
+    factory, tours = layout.factory, list[tuple[int, OperationId, tuple[Sweep, ...]]]()
     for step, number in enumerate(factory.robots[robot].operations):
         if factory.begins(robot, number):
             tours.append((step, number, _rests(layout, robots, robot, step)))
@@ -80,7 +81,7 @@ def _robot(layout: Layout, robots: Staying, robot: int) -> Iterator[tuple[Presen
     name, home = factory.robots[robot].name, layout.guidepaths[robot].length
     for step, number, tour_rests in tours:
         before = factory.operations[factory.robots[robot].operations[step - 1]]
-        wait, begun = factory.net.gears[robot].places[2 * step], factory.operations[number].place
+        wait, begun = factory.net.gears[robot].waiting(step), factory.operations[number].place
         end = layout.visits[number, robot].at
         ways = tuple(
             ((min(end, *at), max(end, home)), lift)
@@ -117,6 +118,5 @@ def _turn(layout: Layout, presence: Presence) -> int:
     place = presence.places[0]
     if place < len(factory.operations):
         return factory.operations[place].turn
-    gear = factory.net.gears[presence.robot].places
-    step = gear.index(place) // 2
+    step = factory.net.gears[presence.robot].step_of(place)
     return factory.operations[factory.robots[presence.robot].operations[step - 1]].turn

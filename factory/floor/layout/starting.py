@@ -16,7 +16,7 @@ def start_positions(layout: Layout, marking: Marking) -> np.ndarray:
     factory, net = layout.factory, layout.factory.net
     positions, lifts = np.zeros(len(factory.robots) + len(layout.strokes)), factory.lift_axis
     for robot, gear in zip(factory.robots, net.gears, strict=True):
-        step = next(i for i, place in enumerate(gear.places) if place in marking) // 2
+        step, _ = gear.step_in(marking)
         positions[robot.index] = layout.home(robot.index, robot.operations[step])
         always = robot.index in factory.adjusted or rises_first(layout, robot.index)
         if robot.index in lifts:

@@ -26,6 +26,7 @@ from factory.floor.layout.layout import Layout
 from factory.floor.layout.presence import ROUNDING, MachineBodies, Presence, Span, corners_of
 from factory.theory.nets.coordinated import Past
 from factory.theory.plant.factory import Operation
+from factory.theory.problem.ids import end_of, is_end, start_of
 from factory.theory.problem.pag import NOPART
 from factory.theory.problem.robot_bodies import ARM_LOW, ARM_TOP, ARM_WIDTH, CARRIAGE_TOP, MAST
 
@@ -90,7 +91,7 @@ class Staying:
                     bodies += self.held(index, number, label)
                 for places, sweeps in (*self._waits(index, step), *self._works(index, step)):
                     held = "" if label == NOPART else label
-                    since = 2 * robot.operations[step - 1] + 1 if label == NOPART else -1
+                    since = end_of(robot.operations[step - 1]) if label == NOPART else -1
                     fields = robot.name, places, bodies, sweeps, partners, False, held, since
                     yield Presence(index, *fields)
 
@@ -168,7 +169,7 @@ class Staying:
         before, number, wait = self._steps(robot, step)
         since, visit = layout.ways[number, robot]
         begin, goal, low, high = since.at, self.goal(robot, step), since.lift, visit.lift
-        carriage, lift = self._chains(2 * before + 1, robot)
+        carriage, lift = self._chains(end_of(before), robot)
         begins = layout.factory.begins(robot, number)
         if begins and rises_first(layout, robot):
             first, _ = next(iter(carriage.legs(begin, begin)))
@@ -191,8 +192,8 @@ class Staying:
         since, visit = layout.ways[number, robot]
         begin, end, goal = since.at, visit.at, self.goal(robot, step)
         low, high = since.lift, visit.lift
-        carriage, lift = self._chains(2 * before + 1, robot)
-        within, _ = self._chains(2 * number, robot)
+        carriage, lift = self._chains(end_of(before), robot)
+        within, _ = self._chains(start_of(number), robot)
         begins = factory.begins(robot, number)
         home = [layout.guidepaths[robot].length] * begins
         if not carriage.beyond and carriage.points:
@@ -217,7 +218,7 @@ class Staying:
     def _steps(self, robot: int, step: int) -> tuple[int, int, int]:
         """The operation before a step of a gear, that of the step, and the wait in between."""
         gear = self.layout.factory.robots[robot].operations
-        return gear[step - 1], gear[step], self.layout.factory.net.gears[robot].places[2 * step]
+        return gear[step - 1], gear[step], self.layout.factory.net.gears[robot].waiting(step)
 
     def goal(self, robot: int, step: int) -> float:
         """Where a robot goes in the wait before a step of its gear, an arc length [m]."""
@@ -245,7 +246,7 @@ class Staying:
         for (start, axis), along in passes.items():
             points = [(self._home(axis, p.at), coordinated.passes[p][0]) for p in along]
             last = after[net.right[points[-1][1]]]
-            chains[start, axis] = Chain(tuple(points), (last,), net.right[last] % 2 == 1)
+            chains[start, axis] = Chain(tuple(points), (last,), is_end(net.right[last]))
         return chains
 
     def _home(self, axis: int, at: float) -> float:

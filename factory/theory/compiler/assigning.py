@@ -19,9 +19,10 @@ from itertools import accumulate
 from factory.support.errors import Diagnostic, InputError
 from factory.theory.nets.gears import Gear, GearNet
 from factory.theory.nets.petri import PetriNet, Place, Transition
-from factory.theory.nets.threaded import Redistribution, ThreadedNet
-from factory.theory.plant.factory import Factory, Operation
+from factory.theory.nets.threaded import Redistribution, Slot, ThreadedNet
+from factory.theory.plant.factory import NO_PARENT, Factory, Operation
 from factory.theory.plant.robot import Robot
+from factory.theory.problem.ids import OperationId, PlaceId, RobotId
 from factory.theory.problem.pag import NOPART, PAG
 from factory.theory.problem.plan import NOBODY, Plan, in_turn, out_of_turn
 from factory.theory.problem.robot_types import LIFT, Catalogue
@@ -51,7 +52,7 @@ def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> Ge
     ]
     slots = [o.robots for o in operations]
     slot_of = [{robot: i for i, robot in enumerate(o.robots)} for o in operations]
-    pairs: list[list[tuple[tuple[int, int], tuple[int, int]]]] = [[] for _ in transitions]
+    pairs: list[list[tuple[Slot, Slot]]] = [[] for _ in transitions]
     gears = []
     for robot in robots:
         gear_places, gear_events = [], []
@@ -64,7 +65,7 @@ def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> Ge
             label = operation.before[slot]
             is_one_of = several and label == NOPART
             stays = label != NOPART and operation.after[slot] != NOPART
-            wait = len(places)
+            wait = PlaceId(len(places))
             places.append(
                 Place(
                     f"{robot.name}:{label}" + (f"/{operation.label}" if is_one_of else ""),
@@ -77,9 +78,9 @@ def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> Ge
                 )
             )
             slots.append((robot.index,))
-            pairs[begun].append(((wait, 0), (number, slot)))
+            pairs[begun].append(((wait, 0), (operation.place, slot)))
             pairs[done].append(((before.place, slot_of[before.index][robot.index]), (wait, 0)))
-            gear_places += [wait, number]
+            gear_places += [wait, operation.place]
             gear_events += [done, begun]
         gears.append(Gear(robot.name, robot.type, tuple(gear_places), tuple(gear_events)))
     redistribution: tuple[Redistribution, ...] = tuple(tuple(sorted(p)) for p in pairs)
@@ -92,7 +93,7 @@ def beside(pag: PAG, factories: Sequence[Factory]) -> Factory:
     each makes one unit."""
     parts = [(unit, o) for unit, one in enumerate(factories) for o in one.making]
     parts += [(unit, one.dropoff) for unit, one in enumerate(factories)]
-    number = {(unit, o.index): n for n, (unit, o) in enumerate(parts)}
+    number = {(unit, o.index): OperationId(n) for n, (unit, o) in enumerate(parts)}
     firsts = [0, *accumulate(len(one.robots) for one in factories)]
     operations = tuple(
         for_unit(o, n, unit, range(firsts[unit], firsts[unit + 1]))
@@ -101,7 +102,7 @@ def beside(pag: PAG, factories: Sequence[Factory]) -> Factory:
     robots = tuple(
         replace(
             robot,
-            index=firsts[unit] + robot.index,
+            index=RobotId(firsts[unit] + robot.index),
             name=f"r{firsts[unit] + robot.index + 1}",
             operations=tuple(number[unit, i] for i in robot.operations),
         )
@@ -114,7 +115,7 @@ def beside(pag: PAG, factories: Sequence[Factory]) -> Factory:
         robots=robots,
         operations=operations,
         net=gear_net(robots, operations),
-        parents=tuple(number.get((u, factories[u].parents[o.index]), -1) for u, o in parts),
+        parents=tuple(number.get((u, factories[u].parents[o.index]), NO_PARENT) for u, o in parts),
         period=len(factories),
     )
 
@@ -129,12 +130,12 @@ def assigned(base: Factory, robots: Sequence[Robot], turns: Sequence[Sequence[in
     makes, drops = range(len(base.making)), range(len(base.making), len(base.operations))
     every = ((o, turn) for part in (makes, drops) for turn in range(len(turns)) for o in part)
     each = ((i, turn) for i, turn in every if (turn, base.operations[i].turn) in unit)
-    number = {one: n for n, one in enumerate(each)}
+    number = {one: OperationId(n) for n, one in enumerate(each)}
     operations = tuple(
         for_unit(o := base.operations[i], n, unit[turn, o.turn], turns[turn])
         for (i, turn), n in number.items()
     )
-    programs: list[list[int]] = [[] for _ in robots]
+    programs: list[list[OperationId]] = [[] for _ in robots]
     tours = sorted(
         (when[tour[-1]], robot, tour)
         for robot, tours_of in enumerate(base.tours)
@@ -147,7 +148,9 @@ def assigned(base: Factory, robots: Sequence[Robot], turns: Sequence[Sequence[in
         replace(robot, operations=tuple(program))
         for robot, program in zip(robots, programs, strict=True)
     )
-    parents = [number[base.parents[o], turn] if base.parents[o] >= 0 else -1 for o, turn in number]
+    parents = [
+        number[base.parents[o], turn] if base.parents[o] >= 0 else NO_PARENT for o, turn in number
+    ]
     return replace(
         base,
         robots=crew,
@@ -206,7 +209,7 @@ def with_crew(
             kind = crew[n].type if n in crew else robot.type
             kind = catalogue.meet(kind, robot.type) or kind
             of = crew.get(n, robot)
-            crew[n] = replace(of, index=n, name=f"r{n + 1}", kind=catalogue[kind])
+            crew[n] = replace(of, index=RobotId(n), name=f"r{n + 1}", kind=catalogue[kind])
     for n in lifts:
         crew[n] = replace(crew[n], kind=catalogue[catalogue.meet(crew[n].type, LIFT) or LIFT])
     return assigned(base, [crew[n] for n in sorted(crew)], turns)
@@ -232,9 +235,9 @@ def _bad(words: str) -> InputError:
 def for_unit(o: Operation, index: int, unit: int, does: Sequence[int]) -> Operation:
     """A copy of an operation for a unit of a period; `does`: the robot that does the tours of each
     robot."""
-    robots = tuple(does[robot] for robot in o.robots)
+    robots = tuple(RobotId(does[robot]) for robot in o.robots)
     if unit == o.turn:
-        return replace(o, index=index, robots=robots)
+        return replace(o, index=OperationId(index), robots=robots)
 
     def named(label: str) -> str:
         return label if label == NOPART else in_turn(out_of_turn(label, o.turn), unit)
@@ -243,7 +246,7 @@ def for_unit(o: Operation, index: int, unit: int, does: Sequence[int]) -> Operat
     approach = o.approach and o.approach.renamed(named)
     return replace(
         o,
-        index=index,
+        index=OperationId(index),
         label=named(o.label),
         robots=robots,
         before=before,

@@ -18,8 +18,9 @@ from factory.theory.compiler.domains import check_prepared
 from factory.theory.compiler.expanding import Node, expand
 from factory.theory.compiler.turning import check_turned
 from factory.theory.plant.approaches import Approach
-from factory.theory.plant.factory import Factory, Operation
+from factory.theory.plant.factory import NO_PARENT, Factory, Operation
 from factory.theory.plant.robot import Robot
+from factory.theory.problem.ids import OperationId, RobotId
 from factory.theory.problem.pag import NOPART, PAG
 from factory.theory.problem.plan import AS_WRITTEN, Plan
 from factory.theory.problem.robot_types import LIFT, Catalogue
@@ -113,9 +114,9 @@ class _Draft:
         self.nodes, self.catalogue, self.approaches = nodes, catalogue, approaches
         self.types: list[str] = []
         self.births: list[Position | None] = []
-        self.visits: list[list[int]] = []
+        self.visits: list[list[OperationId]] = []
         self.operations: list[Operation] = []
-        self.parents: list[int] = []
+        self.parents: list[OperationId] = []
         self.troubles: list[Diagnostic] = []
 
     def compile(self, pag: PAG, output: Template) -> None:
@@ -123,7 +124,7 @@ class _Draft:
         and dropoff."""
         position, product = pag[pag.root].position, next(reversed(self.nodes))
         carrier = self._new_robot(output.robots[0], position)
-        stack: list[tuple[str, int, int]] = [(product, carrier, -1)]
+        stack: list[tuple[str, RobotId, OperationId]] = [(product, carrier, NO_PARENT)]
         while stack:
             label, robot, parent = stack.pop()
             operation = self._operation(self.nodes[label], robot)
@@ -134,17 +135,17 @@ class _Draft:
             brought = zip(operation.robots, operation.before, strict=True)
             inputs = sorted((r, x) for r, x in brought if x != NOPART)
             stack.extend((x, robot, operation.index) for robot, x in reversed(inputs))
-        index = len(self.operations)
+        index = OperationId(len(self.operations))
         last = Operation(index, DROPOFF, output, (carrier,), (product,), (NOPART,), 0.0, position)
         self.operations.append(last)
-        self.parents = [index, *self.parents[1:], -1]
+        self.parents = [index, *self.parents[1:], NO_PARENT]
         self.visits[carrier].insert(0, index)
 
     def robots(self) -> tuple[Robot, ...]:
         """The robots allocated."""
         return tuple(
             Robot(
-                i,
+                RobotId(i),
                 f"r{i + 1}",
                 self.catalogue[self.types[i]],
                 tuple(reversed(visits)),
@@ -153,20 +154,20 @@ class _Draft:
             for i, visits in enumerate(self.visits)
         )
 
-    def _new_robot(self, robot_type: str, position: Position | None) -> int:
+    def _new_robot(self, robot_type: str, position: Position | None) -> RobotId:
         self.types.append(robot_type)
         self.births.append(position)
         self.visits.append([])
-        return len(self.types) - 1
+        return RobotId(len(self.types) - 1)
 
-    def _operation(self, node: Node, carrier: int) -> Operation:
+    def _operation(self, node: Node, carrier: RobotId) -> Operation:
         """The instance of a node's template, with its new robots."""
         template, approach = node.template, self.approaches.get(node.label)
         taken = dict(zip(template.inputs, node.inputs, strict=True))
         before = tuple(taken.get(variable, NOPART) for variable in template.before)
         self._claim_carrier(node, carrier)
         return Operation(
-            len(self.operations),
+            OperationId(len(self.operations)),
             node.label,
             template,
             self._allocate(node, carrier, before, approach.lowered if approach else ""),
@@ -192,8 +193,8 @@ class _Draft:
             self.types[carrier] = met
 
     def _allocate(
-        self, node: Node, carrier: int, before: tuple[str, ...], lowered: str
-    ) -> tuple[int, ...]:
+        self, node: Node, carrier: RobotId, before: tuple[str, ...], lowered: str
+    ) -> tuple[RobotId, ...]:
         """r_1, ..., r_k: the carrier and the new robots, numbered smallest input first, tools last.
         The one that brings `lowered` is a lift."""
         template = node.template

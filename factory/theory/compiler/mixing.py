@@ -36,7 +36,7 @@ def turns_of(forest: Factory, on: Sequence[int], sequence: Sequence[str]) -> Tur
     """The turns of a sequence of products: for each unit and each robot of the forest the line
     (index) that does its tours, NOBODY for another product. `on`: the line of each robot."""
     unit = {product: number for number, product in enumerate(forest.sequence)}
-    makes = {robot: o.turn for o in forest.operations for robot in o.robots}
+    makes = {int(robot): o.turn for o in forest.operations for robot in o.robots}
     return [
         [line if makes[robot] == unit[product] else NOBODY for robot, line in enumerate(on)]
         for product in sequence
@@ -96,7 +96,9 @@ def lowered_alike(products: Sequence[Factory]) -> dict[int, dict[str, str]]:
     another product that begins on the same line has one that is lowered; and the input to be
     lowered there, so that one line with a lift can bring both."""
     lowered_inputs: dict[int, dict[str, str]] = {number: {} for number in range(len(products))}
-    todo = [[(number, one.dropoff.carrier) for number, one in enumerate(products)]]
+    todo: list[list[tuple[int, int]]] = [
+        [(number, one.dropoff.carrier) for number, one in enumerate(products)]
+    ]
     for line in todo:
         begins = [(n, products[n].first(r)) for n, r in line]
         if {len(first.inputs) for _, first in begins} != {2}:

@@ -21,6 +21,7 @@ from factory.support.errors import Diagnostic, InputError
 from factory.theory.compiler.assigning import assigned
 from factory.theory.compiler.folding import Line, line_faults, lines_of_labels
 from factory.theory.plant.factory import Factory, Operation
+from factory.theory.problem.ids import RobotId
 from factory.theory.problem.pag import NOPART
 from factory.theory.problem.plan import Plan
 from factory.theory.problem.robot_types import Catalogue
@@ -92,7 +93,8 @@ def on_stems(factory: Factory) -> tuple[Factory, tuple[int, ...]]:
     number = {robot: n for n, robot in enumerate(kept)}
     place = tuple(number[robot] for robot in head)
     robots = [
-        replace(factory.robots[robot], index=n, name=f"r{n + 1}") for robot, n in number.items()
+        replace(factory.robots[robot], index=RobotId(n), name=f"r{n + 1}")
+        for robot, n in number.items()
     ]
     turns = tuple(tuple(place[robot] for robot in turn) for turn in factory.plan.turns)
     plan = replace(factory.plan, turns=turns, names=(), tees=())

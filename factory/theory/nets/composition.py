@@ -79,7 +79,7 @@ def compose(net: MarkedNet) -> Composition:
 
 def cover(net: MarkedNet, closed: Iterable[bool]) -> list[int]:
     """For each place a gear through it that has at most one token and keeps it, or NONE."""
-    covered = [NONE] * len(net.tokens)
+    covered: list[int] = [NONE] * len(net.tokens)
     for number, (gear, good) in enumerate(zip(net.gears, closed, strict=False)):
         if good and sum(net.tokens[p] for p in gear.places) <= 1:
             for place in gear.places:
@@ -185,32 +185,32 @@ def _shared(net: MarkedNet, passing: list[int]) -> Iterator[Defect]:
     """Definition 3.6 (a) around each transition: gears that share it share one of its places, and
     just one."""
     owners = net.owners
-    joint = [NONE] * len(passing)
+    joint: list[int] = [NONE] * len(passing)
     for place, on in enumerate(owners):
         if len(on) < 2:
             continue
         for event in (net.left[place], net.right[place]):
             if passing[event] == len(on):
                 joint[event] = place if joint[event] == NONE else MANY
-    for event, count in enumerate(passing):
-        if count < 2 or joint[event] >= 0:
+    for shared, count in enumerate(passing):
+        if count < 2 or joint[shared] >= 0:
             continue
-        places, called = net.net.preset[event] + net.net.postset[event], _event(net, event)
+        places, called = net.net.preset[shared] + net.net.postset[shared], _event(net, shared)
         gears = sorted({gear for p in places for gear in owners[p]})
         kind = "no shared place"
         text = f"gears {named(net, gears)} meet at {called} but share no one place [a; b] there"
-        if joint[event] == MANY:
+        if joint[shared] == MANY:
             kind, places = "two gears cross twice", tuple(p for p in places if len(owners[p]) > 1)
             both = f"the place before {called} and the one after it"
             text = f"gears {named(net, gears)} cross twice: they share {both}"
-        yield no_gear_net(kind, text, gears, places, [event])
+        yield no_gear_net(kind, text, gears, places, [shared])
 
 
 def _tree(net: MarkedNet) -> tuple[tuple[Joint, ...], list[Defect]]:
     """A breadth-first search over gears and shared places, which must form a tree."""
     if not net.gears:
         return (), [no_gear_net("no gear", "the net has no gears")]
-    owners, entry = net.owners, [NONE] * len(net.gears)
+    owners, entry = net.owners, [*map(int, [NONE] * len(net.gears))]
     seen = bytearray(len(net.gears))
     seen[0], order = 1, [0]
     for gear in order:

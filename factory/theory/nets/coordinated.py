@@ -15,8 +15,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from factory.theory.nets.gears import GearNet
-from factory.theory.nets.marked import MarkedNet, marked, stuck_circuit, token_free
+from factory.theory.nets.marked import NONE, MarkedNet, marked, stuck_circuit, token_free
 from factory.theory.nets.petri import PetriNet, Place, Transition
+from factory.theory.problem.ids import AxisId, PlaceId, TransitionId, is_end
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,8 +25,8 @@ class Past:
     """A pass: an `axis` has come as far as `at` [m], or further in its `direction` (+1 or -1),
     since the transition `after` has fired."""
 
-    after: int
-    axis: int
+    after: TransitionId
+    axis: AxisId
     at: float
     direction: int = 1
 
@@ -41,11 +42,11 @@ class Order:
     before the transition `end` of its robot, which has fired at most `held` times more often than
     what the pass follows."""
 
-    before: int
-    start: int
+    before: TransitionId
+    start: TransitionId
     tokens: int
     past: Past | None = None
-    end: int = -1
+    end: TransitionId = NONE
     held: int = 0
 
 
@@ -57,15 +58,15 @@ class CoordinatedNet:
     beside; `orders`: those that a supervisor keeps."""
 
     net: MarkedNet
-    passes: Mapping[Past, tuple[int, Past | None]] = field(repr=False)
-    beside: Mapping[int, int] = field(repr=False)
+    passes: Mapping[Past, tuple[PlaceId, Past | None]] = field(repr=False)
+    beside: Mapping[PlaceId, PlaceId] = field(repr=False)
     orders: tuple[Order, ...] = field(repr=False)
 
     @property
-    def deadlock(self) -> tuple[int, ...]:
+    def deadlock(self) -> tuple[PlaceId, ...]:
         """The places of a circuit without token, () where the net is live. Linear."""
         stuck = token_free(self.net).stuck
-        return stuck_circuit(self.net, stuck) if stuck else ()
+        return tuple(map(PlaceId, stuck_circuit(self.net, stuck) if stuck else ()))
 
     def as_json(self) -> dict[str, object]:
         """The net as `check --json` tells of it: its size, whether it is live, and the order places
@@ -87,26 +88,33 @@ class Coordination:
         compiled = marked(net)
         self.transitions, self.places = [*compiled.net.transitions], [*compiled.net.places]
         self.tokens, self._compiled = [*compiled.tokens], len(compiled.net.transitions)
-        self.passes: dict[Past, tuple[int, Past | None]] = {}
-        self.events: dict[Past, int] = {}
-        self.beside: dict[int, int] = {}
-        self._ends: dict[Past, tuple[int, int]] = {}
+        self.passes: dict[Past, tuple[PlaceId, Past | None]] = {}
+        self.events: dict[Past, TransitionId] = {}
+        self.beside: dict[PlaceId, PlaceId] = {}
+        self._ends: dict[Past, tuple[TransitionId, int]] = {}
         self.orders: list[Order] = []
 
-    def transition(self, name: str) -> int:
+    def transition(self, name: str) -> TransitionId:
         """Add a transition; gives its index."""
         self.transitions.append(Transition(name))
-        return len(self.transitions) - 1
+        return TransitionId(len(self.transitions) - 1)
 
-    def place(self, name: str, ends: tuple[int, int], tokens: int, mode: str, label: str) -> int:
+    def place(
+        self,
+        name: str,
+        ends: tuple[TransitionId, TransitionId],
+        tokens: int,
+        mode: str,
+        label: str,
+    ) -> PlaceId:
         """Add a place [before; after], its `ends`; gives its index."""
         before, after = ends
         self.places.append(Place(name, (before,), (after,), mode, label, 0))
         self.tokens.append(tokens)
-        return len(self.places) - 1
+        return PlaceId(len(self.places) - 1)
 
     def chain(
-        self, passes: Mapping[Past, str], kind: tuple[str, str], end: int, beside: int
+        self, passes: Mapping[Past, str], kind: tuple[str, str], end: TransitionId, beside: PlaceId
     ) -> None:
         """Add a path of passes, with their names, from the transition that all of them follow to
         the transition `end`. It carries as many tokens as the place of the compiled net that it is
@@ -122,7 +130,7 @@ class Coordination:
             name, ends = f"{passes[before]} on", (self.events[before], end)
             self.beside[self.place(name, ends, self.tokens[beside], *kind)] = beside
 
-    def order(self, name: str, past: Past, start: int, tokens: int) -> None:
+    def order(self, name: str, past: Past, start: TransitionId, tokens: int) -> None:
         """Add an order place from a pass to a transition of the compiled net."""
         self.place(name, (self.events[past], start), tokens, "order", name)
         self.orders.append(Order(past.after, start, tokens, past, *self._ends[past]))
@@ -137,13 +145,13 @@ class Coordination:
             self.order(name, past, start, tokens)
             return
         self.place(name, (before, start), tokens, "order", name)
-        if before < self._compiled and start < self._compiled and start % 2 == 0:
+        if before < self._compiled and start < self._compiled and not is_end(start):
             self.orders.append(Order(before, start, tokens))
 
     @cached_property
-    def _numbers(self) -> dict[str, int]:
+    def _numbers(self) -> dict[str, TransitionId]:
         """All transitions by name, of a net that gets no more of them."""
-        return {event.name: number for number, event in enumerate(self.transitions)}
+        return {event.name: TransitionId(n) for n, event in enumerate(self.transitions)}
 
     def built(self) -> CoordinatedNet:
         """The net."""

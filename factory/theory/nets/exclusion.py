@@ -20,6 +20,7 @@ from types import MappingProxyType
 
 from factory.theory.nets.marked import NONE, MarkedNet, token_free
 from factory.theory.nets.petri import PetriNet, Place
+from factory.theory.problem.ids import TransitionId
 
 ORDER = "order"
 """The mode of an order place."""
@@ -269,7 +270,14 @@ def _brought_forward(arc: _Arc, when: Sequence[int], earlier: Mapping[int, int])
 def _with_order(net: MarkedNet, arcs: Sequence[_Arc]) -> MarkedNet:
     names = net.net.places
     new = tuple(
-        Place(_named(names, arc), (arc.before,), (arc.after,), ORDER, size=0) for arc in arcs
+        Place(
+            _named(names, arc),
+            (TransitionId(arc.before),),
+            (TransitionId(arc.after),),
+            ORDER,
+            size=0,
+        )
+        for arc in arcs
     )
     return MarkedNet(
         PetriNet(net.net.transitions, (*names, *new)),

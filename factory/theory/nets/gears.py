@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from heapq import heappop, heappush
@@ -11,6 +11,7 @@ from itertools import count, pairwise
 from factory.support.showing import Pictured
 from factory.theory.nets.petri import Marking
 from factory.theory.nets.threaded import Slot, ThreadedNet
+from factory.theory.problem.ids import PlaceId, RobotId, TransitionId
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,8 +24,23 @@ class Gear:
 
     robot: str
     type: str
-    places: tuple[int, ...]
-    transitions: tuple[int, ...]
+    places: tuple[PlaceId, ...]
+    transitions: tuple[TransitionId, ...]
+
+    def waiting(self, step: int) -> PlaceId:
+        """The place in which the robot waits for an operation of its program, counted from 0."""
+        return self.places[2 * step]
+
+    def step_of(self, place: int) -> int:
+        """Which operation of its program, counted from 0, the robot waits for or is in when it is
+        in a place."""
+        return self.places.index(PlaceId(place)) // 2
+
+    def step_in(self, marking: Container[int]) -> tuple[int, bool]:
+        """Which operation of its program, counted from 0, the robot waits for or is in, in a
+        marking; whether it is in it."""
+        step = next(step for step, place in enumerate(self.places) if place in marking)
+        return step // 2, step % 2 == 1
 
 
 @dataclass(frozen=True)
@@ -37,8 +53,8 @@ class GearNet(Pictured):
 
     threaded: ThreadedNet
     gears: tuple[Gear, ...]
-    initial: tuple[int, ...]
-    slots: tuple[tuple[int, ...], ...] = field(repr=False)
+    initial: tuple[PlaceId, ...]
+    slots: tuple[tuple[RobotId, ...], ...] = field(repr=False)
 
     def __repr__(self) -> str:
         net = self.threaded.net
@@ -57,9 +73,11 @@ class GearNet(Pictured):
         gears = sum(bool(gear.places) for gear in self.gears)
         return sum(len(on) - 1 for on in self.slots if on) == gears - 1
 
-    def threads_of(self, marked: Marking) -> dict[Slot, int]:
+    def threads_of(self, marked: Marking) -> dict[Slot, RobotId]:
         """f_m of a marking: every slot holds the robot that owns it (Definition 3.3)."""
-        return {(p, i): robot for p in sorted(marked) for i, robot in enumerate(self.slots[p])}
+        return {
+            (PlaceId(p), i): robot for p in sorted(marked) for i, robot in enumerate(self.slots[p])
+        }
 
 
 def ascending(programs: Iterable[Sequence[int]], turns: Sequence[int]) -> tuple[int, ...]:

@@ -31,7 +31,7 @@ def firings(net: GearNet, marking: Marking) -> dict[int, int]:
             raise ValueError(f"the marking does not mark the gear of {gear.robot} exactly once")
         for event in gear.transitions:
             through.setdefault(event, []).append(number)
-    potential = {net.gears[0].transitions[0]: 0}
+    potential: dict[int, int] = {net.gears[0].transitions[0]: 0}
     queue, seen = [0], {0}
     for number in queue:
         _climb(net, number, marking, potential)
@@ -80,8 +80,8 @@ def legal_marking(net: GearNet, names: str) -> Marking:
                 faults.append(_twice(net, robot, (at[robot], place), position))
     if faults:
         raise InputError(faults)
-    for robot, place in enumerate(net.initial):
-        at.setdefault(robot, place)
+    for number, start in enumerate(net.initial):
+        at.setdefault(number, start)
     marking = _whole(net, at, names)
     circuit = () if net.is_tree else unreached(net, marking)
     if circuit:

@@ -16,10 +16,11 @@ from functools import cached_property
 from factory.support.showing import Pictured
 from factory.theory.nets.gears import Gear, GearNet
 from factory.theory.nets.petri import PetriNet
+from factory.theory.problem.ids import TransitionId
 
-NONE = -1
+NONE = TransitionId(-1)
 """The producer or consumer of a place that has none."""
-MANY = -2
+MANY = TransitionId(-2)
 """The producer or consumer of a place that has several."""
 
 
@@ -45,12 +46,12 @@ class MarkedNet(Pictured):
         return f"<MarkedNet: {counts}, {sum(self.tokens)} tokens>"
 
     @cached_property
-    def left(self) -> tuple[int, ...]:
+    def left(self) -> tuple[TransitionId, ...]:
         """For each place its producer, NONE or MANY."""
         return tuple(_only(place.left) for place in self.net.places)
 
     @cached_property
-    def right(self) -> tuple[int, ...]:
+    def right(self) -> tuple[TransitionId, ...]:
         """For each place its consumer, NONE or MANY."""
         return tuple(_only(place.right) for place in self.net.places)
 
@@ -60,7 +61,7 @@ class MarkedNet(Pictured):
         return MANY not in self.left and MANY not in self.right
 
     @cached_property
-    def blocked(self) -> frozenset[int]:
+    def blocked(self) -> frozenset[TransitionId]:
         """The transitions with a place in both preset and postset: they never fire."""
         both = (set(p.left) & set(p.right) for p in self.net.places if p.left and p.right)
         return frozenset(event for events in both for event in events)
@@ -114,7 +115,7 @@ def marked(net: GearNet | MarkedNet) -> MarkedNet:
     return MarkedNet(net.threaded.net, tuple(tokens), net.gears, net.slots)
 
 
-def _only(events: tuple[int, ...]) -> int:
+def _only(events: tuple[TransitionId, ...]) -> TransitionId:
     if len(events) == 1:
         return events[0]
     return MANY if events else NONE
@@ -141,7 +142,7 @@ def token_free(net: MarkedNet) -> TokenFree:
     for place, event in enumerate(net.right):
         if free[place] and event != NONE:
             waits[event] += 1
-    order = [event for event, count in enumerate(waits) if not count]
+    order = [TransitionId(event) for event, count in enumerate(waits) if not count]
     right, postset = net.right, net.net.postset
     for event in order:
         for place in postset[event]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from factory.support.errors import Position
+from factory.theory.problem.ids import PlaceId, TransitionId
 
 Marking = frozenset[int]
 """m, a subset of P: the indices of the marked places."""
@@ -34,8 +35,8 @@ class Place:
     """
 
     name: str
-    left: tuple[int, ...]
-    right: tuple[int, ...]
+    left: tuple[TransitionId, ...]
+    right: tuple[TransitionId, ...]
     mode: str = ""
     label: str = ""
     size: int = 1
@@ -51,30 +52,30 @@ class PetriNet:
     places: tuple[Place, ...]
 
     @cached_property
-    def preset(self) -> tuple[tuple[int, ...], ...]:
+    def preset(self) -> tuple[tuple[PlaceId, ...], ...]:
         """For each transition e the places of its preset, •e."""
         return self._adjacent("right")
 
     @cached_property
-    def postset(self) -> tuple[tuple[int, ...], ...]:
+    def postset(self) -> tuple[tuple[PlaceId, ...], ...]:
         """For each transition e the places of its postset, e•."""
         return self._adjacent("left")
 
     @cached_property
-    def place_index(self) -> dict[str, int]:
+    def place_index(self) -> dict[str, PlaceId]:
         """Place indices by name."""
-        return {place.name: i for i, place in enumerate(self.places)}
+        return {place.name: PlaceId(i) for i, place in enumerate(self.places)}
 
     @cached_property
-    def transition_index(self) -> dict[str, int]:
+    def transition_index(self) -> dict[str, TransitionId]:
         """Transition indices by name."""
-        return {transition.name: i for i, transition in enumerate(self.transitions)}
+        return {event.name: TransitionId(i) for i, event in enumerate(self.transitions)}
 
-    def _adjacent(self, side: str) -> tuple[tuple[int, ...], ...]:
-        adjacent: list[list[int]] = [[] for _ in self.transitions]
+    def _adjacent(self, side: str) -> tuple[tuple[PlaceId, ...], ...]:
+        adjacent: list[list[PlaceId]] = [[] for _ in self.transitions]
         for index, place in enumerate(self.places):
             for event in getattr(place, side):
-                adjacent[event].append(index)
+                adjacent[event].append(PlaceId(index))
         return tuple(map(tuple, adjacent))
 
     def is_detached(self, events: Iterable[int]) -> bool:

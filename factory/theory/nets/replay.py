@@ -75,8 +75,8 @@ class _Game:
             if self.net.slots[q][j] != robot:
                 return f"{name} moves {self.net.gears[robot].robot} into another robot's slot"
             there[robot] = q
-        for robot, place in there.items():
-            self.at[robot] = place
+        for moved, place in there.items():
+            self.at[moved] = place
         for place in self.needs[event]:
             self.tokens[place] -= 1
         for place in self.gives[event]:

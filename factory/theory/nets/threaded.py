@@ -12,8 +12,9 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 from factory.theory.nets.petri import PetriNet, Place, Transition
+from factory.theory.problem.ids import PlaceId
 
-Slot = tuple[int, int]
+Slot = tuple[PlaceId, int]
 """(p, i): component i of the mode of place p; both counted from 0."""
 
 Redistribution = tuple[tuple[Slot, Slot], ...]

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from itertools import chain
 
 from factory.theory.nets.gears import GearNet
+from factory.theory.problem.ids import TransitionId
 
-Joins = Mapping[int, tuple[int, ...]]
+Joins = Mapping[int, tuple[TransitionId, ...]]
 """For each end the transitions that are undone at least as often as it is: its start, and the ends
 that made what it joined (`Factory.joins`)."""
 

@@ -123,8 +123,8 @@ def _unthreaded(net: GearNet | MarkedNet, subject: MarkedNet) -> Iterator[Defect
     else:
         initial = tuple(next(p for p in g.places if net.tokens[p]) for g in net.gears)
     starting: dict[int, list[int]] = {}
-    for robot, place in enumerate(initial):
-        starting.setdefault(place, []).append(robot)
+    for robot, start in enumerate(initial):
+        starting.setdefault(start, []).append(robot)
     for place, robots in sorted(starting.items()):
         slots, at = subject.slots[place], subject.net.places[place]
         if at.size != len(robots) or sorted(slots) != robots:

@@ -56,7 +56,7 @@ def train_ratio(
     apart = ways_apart(gears, delays, ways)
     delays += apart.values()
     ratio = max_cycle_ratio(with_ways(marked(gears), gears, apart), delays)
-    owners = dict(enumerate(gears.slots))
+    owners: dict[int, tuple[int, ...]] = dict(enumerate(gears.slots))
     owners |= {len(seconds) + number: key[:1] for number, key in enumerate(apart)}
     return ratio, busiest(owners, ratio.circuit, delays)
 

@@ -17,6 +17,16 @@ from factory.theory.nets.gears import GearNet, ascending
 from factory.theory.nets.undone import Joins
 from factory.theory.plant.approaches import Approach
 from factory.theory.plant.robot import Robot
+from factory.theory.problem.ids import (
+    AxisId,
+    OperationId,
+    PlaceId,
+    RobotId,
+    TransitionId,
+    end_of,
+    operation_of,
+    start_of,
+)
 from factory.theory.problem.pag import NOPART, PAG
 from factory.theory.problem.plan import Plan, out_of_turn
 from factory.theory.problem.template import Template
@@ -32,10 +42,10 @@ class Operation:
     where that is free; `turn`: for which unit of a period it is, from 0.
     """
 
-    index: int
+    index: OperationId
     label: str
     template: Template
-    robots: tuple[int, ...]
+    robots: tuple[RobotId, ...]
     before: tuple[str, ...]
     after: tuple[str, ...]
     dwell: float = 0.0
@@ -49,7 +59,7 @@ class Operation:
         return out_of_turn(self.label, self.turn)
 
     @property
-    def carrier(self) -> int:
+    def carrier(self) -> RobotId:
         """The robot that holds the result (index into `Factory.robots`)."""
         return self.robots[self.template.carrier - 1]
 
@@ -81,19 +91,23 @@ class Operation:
         return self.template.before.index(inputs[-1]) if inputs else -1
 
     @property
-    def start(self) -> int:
-        """Index of the transition X_s."""
-        return 2 * self.index
+    def start(self) -> TransitionId:
+        """The transition X_s."""
+        return start_of(self.index)
 
     @property
-    def end(self) -> int:
-        """Index of the transition X_e."""
-        return 2 * self.index + 1
+    def end(self) -> TransitionId:
+        """The transition X_e."""
+        return end_of(self.index)
 
     @property
-    def place(self) -> int:
-        """Index of the operation place [X_s; X_e]."""
-        return self.index
+    def place(self) -> PlaceId:
+        """The operation place [X_s; X_e]."""
+        return PlaceId(self.index)
+
+
+NO_PARENT = OperationId(-1)
+"""The operation that takes what a dropoff makes: none."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +125,7 @@ class Factory(Pictured):
     robots: tuple[Robot, ...]
     operations: tuple[Operation, ...]
     net: GearNet
-    parents: tuple[int, ...] = field(repr=False)
+    parents: tuple[OperationId, ...] = field(repr=False)
     plan: Plan = field(default_factory=Plan, repr=False)
     adjusted: frozenset[int] = frozenset()
     period: int = 1
@@ -150,6 +164,10 @@ class Factory(Pictured):
         """The output robot's last operation, for the first unit of a period."""
         return self.operations[-self.period]
 
+    def operation_of(self, transition: int) -> Operation:
+        """The operation that a transition of the compiled net starts or ends."""
+        return self.operations[operation_of(transition)]
+
     def drops(self, operation: int) -> bool:
         """Whether an operation (index) is a dropoff."""
         return operation >= len(self.operations) - self.period
@@ -177,12 +195,12 @@ class Factory(Pictured):
         return sum(counts.get(dropoff.end, 0) for dropoff in self.dropoffs)
 
     @cached_property
-    def tours(self) -> tuple[tuple[tuple[int, ...], ...], ...]:
+    def tours(self) -> tuple[tuple[tuple[OperationId, ...], ...], ...]:
         """For each robot the operations of its tours, in the order of its gear: a tour leads from
         empty hands to empty hands. A robot that serves one label has one, one on a line several."""
         by_robot = []
         for robot in self.robots:
-            tours, tour = list[tuple[int, ...]](), list[int]()
+            tours, tour = list[tuple[OperationId, ...]](), list[OperationId]()
             for number in robot.operations:
                 operation = self.operations[number]
                 tour.append(number)
@@ -198,14 +216,16 @@ class Factory(Pictured):
         return any(len(tours) > 1 for tours in self.tours)
 
     @cached_property
-    def order(self) -> tuple[int, ...]:
+    def order(self) -> tuple[OperationId, ...]:
         """The operations in an order in which every robot's program ascends, unit by unit, each
         unit's dropoff last: so units can be made one after the other. Raises ValueError where there
         is none: then the net is not live."""
         if not self.folded:
-            return (*reversed(range(len(self.operations) - 1)), len(self.operations) - 1)
+            numbers = [operation.index for operation in self.operations]
+            return (*reversed(numbers[:-1]), numbers[-1])
         turns = [operation.turn for operation in self.operations]
-        return ascending([robot.operations for robot in self.robots], turns)
+        order = ascending([robot.operations for robot in self.robots], turns)
+        return tuple(map(OperationId, order))
 
     @cached_property
     def postorder(self) -> tuple[int, ...]:
@@ -233,12 +253,12 @@ class Factory(Pictured):
         return MappingProxyType(dict(sorted(strokes.items())))
 
     @cached_property
-    def axes(self) -> tuple[tuple[int, ...], ...]:
+    def axes(self) -> tuple[tuple[AxisId, ...], ...]:
         """For each operation the axes that its mode moves: the carriages of its robots, which have
         their robots' numbers, and the lifts that are raised or lowered in it, numbered from R on in
         the order of `strokes`. A lift is up but for the operations that it delivers to; one that is
         adjusted stays where it is on a tour."""
-        moved = [list(operation.robots) for operation in self.operations]
+        moved = [[*map(AxisId, operation.robots)] for operation in self.operations]
         for robot, axis in self.lift_axis.items():
             for tour in self.tours[robot]:
                 ends = (tour[0],) if robot in self.adjusted else (tour[0], tour[-1])
@@ -247,14 +267,14 @@ class Factory(Pictured):
         return tuple(map(tuple, moved))
 
     @cached_property
-    def lift_axis(self) -> Mapping[int, int]:
+    def lift_axis(self) -> Mapping[int, AxisId]:
         """The axis of the lift of each robot (index) that has one."""
-        return {robot: len(self.robots) + n for n, robot in enumerate(self.strokes)}
+        return {robot: AxisId(len(self.robots) + n) for n, robot in enumerate(self.strokes)}
 
-    def robot_of(self, axis: int) -> int:
+    def robot_of(self, axis: int) -> RobotId:
         """The robot (index) of an axis: of its carriage, or of its lift."""
         count = len(self.robots)
-        return axis if axis < count else [*self.strokes][axis - count]
+        return RobotId(axis) if axis < count else RobotId([*self.strokes][axis - count])
 
     def lowers(self, robot: int) -> bool:
         """Whether a robot (index) lowers what it delivers."""
@@ -276,7 +296,7 @@ class Factory(Pictured):
         """Whether a robot (index) ends a tour with an operation (index)."""
         return any(tour[-1] == operation for tour in self.tours[robot])
 
-    def tour_of(self, robot: int, operation: int) -> tuple[int, ...]:
+    def tour_of(self, robot: int, operation: int) -> tuple[OperationId, ...]:
         """The tour of a robot (index) that an operation (index) is in."""
         return next(tour for tour in self.tours[robot] if operation in tour)
 

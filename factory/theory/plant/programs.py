@@ -57,7 +57,7 @@ def program_of(factory: Factory, robot: int) -> Program:
     steps = []
     for position, number in enumerate(factory.robots[robot].operations):
         operation = factory.operations[number]
-        wait = net.threaded.places[gear.places[2 * position]]
+        wait = net.threaded.places[gear.waiting(position)]
         others = tuple(
             (other, label)
             for other, label in sorted(zip(operation.robots, operation.before, strict=True))

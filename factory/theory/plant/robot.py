@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from factory.support.errors import Position
+from factory.theory.problem.ids import OperationId, RobotId
 from factory.theory.problem.robot_bodies import RobotBody
 from factory.theory.problem.robot_types import RobotType
 
@@ -15,10 +16,10 @@ class Robot:
     gear's order. `position` is that of the operation that made it necessary (for diagnostics: the
     user's line)."""
 
-    index: int
+    index: RobotId
     name: str
     kind: RobotType = field(repr=False)
-    operations: tuple[int, ...]
+    operations: tuple[OperationId, ...]
     position: Position | None = field(default=None, compare=False)
 
     @property

@@ -23,7 +23,7 @@ names of the robots, places and transitions concerned. `digest` is the SHA-256 o
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from factory.apps.exports.certificate.listing import CLAIMS, SCHEMA, TRAIN, digest
@@ -86,7 +86,7 @@ def _listing(net: GearNet | MarkedNet, subject: MarkedNet) -> Json:
 
 
 def _robots(net: GearNet | MarkedNet, subject: MarkedNet) -> list[Json]:
-    initial = _marked_places(subject)
+    initial: Sequence[int | None] = _marked_places(subject)
     if isinstance(net, GearNet):
         initial = [*net.initial, *[None] * len(net.gears)][: len(net.gears)]
     return [
@@ -150,7 +150,7 @@ def _live(net: MarkedNet, composition: Composition) -> Json:
     """The order of the transitions gives one of the places they mark."""
     events = token_free(net).order
     postset, tokens = net.net.postset, net.tokens
-    order = [p for event in events for p in postset[event] if not tokens[p]]
+    order: list[int] = [p for event in events for p in postset[event] if not tokens[p]]
     order += [p for p, producer in enumerate(net.left) if producer == NONE and not tokens[p]]
     return {"order": order}
 

@@ -50,7 +50,9 @@ def scan_time(text: str) -> int:
 def stations(factory: Factory) -> dict[int, int]:
     """The number of the station where an operation (index) takes a part or drops a product off:
     the feeders' from 1 in the order of their operations, then the outfeed's."""
-    feeders = {leaf.index: number for number, leaf in enumerate(factory.leaves, start=1)}
+    feeders: dict[int, int] = {
+        leaf.index: number for number, leaf in enumerate(factory.leaves, start=1)
+    }
     return feeders | {dropoff.index: len(feeders) + 1 for dropoff in factory.dropoffs}
 
 

@@ -159,7 +159,7 @@ class RobotBlocks:
 
     def _completed(self, transition: int) -> str:
         """How often a transition of the compiled net has fired."""
-        operation = self.layout.factory.operations[transition // 2]
+        operation = self.layout.factory.operation_of(transition)
         gear = self.layout.factory.robots[operation.carrier].operations
         turn = "Entered" if transition == operation.start else "Finished"
         place = gear.index(operation.index)

@@ -27,6 +27,7 @@ from factory.floor.layout.hands.surfaces import Way
 from factory.floor.layout.stops import stops_of
 from factory.theory.plant.factory import Factory
 from factory.theory.plant.robot import Robot
+from factory.theory.problem.ids import RobotId
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,11 +49,11 @@ class Tours:
         for robot, tours in zip(factory.robots, factory.tours, strict=True):
             of.append(tuple(range(len(robots), len(robots) + len(tours))))
             robots += [
-                replace(robot, index=n, operations=tour)
+                replace(robot, index=RobotId(n), operations=tour)
                 for n, tour in zip(of[-1], tours, strict=True)
             ]
         operations = tuple(
-            replace(o, robots=tuple(of[r][factory.turns[o.index, r]] for r in o.robots))
+            replace(o, robots=tuple(RobotId(of[r][factory.turns[o.index, r]]) for r in o.robots))
             for o in factory.operations
         )
         made = replace(factory, robots=tuple(robots), operations=operations, adjusted=frozenset())

@@ -7,6 +7,7 @@ from factory.floor.layout.dimensions import up
 from factory.floor.layout.feeding import passing
 from factory.floor.layout.layout import Layout
 from factory.theory.nets.coordinated import Past
+from factory.theory.problem.ids import end_of
 
 SPARE = 0.001
 """A hand is clear that is so far from all that it has delivered to [m]."""
@@ -50,7 +51,7 @@ def raised(layout: Layout, robot: int, after: int) -> Past:
     """When a robot's lift is up for its next tour after an operation (index)."""
     gear = layout.factory.robots[robot].operations
     up = layout.visits[gear[(gear.index(after) + 1) % len(gear)], robot].up
-    return Past(2 * after + 1, layout.factory.lift_axis[robot], up - SPARE)
+    return Past(end_of(after), layout.factory.lift_axis[robot], up - SPARE)
 
 
 def farther(layout: Layout, robot: int, by: float) -> float:
