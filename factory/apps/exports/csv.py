@@ -18,7 +18,7 @@ from factory.apps.log.project_table import factory_of
 from factory.support.errors import one_line
 from factory.theory.nets.undone import Undone
 from factory.theory.plant.factory import Factory
-from factory.theory.problem.ids import is_end
+from factory.theory.problem.ids import TransitionId, is_end
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,9 @@ def rows(log: Log) -> Iterator[EventRow]:
         yield _row(factory, time, number, units[number])
 
 
-def _row(factory: Factory, time: float, number: int, unit: int, undone: str = "") -> EventRow:
+def _row(
+    factory: Factory, time: float, number: TransitionId, unit: int, undone: str = ""
+) -> EventRow:
     operation = factory.operation_of(number)
     at = operation.position
     return EventRow(

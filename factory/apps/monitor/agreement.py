@@ -24,7 +24,8 @@ def disagreements(
     firings that move no parts may not have been observed yet."""
     names = subject.factory.net.threaded.transitions
     count = {t.name: subject.counts.get(number, 0) for number, t in enumerate(names)}
-    label = {t.name: subject.factory.operation_of(n).label for n, t in enumerate(names)}
+    operations = subject.factory.operations
+    label = {names[t].name: o.label for o in operations for t in (o.start, o.end)}
     ends = (o for o in subject.factory.operations if subject.moves_parts[o.index])
     shown = {names[o.end].name: o for o in ends}
     left = {(firing.transition, firing.unit): firing for firing in firings}

@@ -16,6 +16,7 @@ from factory.engine.record.findings import Firing, Violation
 from factory.engine.record.subject import MonitorSubject
 from factory.engine.timing.pool import with_wip
 from factory.theory.nets.marked import marked, token_free
+from factory.theory.problem.ids import TransitionId
 
 
 @dataclass(slots=True)
@@ -143,7 +144,7 @@ class _Solver:
     def _violation(
         self, event: int, unit: int, noted: _Seen, cause: int, early: float
     ) -> Violation:
-        operation = self.observed.subject.factory.operation_of(event)
+        operation = self.observed.subject.factory.operation_of(TransitionId(event))
         name, other = self.names[event], self.names[cause]
         never = f"{other} must come first, and was not observed"
         why = f"could not fire before {early:.3f} s, since {other} must come first"

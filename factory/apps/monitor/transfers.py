@@ -10,6 +10,7 @@ from factory.engine.record.anatomy import Anatomy, Holder
 from factory.engine.record.grips import Switch
 from factory.engine.record.subject import MonitorSubject
 from factory.theory.plant.factory import Operation
+from factory.theory.problem.ids import OperationId
 from factory.theory.problem.pag import NOPART
 
 Blame = Callable[[str, int, str, str], None]
@@ -203,7 +204,7 @@ class Transfers:
         operation = self.subject.factory.operations[number]
         unit = self.ended[number]
         self.ended[number] += 1
-        last = self.subject.factory.drops(number)
+        last = self.subject.factory.drops(OperationId(number))
         holder = (HOLD, -1) if last else (GRIP, operation.carrier)
         label = operation.before[0] if last else operation.label
         load = self.load.get(holder, set())

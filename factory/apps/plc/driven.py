@@ -19,6 +19,7 @@ from factory.engine.timing.distributed import Scan
 from factory.support.settings import Settings
 from factory.theory.control.mode import Array, Limits
 from factory.theory.plant.factory import Factory, Operation
+from factory.theory.problem.ids import AxisId, TransitionId
 
 if TYPE_CHECKING:
     from factory.engine.simulation.simulation import Simulation
@@ -76,7 +77,7 @@ class DrivenSupervisor:
     def awaited(self) -> list[Operation]:
         """The operations all of whose robots wait for them."""
         possible = self.interlock.threads.possible
-        return [self.factory.operation_of(event) for event in sorted(possible)]
+        return [self.factory.operation_of(TransitionId(event)) for event in sorted(possible)]
 
     def limit(self, limits: Limits) -> None:
         """Set the limits of the axes."""
@@ -125,7 +126,7 @@ class DrivenSupervisor:
         drives, back, stops = self.drives, self.interlock.held_back, self.drives.stops
         target = self._confined(commands, stops)
         for axis, where in enumerate(target.tolist()):
-            stands = commands.stop or self.tripped or self.factory.robot_of(axis) in back
+            stands = commands.stop or self.tripped or self.factory.robot_of(AxisId(axis)) in back
             drives.target[axis] = stops[axis] if stands else where
         drives.go(self.interlock.world)
 
@@ -149,7 +150,7 @@ class DrivenSupervisor:
         confined = np.clip(commands.target, low, high)
         astray = {*np.flatnonzero(np.abs(confined - commands.target) > SLACK).tolist()}
         for axis in sorted(astray - self._astray):
-            robot = self.factory.robot_of(axis)
+            robot = self.factory.robot_of(AxisId(axis))
             name = self.factory.robots[robot].name + (" lift" if axis != robot else "")
             ends = f"between {low[axis]:.3f} m and {high[axis]:.3f} m now"
             message = f"{name} is sent to {commands.target[axis]:.6g} m: it may go {ends}"

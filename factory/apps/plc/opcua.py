@@ -26,6 +26,7 @@ from factory.engine.simulation.simulation import Simulation
 from factory.support.errors import Diagnostic, InputError
 from factory.support.version import optional
 from factory.theory.plant.factory import Factory
+from factory.theory.problem.ids import AxisId
 
 SPACE = "urn:klavins-factory:plant"
 """The namespace of its nodes."""
@@ -176,7 +177,7 @@ class OpcuaPlant:
             for robot in factory.robots
         ]
         for axis in range(len(self._written.kept.target)):
-            robot = factory.robot_of(axis)
+            robot = factory.robot_of(AxisId(axis))
             name = f"Axis_{1 if axis == robot else 2}"
             made = await places[robot].add_object(space, name)
             await made.add_property(space, "MotionProfile", LINEAR)

@@ -163,7 +163,7 @@ class Responding:
         self.returning.ways.pop(robot, None)
         supervisor = self._books.supervisor
         stages = supervisor.ahead.going(supervisor.active.ahead).values()
-        ahead = {stage.axis: stage.goal for stage in stages if stage.robot == robot}
+        ahead = {int(stage.axis): stage.goal for stage in stages if stage.robot == robot}
         at = ahead or dict(self.returning.rest(robot, self._books.marking))
         self._plant.lift_out(robot, at)
 

@@ -26,6 +26,7 @@ from factory.theory.nets.threaded import Threads
 from factory.theory.nets.undone import Undone
 from factory.theory.plant.demand import Word
 from factory.theory.plant.factory import Factory, Operation
+from factory.theory.problem.ids import TransitionId
 
 
 @dataclass(slots=True)
@@ -161,7 +162,8 @@ class Supervisor:
 
     def awaited(self) -> list[Operation]:
         """The operations all of whose robots wait for them."""
-        return [self.factory.operation_of(event) for event in sorted(self.threads.possible)]
+        possible = map(TransitionId, sorted(self.threads.possible))
+        return [self.factory.operation_of(event) for event in possible]
 
     def _startable(self) -> list[int]:
         """Operations X with X_s enabled: waits marked (their goals are everything), the robots in

@@ -26,7 +26,7 @@ from factory.theory.control.mode import ROUNDING, Array, Limits, Mode
 from factory.theory.control.profile import SpeedProfile, World
 from factory.theory.nets.coordinated import Past
 from factory.theory.plant.factory import Factory
-from factory.theory.problem.ids import carriage_axis, operation_of
+from factory.theory.problem.ids import AxisId, carriage_axis, operation_of
 
 CALM = 3
 """So many ticks after its stroke a slider is at rest."""
@@ -185,7 +185,7 @@ class Timing:
 
     def axis_drive(self, axis: int, change: Change) -> GovernedAxis:
         """How an axis moves, with a change."""
-        limits = self._limits((axis,), (self.factory.robot_of(axis),), change)
+        limits = self._limits((axis,), (self.factory.robot_of(AxisId(axis)),), change)
         return replace(
             self.drive, speed=float(limits.speed[0]), acceleration=float(limits.acceleration[0])
         )

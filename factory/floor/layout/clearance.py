@@ -45,6 +45,7 @@ from factory.floor.layout.outfeed import dip_of, slot_of
 from factory.floor.layout.sweeps import Pile, piles, regions
 from factory.theory.plant.approaches import MARGIN
 from factory.theory.plant.factory import Operation
+from factory.theory.problem.ids import OperationId
 from factory.theory.problem.pag import NOPART
 from factory.theory.problem.robot_bodies import ARM_LOW, ARM_TOP, CARRIAGE_TOP
 
@@ -179,7 +180,7 @@ class ClearanceSearch:
     def _serves(self, region: Region) -> bool:
         """Whether the outfeed may take a region in: itself, the robot under it, the released
         product."""
-        return region.kind not in LOADS or self.layout.factory.drops(region.mode)
+        return region.kind not in LOADS or self.layout.factory.drops(OperationId(region.mode))
 
     def _joined(self, one: Region, other: Region) -> bool:
         """Whether one is coupled in a mode of the other's robot."""

@@ -21,7 +21,7 @@ from factory.floor.layout.layout import Layout
 from factory.theory.nets.coordinated import CoordinatedNet, Coordination, Past
 from factory.theory.nets.gears import GearNet
 from factory.theory.plant.factory import Operation
-from factory.theory.problem.ids import carriage_axis, start_of
+from factory.theory.problem.ids import RobotId, TransitionId, carriage_axis, start_of
 
 HOME = 1e-3
 """A robot is at home within this [m]."""
@@ -113,7 +113,7 @@ def _of(build: Coordination, served: Mapping[int, Served], away: Mapping[int, in
     return Coordinated(made.net, made.passes, made.beside, made.orders, served, away)
 
 
-def _way_of(layout: Layout, past: Past) -> tuple[int, int, bool, float]:
+def _way_of(layout: Layout, past: Past) -> tuple[TransitionId, RobotId, bool, float]:
     """The transition that a pass follows, its robot, and the order in which the robot passes
     points: its lift first if that has to be up before it goes home."""
     robot = layout.factory.robot_of(past.axis)

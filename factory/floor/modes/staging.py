@@ -22,6 +22,7 @@ from factory.support.settings import Settings
 from factory.theory.control.mode import ROUNDING, Array, Mode
 from factory.theory.control.profile import World
 from factory.theory.plant.factory import Factory, Operation
+from factory.theory.problem.ids import AxisId, carriage_axis
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +36,7 @@ class HeadStart:
     slot: int
     mode: Mode = field(repr=False)
     start: float
-    axis: int
+    axis: AxisId
     follows: bool = False
 
     @property
@@ -73,7 +74,9 @@ def stages(layout: Layout, modes: Sequence[Mode]) -> tuple[HeadStart, ...]:
                 ahead, goal = empty and robot in awaited, awaited.get(robot, goal)
             if ahead and abs(float(start[slot]) - goal) > ROUNDING:
                 at = float(start[slot])
-                starts_ahead.append(_ahead(layout.factory, operation, mode, robot, goal, at))
+                starts_ahead.append(
+                    _ahead(layout.factory, operation, mode, carriage_axis(robot), goal, at)
+                )
                 starts_ahead += _adjusting(layout, operation, mode, robot, start)
     return tuple(starts_ahead)
 
@@ -90,7 +93,9 @@ def _rising(
     goal = float(mode.goals[factory.axes[operation.index].index(axis)])
     yield _ahead(factory, operation, mode, axis, goal, 0.0)
     if awaited is not None and abs(start - awaited) > ROUNDING:
-        yield replace(_ahead(factory, operation, mode, robot, awaited, start), follows=True)
+        yield replace(
+            _ahead(factory, operation, mode, carriage_axis(robot), awaited, start), follows=True
+        )
 
 
 def _adjusting(
@@ -108,7 +113,7 @@ def _adjusting(
 
 
 def _ahead(
-    factory: Factory, operation: Operation, mode: Mode, axis: int, goal: float, start: float
+    factory: Factory, operation: Operation, mode: Mode, axis: AxisId, goal: float, start: float
 ) -> HeadStart:
     slot = factory.axes[operation.index].index(axis)
     only = slice(slot, slot + 1)

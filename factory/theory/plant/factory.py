@@ -164,11 +164,11 @@ class Factory(Pictured):
         """The output robot's last operation, for the first unit of a period."""
         return self.operations[-self.period]
 
-    def operation_of(self, transition: int) -> Operation:
+    def operation_of(self, transition: TransitionId) -> Operation:
         """The operation that a transition of the compiled net starts or ends."""
         return self.operations[operation_of(transition)]
 
-    def drops(self, operation: int) -> bool:
+    def drops(self, operation: OperationId) -> bool:
         """Whether an operation (index) is a dropoff."""
         return operation >= len(self.operations) - self.period
 
@@ -271,7 +271,7 @@ class Factory(Pictured):
         """The axis of the lift of each robot (index) that has one."""
         return {robot: AxisId(len(self.robots) + n) for n, robot in enumerate(self.strokes)}
 
-    def robot_of(self, axis: int) -> RobotId:
+    def robot_of(self, axis: AxisId) -> RobotId:
         """The robot (index) of an axis: of its carriage, or of its lift."""
         count = len(self.robots)
         return RobotId(axis) if axis < count else RobotId([*self.strokes][axis - count])
