@@ -27,8 +27,8 @@ from factory.floor.geometry.alike import (
     moved,
     shape_of,
 )
-from factory.floor.geometry.meshes import Array
 from factory.pipeline import all_templates, read
+from factory.support.arrays import Array
 from factory.support.files import write_all
 from tests.command_line import ROOT, Terminal, files_in
 from tests.plan_models import box, model_source, rod

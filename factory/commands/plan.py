@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from factory.apps.planning.parts import InPlace
     from factory.apps.planning.plan import CannotAssemble, Planned, PlannedJoin, PlanOptions
     from factory.apps.planning.searching import Aim
-    from factory.floor.geometry.meshes import Array
     from factory.floor.geometry.overlapping import Overlapping
     from factory.pipeline import Project
+    from factory.support.arrays import Array
     from factory.theory.plant.approaches import Approach, Kind
 
 LOOKS = ("exploded.png", "assembly.mp4")

@@ -21,8 +21,9 @@ from factory.apps.disturbance.values import (
 )
 from factory.engine.simulation.mujoco.world import MujocoWorld
 from factory.engine.simulation.simulation import Simulation
+from factory.support.arrays import Array, Index
 from factory.support.errors import Diagnostic, InputError, did_you_mean
-from factory.theory.control.mode import Array, Index, Limits
+from factory.theory.control.mode import Limits
 
 
 def disturb(simulation: Simulation, *disturbances: Disturbance) -> Simulation:

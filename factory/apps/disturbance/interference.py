@@ -14,8 +14,8 @@ import numpy as np
 
 from factory.engine.simulation.mujoco.drives import INPUTS
 from factory.engine.simulation.mujoco.world import MujocoWorld
+from factory.support.arrays import Array, Index
 from factory.support.engine import mujoco
-from factory.theory.control.mode import Array, Index
 
 Measure = Callable[[Array, Array], tuple[Array, Array]]
 """True positions [m] and speeds [m/s] of the axes -> measured ones; called once a timestep."""

@@ -14,8 +14,9 @@ from factory.apps.log import Log
 from factory.engine.mjcf import names
 from factory.engine.mjcf.parts import HIDDEN
 from factory.engine.simulation.modelling import physical_model
-from factory.floor.geometry.meshes import Array, Mesh
+from factory.floor.geometry.meshes import Mesh
 from factory.floor.geometry.solids import rotation
+from factory.support.arrays import Array
 from factory.support.errors import Diagnostic, InputError
 
 if TYPE_CHECKING:

@@ -16,9 +16,8 @@ from factory.apps.exports.csv import EventRow, rows
 from factory.apps.exports.motion import BodyMotion, motion_of
 from factory.apps.exports.subject import Subject
 from factory.apps.log import Log
-from factory.floor.geometry.meshes import Array
+from factory.support.arrays import Array, Truth
 from factory.support.version import optional
-from factory.theory.control.mode import Truth
 
 FORMAT, TAKES, BINARY = "mcap", "log", True
 

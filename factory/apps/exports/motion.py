@@ -10,8 +10,7 @@ import numpy as np
 
 from factory.apps.log import Log
 from factory.engine.mjcf.parts import HIDDEN
-from factory.floor.geometry.meshes import Array, Indices
-from factory.theory.control.mode import Truth
+from factory.support.arrays import Array, Indices, Truth
 
 if TYPE_CHECKING:
     from factory.support.engine import mujoco

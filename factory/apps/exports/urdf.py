@@ -22,10 +22,11 @@ from factory.engine.mjcf.elements import add, exact, numbers
 from factory.engine.mjcf.mesh_files import stl
 from factory.engine.mjcf.stock import written
 from factory.engine.simulation.modelling import physical_model
-from factory.floor.geometry.meshes import Array, Mesh, hull_mesh
+from factory.floor.geometry.meshes import Mesh, hull_mesh
 from factory.floor.geometry.solids import rotation
 from factory.floor.geometry.turning import upright
 from factory.floor.layout.guidepath import LEVER
+from factory.support.arrays import Array
 
 if TYPE_CHECKING:
     from factory.support.engine import mujoco

@@ -24,8 +24,8 @@ from factory.engine.mjcf.solid import SolidReplica
 from factory.engine.simulation.modelling import physical_model
 from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.layout import Layout
+from factory.support.arrays import Array, Index
 from factory.support.engine import mujoco
-from factory.theory.control.mode import Array, Index
 from factory.theory.plant.approaches import Pair
 
 TOUCH = 1e-6

@@ -18,8 +18,8 @@ from factory.engine.record.state import State
 from factory.engine.simulation.mujoco.world import MujocoWorld
 from factory.engine.simulation.run import Run
 from factory.engine.simulation.simulation import Simulation
+from factory.support.arrays import Array
 from factory.support.engine import mujoco
-from factory.theory.control.mode import Array
 
 FULL = 0.999
 """Share of its limit from which a force is saturated."""

@@ -22,8 +22,8 @@ from factory.apps.importing.part_maker import Placement
 from factory.apps.importing.scene_file import MESHES, SCENES, read_one, read_scene
 from factory.floor.geometry.alike import alike, shape_of
 from factory.floor.geometry.mesh_file import ANEW, UnreadableMesh, obj_of
-from factory.floor.geometry.meshes import Array, Indices
 from factory.floor.geometry.solids import colour
+from factory.support.arrays import Array, Indices
 from factory.support.errors import Diagnostic, InputError, Position
 from factory.support.files import MESH, natural, read_bytes
 from factory.theory.lang.source import quoted

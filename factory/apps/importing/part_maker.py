@@ -13,8 +13,8 @@ from factory.apps.importing.draft import ImportFaults
 from factory.apps.importing.mesh_files import MeshStore, first_file, path_inside
 from factory.floor.geometry.mesh_file import ANEW, UnreadableMesh
 from factory.floor.geometry.mesh_reader import read_mesh
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.solids import rotation
+from factory.support.arrays import Array
 from factory.support.errors import Position
 from factory.support.files import MESH, read_bytes
 from factory.theory.lang.operations import MESHES

@@ -15,9 +15,9 @@ from factory.apps.report.scene import DrawnFactory, Pack, scene, stations
 from factory.apps.report.sections import assembly_tree
 from factory.engine.mjcf import names
 from factory.engine.mjcf.parts import HIDDEN
-from factory.engine.mjcf.replica import Floats
 from factory.engine.record.subject import subject_of_run
 from factory.engine.simulation.simulation import Simulation
+from factory.support.arrays import Array
 from factory.theory.plant.factory import Operation
 
 SCRIPTS = (
@@ -100,7 +100,7 @@ def stage_of(simulation: Simulation) -> DrawnFactory:
     )
 
 
-def _ends(simulation: Simulation) -> Iterator[tuple[Operation, Floats]]:
+def _ends(simulation: Simulation) -> Iterator[tuple[Operation, Array]]:
     """The state of the engine with the robots of an operation where it ends."""
     layout, world = simulation.layout, simulation.physical
     for operation in layout.factory.operations:

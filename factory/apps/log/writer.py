@@ -19,11 +19,12 @@ from factory.apps.log.blocks import LENGTH, MAGIC, STATES, Arrays, bad_log, bloc
 from factory.apps.log.failed import Written
 from factory.apps.log.project_table import project_table
 from factory.apps.log.reader import digest_of, header_in
-from factory.engine.record.state import Array, Event, Observation, Recordable, Recorder, State
+from factory.engine.record.state import Event, Observation, Recordable, Recorder, State
 from factory.engine.record.subject import subject_of_run
 from factory.engine.record.verdict import HEADER, kept_figures
 from factory.floor.layout.saved import LayoutTable
 from factory.pipeline import Project
+from factory.support.arrays import Array
 from factory.support.claim import claimed
 from factory.support.errors import Diagnostic, FactoryError, InputError
 from factory.support.files import RECORD, content_of, unwritten

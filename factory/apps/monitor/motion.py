@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from factory.engine.record.anatomy import Anatomy
 from factory.engine.record.grips import MISSED
-from factory.engine.record.state import Array, Index, Observation
+from factory.engine.record.state import Observation
+from factory.support.arrays import Array, Index
 from factory.support.settings import Settings
 
 REST = 0.01

@@ -22,8 +22,9 @@ from factory.engine.mjcf.replica import Replica
 from factory.engine.mjcf.weld_frames import GRIP, HOLD, PARK
 from factory.engine.record.anatomy import Anatomy
 from factory.engine.record.findings import Violation
-from factory.engine.record.state import Array, Index, Observation
+from factory.engine.record.state import Observation
 from factory.engine.record.subject import MonitorSubject
+from factory.support.arrays import Array, Index
 from factory.support.engine import mujoco
 
 PRESSED = 1e-4

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.apps.planning.subsets import LEVEL_PRICES, Masks, Subsets
-from factory.floor.geometry.meshes import Array
+from factory.support.arrays import Array
 
 Late = Callable[[], bool]
 """Tells whether a search must end."""

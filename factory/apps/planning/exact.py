@@ -25,8 +25,8 @@ import numpy as np
 
 from factory.apps.planning.divisions import Batch, Divisions, Late, TooLate, never
 from factory.apps.planning.subsets import LEVEL_PRICES, Masks, Subsets
-from factory.floor.geometry.meshes import Array
 from factory.floor.layout.durations import Pace
+from factory.support.arrays import Array
 from factory.theory.plant.approaches import MARGIN
 
 STATION = 0.06

@@ -14,9 +14,9 @@ from factory.film.painter import LOOSE_SAMPLES, LooseParts
 from factory.film.picture import Size
 from factory.film.reel import write_still
 from factory.film.video import VideoFile, check_output
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.sight import View, fit, towards
 from factory.floor.geometry.solids import Product
+from factory.support.arrays import Array
 
 FPS = 15.0
 

@@ -21,7 +21,7 @@ from factory.apps.planning.divisions import Late, divisions
 from factory.apps.planning.exact import RELAY, Best, Tree, TreeTask
 from factory.apps.planning.judging import Judged, Site
 from factory.apps.planning.subsets import APART, BLOCKED, LOOSE, PASSES, ROOT_AXIS, TIPS, subsets
-from factory.floor.geometry.meshes import Array
+from factory.support.arrays import Array
 
 Sets = NDArray[np.bool_]
 

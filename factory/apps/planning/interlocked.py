@@ -15,8 +15,8 @@ from factory.film.painter import LOOSE_SAMPLES, LooseParts
 from factory.film.picture import Size
 from factory.film.reel import write_still
 from factory.film.video import check_output
-from factory.floor.geometry.meshes import Array, Indices
 from factory.floor.geometry.sight import fit, towards
+from factory.support.arrays import Array, Indices
 
 SIZE: Size = (1280, 720)
 """Of the picture, without the names below it."""

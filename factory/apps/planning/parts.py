@@ -9,10 +9,11 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 from factory.floor.geometry.decomposition import FULL
-from factory.floor.geometry.meshes import Array, Indices, Mesh, is_closed
+from factory.floor.geometry.meshes import Mesh, is_closed
 from factory.floor.geometry.overlap import drawn
 from factory.floor.geometry.overlapping import Overlapping
 from factory.floor.geometry.solids import Solid
+from factory.support.arrays import Array, Indices
 from factory.support.errors import Diagnostic, InputError
 from factory.theory.nets.verdict import listing
 from factory.theory.problem.pag import PAG, AllowedOverlap, Assembly

@@ -40,12 +40,12 @@ from factory.apps.planning.subsets import BLOCKED, ROOT_AXIS, Stance, stances
 from factory.apps.planning.threads import threads
 from factory.apps.planning.turning import only
 from factory.apps.planning.writing import Tree, planned_product, screws_in
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.overlapping import Overlapping
 from factory.floor.geometry.product import product_geometry
 from factory.floor.layout.durations import Pace
 from factory.floor.mating.mating import matings
 from factory.pipeline import Project, all_templates
+from factory.support.arrays import Array
 from factory.support.bounds import Allowance
 from factory.support.errors import Diagnostic, InputError, did_you_mean
 from factory.support.settings import Settings

@@ -13,7 +13,7 @@ from factory.apps.planning.cannot import Direction, Interlock, interlocks, named
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.standing import TIPS, overhang
 from factory.apps.planning.turning import only, turned, turns
-from factory.floor.geometry.meshes import Array
+from factory.support.arrays import Array
 from factory.support.errors import Diagnostic, InputError
 from factory.theory.nets.verdict import listing
 

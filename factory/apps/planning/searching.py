@@ -17,7 +17,7 @@ from factory.apps.planning.exact import Best, Expected, Tables, TreeTask, tables
 from factory.apps.planning.growing import bettered, divided
 from factory.apps.planning.judging import Judged, Site
 from factory.apps.planning.subsets import MOST, ROOT_AXIS, Stance, Subsets, stances, subsets
-from factory.floor.geometry.meshes import Array
+from factory.support.arrays import Array
 from factory.support.bounds import Allowance
 
 Aim = Literal["cycle", "robots", "floor"]

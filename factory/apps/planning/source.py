@@ -22,9 +22,10 @@ from factory.apps.planning.shanks import screws_among
 from factory.floor.geometry.alike import alike, shape_of
 from factory.floor.geometry.decomposition import can_decompose
 from factory.floor.geometry.mesh_file import ANEW
-from factory.floor.geometry.meshes import Array, Indices, hull_mesh
+from factory.floor.geometry.meshes import hull_mesh
 from factory.floor.geometry.product import product_geometry
 from factory.floor.geometry.solids import Solid, rotation
+from factory.support.arrays import Array, Indices
 from factory.support.collector import collector_paused
 from factory.support.errors import Diagnostic, InputError, did_you_mean
 from factory.theory.lang.pag_reader import load_pag

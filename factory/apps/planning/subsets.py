@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.apps.planning.blocking import AXES, CLASHES, DEEPER, LOCKED, Blocking
-from factory.floor.geometry.meshes import Array
+from factory.support.arrays import Array
 
 ROOT_AXIS = 1
 """The axis of the floor along which the inputs of the finished product come: y."""

@@ -16,8 +16,9 @@ import numpy as np
 from factory.apps.planning.parts import InPlace, PlacedPart
 from factory.apps.planning.source import surface
 from factory.apps.planning.writing import planned_product
-from factory.floor.geometry.meshes import Array, normals_of
+from factory.floor.geometry.meshes import normals_of
 from factory.floor.geometry.product import product_geometry
+from factory.support.arrays import Array
 
 NEAR = 1e-3
 """Faces inside the box of another part, enlarged by this [m], may touch that part."""

@@ -17,7 +17,8 @@ from factory.floor.layout.exclusions import awaited_positions
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.presence import Span
 from factory.floor.layout.staying import Staying, Sweep
-from factory.theory.control.mode import Array, Mode
+from factory.support.arrays import Array
+from factory.theory.control.mode import Mode
 from factory.theory.nets.coordinated import Past
 
 SLACK = 1e-3

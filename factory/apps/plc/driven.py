@@ -16,8 +16,9 @@ from factory.engine.record.state import Event
 from factory.engine.simulation.ordering import Ordering
 from factory.engine.simulation.supervisor import Active
 from factory.engine.timing.distributed import Scan
+from factory.support.arrays import Array
 from factory.support.settings import Settings
-from factory.theory.control.mode import Array, Limits
+from factory.theory.control.mode import Limits
 from factory.theory.plant.factory import Factory, Operation
 
 if TYPE_CHECKING:

@@ -9,8 +9,9 @@ from typing import Protocol
 import numpy as np
 
 from factory.engine.simulation.world import World
+from factory.support.arrays import Array
 from factory.theory.control.governor import towards
-from factory.theory.control.mode import Array, Limits
+from factory.theory.control.mode import Limits
 from factory.theory.plant.factory import Operation
 from factory.theory.problem.pag import NOPART
 

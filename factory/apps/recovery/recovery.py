@@ -19,9 +19,9 @@ from factory.engine.record.failures import Failing, Failures, Stood
 from factory.engine.record.state import Event
 from factory.engine.simulation.simulation import Simulation
 from factory.engine.simulation.supervisor import Supervisor
+from factory.support.arrays import Array
 from factory.support.errors import Diagnostic, InputError
 from factory.support.tables import table_of
-from factory.theory.control.mode import Array
 from factory.theory.nets.undone import Undone
 from factory.theory.plant.factory import Factory, Operation
 from factory.theory.problem.template import Failure

@@ -15,7 +15,8 @@ from factory.engine.simulation.supervisor import Supervisor
 from factory.floor.layout.feeding import passing
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.starting import start_positions
-from factory.theory.control.mode import Array, Mode
+from factory.support.arrays import Array
+from factory.theory.control.mode import Mode
 from factory.theory.nets.petri import Marking
 from factory.theory.plant.factory import Operation
 

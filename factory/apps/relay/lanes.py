@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array
 from factory.floor.layout.dimensions import FINGER, Clearance
 from factory.floor.layout.hands.apart import BESIDE, HandsApart, Swept
 from factory.floor.layout.hands.hand import Hand, Kind, widths
@@ -16,7 +15,7 @@ from factory.floor.layout.hands.in_the_way import InTheWay, Passed
 from factory.floor.layout.hands.places import Places
 from factory.floor.layout.hands.surfaces import Way, swept
 from factory.floor.layout.layout import Layout
-from factory.theory.control.mode import Truth
+from factory.support.arrays import Array, Truth
 from factory.theory.plant.factory import Factory, Operation
 
 

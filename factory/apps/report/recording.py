@@ -19,8 +19,8 @@ from factory.apps.monitor.record import verdict_on, watch_log
 from factory.apps.report.scene import DrawnFactory, stations
 from factory.apps.resume.remade import forged, model_faults
 from factory.engine.record.verdict import RunVerdict
-from factory.floor.geometry.meshes import Array
 from factory.floor.layout.layout import Layout
+from factory.support.arrays import Array
 from factory.support.errors import Diagnostic, InputError, RunError
 from factory.support.tables import misfit
 from factory.theory.plant.factory import Factory, Operation

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from factory.engine.mjcf import names
 from factory.engine.mjcf.parts import HIDDEN
 from factory.engine.mjcf.replica import SHOWN, Replica
+from factory.support.arrays import Array, Index, Truth
 from factory.support.engine import mujoco
-from factory.theory.control.mode import Array, Index, Truth
 
 
 class SolidReplica(Replica):

@@ -10,8 +10,8 @@ import numpy as np
 
 from factory.engine.mjcf import names
 from factory.engine.mjcf.weld_frames import GRIP, KINDS, WeldFrames, check_holders
-from factory.engine.record.state import Index
-from factory.floor.layout.way import Array, Ways
+from factory.floor.layout.way import Ways
+from factory.support.arrays import Array, Index
 from factory.theory.plant.factory import Factory
 
 Bent = tuple[tuple[int, ...], Ways]

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from factory.engine.mjcf.weld_frames import GRIP, HOLD, WeldFrames
 from factory.engine.record.anatomy import Anatomy
-from factory.engine.record.state import Array, Index, Observation
+from factory.engine.record.state import Observation
 from factory.engine.record.subject import MonitorSubject
+from factory.support.arrays import Array, Index
 
 HANGS = 2e-3
 """Distance from its place above which a part is not held [m], in addition to twice the radius of

@@ -18,7 +18,7 @@ from factory.floor.layout.clearance import TOLERANCE, ClearanceSearch
 from factory.floor.layout.guidepath import Point2
 from factory.floor.layout.layout import Layout, carriers
 from factory.floor.layout.sweeps import piles, regions_of
-from factory.theory.control.mode import Array, Index, Truth
+from factory.support.arrays import Array, Index, Truth
 
 
 @dataclass(frozen=True, eq=False, slots=True)

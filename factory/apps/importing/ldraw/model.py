@@ -30,7 +30,7 @@ from factory.apps.importing.ldraw.shapes import (
 )
 from factory.apps.importing.mesh_files import MeshStore
 from factory.apps.importing.part_maker import Placement
-from factory.floor.geometry.meshes import Array
+from factory.support.arrays import Array
 from factory.support.errors import Diagnostic
 from factory.theory.lang.source import quoted
 from factory.theory.problem.pag import Parameter

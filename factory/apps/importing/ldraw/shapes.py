@@ -18,7 +18,7 @@ from factory.apps.importing.ldraw.lines import (
 )
 from factory.apps.importing.mesh_files import first_file, path_inside
 from factory.floor.geometry.mesh_file import obj_of
-from factory.floor.geometry.meshes import Array
+from factory.support.arrays import Array
 from factory.support.errors import Diagnostic
 from factory.theory.lang.source import quoted, read_text, source_of
 

@@ -15,7 +15,7 @@ from factory.engine.mjcf.weld_frames import WeldFrames
 from factory.engine.simulation.mujoco.holdings import Holdings
 from factory.engine.simulation.mujoco.world import MujocoWorld
 from factory.floor.layout.bins import Bin
-from factory.theory.control.mode import Array, Index
+from factory.support.arrays import Array, Index
 from factory.theory.plant.factory import Factory, Operation
 from factory.theory.problem.pag import NOPART
 
