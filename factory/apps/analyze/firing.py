@@ -11,9 +11,9 @@ from types import MappingProxyType
 
 import numpy as np
 
-from factory.support.arrays import Array
+from factory.api import Array, MarkedNet, token_free
 from factory.theory.nets.cycle_ratio import CycleRatio
-from factory.theory.nets.marked import MarkedNet, dead_ends, token_free
+from factory.theory.nets.marked import dead_ends
 
 
 @dataclass(frozen=True, slots=True)

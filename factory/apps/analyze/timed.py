@@ -9,13 +9,10 @@ from functools import cached_property
 
 import numpy as np
 
+from factory.api import NONE, Array, MarkedNet, PetriNet, Place, Timing, steady_from
 from factory.apps.analyze.firing import Slack, circuits, earliest_firings
-from factory.engine.simulation.run import steady_from
 from factory.engine.timing.timed import FEEDER, OUTFEED, SAME, Timed, timed
-from factory.engine.timing.timing import AS_IT_IS, Change, Timing
-from factory.support.arrays import Array
-from factory.theory.nets.marked import NONE, MarkedNet
-from factory.theory.nets.petri import PetriNet, Place
+from factory.engine.timing.timing import AS_IT_IS, Change
 
 
 @dataclass(frozen=True, slots=True)

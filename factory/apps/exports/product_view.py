@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from factory.api import Array, Product, Solid
 from factory.apps.exports.subject import file_name
-from factory.floor.geometry.solids import Product, Solid
-from factory.support.arrays import Array
 from factory.support.canvas import Box, Canvas, Point
 
 WIDTH, TALL, EDGE, BETWEEN, ROW = 560.0, 330.0, 50.0, 40.0, 36.0

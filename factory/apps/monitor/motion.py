@@ -9,11 +9,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from factory.api import Array, Index, Observation, Settings
 from factory.engine.record.anatomy import Anatomy
 from factory.engine.record.grips import MISSED
-from factory.engine.record.state import Observation
-from factory.support.arrays import Array, Index
-from factory.support.settings import Settings
 
 REST = 0.01
 """Speed below which robots hand over [m/s]."""

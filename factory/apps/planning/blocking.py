@@ -17,16 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
+from factory.api import Array, Indices, Product
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.standing import Feet
 from factory.floor.geometry.overlapping import Overlapping
-from factory.floor.geometry.solids import Product
 from factory.floor.mating.bodies import ConvexBodies, bodies
 from factory.floor.mating.mating import AMPLE
 from factory.floor.mating.meetings import Meeting, Meetings
 from factory.floor.mating.overlaps import Finder, Overlaps
 from factory.floor.mating.paths import TOLERANCE
-from factory.support.arrays import Array, Indices
 
 FREE, SCRAPES, DEEPER, LOCKED, CLASHES = range(5)
 """Levels of blocking: none; the parts scrape, or stay drawn into each other; parts that were drawn

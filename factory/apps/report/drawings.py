@@ -9,15 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from factory.api import Array, Factory, Operation, names, rotation
 from factory.apps.exports.svg import NetDrawing
 from factory.apps.report.scene import DrawnFactory, owner, placed, stands_for
-from factory.engine.mjcf import names
 from factory.engine.mjcf.replica import paint, shown
-from factory.floor.geometry.solids import rotation
-from factory.support.arrays import Array
 from factory.support.canvas import Canvas, Point, hexadecimal, hull, millimetres
 from factory.theory.nets.marked import marked
-from factory.theory.plant.factory import Factory, Operation
 
 Link = dict[str, list[int]]
 """Numbers of `robots`, `labels`, `transitions`, `places` and `operations`; `solids` are the labels

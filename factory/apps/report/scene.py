@@ -14,14 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.engine.mjcf import names
-from factory.engine.mjcf.replica import Replica, paint, shown, triangles
+from factory.api import Array, Factory, Operation, Replica, mujoco, names, rotation
+from factory.engine.mjcf.replica import paint, shown, triangles
 from factory.engine.mjcf.robots import ROLES
 from factory.floor.geometry.pieces import joined
-from factory.floor.geometry.solids import rotation
-from factory.support.arrays import Array
-from factory.support.engine import mujoco
-from factory.theory.plant.factory import Factory, Operation
 
 
 class Pack:

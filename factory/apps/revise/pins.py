@@ -7,13 +7,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from factory.api import Array, Hand, Layout, Point2, Product
 from factory.apps.revise.pairing import Pairing
-from factory.floor.geometry.solids import Product
-from factory.floor.layout.guidepath import Point2
-from factory.floor.layout.hands.hand import Hand
-from factory.floor.layout.layout import Layout, carriers
+from factory.floor.layout.layout import carriers
 from factory.floor.layout.stops import carried
-from factory.support.arrays import Array
 
 SAME = 1e-6
 """Lengths that differ by less are the same [m]."""

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from factory.api import Diagnostic, InputError, usage_error
 from factory.support.bounds import WORLDS, WorldName, check_choice, check_values
-from factory.support.errors import Diagnostic, InputError, usage_error
 
 if TYPE_CHECKING:
-    from factory.engine.simulation.request import RunRequest
-    from factory.pipeline import Project
-    from factory.theory.nets.petri import Marking
+    from factory.api import Marking, Project, RunRequest
 
 APART = (
     (
@@ -109,8 +107,8 @@ class RunOptions:
 
     def request(self, project: Project, shown: bool = True) -> RunRequest:
         """The request of a run; `shown`: whether it is filmed or logged. Raises InputError."""
+        from factory.api import RunRequest
         from factory.engine.simulation.demand_file import demand_of
-        from factory.engine.simulation.request import RunRequest
         from factory.floor.geometry.fused_bodies import fusing_pays
         from factory.theory.nets.history import legal_marking
 

@@ -26,11 +26,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from factory.api import NONE, GearNet, MarkedNet, Verdict, token_free
 from factory.apps.exports.certificate.listing import CLAIMS, SCHEMA, TRAIN, digest
 from factory.theory.nets.composition import Composition, compose, cover
-from factory.theory.nets.gears import GearNet
-from factory.theory.nets.marked import NONE, MarkedNet, marked, token_free
-from factory.theory.nets.verdict import Verdict
+from factory.theory.nets.marked import marked
 
 Json = dict[str, Any]
 
