@@ -79,11 +79,10 @@ if TYPE_CHECKING:
     from factory.theory.lang.pag_reader import load_pag as load_pag
     from factory.theory.lang.source import read_text as read_text
     from factory.theory.lang.writer import write_pag as write_pag
-    from factory.theory.nets import marked as marked
-    from factory.theory.nets import verify as verify
     from factory.theory.nets.gears import GearNet as GearNet
     from factory.theory.nets.marked import NONE as NONE
     from factory.theory.nets.marked import MarkedNet as MarkedNet
+    from factory.theory.nets.marked import marked as marked
     from factory.theory.nets.marked import token_free as token_free
     from factory.theory.nets.petri import Marking as Marking
     from factory.theory.nets.petri import PetriNet as PetriNet
@@ -93,6 +92,7 @@ if TYPE_CHECKING:
     from factory.theory.nets.undone import Undone as Undone
     from factory.theory.nets.verdict import Verdict as Verdict
     from factory.theory.nets.verdict import listing as listing
+    from factory.theory.nets.verify import verify as verify
     from factory.theory.plant.demand import Demand as Demand
     from factory.theory.plant.factory import Factory as Factory
     from factory.theory.plant.factory import Operation as Operation
@@ -147,7 +147,7 @@ HOMES = {
     "floor.layout.layout": "Layout",
     "floor.layout.request": "Ground",
     "floor.layout.shapes": "payload_boxes",
-    "engine.mjcf.names": "names",
+    "engine.mjcf": "names",
     "engine.mjcf.model": "Model",
     "engine.mjcf.parts": "HIDDEN",
     "engine.mjcf.replica": "Replica",
@@ -176,8 +176,10 @@ __all__ = sorted(_HOME)
 if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> object:
-        """The object of a name, from the module that defines it."""
+        """The object of a name, from its home; a module where the home has one of this name."""
         if name not in _HOME:
             raise AttributeError(f"module 'factory.api' has no attribute '{name}'")
         home = import_module(f"factory.{_HOME[name]}")
-        return home if _HOME[name].endswith(f".{name}") else getattr(home, name)
+        if not hasattr(home, name):
+            return import_module(f"{home.__name__}.{name}")
+        return getattr(home, name)

@@ -31,7 +31,6 @@ FLOORS = (
     ("engine.record",),
     ("engine.simulation",),
     ("pipeline",),
-    ("sharing",),
     ("film",),
     ("api",),
 )
@@ -39,6 +38,7 @@ FLOORS = (
 beside it. Above them are the apps, then the commands."""
 
 APPS = (
+    ("drawing",),
     ("foreign_nets", "importing", "few_robots", "relay", "platen", "revise", "log", "recovery"),
     ("monitor", "disturbance", "planning", "analyze", "exports"),
     ("runs", "resume"),
@@ -74,6 +74,7 @@ ENGINE_WRITERS = (
     "engine/mjcf",
     "apps/disturbance",
     "apps/recovery",
+    "apps/fidelity/solid",
 )
 """Where the engine's model and data are written: those of a run, and those of a replica that no run
 uses."""
@@ -98,7 +99,12 @@ VARIANT_ROOMS = ("theory/compiler", "theory/problem/plan", "apps/relay", "apps/f
 
 VARIANT_MARKS = {
     **{"commands": 31, "theory.lang": 28, "apps.pareto": 23, "apps.planning": 17, "pipeline": 11},
-    **{"stages": 8, "apps.exports": 7, "floor.layout": 7, "sharing": 6, "floor.mating": 5},
+    **{
+        "stages": 8,
+        "apps.exports": 7,
+        "floor.layout": 7,
+        "floor.mating": 5,
+    },
     **{"support": 5, "apps.foreign_nets": 4, "engine.timing": 3, "theory.plant": 2},
     **{"apps.sweep": 1},
 }

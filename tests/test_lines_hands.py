@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from factory.apps.few_robots.sharing import with_lines
 from factory.apps.fidelity.hidden import HiddenPenetrations
 from factory.apps.runs.watched import watched
 from factory.engine.simulation.request import RunRequest
@@ -30,7 +31,6 @@ from factory.floor.layout.hands.places import places as found_places
 from factory.floor.layout.hanging import Hanging
 from factory.floor.layout.layout import Layout
 from factory.pipeline import Project, read
-from factory.sharing import with_lines
 from tests.layout_values import with_visits
 
 AT_MOST_MM = 0.1

@@ -17,15 +17,15 @@ from factory.api import (
     physical_model,
     write_all,
 )
+from factory.apps.exports.binary import beside, kept, key_of, packed, seal_of, sealed
 from factory.apps.exports.certificate.writer import certificate
 from factory.apps.exports.dot import write_dot
 from factory.apps.exports.floor_sheet import write_svg
 from factory.apps.exports.pnml import write_pnml
+from factory.apps.exports.stock import written
 from factory.apps.exports.ways import ways
 from factory.apps.log.plan_file import LAYOUT_NAME, PLAN_NAME, plan_files
-from factory.engine.mjcf.binary import beside, kept, key_of, packed, seal_of, sealed
 from factory.engine.mjcf.model import model_files
-from factory.engine.mjcf.stock import written
 from factory.floor.layout.exclusions import coordinated
 from factory.floor.modes.modes import operation_modes
 from factory.support.files import own_names

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from factory.api import Product
+from factory.apps.drawing.canvas import shortened
 from factory.apps.exports.product_view import (
     EDGE,
     ROW,
@@ -18,7 +19,6 @@ from factory.apps.exports.product_view import (
     picture_names,
 )
 from factory.floor.mating.findings import Mating, Matings
-from factory.support.canvas import shortened
 
 TOP = 150.0
 """Upper edge of the views."""

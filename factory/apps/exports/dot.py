@@ -5,11 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from factory.api import PAG, GearNet, MarkedNet
+from factory.api import PAG, GearNet, MarkedNet, marked
 from factory.apps.exports.subject import Subject
 from factory.apps.exports.svg import pag_of, view_of
 from factory.apps.exports.swimlanes import colour
-from factory.theory.nets.marked import marked
 
 FORMAT, TAKES, OF = "dot", "net", "net or tree"
 

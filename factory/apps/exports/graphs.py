@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from factory.api import PAG, Factory, GearNet, MarkedNet, Position
-from factory.theory.nets.marked import marked
+from factory.api import PAG, Factory, GearNet, MarkedNet, Position, marked
 
 if TYPE_CHECKING:
     import networkx as nx

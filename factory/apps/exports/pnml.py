@@ -11,12 +11,11 @@ import re
 from collections.abc import Iterable, Iterator
 from xml.sax.saxutils import escape, quoteattr
 
-from factory.api import GearNet, MarkedNet, Place, Point2, Position, Project, Transition
+from factory.api import GearNet, MarkedNet, Place, Point2, Position, Project, Transition, marked
 from factory.apps.exports.subject import Subject
 from factory.apps.exports.swimlanes import Swimlanes, swimlanes
 from factory.floor.layout.exclusions import coordinated
 from factory.theory.nets.gears import Gear
-from factory.theory.nets.marked import marked
 from factory.theory.nets.threaded import Redistribution
 
 FORMAT, TAKES = "pnml", "net"

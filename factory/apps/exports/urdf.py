@@ -17,10 +17,10 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from factory.api import Array, Mesh, names, physical_model, rotation
+from factory.apps.exports.stock import written
 from factory.apps.exports.subject import Subject
 from factory.engine.mjcf.elements import add, exact, numbers
 from factory.engine.mjcf.mesh_files import stl
-from factory.engine.mjcf.stock import written
 from factory.floor.geometry.meshes import hull_mesh
 from factory.floor.geometry.turning import upright
 from factory.floor.layout.guidepath import LEVER

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from factory.api import Model, names
-from factory.engine.mjcf.stock import Scale, scales_of
+from factory.apps.exports.stock import Scale, scales_of
 from factory.floor.layout.exclusions import awaited_positions, coordinated
 from factory.floor.layout.hanging import Hanging
 from factory.floor.layout.machines import presences

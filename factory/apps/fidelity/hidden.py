@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from factory.api import Array, Index, Layout, Simulation, mujoco, names, physical_model
 from factory.apps.fidelity.record import Penetration
+from factory.apps.fidelity.solid import SolidReplica
 from factory.engine.mjcf.loading import load
-from factory.engine.mjcf.solid import SolidReplica
 from factory.theory.plant.approaches import Pair
 
 TOUCH = 1e-6

@@ -22,12 +22,13 @@ from factory.api import (
     Verdict,
     collector_paused,
     listing,
+    marked,
     token_free,
 )
 from factory.apps.foreign_nets.discover import discover
 from factory.apps.foreign_nets.explore import LIMIT, Exploration, explore
 from factory.theory.nets.composition import compose, cover
-from factory.theory.nets.marked import dead_ends, marked, stuck_circuit
+from factory.theory.nets.marked import dead_ends, stuck_circuit
 from factory.theory.nets.train import no_way_back
 from factory.theory.nets.verdict import Defect, verdict
 from factory.theory.nets.verify import legality_defects, shape_defects

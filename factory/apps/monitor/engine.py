@@ -6,8 +6,8 @@ from time import perf_counter
 
 from factory.api import Observation, Report, State, collector_paused
 from factory.apps.monitor.agreement import Recorded
+from factory.apps.monitor.anatomy import Anatomy
 from factory.apps.monitor.monitor import KEPT, Monitor
-from factory.engine.record.anatomy import Anatomy
 from factory.engine.record.subject import MonitorSubject
 
 LOOK = 0.5

@@ -11,12 +11,12 @@ import numpy as np
 
 from factory.api import Factory, Observation, Operation, Report, collector_paused
 from factory.apps.monitor.agreement import Recorded, disagreements
+from factory.apps.monitor.anatomy import Anatomy
 from factory.apps.monitor.explanation import SeenFirings
+from factory.apps.monitor.grips import Grips, misplaced
 from factory.apps.monitor.motion import AxisMotion, Lags
 from factory.apps.monitor.transfers import Transfers
-from factory.engine.record.anatomy import Anatomy
 from factory.engine.record.findings import Violation
-from factory.engine.record.grips import Grips, misplaced
 from factory.engine.record.subject import MonitorSubject
 
 MOST = 100

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.api import Array, Index, Observation, Settings
-from factory.engine.record.anatomy import Anatomy
-from factory.engine.record.grips import MISSED
+from factory.apps.monitor.anatomy import Anatomy
+from factory.apps.monitor.grips import MISSED
 
 REST = 0.01
 """Speed below which robots hand over [m/s]."""

@@ -23,11 +23,11 @@ from factory.apps.log.model import model_of
 from factory.apps.log.project_table import factory_of, of_its_factory, settings_of
 from factory.apps.log.reader import Ends, Log
 from factory.apps.monitor.agreement import contradictions
+from factory.apps.monitor.anatomy import Anatomy
 from factory.apps.monitor.calm import judge_calm
 from factory.apps.monitor.monitor import Monitor
 from factory.apps.monitor.recount import differences, recounted, worst
 from factory.engine.mjcf.weld_frames import SLIDE
-from factory.engine.record.anatomy import Anatomy
 from factory.engine.record.findings import Violation
 from factory.engine.record.subject import MonitorSubject, MonitorTable
 from factory.engine.record.verdict import FAULTS, judged

@@ -24,6 +24,7 @@ from factory.api import (
     load_catalogue,
     pace,
 )
+from factory.apps.few_robots.sharing import with_lines
 from factory.apps.planning.exact import Tree
 from factory.apps.planning.judging import Judged
 from factory.apps.planning.parts import InPlace
@@ -32,7 +33,6 @@ from factory.apps.planning.subsets import Stance
 from factory.apps.planning.writing import Screwed, planned_product, screw_lines, screws_in
 from factory.apps.planning.writing import Tree as LabelTree
 from factory.floor.geometry.product import product_geometry
-from factory.sharing import with_lines
 from factory.theory.lang.pag_reader import read_pag
 
 LAID = 120

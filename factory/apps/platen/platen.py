@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from factory.api import Ground, Hands, Layout, Pace, Point2, RunError, Settings, certified
-from factory.floor.layout.compacting import compacted
+from factory.apps.platen.compacting import compacted
 
 
 def on_platen(layout: Layout, pace: Pace, tile: float, wanted: Point2 | None = None) -> Layout:

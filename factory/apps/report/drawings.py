@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from factory.api import Array, Factory, Operation, names, rotation
+from factory.api import Array, Factory, Operation, marked, names, rotation
+from factory.apps.drawing.canvas import Canvas, Point, hexadecimal, hull, millimetres
 from factory.apps.exports.svg import NetDrawing
 from factory.apps.report.scene import DrawnFactory, owner, placed, stands_for
 from factory.engine.mjcf.replica import paint, shown
-from factory.support.canvas import Canvas, Point, hexadecimal, hull, millimetres
-from factory.theory.nets.marked import marked
 
 Link = dict[str, list[int]]
 """Numbers of `robots`, `labels`, `transitions`, `places` and `operations`; `solids` are the labels

@@ -33,9 +33,9 @@ from factory.apps.report.sections import (
     utilisation,
 )
 from factory.apps.report.words import proof
+from factory.apps.runs.executing import Tell
 from factory.apps.runs.options import RunOptions
 from factory.apps.runs.running import run_project
-from factory.engine.simulation.executing import Tell
 
 SCRIPTS = (
     "report/three.min.js",

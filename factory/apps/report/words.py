@@ -6,10 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from factory.api import Factory, Verdict, listing
+from factory.api import Factory, Verdict, listing, verify
 from factory.apps.exports.certificate.check import check_certificate
 from factory.apps.exports.certificate.writer import certificate
-from factory.theory.nets.verify import verify
 
 NAMES = {
     "gear_net": "Gear net",

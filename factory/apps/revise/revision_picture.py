@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from factory.api import Guidepath, Layout, Point2
+from factory.apps.drawing.canvas import Canvas, millimetres, page_box
 from factory.apps.revise.pins import StayingRobot
-from factory.support.canvas import Canvas, millimetres, page_box
 from factory.theory.problem.robot_bodies import CARRIAGE
 
 STYLE = """

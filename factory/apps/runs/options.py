@@ -99,7 +99,7 @@ class RunOptions:
     def check(self, project: Project) -> None:
         """The same, before a project is laid out; the file of a demand is read, but for a pipe,
         which is read once. Raises InputError."""
-        from factory.engine.simulation.demand_file import demand_of
+        from factory.apps.runs.demand_file import demand_of
 
         self.check_combination()
         if self.demand is not None and not Path(self.demand).is_fifo():
@@ -108,7 +108,7 @@ class RunOptions:
     def request(self, project: Project, shown: bool = True) -> RunRequest:
         """The request of a run; `shown`: whether it is filmed or logged. Raises InputError."""
         from factory.api import RunRequest
-        from factory.engine.simulation.demand_file import demand_of
+        from factory.apps.runs.demand_file import demand_of
         from factory.floor.geometry.fused_bodies import fusing_pays
         from factory.theory.nets.history import legal_marking
 

@@ -12,9 +12,9 @@ from factory.api import Diagnostic, Film, InputError, Project, Run, Simulation, 
 from factory.apps.log import Log
 from factory.apps.log.model import model_of
 from factory.apps.monitor.record import recorded_subject
+from factory.apps.runs.executing import Tell, carry_out
 from factory.apps.runs.options import RunOptions
 from factory.apps.runs.watched import watched
-from factory.engine.simulation.executing import Tell, carry_out
 from factory.film.action import Snapshot, held
 from factory.film.camerawork import Moment, Take, When, past_the_end, pictureless
 from factory.film.film import Still

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 from factory.api import Factory, Run, Simulation
 from factory.apps.recovery.fault_file import check_names, read_campaign
 from factory.apps.recovery.faults import SWAP, Campaign
+from factory.apps.runs.executing import Go, Opening, Tell, carry_out
 from factory.apps.runs.options import RunOptions
 from factory.apps.runs.watched import watched
-from factory.engine.simulation.executing import Go, Opening, Tell, carry_out
 from factory.support.progress import Waiting
 from factory.theory.nets.verify import proved
 

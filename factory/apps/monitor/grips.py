@@ -9,11 +9,10 @@ from math import radians
 import numpy as np
 from numpy.typing import NDArray
 
+from factory.api import Array, Index, Observation
+from factory.apps.monitor.anatomy import Anatomy
 from factory.engine.mjcf.weld_frames import GRIP, HOLD, WeldFrames
-from factory.engine.record.anatomy import Anatomy
-from factory.engine.record.state import Observation
 from factory.engine.record.subject import MonitorSubject
-from factory.support.arrays import Array, Index
 
 HANGS = 2e-3
 """Distance from its place above which a part is not held [m], in addition to twice the radius of
