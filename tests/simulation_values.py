@@ -12,12 +12,12 @@ import numpy as np
 
 from benches.speed.factories import balanced
 from benches.speed.factories import laid_out as floor_of
+from factory.apps.few_robots.sharing import with_branches
 from factory.engine.simulation.mujoco.stepping import SingleSteps
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.layout import Layout
 from factory.pipeline import Project, all_templates, read
-from factory.sharing import with_branches
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
 from factory.theory.lang import read_pag
