@@ -187,8 +187,8 @@ class House:
     def names(self, module: Module) -> set[str]:
         """What a module imports of the house, at run time, inside functions, for typing: modules,
         and names of modules (`theory.nets.petri.Place`)."""
-        names = (name for name in module.imports if name.startswith("factory."))
-        return {name.removeprefix("factory.") for name in names}
+        tops = ((*name.partition("."),) for name in module.imports)
+        return {inside for top, _, inside in tops if top == "factory"}
 
     def imports(self, module: Module) -> set[str]:
         """Modules of the house that a module imports. `from factory.room import x` is resolved to

@@ -30,7 +30,7 @@ from factory.floor.layout.presence import Presence
 from factory.floor.layout.request import Ground
 from factory.pipeline import read
 from factory.support.settings import LEAST
-from tests import test_demand, test_tees
+from tests.whole import test_demand, test_tees
 from tests.random_products import random_blocks, random_product
 
 OFF = SPARE
