@@ -7,12 +7,10 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from difflib import get_close_matches
-from pathlib import Path
 from typing import Any
 from warnings import simplefilter
 
 import click
-from click.core import ParameterSource
 
 from factory.commands.analyze import analyze
 from factory.commands.build import build
@@ -22,7 +20,7 @@ from factory.commands.export import export
 from factory.commands.fidelity import fidelity
 from factory.commands.import_ import import_
 from factory.commands.mix import mix
-from factory.commands.monitor import monitor
+from factory.commands.verdicts import monitor
 from factory.commands.new import new
 from factory.commands.pareto import pareto
 from factory.commands.plan import plan
@@ -30,7 +28,7 @@ from factory.commands.plant import plant
 from factory.commands.programs import programs
 from factory.commands.render import render
 from factory.commands.report import report
-from factory.commands.requests import PLANNED
+from factory.commands.defaults import set_in_advance
 from factory.commands.revise import revise
 from factory.commands.run import run
 from factory.commands.sweep import sweep
@@ -50,55 +48,6 @@ from factory.support.files import NO_ROOM
 from factory.support.guard import guarded
 from factory.support.interruption import interrupt, stop_on_signals
 from factory.support.version import __version__
-
-PARAMETERS = {"templates": "folders"}
-"""Names of parameters that are not those of their options."""
-
-META = "factory.toml"
-"""The key of the defaults in a click context."""
-
-
-def with_defaults(command: click.Command) -> click.Command:
-    """The command, whose options that are not given are taken from the environment (FACTORY_UNITS
-    and so on), or else from the `factory.toml` for its FILE."""
-    from factory.support.user_defaults import OPTIONS
-
-    parameters = {parameter.name: parameter for parameter in command.params}
-    for key in OPTIONS:
-        if parameter := parameters.get(PARAMETERS.get(key, key)):
-            parameter.envvar = f"FACTORY_{key.upper()}"
-    parameters["file"].callback = _read
-    return command
-
-
-def _read(context: click.Context, parameter: click.Parameter, file: Path) -> Path:
-    """FILE itself; values of its `factory.toml` become the defaults of all other options. Raises
-    InputError."""
-    from factory.support.files import is_plan
-    from factory.support.user_defaults import defaults_for
-
-    defaults = context.meta[META] = defaults_for(file)
-    planned = PLANNED if is_plan(file) else {}
-    named = {PARAMETERS.get(key, key): value for key, value in defaults.options().items()}
-    context.default_map = {key: value for key, value in named.items() if key not in planned}
-    return file
-
-
-def set_in_advance(error: click.BadParameter) -> Diagnostic | None:
-    """Error of a bad value from the environment or from `factory.toml`, with its place; None if it
-    was given as an option."""
-    parameter, context = error.param, error.ctx
-    if parameter is None or context is None or not parameter.name:
-        return None
-    source = context.get_parameter_source(parameter.name)
-    if source is ParameterSource.ENVIRONMENT:
-        message = f"{error.format_message()} It is in the environment: {parameter.envvar}."
-        return Diagnostic("Usage", message, None, f"see {context.command_path} --help")
-    if source is ParameterSource.DEFAULT_MAP:
-        key = next((k for k, name in PARAMETERS.items() if name == parameter.name), parameter.name)
-        return Diagnostic("BadValue", f"{key}: {error.message}", context.meta[META].at(key))
-    return None
-
 
 def code_names(ctx: click.Context, param: click.Parameter, begun: str) -> list[str]:
     """Completions of --explain in a shell."""
@@ -285,25 +234,5 @@ def cli(ctx: click.Context, version: bool, explain: str | None, as_json: bool) -
     if as_json:
         raise click.UsageError("--json comes after the command", ctx)
 
-
-ON_A_FILE = (
-    *(check, build, run, plant, render, view, fidelity),
-    *(analyze, pareto, report, programs, export),
-)
-"""The commands on a FILE whose options have defaults in its `factory.toml`."""
-
-for _command in (
-    new,
-    import_,
-    plan,
-    *map(with_defaults, ON_A_FILE),
-    mix,
-    revise,
-    sweep,
-    monitor,
-    templates,
-    doctor,
-):
-    cli.add_command(_command)
 
 __all__ = ["cli", "main", "run_command"]

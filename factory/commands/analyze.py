@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from factory.apps.runs.options import RunOptions
+from factory.commands.defaults import with_defaults
 from factory.commands import options as shared
 from factory.commands.grouped import Grouped
 from factory.commands.requests import OutputOptions, ProjectOptions
@@ -53,6 +54,7 @@ class AnalyzeOptions:
         return change_of(factory, self.seconds, faster, shorter)
 
 
+@with_defaults
 @click.command(cls=Grouped)
 @shared.SOURCE
 @click.option("--units", type=click.IntRange(1, 10_000), default=20, help="Number of products.")

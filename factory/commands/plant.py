@@ -7,8 +7,9 @@ import sys
 import click
 
 from factory.apps.runs.options import RunOptions
+from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
-from factory.commands.monitor import tell_failures
+from factory.commands.verdicts import tell_failures
 from factory.commands.options import FLOOR, LENIENT, MOTION, OUTPUT, RUN, SOURCE, address
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.run import summarise
@@ -20,6 +21,7 @@ SCAN = 10
 """Default period at which the plant reads its commands [ms]."""
 
 
+@with_defaults
 @click.command(cls=Grouped)
 @SOURCE
 @RUN

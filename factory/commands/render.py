@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from factory.apps.runs.options import RunOptions
+from factory.commands.defaults import with_defaults
 from factory.commands import options as shared
 from factory.commands.grouped import Grouped
 from factory.commands.outputs import for_a_pag, writable
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     Moment = float | Literal["end"]
 
 
+@with_defaults
 @click.command(cls=Grouped)
 @shared.SOURCE
 @click.option(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from factory.apps.runs.options import RunOptions
+from factory.commands.defaults import with_defaults
 from factory.commands import options as shared
 from factory.commands.grouped import Grouped
 from factory.commands.requests import OutputOptions, ProjectOptions
@@ -23,6 +24,7 @@ FOR_EVER = 10**9
 """Units of a run that does not end by itself."""
 
 
+@with_defaults
 @click.command(cls=Grouped)
 @shared.SOURCE
 @shared.FAULTS
