@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from factory.commands.defaults import with_defaults
 from factory.commands.allowing import ALLOW
+from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
 from factory.commands.options import (
     OUT,

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import click
 
 from factory.apps.runs.options import RunOptions
-from factory.commands.defaults import with_defaults
 from factory.commands import options as shared
+from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced, cut_off, read_partly

@@ -9,10 +9,10 @@ import click
 from factory.apps.runs.options import RunOptions
 from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
-from factory.commands.verdicts import tell_failures
 from factory.commands.options import FLOOR, LENIENT, MOTION, OUTPUT, RUN, SOURCE, address
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.run import summarise
+from factory.commands.verdicts import tell_failures
 from factory.commands.warnings import announced
 from factory.support.console import emit, say
 from factory.support.errors import usage_error

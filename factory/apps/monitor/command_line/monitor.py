@@ -14,7 +14,6 @@ from factory.commands.verdicts import found_by, say_failures, say_verdict, tell_
 from factory.support.console import emit, say
 
 
-
 @click.command()
 @click.argument("file", metavar="LOG", type=PATH)
 @LENIENT

@@ -9,8 +9,8 @@ from pathlib import Path
 import click
 
 from factory.apps.runs.options import RunOptions
-from factory.commands.defaults import with_defaults
 from factory.commands import options as shared
+from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
 from factory.commands.outputs import for_a_pag, writable
 from factory.commands.requests import OutputOptions, ProjectOptions

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from factory.commands.defaults import with_defaults
 from factory.commands import options as shared
+from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
 from factory.commands.outputs import writable
 from factory.commands.requests import OutputOptions, ProjectOptions
