@@ -53,9 +53,12 @@ APPS = (
 """The apps, from those that use no other app up. An app imports `factory.api`, itself, and the apps
 below it."""
 
-ENTRANCES = ("commands", "stages", "studies", "notebook", "__init__", "__main__")
-"""Above the core and the apps, from the lowest up: the command line, the functions that a user
-calls, how values are shown."""
+ENTRANCES = (
+    *("commands", "apps.*.command_line"),
+    *("stages", "studies", "notebook", "__init__", "__main__"),
+)
+"""Above the core and the apps, from the lowest up: the command line, the commands that apps give,
+the functions that a user calls, how values are shown."""
 
 ENGINE_ROOMS = (
     "support",
@@ -110,8 +113,9 @@ VARIANT_MARKS = {
     **{"support": 5, "apps.foreign_nets": 4, "engine.timing": 3, "theory.plant": 2},
     **{"apps.sweep": 1},
 }
-"""How many identifiers of other rooms may still name a variant. A mark may fall, and never rises:
-what needs it is told by the plan, or by what the factory is."""
+"""How many identifiers of other rooms may still name a variant; the command lines of apps count as
+`commands`. A mark may fall, and never rises: what needs it is told by the plan, or by what the
+factory is."""
 
 STOREYS = ("theory", "floor", "engine", "apps")
 """Folders whose folders are rooms."""
@@ -132,10 +136,11 @@ class Module:
 
     @property
     def room(self) -> str:
-        """Its room, with the storey where that has several: `theory.nets`."""
+        """Its room, with the storey where that has several: `theory.nets`; the command line of an
+        app is one of its own."""
         first, *rest = self.name.split(".")
         if first in STOREYS and rest:
-            return f"{first}.{rest[0]}"
+            return ".".join([first, rest[0], *(n for n in rest[1:2] if n == "command_line")])
         return first or "__init__"
 
     @cached_property
@@ -216,6 +221,7 @@ class House:
 
 def floor(room: str) -> int:
     """The number of a room's floor from the ground up, of the core, the apps, the entrances."""
+    room = re.sub(r"^apps\.\w+\.command_line$", "apps.*.command_line", room)
     if room in ENTRANCES:
         return len(FLOORS) + len(APPS) + ENTRANCES.index(room)
     rooms = (*FLOORS, *(tuple(f"apps.{name}" for name in names) for names in APPS))
@@ -397,7 +403,8 @@ def variants(house: House) -> Iterator[str]:
     found: Counter[str] = Counter()
     for module in house.modules.values():
         if not module.within(VARIANT_ROOMS):
-            found[module.room] += sum(map(bool, map(VARIANTS.search, identifiers(module))))
+            room = "commands" if module.room.endswith(".command_line") else module.room
+            found[room] += sum(map(bool, map(VARIANTS.search, identifiers(module))))
     for room, count in found.items():
         if count > (most := VARIANT_MARKS.get(room, 0)):
             yield f"{room}: names variants {count} times; at most {most}"

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 import trimesh
 
+from factory.commands import places
 from factory.floor.geometry import meshes
 from factory.floor.geometry.product import product_geometry
 from factory.floor.mating.overlaps import Finder
@@ -70,9 +71,9 @@ def work(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
 
 
 def imported(*words: object, cache: Path) -> set[str]:
-    """The packages that a command loads, in a process of its own."""
+    """The packages that a command loads, in a process of its own, and the modules of this one."""
     code = "import sys; from factory.commands import run_command; run_command(sys.argv[1:]);"
-    code += "print(*{name.partition('.')[0] for name in sys.modules}, file=sys.stderr)"
+    code += "print(*{n for name in sys.modules for n in (name, name.partition('.')[0])}, file=sys.stderr)"
     environment = {**os.environ, "XDG_CACHE_HOME": str(cache.parent)}
     command = [sys.executable, "-c", code, *map(str, words)]
     done = subprocess.run(command, capture_output=True, text=True, env=environment, check=True)
@@ -212,6 +213,22 @@ def test_a_command_loads_what_it_needs(
 ) -> None:
     found = imported(*words, cache=cache)
     assert "click" in found and not found & set(without)
+
+
+@pytest.mark.parametrize(
+    ("words", "command"),
+    [
+        (["check", "examples/paper.pag"], "factory.commands.check"),
+        (["report", "--help"], "factory.apps.report.command_line.report"),
+    ],
+    ids=["check", "report"],
+)
+def test_only_the_command_that_is_called_is_loaded(
+    words: list[str], command: str, cache: Path
+) -> None:
+    found = imported(*words, cache=cache)
+    assert found & {place.partition(":")[0] for place in places().values()} == {command}
+    assert "factory.apps.report" not in found
 
 
 def test_boxes_are_checked_without_libraries_of_meshes(tmp_path: Path, cache: Path) -> None:

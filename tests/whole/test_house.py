@@ -105,6 +105,31 @@ BREACHES: tuple[tuple[Law, dict[str, str], str], ...] = (
         "apps.log.a imports apps.report.b",
     ),
     (
+        upward_imports,
+        {
+            "factory/apps/log/a.py": "from factory.apps.log.command_line.b import c",
+            "factory/apps/log/command_line/b.py": "from factory.commands.options import c",
+            "factory/commands/options.py": "",
+        },
+        "apps.log.a imports apps.log.command_line.b",
+    ),
+    (
+        upward_imports,
+        {
+            "factory/commands/a.py": "from factory.apps.log.command_line.b import c",
+            "factory/apps/log/command_line/b.py": "",
+        },
+        "commands.a imports apps.log.command_line.b",
+    ),
+    (
+        upward_imports,
+        {
+            "factory/apps/log/command_line/a.py": "from factory.apps.plc.command_line.b import c",
+            "factory/apps/plc/command_line/b.py": "",
+        },
+        "apps.log.command_line.a imports apps.plc.command_line.b",
+    ),
+    (
         circles,
         {
             "factory/theory/nets/a.py": "from factory.theory.nets import b",

@@ -11,6 +11,7 @@ import click
 
 from factory.apps.runs.options import RunOptions
 from factory.commands import options as shared
+from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced
@@ -23,6 +24,7 @@ FOR_EVER = 10**9
 """Units of a run that does not end by itself."""
 
 
+@with_defaults
 @click.command(cls=Grouped)
 @shared.SOURCE
 @shared.FAULTS

@@ -7,11 +7,12 @@ import sys
 import click
 
 from factory.apps.runs.options import RunOptions
+from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
-from factory.commands.monitor import tell_failures
 from factory.commands.options import FLOOR, LENIENT, MOTION, OUTPUT, RUN, SOURCE, address
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.run import summarise
+from factory.commands.verdicts import tell_failures
 from factory.commands.warnings import announced
 from factory.support.console import emit, say
 from factory.support.errors import usage_error
@@ -20,6 +21,7 @@ SCAN = 10
 """Default period at which the plant reads its commands [ms]."""
 
 
+@with_defaults
 @click.command(cls=Grouped)
 @SOURCE
 @RUN

@@ -12,6 +12,7 @@ import click
 
 from factory.apps.runs.options import RunOptions
 from factory.commands import options as shared
+from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced, cut_off, read_partly
@@ -53,6 +54,7 @@ class AnalyzeOptions:
         return change_of(factory, self.seconds, faster, shorter)
 
 
+@with_defaults
 @click.command(cls=Grouped)
 @shared.SOURCE
 @click.option("--units", type=click.IntRange(1, 10_000), default=20, help="Number of products.")

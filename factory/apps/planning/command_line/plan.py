@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from factory.commands.asking import asked
-from factory.commands.interlocking import refuse
+from factory.apps.planning.command_line.asking import asked
+from factory.apps.planning.command_line.interlocking import refuse
 from factory.commands.options import LIBRARY, OUT, OUTPUT, PATH, SECONDS, TEMPLATES
 from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
 from factory.commands.options import FLOOR, MOTION, OUT, OUTPUT, SECONDS, SOURCE
 from factory.commands.outputs import writable_folder
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 PAGE_NAME = "pareto.html"
 
 
+@with_defaults
 @click.command(cls=Grouped)
 @SOURCE
 @click.option(

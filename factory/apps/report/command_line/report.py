@@ -10,6 +10,7 @@ import click
 
 from factory.apps.runs.options import RunOptions
 from factory.commands import options as shared
+from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
 from factory.commands.outputs import for_a_pag, writable
 from factory.commands.requests import OutputOptions, ProjectOptions
@@ -18,6 +19,7 @@ from factory.commands.warnings import announced
 from factory.support.console import emit, say
 
 
+@with_defaults
 @click.command(cls=Grouped)
 @shared.SOURCE
 @click.option("-o", "--output", type=shared.OUT, required=True, help="Output page: OUT.html.")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 from click.shell_completion import CompletionItem
 
+from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
 from factory.commands.options import FLOOR, MOTION, OUT, OUTPUT, PATH, RELAY, SOURCE
 from factory.commands.outputs import writable, writable_folder
@@ -60,6 +61,7 @@ class _Format(click.ParamType[str]):
         ]
 
 
+@with_defaults
 @click.command(cls=_Listing)
 @SOURCE
 @click.option("--format", "form", type=_Format(), required=True, help="A format listed below.")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from factory.commands import options as shared
+from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
 from factory.commands.outputs import writable
 from factory.commands.requests import OutputOptions, ProjectOptions
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from factory.apps.fidelity.record import Fidelity
 
 
+@with_defaults
 @click.command(cls=Grouped)
 @shared.SOURCE
 @click.option(
