@@ -7,7 +7,6 @@ disc or a capsule, very thin it is a line.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cache, lru_cache
 
 import numpy as np
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from factory.engine.mjcf.robot_bodies import role_of
-from factory.engine.mjcf.robots import ROLES
+from factory.film.look import ROLES, Colour3
 from factory.theory.plant.factory import Factory
 
 GROUND, INK, FAINT, LINE = (243, 243, 245), (38, 44, 54), (112, 121, 134), (205, 209, 215)
@@ -61,12 +60,12 @@ def operation_colours(factory: Factory) -> tuple[Colour, ...]:
 
 def robot_colours(factory: Factory) -> tuple[Colour, ...]:
     """The colour of each robot: the paint of its role."""
-    paint = {role: _colour(rgba.split()) for role, rgba in ROLES.items()}
+    paint = {role: _colour(shade) for role, shade in ROLES.items()}
     return tuple(paint[role_of(factory, robot.index)] for robot in factory.robots)
 
 
-def _colour(rgba: Sequence[str]) -> Colour:
-    red, green, blue = (round(255 * float(word)) for word in rgba[:3])
+def _colour(shade: Colour3) -> Colour:
+    red, green, blue = (round(255 * part) for part in shade)
     return red, green, blue
 
 

@@ -25,7 +25,7 @@ from factory.support.resource import Closing
 MANY = 110
 """Robots above which a film has no shadows: they cost a second pass over all geometry."""
 
-SOFT = 0.11
+SOFT = 0.04
 """Radius of the sun as a still sees it [rad]: the softness of shadows."""
 
 LOOSE_SAMPLES = 12
@@ -104,6 +104,7 @@ class Renderer(Closing):
         self.rectangle = mujoco.MjrRect(0, 0, *size)
         self.pixels = np.empty((size[1], size[0], 3), np.uint8)
         self.marks: list[Mark] = []
+        self.sun: Array | None = None
 
     def close(self) -> None:
         """Gives the GL context back."""
@@ -152,16 +153,17 @@ class Renderer(Closing):
             camera.frustum_top = near * (dy + view.tall)
 
     def _light(self, view: View, sample: Sample | None) -> None:
-        """The headlight shines from the camera, the key light over what is seen; a still moves
-        it."""
+        """The headlight shines from the camera, the key light, beside where the first camera
+        stands, over what is seen; a still moves it."""
+        if self.sun is None:
+            self.sun = sun(view.axes)
         middle = view.position + view.distance * view.axes[2]
         self.drawing.shadowClip = 1.25 * view.distance * max(view.wide, view.tall) + view.depth
         for light in self.scene.lights[: self.scene.nlight]:
             if light.headlight:
                 light.pos, light.dir = view.position, view.axes[2]
             elif light.castshadow:
-                if sample is not None:
-                    light.dir = _moved(np.asarray(light.dir, float), sample)
+                light.dir = -self.sun if sample is None else _moved(-self.sun, sample)
                 light.pos = middle - sum(view.range) / 2 * np.asarray(light.dir, float)
 
 
@@ -193,6 +195,18 @@ class LooseParts(Closing):
         upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(offsets), 1))
         self.replica.place(np.hstack([offsets, upright]).ravel())
         mujoco.mj_camlight(self.replica.m, self.replica.d)
+
+
+ASIDE, HIGH = 68.0, 54.0
+"""Where the sun stands, so far to the left of the camera and so high that shadows fall back to the
+right, and the foreground is free of them [degrees]."""
+
+
+def sun(axes: Array) -> Array:
+    """The direction to the sun (3,) where the first camera has these axes."""
+    back = -axes[2] if abs(axes[2, 2]) < 0.9 else -axes[1]
+    turn, high = np.arctan2(back[1], back[0]) - np.radians(ASIDE), np.radians(HIGH)
+    return np.array([np.cos(high) * np.cos(turn), np.cos(high) * np.sin(turn), np.sin(high)])
 
 
 ROUND = (
