@@ -97,9 +97,6 @@ LIGHTS: dict[str, tuple[Colour3, float]] = {
 }
 """Its sun and its sky: their light, and the strength of their highlights."""
 
-SHADOW_MAP = 4096
-"""Texels along an edge of its shadow map."""
-
 EDGE, PART_EDGE = 1.6e-3, 8e-4
 """Radius of the edges of machines and of parts [m]."""
 
@@ -133,5 +130,3 @@ def _light(root: Element) -> None:
     for light in root.iter("light"):
         colour, highlight = LIGHTS.get(light.get("name") or "", LIGHTS["fill"])
         light.attrib.update(diffuse=numbers(colour), specular=numbers([highlight] * 3))
-    for quality in root.iter("quality"):
-        quality.set("shadowsize", str(SHADOW_MAP))

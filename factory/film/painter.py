@@ -16,6 +16,7 @@ from factory.film.following import Viewpoint
 from factory.film.ink import Pixels
 from factory.film.marks import Mark, Marks
 from factory.film.picture import Camera, Size
+from factory.film.smoothing import smooth
 from factory.floor.geometry.meshes import Array, Indices
 from factory.floor.geometry.sight import Framing, View
 from factory.support import gl
@@ -24,6 +25,9 @@ from factory.support.resource import Closing
 
 MANY = 110
 """Robots above which a film has no shadows: they cost a second pass over all geometry."""
+
+STILL_SHADOWS, FILM_SHADOWS = 4096, 2048
+"""Texels along an edge of the shadow map."""
 
 SOFT = 0.04
 """Radius of the sun as a still sees it [rad]: the softness of shadows."""
@@ -41,7 +45,8 @@ class Painter(Closing):
 
     `caption`: height of the strip below that is kept free, as a fraction of the picture's.
     `samples`: above 1 a picture is the mean of so many, each with the key light and the pixels'
-    grid moved a little: soft shadows and smooth edges, for stills. Raises MissingError where there
+    grid moved a little: soft shadows and smooth edges, for stills. Those of a film are smoothed by
+    how they look, which costs a tenth of a second picture. Raises MissingError where there
     is no GL."""
 
     def __init__(
@@ -58,8 +63,8 @@ class Painter(Closing):
         _facet(self.replica.m)
         quality = self.replica.m.vis
         quality.global_.offwidth, quality.global_.offheight = size
-        if samples > 1:
-            quality.quality.offsamples = 1
+        quality.quality.offsamples = 0
+        quality.quality.shadowsize = STILL_SHADOWS if samples > 1 else FILM_SHADOWS
         framing = Framing(size[0] / size[1], below=0.03 + caption)
         self.viewpoint = Viewpoint(self.replica, camera, framing, subject)
         self.fading = Fading(self.replica)
@@ -86,7 +91,7 @@ class Painter(Closing):
         view = self.viewpoint.view(shown, elapsed, time)
         self.fading.fade(view, self.viewpoint.watched)
         if self.samples == 1:
-            return np.ascontiguousarray(self.renderer.draw(view, self.shadows)[::-1])
+            return smooth(np.ascontiguousarray(self.renderer.draw(view, self.shadows)[::-1]))
         return self.renderer.mean(view, self.samples)
 
 
