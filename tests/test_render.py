@@ -364,7 +364,8 @@ def test_no_more_facets_are_drawn_than_are_seen(layout, tmp_path: Path) -> None:
     subject = subject_of_run(simulation)
     seen = simulation.state().observation
     shown = Snapshot.of(seen.qpos, seen.welds)
-    with Painter(simulation.world.m, (320, 180), "overview", subject) as painter:
+    look = Framing(16 / 9)
+    with Painter(simulation.world.m, (320, 180), "overview", subject, look) as painter:
         few, quality = painter.paint(shown), painter.replica.m.vis.quality
         assert (quality.numquads, quality.numstacks) == (1, 2)
         assert not painter.renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SKYBOX]

@@ -14,14 +14,16 @@ from factory.engine.record.subject import MonitorSubject
 from factory.film.action import Snapshot
 from factory.film.caption import Caption, draw_notices, draw_title
 from factory.film.drawn import drawn
+from factory.film.filament import Filament, draws
 from factory.film.gantt_panel import GanttPanel
 from factory.film.history import History
 from factory.film.ink import Pixels
 from factory.film.marks import Marks
 from factory.film.net_panel import NetPanel
-from factory.film.painter import Painter
+from factory.film.painter import Painter, Renderer
 from factory.film.picture import Area, PanelName, Picture, Size, shared
 from factory.film.sheet import OUTSIDE, Rows
+from factory.floor.geometry.sight import Framing
 from factory.support.engine import mujoco
 from factory.support.errors import Diagnostic, InputError
 from factory.support.resource import Closing
@@ -86,8 +88,11 @@ class Camerawork(Closing):
         self.caption = Caption(size) if picture.caption else None
         self.panels = Panels(take.m, picture.size, areas, take.history) if areas else None
         share = self.caption.share if self.caption else 0.0
-        model = drawn(take.m, take.xml, take.files, picture.camera)
-        self.painter = Painter(model, size, picture.camera, take.subject, share, samples)
+        filament = draws(picture.renderer, self.still)
+        model = drawn(take.m, take.xml, take.files, picture.camera, filament)
+        renderer = Filament if filament else Renderer
+        look = Framing(size[0] / size[1], below=0.03 + share)
+        self.painter = Painter(model, size, picture.camera, take.subject, look, samples, renderer)
         self.marks = Marks(self.painter.replica, take.history)
 
     def picture(self, moment: Moment, elapsed: float = 0.0) -> Pixels:

@@ -9,6 +9,8 @@ from factory.engine.mjcf.loading import compiled
 from factory.engine.mjcf.replica import Replica
 from factory.film.action import action_of
 from factory.film.dress import dressed
+from factory.film.filament import settings
+from factory.film.look import CLASSIC_FLOOR, FILAMENT_FLOOR
 from factory.film.picture import Camera, overview
 from factory.floor.geometry.sight import Framing
 from factory.support.engine import mujoco
@@ -18,11 +20,15 @@ SOUTH = -90.0
 
 
 def drawn(
-    m: mujoco.MjModel, xml: str, files: Mapping[str, bytes], camera: Camera
+    m: mujoco.MjModel, xml: str, files: Mapping[str, bytes], camera: Camera, filament: bool = False
 ) -> mujoco.MjModel:
-    """The drawn model of a run's model `m`, whose MJCF and mesh files these are."""
+    """The drawn model of a run's model `m`, whose MJCF and mesh files these are, for the classic
+    renderer or for Filament."""
     facing = SOUTH if camera == "top" else _azimuth(m)
-    return compiled(dressed(xml, m, facing), files)
+    text = dressed(xml, m, facing, FILAMENT_FLOOR if filament else CLASSIC_FLOOR)
+    if filament:
+        text = text.replace("</mujoco>", f"{settings()}</mujoco>")
+    return compiled(text, files)
 
 
 def _azimuth(m: mujoco.MjModel) -> float:

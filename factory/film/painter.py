@@ -12,11 +12,13 @@ from factory.engine.mjcf.loose_parts import loose_parts
 from factory.engine.mjcf.replica import SHOWN, Replica
 from factory.engine.record.subject import MonitorSubject
 from factory.film.action import Fading, Snapshot
+from factory.film.filament import Filament
 from factory.film.following import Viewpoint
 from factory.film.ink import Pixels
 from factory.film.marks import Mark, Marks
 from factory.film.picture import Camera, Size
 from factory.film.smoothing import smooth
+from factory.film.studio import GOLDEN, moved, sun
 from factory.floor.geometry.meshes import Array, Indices
 from factory.floor.geometry.sight import Framing, View
 from factory.support import gl
@@ -43,11 +45,10 @@ class Painter(Closing):
     """Draws one model from one camera; it has a model and data of its own, so a run is not
     disturbed.
 
-    `caption`: height of the strip below that is kept free, as a fraction of the picture's.
-    `samples`: above 1 a picture is the mean of so many, each with the key light and the pixels'
-    grid moved a little: soft shadows and smooth edges, for stills. Those of a film are smoothed by
-    how they look, which costs a tenth of a second picture. Raises MissingError where there
-    is no GL."""
+    `framing`: the margins that are kept free, that of the caption too. `samples`: above 1 a picture
+    is the mean of so many, each with the key light and the pixels' grid moved a little: soft
+    shadows and smooth edges, for stills; edges of a film's are smoothed afterwards. Raises
+    MissingError where there is no GL."""
 
     def __init__(
         self,
@@ -55,8 +56,9 @@ class Painter(Closing):
         size: Size,
         camera: Camera,
         subject: MonitorSubject,
-        caption: float = 0.0,
+        framing: Framing,
         samples: int = 1,
+        renderer: type[Renderer | Filament] | None = None,
     ) -> None:
         gl.probe()
         self.replica, self.samples = Replica(m), samples
@@ -65,12 +67,11 @@ class Painter(Closing):
         quality.global_.offwidth, quality.global_.offheight = size
         quality.quality.offsamples = 0
         quality.quality.shadowsize = STILL_SHADOWS if samples > 1 else FILM_SHADOWS
-        framing = Framing(size[0] / size[1], below=0.03 + caption)
         self.viewpoint = Viewpoint(self.replica, camera, framing, subject)
         self.fading = Fading(self.replica)
         joints = (names.kind(m.joint(n).name) for n in range(m.njnt))
         self.shadows = sum(kind == "robot" for kind in joints) <= MANY
-        self.renderer = Renderer(self.replica, size)
+        self.renderer = (renderer or Renderer)(self.replica, size)
 
     def close(self) -> None:
         """Gives the GL context back."""
@@ -168,7 +169,7 @@ class Renderer(Closing):
             if light.headlight:
                 light.pos, light.dir = view.position, view.axes[2]
             elif light.castshadow:
-                light.dir = -self.sun if sample is None else _moved(-self.sun, sample)
+                light.dir = -self.sun if sample is None else _spread_sun(self.sun, sample)
                 light.pos = middle - sum(view.range) / 2 * np.asarray(light.dir, float)
 
 
@@ -202,18 +203,6 @@ class LooseParts(Closing):
         mujoco.mj_camlight(self.replica.m, self.replica.d)
 
 
-ASIDE, HIGH = 68.0, 54.0
-"""Where the sun stands, so far to the left of the camera and so high that shadows fall back to the
-right, and the foreground is free of them [degrees]."""
-
-
-def sun(axes: Array) -> Array:
-    """The direction to the sun (3,) where the first camera has these axes."""
-    back = -axes[2] if abs(axes[2, 2]) < 0.9 else -axes[1]
-    turn, high = np.arctan2(back[1], back[0]) - np.radians(ASIDE), np.radians(HIGH)
-    return np.array([np.cos(high) * np.cos(turn), np.cos(high) * np.sin(turn), np.sin(high)])
-
-
 ROUND = (
     mujoco.mjtGeom.mjGEOM_SPHERE,
     mujoco.mjtGeom.mjGEOM_CAPSULE,
@@ -230,15 +219,10 @@ def _facet(m: mujoco.MjModel) -> None:
         m.vis.quality.numstacks = 2
 
 
-def _moved(direction: Array, sample: Sample) -> Array:
-    """A direction moved inside a disc of radius SOFT, the samples evenly spread over it."""
+def _spread_sun(towards: Array, sample: Sample) -> Array:
+    """The way of the light from one place of a sun of radius SOFT, evenly spread over it."""
     n, count = sample
-    radius, angle = SOFT * ((n + 0.5) / count) ** 0.5, n * 2.399963
-    side = np.cross(direction, (0.0, 0.0, 1.0))
-    side /= np.linalg.norm(side)
-    other = np.cross(direction, side)
-    moved = direction + radius * (np.cos(angle) * side + np.sin(angle) * other)
-    return np.asarray(moved / np.linalg.norm(moved))
+    return moved(-towards, SOFT * ((n + 0.5) / count) ** 0.5, n * GOLDEN)
 
 
 @cache

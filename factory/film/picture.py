@@ -139,6 +139,12 @@ PanelName = Literal["net", "gantt"]
 
 PANELS: tuple[PanelName, ...] = get_args(PanelName)
 
+RendererName = Literal["auto", "classic", "filament"]
+"""`classic`: the same to the bit each time; `filament`: physically based, needs Vulkan; `auto`:
+that for stills where it works, else the classic one."""
+
+RENDERERS: tuple[RendererName, ...] = get_args(RendererName)
+
 SHARE = 0.44
 """Of the longer side of a picture that panels take."""
 
@@ -149,16 +155,19 @@ LEAST = 240
 @dataclass(frozen=True, slots=True)
 class Picture:
     """How a still or a film is taken: its `size`, the `camera`, whether it has a `caption`, the
-    `panels` beside the 3-D, and a `title` shown at the beginning. Raises InputError (BadValue) for
-    an unknown camera or panel, and where there is no room for the panels."""
+    `panels` beside the 3-D, a `title` shown at the beginning, and the `renderer`. Raises InputError
+    (BadValue) for an unknown camera, panel or renderer, and without room for the panels."""
 
     size: Size = (1280, 720)
     camera: Camera = "overview"
     caption: bool = True
     panels: tuple[PanelName, ...] = ()
     title: str = ""
+    renderer: RendererName = "auto"
 
     def __post_init__(self) -> None:
+        if self.renderer not in RENDERERS:
+            raise _none_of("renderer", self.renderer, RENDERERS)
         camera_named(self.camera)
         shared(self.size, panels_named(",".join(self.panels)))
 

@@ -1,5 +1,5 @@
-"""Smooth edges of a picture that was drawn with one sample a pixel: of bodies, and of shadows, which
-multisampling leaves as stairs since they lie inside a face.
+"""Smooth edges in a picture of one sample a pixel: of bodies, and of shadows, which multisampling
+leaves as stairs since they lie inside a face.
 
 Fast approximate antialiasing (T. Lottes, 2009): along a step in brightness the nearer end of the
 stair is sought, and a pixel takes as much of the colour beyond the step as the stair covers of it.
