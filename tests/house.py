@@ -15,6 +15,8 @@ from functools import cache, cached_property
 from itertools import chain
 from pathlib import Path
 
+from tests.paths import ROOT
+
 FLOORS = (
     ("support",),
     ("theory.problem",),
@@ -107,6 +109,9 @@ STOREYS = ("theory", "floor", "engine", "apps")
 
 MOST_LINES = 350
 
+BESIDE = ("tests", "benches")
+"""Folders beside the package whose modules import it."""
+
 
 @dataclass(frozen=True)
 class Module:
@@ -128,6 +133,17 @@ class Module:
     def tree(self) -> ast.Module:
         return ast.parse(self.text)
 
+    @cached_property
+    def imports(self) -> list[str]:
+        """All that it imports by absolute names: at run time, inside functions, for typing."""
+        names: list[str] = []
+        for node in ast.walk(self.tree):
+            if isinstance(node, ast.Import):
+                names += [a.name for a in node.names]
+            elif isinstance(node, ast.ImportFrom) and node.level == 0:
+                names += [f"{node.module}.{a.name}" for a in node.names]
+        return names
+
     def within(self, folders: Iterable[str]) -> bool:
         """Whether it lies in one of these folders (`simulation/mujoco`)."""
         path = self.name.replace(".", "/") + "/"
@@ -135,16 +151,19 @@ class Module:
 
 
 CLOCK = re.compile(r"^ *(?:from|import) (?:[^()\n]*, )?time\b", re.M)
-CLOCKED = ("waiting",)
+CLOCKED = ("tests.waiting",)
 """Modules of the tests that read a clock: it waits for processes."""
 
 
 class House:
-    """All modules of a package `factory` below `root`, by name, and those beside its tests."""
+    """All modules of a package `factory` below `root`, by name. `beside`: those of its tests and
+    benches, by their names below `root`."""
 
     def __init__(self, root: Path) -> None:
-        tests = sorted((root / "tests").glob("*.py"))
-        self.tests = [Module(path.stem, path.read_text("utf-8")) for path in tests]
+        self.beside: dict[str, Module] = {}
+        for path in sorted(chain.from_iterable((root / n).rglob("*.py") for n in BESIDE)):
+            name = ".".join(path.relative_to(root).with_suffix("").parts)
+            self.beside[name] = Module(name, path.read_text("utf-8"))
         self.modules: dict[str, Module] = {}
         for path in sorted((root / "factory").rglob("*.py")):
             parts = path.relative_to(root / "factory").with_suffix("").parts
@@ -156,19 +175,24 @@ class House:
         """Modules of the house that a module imports: at run time, inside functions, for typing.
         `from factory.room import x` is resolved to the module x where there is one."""
         found: set[str] = set()
-        for node in ast.walk(module.tree):
-            if isinstance(node, ast.Import):
-                names = [a.name for a in node.names]
-            elif isinstance(node, ast.ImportFrom) and node.level == 0:
-                names = [f"{node.module}.{a.name}" for a in node.names]
-            else:
-                names = []
-            for name in names:
-                top, _, inside = name.partition(".")
-                if top == "factory":
-                    parent = inside.rpartition(".")[0]
-                    found.add(inside if inside in self.modules else parent)
+        for name in module.imports:
+            top, _, inside = name.partition(".")
+            if top == "factory":
+                found.add(inside if inside in self.modules else inside.rpartition(".")[0])
         return found - {module.name}
+
+    def needs(self, module: Module) -> set[str]:
+        """Modules of the house that a test imports, itself or by the tests and benches it
+        imports."""
+        found, names, seen = set[str](), [module.name], set[str]()
+        while names:
+            name = names.pop()
+            one = self.beside.get(name) or self.beside.get(name := name.rpartition(".")[0])
+            if one and name not in seen:
+                seen.add(name)
+                found |= self.imports(one)
+                names += one.imports
+        return found
 
 
 def floor(room: str) -> int:
@@ -275,9 +299,24 @@ def unexplained(house: House) -> Iterator[str]:
 
 def clocks(house: House) -> Iterator[str]:
     """Test modules that import `time`: what they find must not depend on how busy a machine is."""
-    for module in house.tests:
-        if CLOCK.search(module.text) and module.name not in CLOCKED:
-            yield f"tests.{module.name} reads a clock"
+    for name, module in house.beside.items():
+        if name.startswith("tests.") and CLOCK.search(module.text) and name not in CLOCKED:
+            yield f"{name} reads a clock"
+
+
+def misplaced_tests(house: House) -> Iterator[str]:
+    """Tests that stand neither in tests/core, nor with an app, nor in tests/whole, and those in
+    tests/core that need an app, a command or another entrance."""
+    for name, module in house.beside.items():
+        match name.split("."):
+            case ["tests", "core", _]:
+                for other in sorted(house.needs(module)):
+                    if floor(house.modules[other].room) >= len(FLOORS):
+                        yield f"{name} needs {other or 'factory'}"
+            case ["tests", "apps", app, _] if floor(f"apps.{app}") >= 0:
+                pass
+            case ["tests", *folders, test] if test.startswith("test_") and folders != ["whole"]:
+                yield f"{name} stands with no app, nor in core or whole"
 
 
 def identifiers(module: Module) -> Iterator[str]:
@@ -334,4 +373,4 @@ def anys(house: House, name: str) -> Iterator[str]:
 @cache
 def this_house() -> House:
     """The source tree that these tests are in."""
-    return House(Path(__file__).resolve().parent.parent)
+    return House(ROOT)

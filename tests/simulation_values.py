@@ -21,8 +21,8 @@ from factory.sharing import with_branches
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
 from factory.theory.lang import read_pag
-from tests.command_line import ROOT
 from tests.examples import without_hands
+from tests.paths import ROOT
 
 FENCE = (ROOT / "tests" / "baselines" / "fence.pag").read_text("utf-8")
 """A small product with lifts."""
