@@ -207,7 +207,7 @@ class Dress:
         walls = [solids.pop(part) for part in SHED]
         mouth = float(walls[-1].at[0] - walls[-1].half[0])
         self._enclose(body, "outfeed/housing", walls, housings.shed, self.product)
-        half = (mouth - float(low[0])) / 2, 3e-3, 5e-3
+        half = (mouth - float(low[0])) / 2, 3e-3, belts[0].half[2]
         bar = outfits.block(half)[0].skin
         sides = bar.moved(y=low[1] - BESIDE + 3e-3) + bar.moved(y=high[1] + BESIDE - 3e-3)
         at = replace(belts[0], at=np.array([(mouth + low[0]) / 2, 0.0, high[2] - half[2]]))

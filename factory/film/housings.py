@@ -13,6 +13,10 @@ import numpy as np
 from factory.film.lettering import height, lettering
 from factory.film.outfits import OUT, Half, Layer, Outfit, together
 from factory.film.skins import RoundRectangle, Skin, hood, slab
+from factory.floor.layout.dimensions import PLAY, WALL
+
+CORNER = 3 * (WALL + PLAY)
+"""Radius of a housing's corners [m]: what is inside, so far from its sides, does not stand out."""
 
 LEAST, LID_LEAST = 2.5e-3, 6e-3
 """Height of words at least, or they are left out; on a lid, or they are on the sides [m]."""
@@ -32,7 +36,7 @@ def magazine(half: Half, label: str, seen: float) -> Outfit:
     """A feeder's housing of these half sides, open below, about its middle. What is on its lid can
     be read from an azimuth `seen` in its frame [rad]."""
     x, y, z = half
-    radius = min(8e-3, 0.35 * min(x, y))
+    radius = min(CORNER, 0.35 * min(x, y))
     shell = hood(RoundRectangle(x, y, radius), -z, z, min(2.5e-3, 0.3 * z))
     return Layer("skin", shell, "housing"), *_faces(half, label, radius, seen)
 
@@ -41,7 +45,7 @@ def magazine(half: Half, label: str, seen: float) -> Outfit:
 def shed(half: Half, product: str, seen: float) -> Outfit:
     """The outfeed's shed, open towards -x, about its middle."""
     x, y, z = half
-    radius = min(0.012, 0.2 * y)
+    radius = min(CORNER, 0.2 * y)
     shell = hood(RoundRectangle(y, z, radius), -x, x, 3e-3).along("x")
     edge = RoundRectangle(max(0.6 * y, y - 0.018), max(0.3 * z, z - 0.018), 6e-3)
     rear = slab(edge, -OUT, OUT, PANE).along("x").moved(x=x)

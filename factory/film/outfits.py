@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cache
 from math import cos, pi, sin
 
-from factory.film.lettering import height, lettering
+from factory.film.lettering import WEIGHT, height, lettering
 from factory.film.look import EDGE, PART_EDGE
 from factory.film.skins import RoundRectangle, Skin, extrusion, rounded, slab, spindle
 
@@ -131,7 +131,7 @@ def _number(half: Half, number: str, seen: float) -> Skin | None:
     sides = (pi, half[0], half[1]), (pi / 2, half[1], half[0]), (-pi / 2, half[1], half[0])
     out, deep, wide = max(sides, key=lambda side: cos(side[0] - seen))
     near, far = MAST * deep, deep - RIM
-    tall = height(number, 2 * (wide - RIM) - 4e-3, 0.94 * (far - near))
+    tall = height(number, 2 * (wide - RIM) - 4e-3, (far - near) / (1 + WEIGHT))
     text = lettering(number, tall) if tall > 0 else None
     if text is None:
         return None
