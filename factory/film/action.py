@@ -47,7 +47,7 @@ class Fading:
         for body in range(1, self.m.nbody):
             if names.kind(name := self.m.body(body).name) == "feeder":
                 geoms = shown(self.m, body)
-                stands += [(g, name) for g in geoms if _is_stand(self.m.geom(g).name)]
+                stands += [(g, name) for g in geoms if is_stand(self.m.geom(g).name)]
         self.geoms = np.array([g for g, _ in stands], np.intp)
         self.groups = np.unique([group for _, group in stands], return_inverse=True)[1]
         self.paint = np.array([paint(self.m, g) for g in self.geoms]).reshape(-1, 4)
@@ -81,7 +81,7 @@ class Fading:
         return greatest
 
 
-def _is_stand(geom: str) -> bool:
+def is_stand(geom: str) -> bool:
     """Whether a geom of a feeder is its post or its boom, or a skin of one."""
     return not set(STANDS).isdisjoint(geom.split("/")[2:])
 

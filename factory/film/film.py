@@ -82,6 +82,9 @@ class Film(_Observer):
         """Finish the file, and write the poster."""
         self.reel.close()
 
+    def __exit__(self, *raised: object) -> None:
+        self.reel.__exit__(*raised)
+
 
 class Still(_Observer):
     """A still (PNG) of a run at a time [s], or at its end; written when it is closed, except after

@@ -67,7 +67,7 @@ class Painter(Closing):
         quality.global_.offwidth, quality.global_.offheight = size
         quality.quality.offsamples = 0
         quality.quality.shadowsize = STILL_SHADOWS if samples > 1 else FILM_SHADOWS
-        self.viewpoint = Viewpoint(self.replica, camera, framing, subject)
+        self.viewpoint = Viewpoint(self.replica, camera, framing, subject, samples > 1)
         self.fading = Fading(self.replica)
         joints = (names.kind(m.joint(n).name) for n in range(m.njnt))
         self.shadows = sum(kind == "robot" for kind in joints) <= MANY

@@ -76,9 +76,9 @@ def overview(points: Array, framing: Framing) -> View:
     return best if size(best) > 1.05 * size(usual) else usual
 
 
-def orbit(points: Array, framing: Framing) -> Callable[[float], View]:
-    """The view at each time [s] from a camera that goes round at an even height. It comes nearer
-    and goes away calmly, and has everything in the frame all the way."""
+def orbit(points: Array, framing: Framing, turn: float = TURN) -> Callable[[float], View]:
+    """The view at each time [s] from a camera that goes round at an even height, `turn` degrees a
+    second. It comes nearer and goes away calmly, and has everything in the frame all the way."""
     elevation = 36.0 if framing.aspect >= 1 else 50.0
     azimuths = np.arange(0.0, 360.0, 3.0)
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
@@ -90,7 +90,7 @@ def orbit(points: Array, framing: Framing) -> Callable[[float], View]:
     depth = float(np.linalg.norm(about, axis=1).max())
 
     def view(time: float) -> View:
-        azimuth = -62.0 + TURN * time
+        azimuth = -62.0 + turn * time
         axes = towards(azimuth, elevation)
         right, up, back = (
             np.interp(azimuth, azimuths, values, period=360.0) for values in (*aside.T, away)

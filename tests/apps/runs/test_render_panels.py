@@ -27,7 +27,7 @@ from factory.film.history import History, OperationProgress, depths, followed
 from factory.film.ink import GROUND, Ink, fitted, operation_colours, robot_colours, width
 from factory.film.net_panel import NetPanel
 from factory.film.picture import PANELS, shared
-from factory.film.reel import Poster
+from factory.film.reel import Completions, Poster
 from factory.film.sheet import (
     BOTTOM,
     CLOSE,
@@ -393,11 +393,11 @@ def test_ink_is_where_it_is_put_to_a_fraction_of_a_pixel() -> None:
 
 def test_the_poster_is_when_the_product_has_become_whole_and_most_is_there(paper: Log) -> None:
     take = take_of(paper, Picture(SIZE))
-    poster = Poster(take, Path("poster.png"))
+    poster, completions = Poster(take, Path("poster.png")), Completions(take)
     firings = list(zip(paper.fired_t.tolist(), paper.fired.tolist(), strict=True))
     for row in range(len(paper)):
         take.history.catch_up(paper.timed_entries, float(paper.time[row]))
-        poster.see(moment_of(paper, row))
+        poster.see(moment_of(paper, row), completions.since_last())
     root = take.subject.factory.by_label["sub3"]
     ends = [t for t, event in firings if event == root.end]
     assert isinstance(poster.moment, Moment)
@@ -419,7 +419,7 @@ def test_a_film_with_everything(tmp_path: Path) -> None:
     ):
         run = simulation.run([writer.observe, filming.observe])
     frames = iio.imread(film, plugin="pyav").astype(int)
-    assert frames.shape == (int(run.sim_time_s * 2 + 1e-6) + 3, 490, 560, 3)
+    assert frames.shape == (int(run.sim_time_s * 2 + 1e-6) + 7, 490, 560, 3)
     assert iio.imread(tmp_path / "p.png").shape == (490, 560, 3)
     again = tmp_path / "again.mp4"
     render_log(read_log(log), again, picture, 2)
