@@ -7,6 +7,7 @@ disc or a capsule, very thin it is a line.
 
 from __future__ import annotations
 
+import re
 from functools import cache, lru_cache
 
 import numpy as np
@@ -173,13 +174,17 @@ def width(text: str, points: int) -> int:
     return _mask(text, points).shape[1] - 1 if text else 0
 
 
+ENDING = re.compile(r"(?<=\w\w\w)([/_.-]\w{1,5}|\d{1,3})$")
+"""The end of a label that has others beside it."""
+
+
 def fitted(text: str, points: int, room: float) -> str:
-    """A text, shortened to fit; "" if less than three letters or two fifths of it fit. The number
-    of a label such as `box/3` is kept."""
+    """A text, shortened to fit; "" if less than three letters or two fifths of it fit. What tells
+    a label from its like is kept: the number of `box/3` and `log12`, the end of `axle_left`."""
     if width(text, points) <= room:
         return text
-    head, slash, number = text.rpartition("/")
-    head, tail = (head, slash + number) if slash else (text, "")
+    match = ENDING.search(text)
+    head, tail = (text[: match.start()], match[0]) if match else (text, "")
     for length in range(len(head) - 1, max(2, int(0.4 * len(head))), -1):
         shorter = f"{head[:length].rstrip()}…{tail}"
         if width(shorter, points) <= room:

@@ -145,8 +145,8 @@ that for stills where it works, else the classic one."""
 
 RENDERERS: tuple[RendererName, ...] = get_args(RendererName)
 
-SHARE = 0.44
-"""Of the longer side of a picture that panels take."""
+SHARE = 0.30
+"""Of the longer side of a picture that panels take, or more where they need it."""
 
 LEAST = 240
 """Pixels that a panel is wide and high at least."""
@@ -204,9 +204,10 @@ def shared(size: Size, panels: Sequence[PanelName]) -> tuple[Area, dict[PanelNam
     if not panels:
         return Area(0, 0, width, height), {}
     beside = width >= height
-    wide = 2 * round(SHARE * width / 2) if beside else width
-    tall = height if beside else 2 * round(SHARE * height / 2)
-    if wide < LEAST or tall < LEAST * len(panels):
+    least = LEAST if beside else LEAST * len(panels)
+    taken = max(2 * round(SHARE * max(size) / 2), least)
+    wide, tall = (taken, height) if beside else (width, taken)
+    if wide < LEAST or tall < LEAST * len(panels) or 2 * taken > max(size):
         hint = "take 1280x720, or leave panels out"
         message = f"{width}x{height} has no room for {' and '.join(panels)}"
         raise InputError(Diagnostic("BadValue", message, None, hint))

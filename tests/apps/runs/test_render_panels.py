@@ -344,7 +344,7 @@ def test_areas_cover_the_picture_once(size, panels) -> None:
     for area in (scene, *areas.values()):
         covered[area.top : area.top + area.height, area.left : area.left + area.width] += 1
     assert (covered == 1).all() and list(areas) == list(panels)
-    assert 0.4 < scene.width * scene.height / (size[0] * size[1]) < 0.7
+    assert 0.4 < scene.width * scene.height / (size[0] * size[1]) <= 0.7
 
 
 def test_pictures_too_small_for_panels_are_refused() -> None:
@@ -367,6 +367,11 @@ def test_a_title_fades_and_then_leaves_the_picture_alone() -> None:
 def test_words_are_cut_to_fit() -> None:
     assert fitted("gearbox", 12, 1000) == "gearbox"
     assert fitted("gearbox/12", 12, 0.8 * width("gearbox/12", 12)).endswith("…/12")
+    one, other = (
+        fitted(f"axle_{end}", 12, 0.9 * width("axle_right", 12)) for end in ("left", "right")
+    )
+    assert one != other
+    assert fitted("subassembly12", 12, 60).endswith("…12")
     assert fitted("gearbox", 12, 5) == ""
     assert fitted("mount/2", 12, 0.65 * width("mount/2", 12)) == ""
     for label in ("mount", "mount/2", "front_axle", "cab"):
