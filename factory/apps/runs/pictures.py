@@ -63,7 +63,8 @@ def take_of(log: Log, picture: Picture) -> Take:
     if log.failures is not None:
         history.failings += log.failures.found
         history.stand(log.failures.stood)
-    return Take(m, subject, log.header["product"], log.header["units"], picture, history)
+    product, units = log.header["product"], log.header["units"]
+    return Take(m, log.xml, log.files, subject, product, units, picture, history)
 
 
 def moment_of(log: Log, row: int) -> Moment:
