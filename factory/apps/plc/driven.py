@@ -13,8 +13,8 @@ from factory.apps.plc.corridors import SLACK
 from factory.apps.plc.interlock import PlantInterlock
 from factory.apps.plc.signals import NOBODY, AxisDrives, Commands, Controller, Refusal, Sensed
 from factory.engine.record.state import Event
+from factory.engine.simulation.active import Active
 from factory.engine.simulation.ordering import Ordering
-from factory.engine.simulation.supervisor import Active
 from factory.engine.timing.distributed import Scan
 from factory.support.settings import Settings
 from factory.theory.control.mode import Array, Limits
