@@ -16,7 +16,6 @@ from pathlib import Path
 from types import MappingProxyType
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
-from xml.sax.saxutils import quoteattr
 
 from factory.engine.mjcf.bins import add_bins
 from factory.engine.mjcf.driving import (
@@ -45,6 +44,7 @@ from factory.floor.layout.feeding import outlets_of
 from factory.floor.layout.hanging import Hanging
 from factory.floor.layout.layout import Layout
 from factory.support.errors import Diagnostic
+from factory.support.markup import quoteattr
 from factory.support.settings import Settings
 from factory.theory.control.profile import SpeedProfile
 from factory.theory.plant.approaches import Pair
