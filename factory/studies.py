@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from factory.apps.analyze import Analysis
     from factory.apps.planning.plan import Planned
     from factory.apps.report.page import RunReport
+    from factory.apps.runs.executing import Tell
     from factory.apps.runs.pictures import Rendered
     from factory.apps.sweep.summary import Summary
-    from factory.engine.simulation.executing import Tell
     from factory.engine.simulation.run import Run
     from factory.film.picture import PanelName
     from factory.support.bounds import WorldName

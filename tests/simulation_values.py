@@ -17,9 +17,9 @@ from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.layout import Layout
 from factory.pipeline import Project, all_templates, read
-from factory.sharing import with_branches
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
+from factory.theory.compiler.parallel import in_parallel
 from factory.theory.lang import read_pag
 from tests.examples import without_hands
 from tests.paths import ROOT
@@ -51,7 +51,8 @@ def layout_of(name: str) -> Layout:
     if name == "bar":
         return laid_out_with_lifts(BAR)
     if name == "tee":
-        return with_branches(read(ROOT / "examples" / "paper.pag"), [("part3", 2)]).layout
+        paper = read(ROOT / "examples" / "paper.pag")
+        return paper.with_plan(in_parallel(paper.planned, [("part3", 2)])).layout
     return without_hands(name)
 
 

@@ -128,7 +128,7 @@ class ProjectOptions:
         kept = defaults_for(self.file)
         if self.robots is not None or self.cycle is not None:
             return self._with_few_robots(project, silent)
-        from factory.sharing import with_branches, with_lines, with_tees
+        from factory.apps.few_robots.sharing import with_branches, with_lines, with_tees
 
         if lines := kept.lines():
             project = with_lines(project, lines)

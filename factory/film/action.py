@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from factory.engine.mjcf import names
 from factory.engine.mjcf.replica import Replica, mesh_of, paint, shown
 from factory.engine.mjcf.weld_frames import WeldFrames
-from factory.floor.geometry.sight import Array, View
+from factory.floor.geometry.sight import View
 from factory.floor.geometry.solids import rotation
+from factory.support.arrays import Array
 from factory.support.engine import mujoco
 
 FAINT = 0.16

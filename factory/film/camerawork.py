@@ -20,10 +20,10 @@ from factory.film.net_panel import NetPanel
 from factory.film.painter import Painter
 from factory.film.picture import Area, PanelName, Picture, Size, shared
 from factory.film.sheet import OUTSIDE, Rows
+from factory.support.arrays import Array
 from factory.support.engine import mujoco
 from factory.support.errors import Diagnostic, InputError
 from factory.support.resource import Closing
-from factory.theory.control.mode import Array
 from factory.theory.lang.source import counted
 
 When = float | Literal["end"]

@@ -18,7 +18,8 @@ from factory.engine.record.subject import MonitorSubject
 from factory.film.action import SIGNS, Snapshot, action_of, corners
 from factory.film.junction import handover_view
 from factory.film.picture import HANDOVER, PART, Camera, from_above, orbit, overview
-from factory.floor.geometry.sight import Array, Framing, View, fit, towards
+from factory.floor.geometry.sight import Framing, View, fit, towards
+from factory.support.arrays import Array
 from factory.support.engine import mujoco
 
 LAG = 0.25

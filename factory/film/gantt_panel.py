@@ -21,7 +21,7 @@ from factory.film.ink import (
     width,
 )
 from factory.film.sheet import FOOT, PanelRow, PanelSheet, Rows
-from factory.theory.control.mode import Array
+from factory.support.arrays import Array
 
 CYCLES = 2.2
 """How many rounds of the busiest robot are shown."""

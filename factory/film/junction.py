@@ -18,7 +18,8 @@ from factory.engine.mjcf.replica import Replica, shown
 from factory.engine.mjcf.weld_frames import held_at
 from factory.engine.record.subject import MonitorSubject
 from factory.film.action import STANDS, box_of, outlines, placed, shape_of
-from factory.floor.geometry.sight import Array, Framing, View, fit, towards
+from factory.floor.geometry.sight import Framing, View, fit, towards
+from factory.support.arrays import Array
 from factory.theory.plant.factory import Operation
 from factory.theory.problem.pag import NOPART
 

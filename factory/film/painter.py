@@ -16,9 +16,9 @@ from factory.film.following import Viewpoint
 from factory.film.ink import Pixels
 from factory.film.marks import Mark, Marks
 from factory.film.picture import Camera, Size
-from factory.floor.geometry.meshes import Array, Indices
 from factory.floor.geometry.sight import Framing, View
 from factory.support import gl
+from factory.support.arrays import Array, Indices
 from factory.support.engine import mujoco
 from factory.support.resource import Closing
 

@@ -9,7 +9,8 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from factory.floor.geometry.sight import Array, Framing, View, fit, tangents, towards
+from factory.floor.geometry.sight import Framing, View, fit, tangents, towards
+from factory.support.arrays import Array
 from factory.support.errors import Diagnostic, InputError, did_you_mean
 from factory.theory.problem.pag import PAG
 

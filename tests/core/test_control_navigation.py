@@ -11,8 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from factory.support.arrays import Array
 from factory.theory.control import mode as mode_module
-from factory.theory.control.mode import Array, Limits, Mode
+from factory.theory.control.mode import Limits, Mode
 from factory.theory.control.navigation import Bundle
 from tests.navigation_functions import gradient as gradient_of
 from tests.navigation_functions import potential

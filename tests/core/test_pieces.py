@@ -25,7 +25,7 @@ from factory.engine.mjcf.model import model_files
 from factory.engine.simulation.modelling import physical_model
 from factory.floor.geometry import decomposition
 from factory.floor.geometry.glb_reader import UPRIGHT
-from factory.floor.geometry.meshes import Array, Indices, Mesh, is_closed
+from factory.floor.geometry.meshes import Mesh, is_closed
 from factory.floor.geometry.overlap import drawn
 from factory.floor.geometry.pieces import (
     MOST_PIECES,
@@ -40,6 +40,7 @@ from factory.floor.geometry.pieces import (
 from factory.floor.geometry.product import product_geometry
 from factory.floor.geometry.solids import Solid
 from factory.floor.geometry.touching import bodies
+from factory.support.arrays import Array, Indices
 from factory.theory.problem.pag import PAG
 from tests.examples import plainly_laid_out
 from tests.layout_values import table_pag

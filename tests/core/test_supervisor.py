@@ -12,8 +12,8 @@ from factory.engine.simulation.mujoco.feeders import Feeders
 from factory.engine.simulation.mujoco.world import MujocoWorld
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
+from factory.support.arrays import Array, Truth
 from factory.support.settings import Settings
-from factory.theory.control.mode import Array, Truth
 from factory.theory.control.navigation import Bundle
 from tests.pag_texts import KARY, laid_out
 from tests.simulation_values import layout_of

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+import factory
+from factory.apps.few_robots.sharing import with_lines
 from factory.apps.fidelity.hidden import HiddenPenetrations
 from factory.apps.runs.watched import watched
 from factory.engine.simulation.request import RunRequest
@@ -30,8 +32,8 @@ from factory.floor.layout.hands.places import places as found_places
 from factory.floor.layout.hanging import Hanging
 from factory.floor.layout.layout import Layout
 from factory.pipeline import Project, read
-from factory.sharing import with_lines
 from tests.layout_values import with_visits
+from tests.random_products import random_product
 
 AT_MOST_MM = 0.1
 
@@ -335,3 +337,12 @@ def test_a_hand_over_2_mm_off_fails_certificate_and_run(monkeypatch: pytest.Monk
     run = run_of(changed)
     assert not run.succeeded
     assert "HandOffGap" in {failure.code for failure in run.verdict.failures}
+
+
+def test_the_sliders_of_a_magazine_turn_round_as_predicted(tmp_path: Path) -> None:
+    """Where each part waits for the slider of the one before, a run takes the time of its critical
+    circuit: the next part begins to come down in the tick in which the last slider is up."""
+    file = tmp_path / "product.pag"
+    file.write_text(random_product(50))
+    run = factory.run(factory.compile(file, robots="least"), units=4)
+    assert run.cycle_time_s == pytest.approx(run.predicted_cycle_time_s, abs=1e-6)

@@ -7,6 +7,16 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from factory.api import (
+    Array,
+    Diagnostic,
+    Index,
+    InputError,
+    Limits,
+    MujocoWorld,
+    Simulation,
+    did_you_mean,
+)
 from factory.apps.disturbance.interference import Interference, Measure
 from factory.apps.disturbance.values import (
     Delay,
@@ -19,10 +29,6 @@ from factory.apps.disturbance.values import (
     Push,
     Slowed,
 )
-from factory.engine.simulation.mujoco.world import MujocoWorld
-from factory.engine.simulation.simulation import Simulation
-from factory.support.errors import Diagnostic, InputError, did_you_mean
-from factory.theory.control.mode import Array, Index, Limits
 
 
 def disturb(simulation: Simulation, *disturbances: Disturbance) -> Simulation:

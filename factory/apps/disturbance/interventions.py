@@ -9,14 +9,9 @@ from types import MappingProxyType
 
 import numpy as np
 
+from factory.api import Diagnostic, InputError, Limits, MujocoWorld, Operation, Simulation, names
 from factory.apps.disturbance.interference import Interference
 from factory.apps.recovery import Campaign, WorldFault, recover
-from factory.engine.mjcf import names
-from factory.engine.simulation.mujoco.world import MujocoWorld
-from factory.engine.simulation.simulation import Simulation
-from factory.support.errors import Diagnostic, InputError
-from factory.theory.control.mode import Limits
-from factory.theory.plant.factory import Operation
 
 
 @dataclass(slots=True)

@@ -12,12 +12,11 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import astuple, dataclass
 
+from factory.api import Factory, Undone
 from factory.apps.exports.subject import Subject
 from factory.apps.log import Log
 from factory.apps.log.project_table import factory_of
 from factory.support.errors import one_line
-from factory.theory.nets.undone import Undone
-from factory.theory.plant.factory import Factory
 
 
 @dataclass(frozen=True, slots=True)

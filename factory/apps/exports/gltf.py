@@ -10,12 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from factory.api import PAG, Array, Indices, Mesh, Product, rotation
 from factory.apps.exports.subject import Subject, triangles, wanted
 from factory.engine.mjcf.mesh_files import corner_normals
 from factory.floor.geometry.glb_reader import UPRIGHT, linear
-from factory.floor.geometry.meshes import Array, Indices, Mesh
-from factory.floor.geometry.solids import Product, rotation
-from factory.theory.problem.pag import PAG
 
 WORLD = "/world"
 """The outermost node."""

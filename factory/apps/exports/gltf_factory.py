@@ -8,18 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from factory.api import HIDDEN, Array, Diagnostic, InputError, Mesh, names, physical_model, rotation
 from factory.apps.exports.gltf import new_scene, pose, shaded, written
 from factory.apps.exports.subject import Subject
 from factory.apps.log import Log
-from factory.engine.mjcf import names
-from factory.engine.mjcf.parts import HIDDEN
-from factory.engine.simulation.modelling import physical_model
-from factory.floor.geometry.meshes import Array, Mesh
-from factory.floor.geometry.solids import rotation
-from factory.support.errors import Diagnostic, InputError
 
 if TYPE_CHECKING:
-    from factory.engine.mjcf.replica import Replica
+    from factory.api import Replica
 
 FORMAT, TAKES, BINARY, OF, ENDING = "gltf-factory", "factory", True, "a time of a log [s]", "glb"
 
@@ -38,9 +33,9 @@ def export(subject: Subject) -> bytes:
 
 def _state(subject: Subject) -> Replica:
     """The engine's model in the requested state."""
+    from factory.api import Replica
     from factory.apps.log.model import model_of
     from factory.engine.mjcf.loading import load
-    from factory.engine.mjcf.replica import Replica
 
     if isinstance(subject.source, Log):
         replica = Replica(model_of(subject.log))

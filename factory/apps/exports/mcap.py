@@ -12,13 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from factory.api import Array, optional
 from factory.apps.exports.csv import EventRow, rows
 from factory.apps.exports.motion import BodyMotion, motion_of
 from factory.apps.exports.subject import Subject
 from factory.apps.log import Log
-from factory.floor.geometry.meshes import Array
-from factory.support.version import optional
-from factory.theory.control.mode import Truth
+from factory.support.arrays import Truth
 
 FORMAT, TAKES, BINARY = "mcap", "log", True
 
@@ -106,8 +105,8 @@ class _Recorder:
 
     def _shapes(self, body: int) -> dict[str, list[Any]]:
         """Foxglove's primitives of a body by the field of the entity that they belong to."""
+        from factory.api import mujoco
         from factory.engine.mjcf.replica import half_sizes, mesh_of, paint, shown
-        from factory.support.engine import mujoco
 
         m, kinds, messages = self.m, mujoco.mjtGeom, self.messages
         shapes = {name: list[Any]() for name in ("cubes", "cylinders", "spheres", "triangles")}

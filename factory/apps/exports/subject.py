@@ -9,13 +9,17 @@ from pathlib import Path
 
 import numpy as np
 
+from factory.api import (
+    Diagnostic,
+    GearNet,
+    InputError,
+    MarkedNet,
+    Mesh,
+    Project,
+    Solid,
+    did_you_mean,
+)
 from factory.apps.log import Log
-from factory.floor.geometry.meshes import Mesh
-from factory.floor.geometry.solids import Solid
-from factory.pipeline import Project
-from factory.support.errors import Diagnostic, InputError, did_you_mean
-from factory.theory.nets.gears import GearNet
-from factory.theory.nets.marked import MarkedNet
 
 Source = Project | GearNet | MarkedNet | Log
 """Source of an export."""

@@ -16,19 +16,17 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from factory.api import Array, Mesh, names, physical_model, rotation
+from factory.apps.exports.stock import written
 from factory.apps.exports.subject import Subject
-from factory.engine.mjcf import names
 from factory.engine.mjcf.elements import add, exact, numbers
 from factory.engine.mjcf.mesh_files import stl
-from factory.engine.mjcf.stock import written
-from factory.engine.simulation.modelling import physical_model
-from factory.floor.geometry.meshes import Array, Mesh, hull_mesh
-from factory.floor.geometry.solids import rotation
+from factory.floor.geometry.meshes import hull_mesh
 from factory.floor.geometry.turning import upright
 from factory.floor.layout.guidepath import LEVER
 
 if TYPE_CHECKING:
-    from factory.support.engine import mujoco
+    from factory.api import mujoco
 
 FORMAT, TAKES = "urdf", "pag"
 
@@ -54,8 +52,8 @@ class _Writer:
     """Writes the bodies of a compiled model as links; `files`: the meshes that these refer to."""
 
     def __init__(self, m: mujoco.MjModel, speed: float, folder: str) -> None:
+        from factory.api import mujoco
         from factory.engine.mjcf import replica
-        from factory.support.engine import mujoco
 
         self.m, self.speed, self.folder, self.replica = m, speed, folder, replica
         self.geom, joint = mujoco.mjtGeom, mujoco.mjtJoint

@@ -18,14 +18,12 @@ from functools import cached_property
 from math import inf
 from typing import Literal
 
-from factory.floor.layout.durations import Pace
+from factory.api import PAG, Pace, Template
 from factory.floor.layout.guidepath import Box
 from factory.floor.mating.findings import BLOCKED, NO_DEEPER
 from factory.floor.mating.mating import Admitted
 from factory.theory.compiler.expanding import Node, expand, joins
-from factory.theory.problem.pag import PAG
 from factory.theory.problem.plan import THIRD
-from factory.theory.problem.template import Template
 
 APART = 0.06
 """Length of guidepath from one station to the next, beside the sub-assembly [m]."""

@@ -10,15 +10,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
+from factory.api import Catalogue, Factory, Pace, Plan, marked
 from factory.apps.few_robots.bundles import BETWEEN, LANE, Filling, SizeTiming, bundled
-from factory.floor.layout.durations import Pace
 from factory.floor.layout.guidepath import Box
 from factory.theory.compiler.folding import Line, count_of, fold, folded
 from factory.theory.nets.cycle_ratio import max_cycle_ratio
-from factory.theory.nets.marked import marked
-from factory.theory.plant.factory import Factory
-from factory.theory.problem.plan import Plan
-from factory.theory.problem.robot_types import Catalogue
 
 SLACKS = (inf, 1.5, 0.6, 0.25, 0.0)
 """Waits of tours over their own work, from long to short."""

@@ -14,15 +14,23 @@ from itertools import islice
 
 import networkx as nx
 
+from factory.api import (
+    NONE,
+    GearNet,
+    MarkedNet,
+    Position,
+    Verdict,
+    collector_paused,
+    listing,
+    marked,
+    token_free,
+)
 from factory.apps.foreign_nets.discover import discover
 from factory.apps.foreign_nets.explore import LIMIT, Exploration, explore
-from factory.support.collector import collector_paused
-from factory.support.errors import Position
 from factory.theory.nets.composition import compose, cover
-from factory.theory.nets.gears import GearNet
-from factory.theory.nets.marked import NONE, MarkedNet, dead_ends, marked, stuck_circuit, token_free
+from factory.theory.nets.marked import dead_ends, stuck_circuit
 from factory.theory.nets.train import no_way_back
-from factory.theory.nets.verdict import Defect, Verdict, listing, verdict
+from factory.theory.nets.verdict import Defect, verdict
 from factory.theory.nets.verify import legality_defects, shape_defects
 
 WORK = 5_000_000

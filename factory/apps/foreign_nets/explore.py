@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from factory.theory.nets.marked import MarkedNet
+from factory.api import MarkedNet
 
 LIMIT = 200_000
 """Greatest number of markings that are explored."""

@@ -11,15 +11,21 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
-from factory.support.collector import collector_paused
-from factory.support.errors import Position, did_you_mean
+from factory.api import (
+    GearNet,
+    MarkedNet,
+    PetriNet,
+    Place,
+    Position,
+    Transition,
+    collector_paused,
+    did_you_mean,
+    read_text,
+)
 from factory.support.files import NET
 from factory.support.xml_tree import Element, XmlDocument
-from factory.theory.lang.source import read_text
 from factory.theory.nets.composition import compose
-from factory.theory.nets.gears import Gear, GearNet
-from factory.theory.nets.marked import MarkedNet
-from factory.theory.nets.petri import PetriNet, Place, Transition
+from factory.theory.nets.gears import Gear
 from factory.theory.nets.threaded import Redistribution, ThreadedNet
 
 DRAWN = frozenset({"graphics"})

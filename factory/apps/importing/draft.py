@@ -10,10 +10,10 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Literal
 
-from factory.support.errors import Diagnostic, InputError, Position
+from factory.api import PAG, Assembly, Diagnostic, InputError, Position
 from factory.theory.lang.source import where
 from factory.theory.lang.words import is_label
-from factory.theory.problem.pag import PAG, RESERVED, Assembly, Parameter
+from factory.theory.problem.pag import RESERVED, Parameter
 
 Mates = Literal["many", "chain"]
 """How three or more inputs are mated: in one operation, or one after the other."""

@@ -7,9 +7,9 @@ from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path, PurePosixPath
 
+from factory.api import Assembly, read_bytes
 from factory.apps.importing.draft import file_stem
-from factory.support.files import MESH, read_bytes
-from factory.theory.problem.pag import Assembly
+from factory.support.files import MESH
 
 
 def path_inside(name: str) -> PurePosixPath | None:

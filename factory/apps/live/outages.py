@@ -9,9 +9,9 @@ from math import ceil, isfinite
 
 import numpy as np
 
+from factory.api import listing
 from factory.apps.recovery import Recovery
 from factory.film.marks import Zone, Zones
-from factory.theory.nets.verdict import listing
 
 Message = tuple[str, str]
 """A mark of the page, `dead`, `closed`, `standing`, `dark` or `empty`, and its text."""

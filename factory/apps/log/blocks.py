@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.support.errors import Diagnostic, InputError
+from factory.api import Diagnostic, InputError
 from factory.support.files import AGAIN, LOG, Content
 
 STATES = ("qpos", "qvel", "ctrl")

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from factory.api import Demand, value_of
 from factory.apps.log.blocks import Arrays
 from factory.apps.log.project_table import ProjectTable
 from factory.engine.record.subject import MonitorTable
 from factory.floor.layout.saved import LayoutTable
 from factory.support.settings import AUTO
-from factory.support.tables import LARGE, value_of
+from factory.support.tables import LARGE
 from factory.theory.control.profile import World
-from factory.theory.plant.demand import Demand
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,11 +13,10 @@ from collections.abc import Iterator, Mapping
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
+from factory.api import Diagnostic, InputError, mujoco
 from factory.apps.log.reader import Log, Ragged
 from factory.engine.mjcf.loading import compiled
 from factory.engine.mjcf.model import ARENA, broad_phase
-from factory.support.engine import mujoco
-from factory.support.errors import Diagnostic, InputError
 from factory.support.files import AGAIN, MIB
 
 LARGEST, TAGS, DEEPEST = 256 * MIB, 2_000_000, 32

@@ -5,10 +5,9 @@ net.
 It observes positions, speeds, setpoints and active constraints, and never reads the supervisor, its
 events or its marking. It works beside a run, or on a log (`factory.apps.monitor.record`)."""
 
+from factory.api import Recordable, Report
+from factory.apps.monitor.anatomy import Anatomy
 from factory.apps.monitor.engine import EngineMonitor
-from factory.engine.record.anatomy import Anatomy
-from factory.engine.record.findings import Report
-from factory.engine.record.state import Recordable
 from factory.engine.record.subject import MonitorSubject, subject_of, subject_of_run
 
 

@@ -9,19 +9,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from factory.api import Array, Event, Factory, Limits, Operation, Settings
 from factory.apps.plc.corridors import SLACK
 from factory.apps.plc.interlock import PlantInterlock
 from factory.apps.plc.signals import NOBODY, AxisDrives, Commands, Controller, Refusal, Sensed
-from factory.engine.record.state import Event
 from factory.engine.simulation.ordering import Ordering
 from factory.engine.simulation.supervisor import Active
 from factory.engine.timing.distributed import Scan
-from factory.support.settings import Settings
-from factory.theory.control.mode import Array, Limits
-from factory.theory.plant.factory import Factory, Operation
 
 if TYPE_CHECKING:
-    from factory.engine.simulation.simulation import Simulation
+    from factory.api import Simulation
 
 
 class DrivenSupervisor:

@@ -8,17 +8,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from factory.api import NOPART, Event, Layout, Mode, Operation, World
 from factory.apps.plc.corridors import Corridors
 from factory.apps.plc.signals import Commands, GripStates, Refusal
-from factory.engine.record.state import Event
 from factory.engine.simulation.ordering import Ordering
-from factory.engine.simulation.world import World
 from factory.floor.layout.coordinating import Coordinated
-from factory.floor.layout.layout import Layout
-from factory.theory.control.mode import REST, Mode
+from factory.theory.control.mode import REST
 from factory.theory.nets.threaded import Threads
-from factory.theory.plant.factory import Operation
-from factory.theory.problem.pag import NOPART
 
 REACH = 1e-3
 """Greatest distance of an axis from where parts change hands at which a grip takes a part [m]."""

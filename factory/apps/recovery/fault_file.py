@@ -8,10 +8,9 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from factory.api import Diagnostic, Factory, InputError, Position, did_you_mean
 from factory.apps.recovery.faults import CLEAR, KINDS, OF_LABEL, SWAP, Campaign, Sensors, WorldFault
-from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 from factory.support.user_defaults import key_position, read_toml
-from factory.theory.plant.factory import Factory
 
 EXAMPLE = 'for example [[fault]], and below it kind = "drop", label = "part1", unit = 2'
 

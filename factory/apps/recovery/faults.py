@@ -8,8 +8,8 @@ from math import isfinite, radians
 from types import MappingProxyType
 from typing import Any
 
+from factory.api import value_of
 from factory.engine.record.verdict import MOST
-from factory.support.tables import value_of
 
 KINDS: Mapping[str, str] = MappingProxyType(
     {

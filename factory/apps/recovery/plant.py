@@ -5,8 +5,8 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence, Set
 
+from factory.api import Operation
 from factory.apps.recovery.faults import WorldFault
-from factory.theory.plant.factory import Operation
 
 
 class Plant(ABC):

@@ -1,5 +1,5 @@
 """The response to a failure: the net fires backwards to the greatest marking without it
-(nets/undo.py); robots return to where they wait in that marking and drop what has become scrap."""
+(undo.py); robots return to where they wait in that marking and drop what has become scrap."""
 
 from __future__ import annotations
 
@@ -8,21 +8,15 @@ from functools import partial
 
 import numpy as np
 
+from factory.api import NOPART, Diagnostic, Failing, Marking, Operation, Simulation, Undone
 from factory.apps.recovery.books import Books
 from factory.apps.recovery.faults import Campaign
 from factory.apps.recovery.plant import Plant
 from factory.apps.recovery.returning import Goal, Returning, WayBack, order_of
 from factory.apps.recovery.standing import Standing
+from factory.apps.recovery.undo import marking_after, undo
 from factory.apps.recovery.wasting import OnEnd, Wasting
-from factory.engine.record.failures import Failing
-from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.scrapping import not_carried_back
-from factory.support.errors import Diagnostic
-from factory.theory.nets.petri import Marking
-from factory.theory.nets.undo import marking_after, undo
-from factory.theory.nets.undone import Undone
-from factory.theory.plant.factory import Operation
-from factory.theory.problem.pag import NOPART
 
 SCRAPS = 20
 """So many scraps of one operation on end stop the run: something else is wrong."""

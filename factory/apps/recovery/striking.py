@@ -6,10 +6,9 @@ from heapq import heappop, heappush
 
 import numpy as np
 
+from factory.api import NOPART, Operation
 from factory.apps.recovery.faults import Campaign, WorldFault
 from factory.apps.recovery.plant import Plant
-from factory.theory.plant.factory import Operation
-from factory.theory.problem.pag import NOPART
 
 EARLY, LATE = 0.1, 0.9
 """A robot drops what it carries after a share of its operation's time between these."""

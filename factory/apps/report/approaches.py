@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from html import escape
 
+from factory.api import Operation
 from factory.apps.report.recording import Recording
 from factory.floor.mating.mating import AMPLE, rooms
 from factory.theory.compiler.expanding import nodes_of
 from factory.theory.plant.approaches import Approach, Pair
-from factory.theory.plant.factory import Operation
 
 COLUMNS = ("Operation", "Inputs", "Approach", "Clearance on approach", "Excluded")
 

@@ -14,13 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.engine.mjcf import names
-from factory.engine.mjcf.replica import Floats, Replica, paint, shown, triangles
+from factory.api import Array, Factory, Operation, Replica, mujoco, names, rotation
+from factory.engine.mjcf.replica import paint, shown, triangles
 from factory.engine.mjcf.robots import ROLES
 from factory.floor.geometry.pieces import joined
-from factory.floor.geometry.solids import rotation
-from factory.support.engine import mujoco
-from factory.theory.plant.factory import Factory, Operation
 
 
 class Pack:
@@ -56,9 +53,9 @@ class DrawnFactory:
 
     factory: Factory
     m: mujoco.MjModel = field(repr=False)
-    position: Floats = field(repr=False)
-    quaternion: Floats = field(repr=False)
-    reach: Floats = field(repr=False)
+    position: Array = field(repr=False)
+    quaternion: Array = field(repr=False)
+    reach: Array = field(repr=False)
     places: Mapping[str, Iterable[float]] = field(repr=False)
     stations: Mapping[tuple[float, float], list[str]] = field(repr=False)
 
@@ -78,7 +75,7 @@ class DrawnFactory:
 
 
 def stations(
-    factory: Factory, m: mujoco.MjModel, ends: Iterable[tuple[Operation, Floats]]
+    factory: Factory, m: mujoco.MjModel, ends: Iterable[tuple[Operation, Array]]
 ) -> dict[tuple[float, float], list[str]]:
     """The stations of operations, each with the state of the engine (nq,) as it ends."""
     replica, sites = Replica(m), {m.site(number).name for number in range(m.nsite)}
@@ -93,7 +90,7 @@ def stations(
     return stations
 
 
-def placed(m: mujoco.MjModel, geom: int) -> tuple[Floats, NDArray[np.int64]]:
+def placed(m: mujoco.MjModel, geom: int) -> tuple[Array, NDArray[np.int64]]:
     """A geom's vertices, in the frame of its body [m], and faces."""
     points, faces = triangles(m, geom)
     return points @ rotation(m.geom_quat[geom]).T + m.geom_pos[geom], faces

@@ -12,20 +12,24 @@ from typing import Any
 
 import numpy as np
 
+from factory.api import (
+    Demand,
+    Diagnostic,
+    FactoryError,
+    Layout,
+    RunRequest,
+    Simulation,
+    State,
+    misfit,
+    value_of,
+)
 from factory.apps.log import Log
 from factory.apps.log.project_table import project_of, settings_of
 from factory.apps.log.reader import digest_of
 from factory.apps.log.writer import packed, versions
 from factory.engine.mjcf.reservations import reservations_of
-from factory.engine.record.state import State
 from factory.engine.record.subject import subject_of_run
 from factory.engine.record.verdict import FAULTS, HEADER, RESERVATIONS
-from factory.engine.simulation.request import RunRequest
-from factory.engine.simulation.simulation import Simulation
-from factory.floor.layout.layout import Layout
-from factory.support.errors import Diagnostic, FactoryError
-from factory.support.tables import misfit, value_of
-from factory.theory.plant.demand import Demand
 
 TAG = re.compile(r"<[^>]+>")
 

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from factory.api import Diagnostic, InputError, usage_error
 from factory.support.bounds import WORLDS, WorldName, check_choice, check_values
-from factory.support.errors import Diagnostic, InputError, usage_error
 
 if TYPE_CHECKING:
-    from factory.engine.simulation.request import RunRequest
-    from factory.pipeline import Project
-    from factory.theory.nets.petri import Marking
+    from factory.api import Marking, Project, RunRequest
 
 APART = (
     (
@@ -101,7 +99,7 @@ class RunOptions:
     def check(self, project: Project) -> None:
         """The same, before a project is laid out; the file of a demand is read, but for a pipe,
         which is read once. Raises InputError."""
-        from factory.engine.simulation.demand_file import demand_of
+        from factory.apps.runs.demand_file import demand_of
 
         self.check_combination()
         if self.demand is not None and not Path(self.demand).is_fifo():
@@ -109,8 +107,8 @@ class RunOptions:
 
     def request(self, project: Project, shown: bool = True) -> RunRequest:
         """The request of a run; `shown`: whether it is filmed or logged. Raises InputError."""
-        from factory.engine.simulation.demand_file import demand_of
-        from factory.engine.simulation.request import RunRequest
+        from factory.api import RunRequest
+        from factory.apps.runs.demand_file import demand_of
         from factory.floor.geometry.fused_bodies import fusing_pays
         from factory.theory.nets.history import legal_marking
 

@@ -8,23 +8,20 @@ from math import isfinite
 from pathlib import Path
 from typing import NamedTuple
 
+from factory.api import Diagnostic, Film, InputError, Project, Run, Simulation, usage_error
 from factory.apps.log import Log
 from factory.apps.log.model import model_of
 from factory.apps.monitor.record import recorded_subject
+from factory.apps.runs.executing import Tell, carry_out
 from factory.apps.runs.options import RunOptions
 from factory.apps.runs.watched import watched
-from factory.engine.simulation.executing import Tell, carry_out
-from factory.engine.simulation.run import Run
-from factory.engine.simulation.simulation import Simulation
 from factory.film.action import Snapshot, held
 from factory.film.camerawork import Moment, Take, When, past_the_end, pictureless
-from factory.film.film import Film, Still
+from factory.film.film import Still
 from factory.film.history import History
 from factory.film.picture import USUAL, Picture
 from factory.film.reel import Reel, save
 from factory.film.video import FPS, check_output
-from factory.pipeline import Project
-from factory.support.errors import Diagnostic, InputError, usage_error
 from factory.support.gl import probe
 
 

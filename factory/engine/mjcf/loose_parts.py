@@ -8,7 +8,7 @@ import numpy as np
 
 from factory.engine.mjcf.model import SKELETON
 from factory.engine.mjcf.scene import FILL, KEY
-from factory.floor.geometry.meshes import Array, Indices
+from factory.support.arrays import Array, Indices
 from factory.support.engine import mujoco
 
 FLOOR = 20.0

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from factory.support.arrays import Array
 from factory.support.engine import mujoco
-
-Floats = NDArray[np.float64]
 
 SHOWN = 3
 """Geoms of groups below this one are drawn."""
@@ -64,19 +63,19 @@ def shown(m: mujoco.MjModel, body: int) -> Iterator[int]:
             yield geom
 
 
-def paint(m: mujoco.MjModel, geom: int) -> Floats:
+def paint(m: mujoco.MjModel, geom: int) -> Array:
     """The colour (4,) of a geom or of its material, from 0 to 1."""
     material = m.geom_matid[geom]
     return np.asarray(m.mat_rgba[material] if material >= 0 else m.geom_rgba[geom], float)
 
 
-def half_sizes(m: mujoco.MjModel, geom: int) -> Floats:
+def half_sizes(m: mujoco.MjModel, geom: int) -> Array:
     """Half the sides (3,) of a box, or of the box round a geom of another shape [m]."""
     box = m.geom_type[geom] == mujoco.mjtGeom.mjGEOM_BOX
     return np.asarray(m.geom_size[geom] if box else m.geom_aabb[geom, 3:], float)
 
 
-def mesh_of(m: mujoco.MjModel, geom: int) -> tuple[Floats, NDArray[np.int64]]:
+def mesh_of(m: mujoco.MjModel, geom: int) -> tuple[Array, NDArray[np.int64]]:
     """The vertices (n, 3) [m] and faces (k, 3) of a geom's mesh, in its frame."""
     mesh = m.mesh(int(m.geom_dataid[geom]))
     first, count = int(mesh.vertadr[0]), int(mesh.vertnum[0])
@@ -85,7 +84,7 @@ def mesh_of(m: mujoco.MjModel, geom: int) -> tuple[Floats, NDArray[np.int64]]:
     return vertices, np.asarray(m.mesh_face[first : first + count], np.int64)
 
 
-def triangles(m: mujoco.MjModel, geom: int) -> tuple[Floats, NDArray[np.int64]]:
+def triangles(m: mujoco.MjModel, geom: int) -> tuple[Array, NDArray[np.int64]]:
     """A geom's vertices (n, 3), in its own frame [m], and faces (k, 3)."""
     from trimesh import creation
 

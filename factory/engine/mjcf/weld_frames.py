@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from factory.theory.control.mode import Array, Index
+from factory.support.arrays import Array, Index
 
 if TYPE_CHECKING:
     from factory.support.engine import mujoco

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from factory.theory.control.mode import Index, Limits, Mode
+from factory.support.arrays import Index
+from factory.theory.control.mode import Limits, Mode
 from factory.theory.control.navigation import Bundle
 from factory.theory.control.obstacles import ranges
 

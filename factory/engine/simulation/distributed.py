@@ -23,8 +23,9 @@ from factory.engine.simulation.supervisor import Active
 from factory.engine.simulation.world import Job, World
 from factory.engine.timing.distributed import Scan, drawn_scans
 from factory.floor.modes.staging import HeadStart
+from factory.support.arrays import Array, Index
 from factory.theory.control.governor import govern
-from factory.theory.control.mode import ROUNDING, STILL, Array, Index, Limits, Mode
+from factory.theory.control.mode import ROUNDING, STILL, Limits, Mode
 from factory.theory.control.navigation import Bundle
 from factory.theory.plant.factory import Factory, Operation
 from factory.theory.plant.programs import Program, ProgramStep, program_of

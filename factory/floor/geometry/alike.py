@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array, Indices
+from factory.support.arrays import Array, Indices
 
 CLOSE, DIGITS = 2e-5, 1e-6
 """The tolerance for equal vertices: the first share of the shape's size, or the second share of its

@@ -10,8 +10,9 @@ from types import MappingProxyType
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array, sound
+from factory.floor.geometry.meshes import sound
 from factory.floor.geometry.solids import Product
+from factory.support.arrays import Array
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.pag import NOPART
 

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.floor.geometry.mesh_file import EXPECTED, UnreadableMesh
-from factory.floor.geometry.meshes import Array, Indices
 from factory.floor.geometry.solids import rotation
+from factory.support.arrays import Array, Indices
 
 MOST = 10_000_000
 """The most numbers of an accessor, and the most triangles of all placed bodies."""

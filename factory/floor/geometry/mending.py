@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from factory.floor.geometry.mesh_file import areas_of
-from factory.floor.geometry.meshes import Array, Indices, is_closed
+from factory.floor.geometry.meshes import is_closed
 from factory.floor.geometry.pieces import components
+from factory.support.arrays import Array, Indices
 
 if TYPE_CHECKING:
     import trimesh

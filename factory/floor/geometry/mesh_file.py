@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array, Indices, normals_of
+from factory.floor.geometry.meshes import normals_of
 from factory.floor.geometry.pieces import joined
+from factory.support.arrays import Array, Indices
 
 EXPECTED = {
     ".obj": "an OBJ file (lines 'v x y z' for vertices, 'f 1 2 3' for faces)",

@@ -10,9 +10,9 @@ import numpy as np
 
 from factory.floor.geometry.decomposition import collides_as_hull
 from factory.floor.geometry.facets import sagitta
-from factory.floor.geometry.meshes import Indices
 from factory.floor.geometry.overlap import common, drawn
 from factory.floor.geometry.solids import Product, Solid
+from factory.support.arrays import Indices
 from factory.support.errors import Diagnostic
 from factory.theory.problem.pag import ROUNDING, AllowedOverlap, most_allowed
 

@@ -15,8 +15,9 @@ from itertools import combinations
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array, Indices, hull_of
+from factory.floor.geometry.meshes import hull_of
 from factory.floor.geometry.touching import as_they_come, bodies, connected
+from factory.support.arrays import Array, Indices
 
 ROUND = 5e-6
 """The tolerated protrusion of the polytope round a round body [m]."""

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.solids import Solid, rotation
+from factory.support.arrays import Array
 
 GAP = 1e-4
 """The gap between a pad and the part [m]."""

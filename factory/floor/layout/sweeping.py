@@ -8,7 +8,8 @@ import numpy as np
 
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.sweeps import piles, regions
-from factory.theory.control.mode import ROUNDING, Array, Index
+from factory.support.arrays import Array, Index
+from factory.theory.control.mode import ROUNDING
 
 APART = 0.02
 """Robots keep so far from what lies about [m]."""

@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.solids import Product
 from factory.floor.geometry.turning import turning_box
 from factory.floor.layout.certificate import (
@@ -44,6 +43,7 @@ from factory.floor.layout.hands.hand import ROOT
 from factory.floor.layout.hands.limbs import cross_of
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.visits import Visit
+from factory.support.arrays import Array
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.pag import NOPART
 from factory.theory.problem.robot_bodies import ARM_LOW, ARM_TOP, ARM_WIDTH, CARRIAGE_TOP, MAST

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from factory.floor.geometry.solids import Product
 from factory.floor.mating.bodies import bodies
 from factory.floor.mating.findings import BLOCKED, LEFT_OUT, NO_DEEPER, STRICT, Mating, Matings
-from factory.floor.mating.meetings import Ints, Meeting, Meetings, meetings
+from factory.floor.mating.meetings import Meeting, Meetings, meetings
 from factory.floor.mating.overlaps import Finder, Overlaps
 from factory.floor.mating.paths import SIGNS
+from factory.support.arrays import Indices
 from factory.support.errors import Position
 from factory.theory.compiler.expanding import Node, nodes_of
 from factory.theory.plant.approaches import MARGIN, Approach, Clash, Kind, Overlap, Pair
@@ -198,7 +199,7 @@ class _Judge:
         return parts
 
 
-def levels_of(overlaps: Overlaps, count: int) -> tuple[Ints, Ints]:
+def levels_of(overlaps: Overlaps, count: int) -> tuple[Indices, Indices]:
     """The level of each meeting from each side (count, 2), and how many pairs clash there."""
     clashing, deeper, faulty = (
         np.stack(

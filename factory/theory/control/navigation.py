@@ -34,7 +34,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.theory.control.mode import Array, Index, Limits, Mode, Truth, lock
+from factory.support.arrays import Array, Index, Truth
+from factory.theory.control.mode import Limits, Mode, lock
 from factory.theory.control.obstacles import Gates, Pairs, ranges
 from factory.theory.control.profile import landing_speed
 

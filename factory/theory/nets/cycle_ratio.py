@@ -18,12 +18,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from factory.support.arrays import Array, Index
 from factory.theory.nets.marked import NONE, MarkedNet, token_free
-
-Floats = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 ROUNDING = 1e-12
 """Relative tolerance of dates."""
@@ -41,11 +38,11 @@ class CycleRatio:
 
     seconds: float
     circuit: tuple[int, ...]
-    dates: Floats = field(repr=False)
+    dates: Array = field(repr=False)
     edges: Index = field(repr=False)
     before: Index = field(repr=False)
     after: Index = field(repr=False)
-    reduced: Floats = field(repr=False)
+    reduced: Array = field(repr=False)
 
     @cached_property
     def tolerance(self) -> float:

@@ -311,7 +311,7 @@ class Factory(Pictured):
     def joins(self) -> Joins:
         """For the end of each operation its start and the ends of the operations that made its
         inputs: the transitions that are undone as often as the end, since nothing is taken apart
-        (the material rule of `factory.theory.nets.undo`)."""
+        (the material rule of `factory.apps.recovery.undo`)."""
         made = self.by_label
         return {o.end: (o.start, *(made[x].end for x in o.inputs)) for o in self.operations}
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from factory.apps.few_robots.lines import Shift
+from factory.apps.few_robots.sharing import with_branches
 from factory.apps.log.plan_file import PLAN_NAME, plan_files, read_plan
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
@@ -20,7 +21,6 @@ from factory.floor.layout.saved import LayoutTable
 from factory.floor.layout.shapes import payload_boxes
 from factory.floor.mating.mating import judged
 from factory.pipeline import Project, read
-from factory.sharing import with_branches
 from factory.support.errors import Diagnostic, InputError, RunError
 from factory.support.settings import Settings
 from factory.theory.compiler.assigning import shared

@@ -27,8 +27,8 @@ from factory.floor.geometry.alike import (
     moved,
     shape_of,
 )
-from factory.floor.geometry.meshes import Array
 from factory.pipeline import all_templates, read
+from factory.support.arrays import Array
 from factory.support.files import write_all
 from tests.command_line import Terminal
 from tests.paths import ROOT, files_in

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from factory.apps.log import Log
 from factory.apps.log.model import model_of
 from factory.apps.monitor.record import recorded_subject
+from factory.apps.recovery.undo import marking_after, undo
 from factory.apps.runs.pictures import moment_of
 from factory.engine.mjcf.replica import Replica
 from factory.engine.record.failures import Death, Failing, deaths
@@ -24,7 +25,6 @@ from factory.film.marks import Mark, Marks
 from factory.film.net_panel import NetPanel
 from factory.film.sheet import Rows
 from factory.support.settings import Settings
-from factory.theory.nets.undo import marking_after, undo
 from factory.theory.nets.undone import Undone
 from tests.failing_runs import failing, paper_layout
 from tests.token_game import enabled, follower

@@ -150,8 +150,8 @@ def _run(
 ) -> tuple[RunRecord, int]:
     """A run without fused parts, and its exit status."""
     from factory.apps.analyze.measured import record_of
+    from factory.apps.runs.executing import carry_out
     from factory.apps.runs.watched import watched
-    from factory.engine.simulation.executing import carry_out
     from factory.engine.simulation.simulation import Simulation
 
     request = replace(asked, fuse=False).request(project, shown=False)

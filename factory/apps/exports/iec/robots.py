@@ -13,13 +13,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import ceil
 
+from factory.api import NOPART, Layout, Mode
 from factory.apps.exports.iec.declarations import OrganizationUnit, Variable, comment
-from factory.floor.layout.layout import Layout
 from factory.floor.modes.staging import HeadStart
-from factory.theory.control.mode import STILL, Mode
+from factory.theory.control.mode import STILL
 from factory.theory.nets.coordinated import Order
 from factory.theory.plant.programs import Program, ProgramStep, program_of
-from factory.theory.problem.pag import NOPART
 
 WAIT, RUN, GRIP, LEAVE = range(4)
 """Phases of a step: it waits for the others; moves to the goal; opens or closes the grip and waits

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from factory.apps.planning.parts import InPlace
     from factory.apps.planning.plan import CannotAssemble, Planned, PlannedJoin, PlanOptions
     from factory.apps.planning.searching import Aim
-    from factory.floor.geometry.meshes import Array
     from factory.floor.geometry.overlapping import Overlapping
     from factory.pipeline import Project
+    from factory.support.arrays import Array
     from factory.theory.plant.approaches import Approach, Kind
 
 LOOKS = ("exploded.png", "assembly.mp4")
@@ -103,12 +103,12 @@ def plan(
     write the assembly tree as a PAG with its meshes. SOURCE is a folder of meshes, a file with
     named bodies (.glb, .3mf, .step), an LDraw model (.ldr, .mpd), or a PAG whose assembly tree is
     to be ignored."""
+    from factory.apps.few_robots.sharing import with_lines
     from factory.apps.importing.draft import file_stem
     from factory.apps.planning.outcome import write_planned
     from factory.apps.planning.plan import CannotAssemble, PlanOptions
     from factory.apps.planning.source import SourceOptions, read_source
     from factory.pipeline import all_templates, read
-    from factory.sharing import with_lines
     from factory.support.files import own_names
     from factory.theory.lang.overlaps import overlaps_in
 

@@ -8,9 +8,9 @@ from math import ceil, sqrt
 
 import numpy as np
 
+from factory.api import MujocoWorld
 from factory.engine.mjcf.driving import GRAVITY
 from factory.engine.mjcf.masks import robot_code
-from factory.engine.simulation.mujoco.world import MujocoWorld
 from factory.floor.layout.bins import TOP, Bin
 from factory.floor.layout.sweeping import SweptFloor
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence, Set
 
 import numpy as np
 
+from factory.api import NOPART, Array, Factory, Index, MujocoWorld, Operation
 from factory.apps.recovery.faults import SHIFTED, TURNED, Campaign, WorldFault
 from factory.apps.recovery.mujoco.fallen import Fallen
 from factory.apps.recovery.mujoco.mishaps import Mishaps
@@ -13,11 +14,7 @@ from factory.apps.recovery.plant import Plant
 from factory.engine.mjcf.masks import robot_code
 from factory.engine.mjcf.weld_frames import WeldFrames
 from factory.engine.simulation.mujoco.holdings import Holdings
-from factory.engine.simulation.mujoco.world import MujocoWorld
 from factory.floor.layout.bins import Bin
-from factory.theory.control.mode import Array, Index
-from factory.theory.plant.factory import Factory, Operation
-from factory.theory.problem.pag import NOPART
 
 SCRAP = 1 << 20
 """Bodies that are scrap count for units from this one on."""

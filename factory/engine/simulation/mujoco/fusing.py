@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from factory.floor.geometry.meshes import Array
+from factory.support.arrays import Array
 from factory.support.engine import mujoco
 
 SETTLING = 0.025

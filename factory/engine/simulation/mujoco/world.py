@@ -28,8 +28,8 @@ from factory.engine.simulation.mujoco.soundness import Soundness
 from factory.engine.simulation.mujoco.stepping import SingleSteps
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.world import Drop, Hooks, Job
+from factory.support.arrays import Array, Index
 from factory.support.engine import by_name, mujoco
-from factory.theory.control.mode import Array, Index
 from factory.theory.control.navigation import Bundle
 from factory.theory.nets.coordinated import Past
 from factory.theory.plant.demand import Word
@@ -179,7 +179,8 @@ class MujocoWorld:
             motion.plan_robots(bundle)
         if until:
             ticks = 1 if self.d.ncon else min(ticks, max(1, min(map(motion.robots.until, until))))
-        left = (self.parts.feeders.due - self.time) / self.model.settings.tick
+        due = min(self.parts.feeders.due, motion.sliders.up)
+        left = (due - self.time) / self.model.settings.tick
         if left < ticks:
             ticks = max(1, ceil(left - ROUNDED))
         self._settle(motion.step(bundle, ticks))
@@ -221,6 +222,8 @@ class MujocoWorld:
         outfeed, unit, feeders = self.motion.outfeed, self.parts.on_tray, self.parts.feeders
         if feeders.due <= self.motion.sliders.now:
             feeders.due, self.supplied = NEVER, True
+        if self.motion.sliders.up <= self.motion.sliders.now:
+            self.supplied |= feeders.tend()
         if outfeed.busy and outfeed.rests():
             self.supplied = True
             if unit is None:

@@ -14,10 +14,9 @@ from itertools import product as pairs
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.solids import Product, Solid
 from factory.floor.mating.depth import polytope
-from factory.theory.control.mode import Index, Truth
+from factory.support.arrays import Array, Index, Truth
 
 Way = tuple[float, float]
 """A direction of the world in the plane."""

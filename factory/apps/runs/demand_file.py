@@ -6,10 +6,8 @@ import random
 import re
 from pathlib import Path
 
-from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
-from factory.support.files import TABLE, read_bytes
-from factory.theory.plant.demand import Demand
-from factory.theory.problem.pag import PAG
+from factory.api import PAG, Demand, Diagnostic, InputError, Position, did_you_mean, read_bytes
+from factory.support.files import TABLE
 
 MOST = 10**9
 """The latest time of an order [s], and the largest count."""

@@ -18,9 +18,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from heapq import heapify, heappop, heappush
 
-from factory.theory.nets.gears import GearNet
-from factory.theory.nets.marked import MarkedNet, marked
-from factory.theory.nets.petri import Marking
+from factory.api import GearNet, MarkedNet, Marking, marked
 from factory.theory.nets.undone import Joins
 
 

@@ -9,9 +9,9 @@ from math import radians
 import numpy as np
 from numpy.typing import NDArray
 
+from factory.api import Array, Index, Observation
+from factory.apps.monitor.anatomy import Anatomy
 from factory.engine.mjcf.weld_frames import GRIP, HOLD, WeldFrames
-from factory.engine.record.anatomy import Anatomy
-from factory.engine.record.state import Array, Index, Observation
 from factory.engine.record.subject import MonitorSubject
 
 HANGS = 2e-3

@@ -13,12 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from factory.api import Layout, Pace
+from factory.apps.platen.placing import Floor, Placing
 from factory.floor.layout.bending import Detour, bent
 from factory.floor.layout.dimensions import up
-from factory.floor.layout.durations import Pace, cycle_of
+from factory.floor.layout.durations import cycle_of
 from factory.floor.layout.feeding import cleared
-from factory.floor.layout.layout import Layout, branch_of
-from factory.floor.layout.placing import Floor, Placing
+from factory.floor.layout.layout import branch_of
 from factory.floor.layout.presence import ROUNDING
 from factory.floor.layout.way import Bend, rounding_for
 

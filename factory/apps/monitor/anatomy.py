@@ -8,11 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from factory.engine.mjcf import names
+from factory.api import Array, Factory, Index, names
 from factory.engine.mjcf.weld_frames import GRIP, KINDS, WeldFrames, check_holders
-from factory.engine.record.state import Index
-from factory.floor.layout.way import Array, Ways
-from factory.theory.plant.factory import Factory
+from factory.floor.layout.way import Ways
 
 Bent = tuple[tuple[int, ...], Ways]
 """The robots (index) whose guidepaths have bends, and the ways that these are."""
@@ -93,7 +91,7 @@ class Anatomy:
     def of(cls, m: Any, factory: Factory, bent: Bent) -> Anatomy:
         """The anatomy of a model of a factory, some of whose guidepaths are `bent`. Raises
         ValueError where the model is not of that factory."""
-        from factory.support.engine import mujoco  # logs are written and read without the engine
+        from factory.api import mujoco
 
         robots = {r.name: r.index for r in factory.robots}
         try:

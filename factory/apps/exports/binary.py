@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from factory.engine.mjcf.model import Model
+from factory.api import Model
 
 if TYPE_CHECKING:
-    from factory.support.engine import mujoco
+    from factory.api import mujoco
 
 ENDING = ".mjb"
 
@@ -69,7 +69,7 @@ def kept(path: Path, key: str) -> bytes | None:
 
 def packed(m: mujoco.MjModel) -> bytes:
     """A model of the engine as the bytes of a binary file."""
-    from factory.support.engine import mujoco
+    from factory.api import mujoco
 
     content = np.empty(mujoco.mj_sizeModel(m), np.uint8)
     mujoco.mj_saveModel(m, None, content)

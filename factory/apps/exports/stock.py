@@ -14,14 +14,12 @@ from dataclasses import dataclass, replace
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from factory.engine.mjcf import names
+from factory.api import Layout, Model, names
 from factory.engine.mjcf.driving import GRAVITY
 from factory.engine.mjcf.elements import add, number, numbers
 from factory.engine.mjcf.feeders import SLIDER_MASS
-from factory.engine.mjcf.model import Model
 from factory.engine.mjcf.outfeed import SHUTTER_MASS
 from factory.floor.layout.feeding import outlets_of
-from factory.floor.layout.layout import Layout
 from factory.floor.layout.starting import start_positions
 from factory.theory.problem.robot_bodies import LIFT_JOINT
 

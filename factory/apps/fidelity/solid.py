@@ -11,11 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.engine.mjcf import names
-from factory.engine.mjcf.parts import HIDDEN
-from factory.engine.mjcf.replica import SHOWN, Replica
-from factory.support.engine import mujoco
-from factory.theory.control.mode import Array, Index, Truth
+from factory.api import HIDDEN, Array, Index, Replica, mujoco, names
+from factory.engine.mjcf.replica import SHOWN
+from factory.support.arrays import Truth
 
 
 class SolidReplica(Replica):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from factory.pipeline import Project
+from factory.api import Project
 from factory.theory.compiler.folding import fold, lines_of_labels
 from factory.theory.compiler.parallel import Branches, in_parallel
 from factory.theory.compiler.tees import with_tees as tees_in_plan

@@ -8,15 +8,13 @@ from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING
 
-from factory.engine.record.ending import CutOff
-from factory.engine.simulation.run import Run
-from factory.engine.simulation.simulation import Simulation
-from factory.support.errors import Diagnostic, StoppedError
+from factory.api import CutOff, Diagnostic, Run, Simulation
+from factory.support.errors import StoppedError
 from factory.support.interruption import Interruption
 from factory.support.progress import Progress
 
 if TYPE_CHECKING:
-    from factory.engine.record.state import Observer, Recorder
+    from factory.api import Observer, Recorder
 
 Opening = Callable[[], "Recorder"]
 """Opens a recorder of a run, such as a log, as a context."""
