@@ -97,8 +97,8 @@ def work(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
 def imported(*words: object, cache: Path) -> set[str]:
     """The packages that a command loads, in a process of its own, and the modules of this one."""
     code = "import sys; from factory.commands import run_command; run_command(sys.argv[1:]);"
-    names = "{n for name in sys.modules for n in (name, name.partition('.')[0])}"
-    code += f"print(*{names}, file=sys.stderr)"
+    code += "found = {n for name in sys.modules for n in (name, name.partition('.')[0])};"
+    code += "print(*found, file=sys.stderr)"
     environment = {**os.environ, "XDG_CACHE_HOME": str(cache.parent)}
     command = [sys.executable, "-c", code, *map(str, words)]
     done = subprocess.run(command, capture_output=True, text=True, env=environment, check=True)

@@ -11,8 +11,7 @@ from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
 from factory.commands.options import FLOOR, LENIENT, MOTION, OUTPUT, RUN, SOURCE, address
 from factory.commands.requests import OutputOptions, ProjectOptions
-from factory.commands.run import summarise
-from factory.commands.verdicts import tell_failures
+from factory.commands.summaries import summarise, tell_failures
 from factory.commands.warnings import announced
 from factory.support.console import emit, say
 from factory.support.errors import usage_error
