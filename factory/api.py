@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from factory.engine.mjcf import names as names
     from factory.engine.mjcf.model import Model as Model
     from factory.engine.mjcf.parts import HIDDEN as HIDDEN
+    from factory.engine.mjcf.replica import Geoms as Geoms
     from factory.engine.mjcf.replica import Replica as Replica
     from factory.engine.record.ending import CutOff as CutOff
     from factory.engine.record.failures import Failing as Failing
@@ -150,7 +151,7 @@ HOMES = {
     "engine.mjcf": "names",
     "engine.mjcf.model": "Model",
     "engine.mjcf.parts": "HIDDEN",
-    "engine.mjcf.replica": "Replica",
+    "engine.mjcf.replica": "Geoms Replica",
     "engine.timing.timed": "pace",
     "engine.timing.timing": "Timing",
     "engine.record.ending": "CutOff",

@@ -19,9 +19,9 @@ from factory.apps.pareto import Effort, FrontPoint, FrontSweep, ParetoFront, par
 from factory.apps.pareto.chart import ChartAxis, cycle_chart
 from factory.apps.pareto.front import Trial, commands_of, point_files, tried, undominated
 from factory.apps.pareto.page import floor_plans, front_page
+from factory.apps.runs import progress
+from factory.apps.runs.progress import StepBar
 from factory.pipeline import Project, read
-from factory.support import progress
-from factory.support.progress import StepBar
 from tests.command_line import PAPER, ROOT, Screen, Terminal, files_in
 from tests.report_values import EVIL
 from tests.waiting import until

@@ -15,9 +15,9 @@ import pytest
 from factory.apps.planning.blocking import blocking
 from factory.apps.planning.cannot import interlocks
 from factory.apps.planning.interlocked import PAINTS
+from factory.apps.runs.progress import StepBar
 from factory.commands.plan import _by_label
 from factory.pipeline import read
-from factory.support.progress import StepBar
 from tests.command_line import ROOT, Done, Terminal, files_in
 from tests.opengl import needs_gl
 from tests.plan_puzzles import Parts, block, pinwheel, source, tub

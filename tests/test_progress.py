@@ -15,11 +15,11 @@ from types import SimpleNamespace
 
 import pytest
 
+from factory.apps.runs import progress
+from factory.apps.runs.progress import Progress, Waiting
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
-from factory.support import progress
 from factory.support.interruption import awaited, side_by_side
-from factory.support.progress import Progress, Waiting
 from tests.command_line import ROOT, Screen
 from tests.examples import without_hands
 from tests.waiting import left_alone, until

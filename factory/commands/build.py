@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from factory.apps.runs.progress import Waiting
 from factory.commands.grouped import Grouped
 from factory.commands.options import FLOOR, MOTION, OUT, OUTPUT, RELAY, SOURCE, UNITS, WIP
 from factory.commands.outputs import writable, writable_folder
@@ -20,7 +21,6 @@ from factory.support.collector import collector_paused
 from factory.support.console import POOL_BOUND, emit, say, warning
 from factory.support.errors import printed
 from factory.support.files import is_plan
-from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
     from factory.apps.exports.build import Built

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from factory.apps.runs.progress import Waiting
 from factory.commands.allowing import ALLOW
 from factory.commands.grouped import Grouped
 from factory.commands.options import (
@@ -29,7 +30,6 @@ from factory.support.collector import collector_paused
 from factory.support.console import emit, say, table
 from factory.support.errors import Diagnostic, RunError, usage_error
 from factory.support.files import is_net
-from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
     from factory.commands.checking import Checked

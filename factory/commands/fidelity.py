@@ -55,9 +55,9 @@ def fidelity(
 ) -> int:
     """Compare FILE.pag in MuJoCo with the ideal world over the same seeds."""
     from factory.apps.fidelity import measure
+    from factory.apps.runs.progress import StepBar
     from factory.apps.sweep.pool import cores
     from factory.support.files import write_text
-    from factory.support.progress import StepBar
     from factory.theory.nets.verify import proved
 
     writable(output)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from factory.apps.runs.progress import Waiting
 from factory.commands.requests import OutputOptions
 from factory.commands.warnings import announced
 from factory.support.errors import InputError, MissingError
-from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
     from factory.apps.planning.parts import InPlace

@@ -103,7 +103,7 @@ def _found(
     user stopped the search after a first point."""
     from factory.apps.pareto import FrontSweep
     from factory.apps.pareto.front import tried
-    from factory.support.progress import StepBar
+    from factory.apps.runs.progress import StepBar
 
     front = None
     with StepBar("searching for the front", out.silent) as bar:

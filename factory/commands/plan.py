@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from factory.apps.runs.progress import StepBar, Waiting
 from factory.commands.asking import asked
 from factory.commands.interlocking import refuse
 from factory.commands.options import LIBRARY, OUT, OUTPUT, PATH, SECONDS, TEMPLATES
@@ -19,7 +20,6 @@ from factory.commands.warnings import announced, say_allowed
 from factory.support.bounds import AIMS, LENGTHS, UPS
 from factory.support.console import emit, say
 from factory.support.errors import MissingError
-from factory.support.progress import StepBar, Waiting
 
 if TYPE_CHECKING:
     from factory.apps.planning.parts import InPlace

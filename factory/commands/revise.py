@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import click
 
+from factory.apps.runs.progress import Waiting
 from factory.commands.options import OUT, OUTPUT, PATH, TEMPLATES, pag_files
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.support.console import emit, say, warn
 from factory.support.errors import RunError
-from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
     from factory.apps.revise.revision import Pin

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from factory.apps.runs.options import RunOptions, check_ideal
+from factory.apps.runs.progress import Waiting
 from factory.commands import options as shared
 from factory.commands.allowing import ALLOW
 from factory.commands.grouped import Grouped
@@ -24,7 +25,6 @@ from factory.commands.warnings import announced, say_allowed
 from factory.support.console import emit, say, table
 from factory.support.errors import usage_error
 from factory.support.guard import reading
-from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
     from factory.apps.resume.resuming import Resumed

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from factory.api import CutOff, Diagnostic, InputError, Project, RunRequest, Simulation
 from factory.apps.log.blocks import bad_log
+from factory.apps.log.content import AGAIN, content_of
 from factory.apps.log.project_table import check_names, of_its_factory, project_of
 from factory.apps.log.reader import Log, read_log
 from factory.apps.log.writer import rows_of_a_block, versions
@@ -16,8 +17,8 @@ from factory.apps.recovery.faults import campaign_of
 from factory.apps.recovery.recovery import recover
 from factory.apps.resume.continued import Continued, last_full
 from factory.apps.resume.remade import request_of
-from factory.support.claim import claimed_again
-from factory.support.files import AGAIN, RECORD, content_of
+from factory.support.claim import _claimed
+from factory.support.files import RECORD
 from factory.support.settings import AUTO
 
 IN_ITSELF = ("Stalled", "Dropped", "Unstable", "Failed")
@@ -130,3 +131,9 @@ def _made(path: Path, log: Log, project: Project, request: RunRequest) -> Simula
 
 def _bad(path: Path, words: str, hint: str = AGAIN) -> Diagnostic:
     return Diagnostic("BadLog", f"'{path}' {words}", None, hint)
+
+
+def claimed_again(path: Path) -> FileIO:
+    """An existing file opened for writing at its beginning, with its content kept. It is
+    claimed as by `claimed`, which raises the same."""
+    return _claimed(path, "r+")
