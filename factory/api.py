@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from factory.engine.timing.timed import pace as pace
     from factory.engine.timing.timing import Timing as Timing
     from factory.film.film import Film as Film
+    from factory.film.picture import Picture as Picture
+    from factory.film.shot import Shot as Shot
     from factory.floor.geometry.meshes import Mesh as Mesh
     from factory.floor.geometry.solids import Product as Product
     from factory.floor.geometry.solids import Solid as Solid
@@ -166,6 +168,8 @@ HOMES = {
     "engine.simulation.simulation": "Simulation",
     "engine.simulation.world": "World",
     "film.film": "Film",
+    "film.picture": "Picture",
+    "film.shot": "Shot",
     "pipeline": "Project",
 }
 """The names by the modules that define them, in the order of the house."""

@@ -34,6 +34,7 @@ from factory.film.caption import Caption
 from factory.film.painter import Painter, Renderer
 from factory.film.picture import from_above, overview
 from factory.film.reel import HOLD
+from factory.film.shot import Shot
 from factory.film.video import ENCODERS, VideoFile
 from factory.floor.geometry.meshes import Mesh
 from factory.floor.geometry.sight import Framing, fit, towards
@@ -113,7 +114,7 @@ def test_a_film_ends_with_all_units_for_a_second(
     assert HELD == FPS
     assert all(np.array_equal(pictures[-1], one) for one in pictures[-HELD:])
     monkeypatch.setattr(Caption, "draw", drawn)
-    render_log(read_log(taken[0] / "run.log"), tmp_path / "again.mp4", SMALL, FPS)
+    render_log(read_log(taken[0] / "run.log"), Shot(tmp_path / "again.mp4", SMALL, FPS))
     assert said[0] == 0 and said[-1] == 1
 
 
@@ -143,7 +144,7 @@ def test_the_same_pictures_are_encoded_the_same_every_time(taken, tmp_path: Path
     log = read_log(taken[0] / "run.log")
     films = set()
     for _ in range(3):
-        render_log(log, tmp_path / "again.mp4", SMALL, 5.0)
+        render_log(log, Shot(tmp_path / "again.mp4", SMALL, 5.0))
         films.add((tmp_path / "again.mp4").read_bytes())
     assert len(films) == 1
 
@@ -153,15 +154,15 @@ def test_a_log_gives_the_same_pictures_as_its_run(taken, tmp_path: Path) -> None
     folder = taken[0]
     log = read_log(folder / "run.log")
     with drawn() as pictures:
-        count = render_log(log, tmp_path / "log.mp4", SMALL, FPS)
+        count = render_log(log, Shot(tmp_path / "log.mp4", SMALL, FPS))
     one, other = np.array(taken[3]), np.array(pictures)
     assert one.shape == other.shape == (count, SIZE[1], SIZE[0], 3)
     assert np.abs(one.astype(int) - other).max() <= 2
     assert len(film_of(tmp_path / "log.mp4")) == count
-    assert render_log(log, tmp_path / "log.png", PRODUCT) == 1
+    assert render_log(log, Shot(tmp_path / "log.png", PRODUCT)) == 1
     pictures = [iio.imread(p).astype(int) for p in (folder / "end.png", tmp_path / "log.png")]
     assert np.abs(pictures[0] - pictures[1]).max() <= 2
-    assert render_log(log, tmp_path / "then.png", SMALL, at=1.0) == 1
+    assert render_log(log, Shot(tmp_path / "then.png", SMALL, at=1.0)) == 1
     assert iio.imread(tmp_path / "then.png").shape == (SIZE[1], SIZE[0], 3)
 
 
@@ -446,7 +447,7 @@ def test_the_ideal_world_has_no_picture(layout, tmp_path: Path) -> None:
     with LogWriter(tmp_path / "log", simulation) as log:
         simulation.run([log.observe])
     with pytest.raises(InputError, match="ideal world"):
-        render_log(read_log(tmp_path / "log"), tmp_path / "a.mp4")
+        render_log(read_log(tmp_path / "log"), Shot(tmp_path / "a.mp4"))
     assert not (tmp_path / "a.mp4").exists()
 
 

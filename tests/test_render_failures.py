@@ -13,7 +13,6 @@ from factory.apps.log import Log
 from factory.apps.log.model import model_of
 from factory.apps.monitor.record import recorded_subject
 from factory.apps.recovery.undo import marking_after, undo
-from factory.apps.runs.pictures import moment_of
 from factory.engine.mjcf.replica import Replica
 from factory.engine.record.failures import Death, Failing, deaths
 from factory.engine.record.subject import subject_of
@@ -24,6 +23,7 @@ from factory.film.ink import AMBER, DEAD, FLASH, Ink
 from factory.film.marks import Mark, Marks
 from factory.film.net_panel import NetPanel
 from factory.film.sheet import Rows
+from factory.film.shot import moment_of
 from factory.support.settings import Settings
 from factory.theory.nets.undone import Undone
 from tests.failing_runs import failing, paper_layout

@@ -11,8 +11,9 @@ import pytest
 
 import factory
 from factory.apps.log import Log, LogWriter, read_log
+from factory.apps.log.model import model_of
 from factory.apps.monitor.record import recorded_subject
-from factory.apps.runs.pictures import moment_of, render_log, take_of
+from factory.apps.runs.pictures import render_log
 from factory.engine.record.state import State
 from factory.engine.record.subject import subject_of_run
 from factory.engine.simulation.request import RunRequest
@@ -39,6 +40,7 @@ from factory.film.sheet import (
     Rows,
     neighbourhood,
 )
+from factory.film.shot import Shot, moment_of, recorded_take
 from factory.pipeline import all_templates
 from factory.support.errors import InputError
 from factory.theory.lang import read_pag
@@ -392,7 +394,8 @@ def test_ink_is_where_it_is_put_to_a_fraction_of_a_pixel() -> None:
 
 
 def test_the_poster_is_when_the_product_has_become_whole_and_most_is_there(paper: Log) -> None:
-    take = take_of(paper, Picture(SIZE))
+    scene = model_of(paper), recorded_subject(paper.header)
+    take = recorded_take(paper, lambda: scene, Picture(SIZE))
     poster = Poster(take, Path("poster.png"))
     firings = list(zip(paper.fired_t.tolist(), paper.fired.tolist(), strict=True))
     for row in range(len(paper)):
@@ -422,7 +425,7 @@ def test_a_film_with_everything(tmp_path: Path) -> None:
     assert frames.shape == (int(run.sim_time_s * 2 + 1e-6) + 3, 490, 560, 3)
     assert iio.imread(tmp_path / "p.png").shape == (490, 560, 3)
     again = tmp_path / "again.mp4"
-    render_log(read_log(log), again, picture, 2)
+    render_log(read_log(log), Shot(again, picture, 2))
     assert np.abs(frames - iio.imread(again, plugin="pyav")).max() <= 2
     panels = shared(size, PANELS)[1]
     for area in panels.values():

@@ -21,12 +21,12 @@ from factory.apps.log.content import content_of
 from factory.apps.log.reader import digest_of, header_in
 from factory.apps.log.writer import rows_of_a_block
 from factory.apps.resume.continued import Continued, last_full
-from factory.apps.resume.resuming import Resumed, claimed_again
+from factory.apps.resume.resuming import Resumed
 from factory.engine.record.state import State
 from factory.engine.record.verdict import HEADER
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Compiled, Simulation, compiled
-from factory.support.claim import claimed
+from factory.support.claim import claimed, claimed_again
 from factory.support.errors import InputError
 from factory.support.files import RECORD
 from tests.command_line import PAPER, ROOT, Terminal, spawn, started

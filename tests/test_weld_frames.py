@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import factory
-from factory.engine.mjcf.weld_frames import WeldFrames, check_holders, gaps, held_at
+from factory.apps.monitor.anatomy import check_holders
+from factory.engine.mjcf.weld_frames import WeldFrames, gaps, held_at
 from factory.engine.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 

@@ -58,3 +58,9 @@ def is_claimed(path: Path) -> bool:
             return not _lock(file)
     except OSError:
         return False
+
+
+def claimed_again(path: Path) -> FileIO:
+    """An existing file opened for writing at its beginning, with its content kept. It is
+    claimed as by `claimed`, which raises the same."""
+    return _claimed(path, "r+")

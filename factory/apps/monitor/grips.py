@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.api import Array, Index, Observation
-from factory.apps.monitor.anatomy import Anatomy
-from factory.engine.mjcf.weld_frames import GRIP, HOLD, WeldFrames
+from factory.apps.monitor.anatomy import GRIP, HOLD, Anatomy
+from factory.engine.mjcf.weld_frames import WeldFrames
 from factory.engine.record.subject import MonitorSubject
 
 HANGS = 2e-3

@@ -6,9 +6,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from factory.api import NOPART, Operation
-from factory.apps.monitor.anatomy import Anatomy, Holder
+from factory.apps.monitor.anatomy import FEED, GRIP, HOLD, PARK, Anatomy, Holder
 from factory.apps.monitor.grips import Switch
-from factory.engine.mjcf.weld_frames import FEED, GRIP, HOLD, PARK
 from factory.engine.record.subject import MonitorSubject
 
 Blame = Callable[[str, int, str, str], None]

@@ -17,7 +17,7 @@ from factory.apps.recovery.faults import campaign_of
 from factory.apps.recovery.recovery import recover
 from factory.apps.resume.continued import Continued, last_full
 from factory.apps.resume.remade import request_of
-from factory.support.claim import _claimed
+from factory.support.claim import claimed_again
 from factory.support.files import RECORD
 from factory.support.settings import AUTO
 
@@ -131,9 +131,3 @@ def _made(path: Path, log: Log, project: Project, request: RunRequest) -> Simula
 
 def _bad(path: Path, words: str, hint: str = AGAIN) -> Diagnostic:
     return Diagnostic("BadLog", f"'{path}' {words}", None, hint)
-
-
-def claimed_again(path: Path) -> FileIO:
-    """An existing file opened for writing at its beginning, with its content kept. It is
-    claimed as by `claimed`, which raises the same."""
-    return _claimed(path, "r+")
