@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from factory.engine.record.state import Recordable as Recordable
     from factory.engine.record.state import Recorder as Recorder
     from factory.engine.record.state import State as State
+    from factory.engine.record.subject import MonitorSubject as MonitorSubject
     from factory.engine.record.verdict import RunVerdict as RunVerdict
     from factory.engine.simulation.modelling import physical_model as physical_model
     from factory.engine.simulation.mujoco.world import MujocoWorld as MujocoWorld
@@ -160,6 +161,7 @@ HOMES = {
     "engine.record.failures": "Failing Failures",
     "engine.record.findings": "Report",
     "engine.record.state": "Event Observation Observer Recordable Recorder State",
+    "engine.record.subject": "MonitorSubject",
     "engine.record.verdict": "RunVerdict",
     "engine.simulation.modelling": "physical_model",
     "engine.simulation.mujoco.world": "MujocoWorld",

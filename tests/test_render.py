@@ -25,7 +25,7 @@ from factory.apps.log import LogWriter, read_log
 from factory.apps.runs.pictures import render_log
 from factory.engine.mjcf.mesh_files import corner_normals, face_normals, mesh_file
 from factory.engine.record.state import State
-from factory.engine.record.subject import subject_of_run
+from factory.engine.record.subject import MonitorSubject
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.film import Film, Picture, Still, check_output
@@ -362,7 +362,7 @@ def test_no_more_facets_are_drawn_than_are_seen(layout, tmp_path: Path) -> None:
     """Faces are whole, cylinders have two rings, the sky behind the floor is left out; a picture
     with all of that shows the same."""
     simulation = Simulation(layout, RunRequest("mujoco", units=1))
-    subject = subject_of_run(simulation)
+    subject = MonitorSubject.of_run(simulation)
     seen = simulation.state().observation
     shown = Snapshot.of(seen.qpos, seen.welds)
     with Painter(simulation.world.m, (320, 180), "overview", subject) as painter:

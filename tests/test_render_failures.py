@@ -15,7 +15,7 @@ from factory.apps.monitor.record import recorded_subject
 from factory.apps.recovery.undo import marking_after, undo
 from factory.engine.mjcf.replica import Replica
 from factory.engine.record.failures import Death, Failing, deaths
-from factory.engine.record.subject import subject_of
+from factory.engine.record.subject import MonitorSubject
 from factory.film.caption import TOLD, Caption, draw_notices
 from factory.film.gantt_panel import GanttPanel
 from factory.film.history import History
@@ -83,7 +83,7 @@ def test_an_undo_left_out_would_be_noticed(log: Log) -> None:
 
 @pytest.fixture(scope="module")
 def subject():
-    return subject_of(paper_layout(), Settings())
+    return MonitorSubject.of(paper_layout(), Settings())
 
 
 @settings(max_examples=60, deadline=None)

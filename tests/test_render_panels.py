@@ -15,7 +15,7 @@ from factory.apps.log.model import model_of
 from factory.apps.monitor.record import recorded_subject
 from factory.apps.runs.pictures import render_log
 from factory.engine.record.state import State
-from factory.engine.record.subject import subject_of_run
+from factory.engine.record.subject import MonitorSubject
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.film import Film, Picture, Still, camera_named, panels_named
@@ -270,7 +270,7 @@ def test_the_product_followed_is_the_same_when_parts_become_one_body(tmp_path: P
     found = []
     for fuse in (False, True):
         simulation = Simulation(layout, RunRequest("mujoco", units=2, fuse=fuse))
-        followed = Followed(simulation.world.m, subject_of_run(simulation))
+        followed = Followed(simulation.world.m, MonitorSubject.of_run(simulation))
         track: list[np.ndarray] = []
 
         def look(state: State, d=simulation.world.d, followed=followed, track=track) -> None:
@@ -291,7 +291,7 @@ def test_the_product_followed_is_the_same_when_parts_become_one_body(tmp_path: P
 @pytest.mark.parametrize("fuse", [False, True])
 def test_a_part_is_followed_from_its_feeder_to_the_dropoff(fuse: bool) -> None:
     simulation = Simulation(laid_out("paper"), RunRequest("mujoco", units=2, fuse=fuse))
-    followed = Followed(simulation.world.m, subject_of_run(simulation), "part1")
+    followed = Followed(simulation.world.m, MonitorSubject.of_run(simulation), "part1")
     ranks, labels = [], []
 
     def look(state: State) -> None:
