@@ -2,11 +2,12 @@
 PY := .venv/bin/python
 FACTORY := $(PY) -m factory
 
-.PHONY: help demo test test-all oracles bench fidelity faults compare docs gallery lint golden wheel setup clean
+.PHONY: help demo test test-core test-all oracles bench fidelity faults compare docs gallery lint golden wheel setup clean
 
 help:
 	@echo "make demo      run the paper's example: a video and a poster in renders/"
 	@echo "make test      the test suite (under 10 minutes on 2 cores)"
+	@echo "make test-core the tests that need the core alone (under 4 minutes)"
 	@echo "make test-all  the long campaigns too"
 	@echo "make bench     times and sizes, written to docs/benchmarks.md"
 	@echo "make fidelity  how far the physics can be believed, written to docs/fidelity.md"
@@ -32,6 +33,9 @@ demo: setup
 
 test: setup
 	TEST_DAY=$$(date +%y%m%d) $(PY) -m pytest -q -n 2 --dist worksteal -m "not slow" $(ARGS)
+
+test-core: setup
+	$(PY) -m pytest -q -n 2 --dist worksteal -m "not slow" tests/core $(ARGS)
 
 test-all: setup oracles
 	$(PY) -m pytest -q -n 2 --dist worksteal $(ARGS)

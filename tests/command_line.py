@@ -9,16 +9,13 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from factory.commands import run_command
-
-ROOT = Path(__file__).resolve().parent.parent
-PAPER = ROOT / "examples" / "paper.pag"
+from tests.paths import ROOT
 
 
 @dataclass(frozen=True)
@@ -62,13 +59,6 @@ class Terminal:
         return Done(status, out, err)
 
 
-class Screen(StringIO):
-    """A stream that is a terminal."""
-
-    def isatty(self) -> bool:
-        return True
-
-
 def spawn(*words: object, cwd: Path | None = None, **variables: str) -> Done:
     """Runs a command in a process of its own, with environment variables added."""
     done = subprocess.run(
@@ -88,6 +78,7 @@ import json, sys
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from factory.commands import run_command
+from tests.paths import ROOT
 for words in json.loads(sys.argv[1]):
     with redirect_stdout(StringIO()) as out, redirect_stderr(StringIO()) as err:
         status = run_command(words)
@@ -119,12 +110,3 @@ def started(*words: object, **options: Any) -> Iterator[subprocess.Popen[Any]]:
             yield process
         finally:
             process.kill()
-
-
-def files_in(folder: Path) -> dict[str, bytes]:
-    """Every file below a folder, by its name, with its content."""
-    return {
-        path.relative_to(folder).as_posix(): path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file()
-    }

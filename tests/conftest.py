@@ -1,4 +1,6 @@
-"""What all tests share: golden files, the shipped templates, hypothesis without deadlines."""
+"""What all tests share: golden files, the shipped templates, hypothesis without deadlines.
+
+What needs commands or an app is imported by its fixture alone: tests of the core need neither."""
 
 from __future__ import annotations
 
@@ -7,21 +9,21 @@ import shutil
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import HealthCheck, settings
 
-from factory.apps.sweep import Recipe, sweeping
-from factory.apps.sweep.grid import Point
-from factory.apps.sweep.work import Outcome, Runner
 from factory.theory.lang import load_templates
 from factory.theory.problem.template import Template
-from tests.command_line import Terminal
 from tests.once import ANEW, Stages, stages_once
+from tests.paths import ROOT, TESTS
 
-TESTS = Path(__file__).parent
-ROOT = TESTS.parent
+if TYPE_CHECKING:
+    from factory.apps.sweep import Recipe
+    from factory.apps.sweep.grid import Point
+    from factory.apps.sweep.work import Outcome
+    from tests.command_line import Terminal
 
 collect_ignore_glob = ["oracles/*"]
 """Scripts for environments of their own."""
@@ -112,12 +114,16 @@ def templates() -> Mapping[str, Template]:
 @pytest.fixture
 def run(capsys: pytest.CaptureFixture[str]) -> Terminal:
     """`run("check", file, "--json")` runs a command of the command line in this process."""
+    from tests.command_line import Terminal
+
     return Terminal(capsys)
 
 
 @pytest.fixture
 def here() -> Iterator[None]:
     """Runs of a sweep are done in this process, which starts at once."""
+    from factory.apps.sweep import sweeping
+    from factory.apps.sweep.work import Runner
 
     def run_here(recipe: Recipe, wanted: Sequence[Point], jobs: int) -> Iterator[Outcome]:
         yield from map(Runner(recipe), wanted)

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 
-import factory
 from factory.floor.layout.layout import Layout
-from factory.pipeline import read
-from tests.command_line import ROOT
+from factory.pipeline import Project, read
+from tests.paths import ROOT
+
+
+def plainly_laid_out(file: Path) -> Layout:
+    """A product laid out as `factory.lay_out` does with its factory."""
+    return Project.of_made(read(file).plain).layout
 
 
 @cache
 def without_hands(name: str) -> Layout:
     """An example laid out as `factory.lay_out` does."""
-    file = ROOT / "examples" / f"{name}.pag"
-    return factory.lay_out(factory.compile(factory.load_pag(file)))
+    return plainly_laid_out(ROOT / "examples" / f"{name}.pag")
 
 
 @cache

@@ -18,12 +18,12 @@ from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.layout import Layout
 from factory.pipeline import Project, read
-from tests.command_line import PAPER, ROOT
+from tests.paths import PAPER, ROOT, TESTS
 
 LAMP = ROOT / "examples" / "lamp.pag"
 MESHES = ROOT / "tests" / "baselines" / "meshes.pag"
 PYTHON = ROOT / ".oracles" / "bin" / "python"
-ORACLES = Path(__file__).parent / "oracles"
+ORACLES = TESTS / "oracles"
 
 
 @cache

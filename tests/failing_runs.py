@@ -10,7 +10,7 @@ from factory.engine.simulation.request import RunRequest, WorldName
 from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.layout import Layout
 from factory.pipeline import read
-from tests.command_line import PAPER
+from tests.paths import PAPER
 
 FAULTS = """
 clear = 2

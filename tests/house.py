@@ -16,6 +16,8 @@ from functools import cache, cached_property
 from itertools import chain
 from pathlib import Path
 
+from tests.paths import ROOT
+
 FLOORS = (
     ("support",),
     ("theory.problem",),
@@ -51,9 +53,12 @@ APPS = (
 """The apps, from those that use no other app up. An app imports `factory.api`, itself, and the apps
 below it."""
 
-ENTRANCES = ("commands", "stages", "studies", "notebook", "__init__", "__main__")
-"""Above the core and the apps, from the lowest up: the command line, the functions that a user
-calls, how values are shown."""
+ENTRANCES = (
+    *("commands", "apps.*.command_line"),
+    *("stages", "studies", "notebook", "__init__", "__main__"),
+)
+"""Above the core and the apps, from the lowest up: the command line, the commands that apps give,
+the functions that a user calls, how values are shown."""
 
 ENGINE_ROOMS = (
     "support",
@@ -108,13 +113,17 @@ VARIANT_MARKS = {
     **{"support": 5, "apps.foreign_nets": 4, "engine.timing": 3, "theory.plant": 2},
     **{"apps.sweep": 1},
 }
-"""How many identifiers of other rooms may still name a variant. A mark may fall, and never rises:
-what needs it is told by the plan, or by what the factory is."""
+"""How many identifiers of other rooms may still name a variant; the command lines of apps count as
+`commands`. A mark may fall, and never rises: what needs it is told by the plan, or by what the
+factory is."""
 
 STOREYS = ("theory", "floor", "engine", "apps")
 """Folders whose folders are rooms."""
 
 MOST_LINES = 350
+
+BESIDE = ("tests", "benches")
+"""Folders beside the package whose modules import it."""
 
 
 @dataclass(frozen=True)
@@ -127,15 +136,27 @@ class Module:
 
     @property
     def room(self) -> str:
-        """Its room, with the storey where that has several: `theory.nets`."""
+        """Its room, with the storey where that has several: `theory.nets`; the command line of an
+        app is one of its own."""
         first, *rest = self.name.split(".")
         if first in STOREYS and rest:
-            return f"{first}.{rest[0]}"
+            return ".".join([first, rest[0], *(n for n in rest[1:2] if n == "command_line")])
         return first or "__init__"
 
     @cached_property
     def tree(self) -> ast.Module:
         return ast.parse(self.text)
+
+    @cached_property
+    def imports(self) -> list[str]:
+        """All that it imports by absolute names: at run time, inside functions, for typing."""
+        names: list[str] = []
+        for node in ast.walk(self.tree):
+            if isinstance(node, ast.Import):
+                names += [a.name for a in node.names]
+            elif isinstance(node, ast.ImportFrom) and node.level == 0:
+                names += [f"{node.module}.{a.name}" for a in node.names]
+        return names
 
     def within(self, folders: Iterable[str]) -> bool:
         """Whether it lies in one of these folders (`simulation/mujoco`)."""
@@ -144,16 +165,19 @@ class Module:
 
 
 CLOCK = re.compile(r"^ *(?:from|import) (?:[^()\n]*, )?time\b", re.M)
-CLOCKED = ("waiting",)
+CLOCKED = ("tests.waiting",)
 """Modules of the tests that read a clock: it waits for processes."""
 
 
 class House:
-    """All modules of a package `factory` below `root`, by name, and those beside its tests."""
+    """All modules of a package `factory` below `root`, by name. `beside`: those of its tests and
+    benches, by their names below `root`."""
 
     def __init__(self, root: Path) -> None:
-        tests = sorted((root / "tests").glob("*.py"))
-        self.tests = [Module(path.stem, path.read_text("utf-8")) for path in tests]
+        self.beside: dict[str, Module] = {}
+        for path in sorted(chain.from_iterable((root / n).rglob("*.py") for n in BESIDE)):
+            name = ".".join(path.relative_to(root).with_suffix("").parts)
+            self.beside[name] = Module(name, path.read_text("utf-8"))
         self.modules: dict[str, Module] = {}
         for path in sorted((root / "factory").rglob("*.py")):
             parts = path.relative_to(root / "factory").with_suffix("").parts
@@ -168,13 +192,8 @@ class House:
     def names(self, module: Module) -> set[str]:
         """What a module imports of the house, at run time, inside functions, for typing: modules,
         and names of modules (`theory.nets.petri.Place`)."""
-        found: set[str] = set()
-        for node in ast.walk(module.tree):
-            if isinstance(node, ast.Import):
-                found.update(a.name for a in node.names)
-            elif isinstance(node, ast.ImportFrom) and node.level == 0:
-                found.update(f"{node.module}.{a.name}" for a in node.names)
-        return {name.removeprefix("factory.") for name in found if name.startswith("factory.")}
+        tops = ((*name.partition("."),) for name in module.imports)
+        return {inside for top, _, inside in tops if top == "factory"}
 
     def imports(self, module: Module) -> set[str]:
         """Modules of the house that a module imports. `from factory.room import x` is resolved to
@@ -186,9 +205,23 @@ class House:
         """The module that a name of the house lies in, or is."""
         return name if name in self.modules else name.rpartition(".")[0]
 
+    def needs(self, module: Module) -> set[str]:
+        """Modules of the house that a test imports, itself or by the tests and benches it
+        imports."""
+        found, names, seen = set[str](), [module.name], set[str]()
+        while names:
+            name = names.pop()
+            one = self.beside.get(name) or self.beside.get(name := name.rpartition(".")[0])
+            if one and name not in seen:
+                seen.add(name)
+                found |= self.imports(one)
+                names += one.imports
+        return found
+
 
 def floor(room: str) -> int:
     """The number of a room's floor from the ground up, of the core, the apps, the entrances."""
+    room = re.sub(r"^apps\.\w+\.command_line$", "apps.*.command_line", room)
     if room in ENTRANCES:
         return len(FLOORS) + len(APPS) + ENTRANCES.index(room)
     rooms = (*FLOORS, *(tuple(f"apps.{name}" for name in names) for names in APPS))
@@ -223,7 +256,7 @@ def reach_ins(house: House) -> Iterator[str]:
     there = {
         (module.room.removeprefix("apps."), name)
         for module in house.modules.values()
-        if module.room.startswith("apps.")
+        if re.fullmatch(r"apps\.\w+", module.room)
         for name in house.names(module)
         if not name.startswith(("api.", "apps."))
     }
@@ -312,9 +345,24 @@ def unexplained(house: House) -> Iterator[str]:
 
 def clocks(house: House) -> Iterator[str]:
     """Test modules that import `time`: what they find must not depend on how busy a machine is."""
-    for module in house.tests:
-        if CLOCK.search(module.text) and module.name not in CLOCKED:
-            yield f"tests.{module.name} reads a clock"
+    for name, module in house.beside.items():
+        if name.startswith("tests.") and CLOCK.search(module.text) and name not in CLOCKED:
+            yield f"{name} reads a clock"
+
+
+def misplaced_tests(house: House) -> Iterator[str]:
+    """Tests that stand neither in tests/core, nor with an app, nor in tests/whole, and those in
+    tests/core that need an app, a command or another entrance."""
+    for name, module in house.beside.items():
+        match name.split("."):
+            case ["tests", "core", _]:
+                for other in sorted(house.needs(module)):
+                    if floor(house.modules[other].room) >= len(FLOORS):
+                        yield f"{name} needs {other or 'factory'}"
+            case ["tests", "apps", app, _] if floor(f"apps.{app}") >= 0:
+                pass
+            case ["tests", *folders, test] if test.startswith("test_") and folders != ["whole"]:
+                yield f"{name} stands with no app, nor in core or whole"
 
 
 def identifiers(module: Module) -> Iterator[str]:
@@ -355,7 +403,8 @@ def variants(house: House) -> Iterator[str]:
     found: Counter[str] = Counter()
     for module in house.modules.values():
         if not module.within(VARIANT_ROOMS):
-            found[module.room] += sum(map(bool, map(VARIANTS.search, identifiers(module))))
+            room = "commands" if module.room.endswith(".command_line") else module.room
+            found[room] += sum(map(bool, map(VARIANTS.search, identifiers(module))))
     for room, count in found.items():
         if count > (most := VARIANT_MARKS.get(room, 0)):
             yield f"{room}: names variants {count} times; at most {most}"
@@ -371,4 +420,4 @@ def anys(house: House, name: str) -> Iterator[str]:
 @cache
 def this_house() -> House:
     """The source tree that these tests are in."""
-    return House(Path(__file__).resolve().parent.parent)
+    return House(ROOT)

@@ -21,7 +21,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.apps.sweep.pool import pickle_locked_mappings
 from factory.floor.layout import clearance
 from factory.floor.layout.request import Ground
 from factory.floor.mating import mating
@@ -31,26 +30,39 @@ from tests import layout_values
 ANEW = ("test_cold_and_warm", "test_layout_optimised", "test_progress", "test_reproducible")
 
 
-class _Digest(pickle.Pickler):
+class _Values(pickle.Pickler):
+    """Pickles locked mappings."""
+
+    def reducer_override(self, value: Any) -> Any:
+        if isinstance(value, MappingProxyType):
+            return _locked_mapping, (dict(value),)
+        return NotImplemented
+
+
+def _locked_mapping(content: dict[Any, Any]) -> MappingProxyType[Any, Any]:
+    return MappingProxyType(content)
+
+
+class _Digest(_Values):
     """Pickles dataclasses as their fields, sets in order: what a value has computed of itself, and
     keeps, is no part of it."""
 
     def reducer_override(self, value: Any) -> Any:
         if not is_dataclass(value) or isinstance(value, type):
-            return NotImplemented
+            return super().reducer_override(value)
         told = (getattr(value, field.name) for field in fields(value) if field.init)
         return type(value), tuple(
             sorted(one, key=repr) if isinstance(one, set | frozenset) else one for one in told
         )
 
 
-class _Result(pickle.Pickler):
+class _Result(_Values):
     """Pickles locked arrays so that they come back locked."""
 
     def reducer_override(self, value: Any) -> Any:
         if isinstance(value, np.ndarray) and not value.flags.writeable:
             return _locked, (value.copy(),)
-        return NotImplemented
+        return super().reducer_override(value)
 
 
 def _locked(array: Any) -> Any:
@@ -96,7 +108,6 @@ class Stages:
 @contextmanager
 def stages_once(folder: Path) -> Iterator[Stages]:
     """The stages of the package, computed once in this block."""
-    pickle_locked_mappings()
     stages, lay_out, matings = Stages(folder), Ground.lay_out, mating.matings
     apart = stages.once(clearance.exclusions)
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import factory
 from factory.floor.layout.layout import Layout
-from factory.pipeline import all_templates
+from factory.pipeline import Project, all_templates
 from factory.support.errors import InputError
 from factory.theory.compiler.compiler import compile_pag
 from factory.theory.lang import read_pag, read_template
@@ -57,7 +56,7 @@ def compiled(text: str, *templates: str, catalogue: Catalogue | None = None) -> 
 
 def laid_out(text: str) -> Layout:
     """The layout of that factory, as `factory.lay_out` makes it."""
-    return factory.lay_out(compiled(text))
+    return Project.of_made(compiled(text)).layout
 
 
 def read_or_refused(read: Callable[[str], object], text: str) -> None:

@@ -35,9 +35,9 @@ from factory.support.engine import mujoco
 from factory.support.errors import InputError
 from factory.support.settings import Settings
 from factory.theory.plant.factory import Operation
-from tests.command_line import ROOT
 from tests.examples import with_hands
 from tests.pag_texts import laid_out
+from tests.paths import ROOT
 
 Acts = Callable[[Any, Any], None]
 """Acts on an engine's model and data."""

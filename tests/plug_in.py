@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tests.command_line import ROOT
+from tests.paths import ROOT
 
 ENTRY_POINTS = {
     "factory.templates": "dab = gluing.templates",

@@ -10,10 +10,10 @@ from typing import Any
 
 from benches.tables import table
 from factory.apps.log.reader import read_log
+from tests.apps.resume.test_resume import FACTORIES, killed_and_gone_on, ticks_of
+from tests.apps.resume.test_resume_faults import FACTORIES as FAILING
+from tests.apps.resume.test_resume_faults import FAULTS
 from tests.command_line import spawn
-from tests.test_resume import FACTORIES, killed_and_gone_on, ticks_of
-from tests.test_resume_faults import FACTORIES as FAILING
-from tests.test_resume_faults import FAULTS
 
 KILLS = 5
 
@@ -22,7 +22,7 @@ RUNS = (*((words, "") for words in FACTORIES), *((words, FAULTS) for words in FA
 
 
 def measure(quick: bool = False) -> Iterator[dict[str, Any]]:
-    """Kill each run again and again, as tests/test_resume.py and test_resume_faults.py do."""
+    """Kill each run again and again, as the tests in tests/apps/resume do."""
     rows = list[dict[str, Any]]()
     for number, (given, faults) in enumerate(RUNS[:1] if quick else RUNS):
         kills = 1 if quick else KILLS

@@ -11,8 +11,8 @@ from typing import Any
 from benches.tables import table
 from factory.apps.exports.clearance.checking import faults_of
 from factory.apps.exports.clearance.documents import read_folder
+from tests.apps.exports.test_clearance_files import FORGERIES, Forgery, built
 from tests.planted import BENIGN, PLANTS
-from tests.test_clearance_files import FORGERIES, Forgery, built
 
 WHERE = {
     "xml": "text of the model",
@@ -110,9 +110,9 @@ def section(results: dict) -> str:
             "## Planted faults",
             "Runs of 1 or 2 units of the paper's example, or of two boxes, each with one fault"
             " (`tests/planted.py`), and the files of the stool's certificate, forged"
-            " (`tests/test_clearance_files.py`). The codes are all by which the run or the check"
-            " fails, in the order of time: the first names the cause. Shown are what finds it, and"
-            " what is said. Benign ones are what a factory is made to bear.",
+            " (`tests/apps/exports/test_clearance_files.py`). The codes are all by which the run or"
+            " the check fails, in the order of time: the first names the cause. Shown are what"
+            " finds it, and what is said. Benign ones are what a factory is made to bear.",
             table(("planted", "where", "status", "found by", "said first", "codes"), rows),
             f"**{found} of {len(faults)} faults found, {quiet} of {len(plants) - len(faults)}"
             f" benign ones let pass.**" + (f" Missed: {', '.join(missed)}." if missed else ""),

@@ -7,7 +7,6 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from pathlib import Path
 
-import factory
 from factory.engine.record.verdict import RunVerdict, judged, kept_figures
 from factory.engine.simulation.mujoco.courses import Course
 from factory.engine.simulation.request import RunRequest
@@ -16,6 +15,7 @@ from factory.engine.simulation.simulation import Simulation
 from factory.floor.geometry.product import product_geometry
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.request import Ground
+from factory.pipeline import read
 from factory.support.settings import MOST, Settings
 from factory.theory.nets.replay import replay
 
@@ -81,7 +81,7 @@ def laid_out(text: str, settings: Settings = DEFAULT) -> Layout:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "product.pag"
         file.write_text(text)
-        plan = factory.compile(factory.load_pag(file))
+        plan = read(file).plain
         return Ground().lay_out(plan, product_geometry(plan.pag), settings)
 
 

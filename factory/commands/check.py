@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from factory.apps.runs.progress import Waiting
 from factory.commands.allowing import ALLOW
+from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
 from factory.commands.options import (
     OUT,
@@ -30,6 +30,7 @@ from factory.support.collector import collector_paused
 from factory.support.console import emit, say, table
 from factory.support.errors import Diagnostic, RunError, usage_error
 from factory.support.files import is_net
+from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
     from factory.commands.checking import Checked
@@ -60,6 +61,7 @@ POOLED = 8
 """The most parts whose copies are printed."""
 
 
+@with_defaults
 @click.command(cls=Grouped)
 @SOURCE
 @click.option("--certificate", type=OUT, help="Write the proof to this file.")

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import click
 
+from factory.commands.defaults import with_defaults
 from factory.commands.options import OUTPUT, RELAY, SOURCE
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.support.console import emit, say
 from factory.support.errors import did_you_mean, usage_error
 
 
+@with_defaults
 @click.command()
 @SOURCE
 @click.option("--robot", help="Only this robot, for example r3.")

@@ -9,6 +9,7 @@ import click
 
 from factory.apps.runs.options import RunOptions
 from factory.commands import options as shared
+from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
 from factory.commands.outputs import for_a_pag, writable
 from factory.commands.requests import OutputOptions, PictureOptions, ProjectOptions
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     Moment = float | Literal["end"]
 
 
+@with_defaults
 @click.command(cls=Grouped)
 @shared.SOURCE
 @click.option(

@@ -169,8 +169,8 @@ class ProjectOptions:
         """The project with the plan that is found for --robots and --cycle."""
         from factory.apps.few_robots.aim import Aim, usual_effort
         from factory.apps.few_robots.search import allocated
-        from factory.apps.runs.progress import StepBar
         from factory.support.console import warn
+        from factory.support.progress import StepBar
 
         several = self.branches()
         units = prod(k for _, k in several)

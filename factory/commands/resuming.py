@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from factory.apps.runs.progress import Waiting
 from factory.commands.outputs import for_a_pag
 from factory.commands.requests import OutputOptions
 from factory.support.console import emit, say
+from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
     from factory.apps.resume.resuming import Resumed

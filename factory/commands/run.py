@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING
 import click
 
 from factory.apps.runs.options import RunOptions, check_ideal
-from factory.apps.runs.progress import Waiting
 from factory.commands import options as shared
 from factory.commands.allowing import ALLOW
+from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
-from factory.commands.monitor import found_by, say_failures, say_verdict, tell_failures
 from factory.commands.outputs import for_a_film, writable
 from factory.commands.requests import (
     OutputOptions,
@@ -21,10 +20,12 @@ from factory.commands.requests import (
     ProjectOptions,
 )
 from factory.commands.resuming import resumed
+from factory.commands.verdicts import found_by, say_failures, say_verdict, tell_failures
 from factory.commands.warnings import announced, say_allowed
 from factory.support.console import emit, say, table
 from factory.support.errors import usage_error
 from factory.support.guard import reading
+from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
     from factory.apps.resume.resuming import Resumed
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from factory.theory.plant.factory import Factory
 
 
+@with_defaults
 @click.command(cls=Grouped)
 @shared.SOURCE
 @shared.FAULTS

@@ -28,6 +28,9 @@ SINGLE, SHARED = 0.3, 0.8
 """Shares of the effort after which factories with one robot for each label are no longer tried, and
 after which estimates are no longer laid out."""
 
+WITHIN = 5e-3
+"""A cycle time is met within this [s]: the half of a hundredth, as it is printed."""
+
 Seen = Callable[[Candidate, Candidate], None]
 """Told of each candidate, and of the best so far."""
 
@@ -41,7 +44,8 @@ def allocated(
     """The project with forms and lines chosen for an aim: as few robots as found for a cycle time,
     or the shortest cycle time found with so many robots; `project` itself where it asks for
     neither. Where nothing found is fast enough, with relays. Each candidate is `seen`; that the
-    time ended the search (OutOfTime) is a warning. Raises InputError (TooFewRobots) where more
+    time ended the search (OutOfTime), or that the cycle time asked for was not found (SlowCycle),
+    is a warning. Raises InputError (TooFewRobots) where more
     robots are needed, or none of the factories found has as few."""
     if not aim.asks:
         return project
@@ -69,6 +73,10 @@ def allocated(
         plain = best if best.filling is None else search.written
         relayed = replace(plain, single=plain.single.with_ground(project.ground))
         best = min(best, relayed, key=search.rank)
+    if aim.cycle is not None and best.has_layout and best.seconds > aim.cycle + WITHIN:
+        message = f"the fastest factory found takes {best.seconds:.2f} s a product"
+        hint = f"--cycle {best.seconds:.2f}, or a longer search with more --effort"
+        warn(Diagnostic("SlowCycle", f"{message}, not {aim.cycle:g} s", None, hint))
     return best.project
 
 

@@ -9,9 +9,9 @@ from shlex import quote
 from typing import TYPE_CHECKING
 
 from factory.api import CutOff, Diagnostic, Run, Simulation
-from factory.apps.runs.progress import Progress
 from factory.support.errors import StoppedError
 from factory.support.interruption import Interruption
+from factory.support.progress import Progress
 
 if TYPE_CHECKING:
     from factory.api import Observer, Recorder

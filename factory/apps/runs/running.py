@@ -13,8 +13,8 @@ from factory.apps.recovery.fault_file import check_names, read_campaign
 from factory.apps.recovery.faults import SWAP, Campaign
 from factory.apps.runs.executing import Go, Opening, Tell, carry_out
 from factory.apps.runs.options import RunOptions
-from factory.apps.runs.progress import Waiting
 from factory.apps.runs.watched import watched
+from factory.support.progress import Waiting
 from factory.theory.nets.verify import proved
 
 if TYPE_CHECKING:

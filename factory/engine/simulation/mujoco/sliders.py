@@ -74,6 +74,7 @@ class Sliders:
     several hang is there for each, and has at most one of them at a time.
 
     `ends` (n,): when each that is under way comes to the end of its way [s], NEVER for others.
+    `up`: when the first of those on their way up does [s].
     `trees` (n,): their kinematic trees.
     """
 
@@ -98,6 +99,7 @@ class Sliders:
         self._soon = ROUNDED * settings.tick
         self._begun, self.ends = np.zeros(len(outlets)), np.full(len(outlets), NEVER)
         self._down = np.zeros(len(outlets), np.intp)
+        self.up = NEVER
 
     @property
     def now(self) -> float:
@@ -143,6 +145,7 @@ class Sliders:
         self._drives.follow(chosen, self._strokes.setpoints[int(down), chosen])
         self._down[chosen], self._begun[chosen] = down, self._drives.time
         self.ends[chosen] = self._drives.time + self._strokes.seconds[int(down), chosen]
+        self.up = self._first_up()
         self.show(0)
         self._sleep.wake(self._body[chosen])
 
@@ -165,6 +168,10 @@ class Sliders:
             self._stand(over[down], True)
             self._stand(over[~down], False)
             self.ends[over] = NEVER
+            self.up = self._first_up()
+
+    def _first_up(self) -> float:
+        return float(self.ends[self._down == 0].min(initial=NEVER))
 
 
 def _limits(settings: Settings, count: int) -> tuple[Array, Array]:

@@ -1,0 +1,141 @@
+"""Hidden penetrations against planted ones, and without regard to how a run judges contacts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from factory.apps.fidelity.hidden import HiddenPenetrations, overlaps_of
+from factory.apps.fidelity.solid import drawn
+from factory.engine.record.state import State
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.support.engine import mujoco
+from tests.command_line import Terminal
+from tests.pag_texts import laid_out
+from tests.paths import PAPER
+from tests.whole.test_insets import PRESSED
+
+MASKS = 'contype="0" conaffinity="0"'
+EXCLUDE = '<exclude body1="r1/head" body2="part/a#1"/>'
+SCENE = """<mujoco><worldbody>
+ <geom name="floor" type="plane" size="1 1 1"/>
+ <geom name="r1/rail" type="box" size=".1 .01 .004" pos="0 0 .004"/>
+ <geom name="r2/rail" type="box" size=".1 .01 .004" pos="0 {rail} .004"/>
+ <body name="r1/carriage" pos="0 0 {height}"><joint type="slide"/>
+  <geom name="r1/carriage" type="box" size=".03 .03 .02" {masks}/>
+  <body name="r1/shell"><geom name="r1/lid" size=".01" group="1" {masks}/></body>
+  <body name="r1/head" pos="{head} 0 0"><joint type="slide" axis="0 0 1"/>
+   <geom name="r1/plate" type="cylinder" size=".01 .02" {masks}/></body></body>
+ <body name="part/a#1" pos="{x} 0 {height}"><freejoint/>
+  <geom name="part/a#1" type="box" size=".02 .02 .02" group="1" {masks}/>
+  <geom name="part/a#1/1" type="box" size=".02 .01 .02" group="3" {masks}/></body>
+ <body name="part/b#1" pos=".4 .4 -1"><freejoint/><geom name="part/b#1" size=".05"/></body>
+ <body name="part/b#2" pos=".4 .4 -1"><freejoint/><geom name="part/b#2" size=".05"/></body>
+</worldbody><contact>{exclude}</contact></mujoco>"""
+"""A carriage with a lid in it and a head ahead, beside whose plate is a part; two spare parts in
+one place below the floor."""
+
+
+def told(
+    x: float = 0.25,
+    rail: float = 0.1,
+    height: float = 0.1,
+    head: float = 0.2,
+    masks: str = "",
+    exclude: str = "",
+) -> dict[tuple[str, str], tuple[float, bool]]:
+    """The depths [mm] by pairs, and whether one of them moves."""
+    text = SCENE.format(x=x, rail=rail, height=height, head=head, masks=masks, exclude=exclude)
+    m = mujoco.MjModel.from_xml_string(text)
+    hidden = HiddenPenetrations(m, {})
+    hidden.look(m.qpos0, 0.5)
+    return {p.geoms: (pytest.approx(p.depth_mm, abs=1e-3), p.moves) for p in hidden.found()}
+
+
+def test_what_is_apart_or_touches_is_not_inside() -> None:
+    """Nor is what is fixed to each other, and what is below the floor."""
+    assert told() == told(rail=0.02) == told(x=0.23) == {}
+
+
+@pytest.mark.parametrize("mm", [0.2, 1.0])
+def test_a_planted_overlap_is_seen_whatever_the_masks_are(mm: float) -> None:
+    """A part's pieces count, and not what is drawn in their place."""
+    for masks in ("", MASKS):
+        for exclude in ("", EXCLUDE):
+            found = told(0.23 - mm * 1e-3, masks=masks, exclude=exclude)
+            assert found == {("part/a#1/1", "r1/plate"): (mm, True)}
+
+
+def test_what_slides_on_its_own_rail_or_robot_and_what_stands_is_seen() -> None:
+    assert told(head=0.0395) == {("r1/carriage", "r1/plate"): (0.5, True)}
+    assert told(height=0.027) == {("r1/carriage", "r1/rail"): (1.0, True)}
+    assert told(rail=0.0195) == {("r1/rail", "r2/rail"): (0.5, False)}
+
+
+def test_the_deepest_of_all_times_and_copies_is_kept() -> None:
+    m = mujoco.MjModel.from_xml_string(
+        SCENE.format(x=1, rail=1, height=0.1, head=0.2, masks="", exclude="")
+    )
+    hidden = HiddenPenetrations(m, {})
+    assert (hidden.found(), hidden.deepest()) == ((), 0.0)
+    for time, copies, apart in ((0.1, "12", 0.01), (0.2, "21", 0.03), (0.3, "12", 0.02)):
+        qpos = m.qpos0.copy()
+        for copy, x in zip(copies, (0.0, apart), strict=True):
+            at = int(m.jnt_qposadr[m.body_jntadr[m.body(f"part/b#{copy}").id]])
+            qpos[at : at + 3] = 1.0 + x, 1.0, 1.0
+        hidden.look(qpos, time)
+    (found,) = hidden.found()
+    assert (found.geoms, found.time_s) == (("part/b#1", "part/b#2"), 0.1)
+    assert found.depth_mm == hidden.deepest() == pytest.approx(90, abs=0.01)
+    assert str(found) == "90.000 mm: part/b#1 - part/b#2, at 0.10 s"
+
+
+def test_parts_count_by_what_they_are_deeper_than_in_the_product() -> None:
+    layout = laid_out(PRESSED)
+    assert overlaps_of(layout) == {("a", "b"): pytest.approx(0.3e-3)}
+    simulation = Simulation(layout, RunRequest(units=2, seed=1, jitter=0.3))
+    less, whole = HiddenPenetrations.of(simulation), HiddenPenetrations.of(simulation)
+    whole = HiddenPenetrations(whole.replica.m, {})
+
+    def look(_: State) -> None:
+        for hidden in (less, whole):
+            hidden.look(simulation.physical.d.qpos, simulation.world.time)
+
+    simulation.run([look])
+    deep = [
+        max(
+            (p.depth_mm for p in hidden.found() if "part/a#" in str(p) and "part/b#" in str(p)),
+            default=0.0,
+        )
+        for hidden in (less, whole)
+    ]
+    assert deep[0] < 0.02
+    assert deep[1] == pytest.approx(0.3, abs=0.02)
+
+
+def test_all_that_is_drawn_is_solid() -> None:
+    simulation = Simulation(laid_out(PAPER.read_text()), RunRequest())
+    m = simulation.physical.m
+    solid = {m.geom(int(i)).name for i in np.flatnonzero(drawn(m))}
+    assert {"r1/number", "r2/rail", "outfeed/roof", "feeder/part1/boom", "part/part1#1"} <= solid
+    assert not {"floor", "ground", "compass/1"} & solid
+
+
+def test_a_seed_lists_its_worst_penetrations_and_the_command_tells_them(run: Terminal) -> None:
+    words = (PAPER, "--seeds", 1, "--units", 1, "--jobs", 1)
+    done, key = run("fidelity", *words, "--json"), "hidden_penetration_max_mm"
+    (seed,) = done.json["seeds"]
+    listed = seed["hidden_penetrations"]
+    assert done.json["figures"][key]["worst"] == max((p["depth_mm"] for p in listed), default=0)
+    told = run("fidelity", *words, "-v")
+    assert key in told.out
+    for penetration in listed:
+        assert " - ".join(penetration["geoms"]) in told.out
+
+
+def test_a_magazine_of_a_line_is_solid(run: Terminal) -> None:
+    words = (PAPER, "--robots", 3, "--seeds", 1, "--units", 2, "--jobs", 1)
+    done = run("fidelity", *words, "--json")
+    assert done.status == 0, done.err
+    assert done.json["figures"]["hidden_penetration_max_mm"]["worst"] < 0.1

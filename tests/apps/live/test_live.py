@@ -1,0 +1,416 @@
+"""A running factory: its commands, their effects, and access to its page."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import socket
+import sys
+from collections.abc import Iterator
+from dataclasses import fields
+from http.client import HTTPConnection
+from subprocess import PIPE
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from factory.apps.disturbance.interventions import Interventions
+from factory.apps.live import Server, Session
+from factory.apps.live.commands import FAULTS, KEYS, Command, command_of
+from factory.apps.live.page import page, stage_of
+from factory.apps.monitor import beside
+from factory.apps.report.drawings import floor_plan, labels_of
+from factory.engine.record.state import State
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.support.errors import InputError
+from factory.theory.nets.replay import replay
+from tests.command_line import Terminal, started
+from tests.layout_values import paper_layout
+from tests.live_sessions import Running, a_session
+from tests.paths import PAPER
+
+websockets = pytest.importorskip("websockets.sync.client", reason="pip install websockets")
+
+PARTS = ("part1", "part2", "part3")
+
+
+# --- commands ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("message", "command"),
+    [
+        ('{"do": "pause"}', Command("pause")),
+        ('{"do": "step", "more": 1}', Command("step")),
+        ('{"do": "speed", "factor": 0}', Command("speed", factor=0)),
+        ('{"do": "push", "robot": 5, "share": -1}', Command("push", robot=5, share=-1)),
+        ('{"do": "slow", "robot": 0, "factor": 0.1}', Command("slow", robot=0, factor=0.1)),
+        (
+            '{"do": "block", "part": "part2", "blocked": false}',
+            Command("block", part="part2", blocked=False),
+        ),
+    ],
+)
+def test_commands_are_read(message: str, command: object) -> None:
+    assert command_of(message, 6, PARTS) == command
+
+
+@pytest.mark.parametrize(
+    ("message", "words"),
+    [
+        ("no json", "JSON object"),
+        (b"\xff\xfe", "JSON object"),
+        ("[1]", "JSON object"),
+        ("[" * 2000, "JSON object"),
+        ("{}", "'do' is None: there are pause"),
+        ('{"do": ["pause"]}', "there are pause"),
+        ('{"do": "explode"}', "'do' is 'explode': there are pause"),
+        ('{"do": "push", "robot": 6, "share": 1}', "'robot' of 'push' is 6: a number from 0 to 5"),
+        ('{"do": "push", "robot": true, "share": 1}', "'robot' of 'push' is True"),
+        ('{"do": "push", "robot": 1.0, "share": 1}', "'robot' of 'push' is 1.0"),
+        ('{"do": "push", "robot": 1, "share": 1e9}', "'share' of 'push' is 1000000000.0: one of"),
+        ('{"do": "push", "robot": 1, "share": NaN}', "'share' of 'push' is nan"),
+        ('{"do": "slow", "robot": 1}', "'factor' of 'slow' is None: one of (0.1"),
+        ('{"do": "slow", "robot": 1, "factor": 0}', "'factor' of 'slow' is 0"),
+        ('{"do": "speed", "factor": "2"}', "'factor' of 'speed' is '2'"),
+        ('{"do": "block", "part": "sub1", "blocked": true}', "'part' of 'block' is 'sub1'"),
+        ('{"do": "block", "part": "part1", "blocked": 1}', "true or false"),
+    ],
+)
+def test_what_is_no_command_is_explained(message: str | bytes, words: str) -> None:
+    with pytest.raises(ValueError) as error:
+        command_of(message, 6, PARTS)
+    assert words in str(error.value)
+
+
+# --- interventions ------------------------------------------------------------------------------
+
+
+def moved(share: float) -> float:
+    """The greatest distance that a push moves a waiting robot along its guidepath [m]."""
+    simulation = Simulation(paper_layout(), RunRequest(units=10))
+    interventions, world = Interventions(simulation), simulation.physical
+    interventions.block("part1")
+    slide = world.motion.axes.qpos[0]
+    start = float(world.d.qpos[slide])
+    found = [0.0]
+    for tick in range(100):
+        if tick == 10:
+            interventions.push(0, share, 0.3)
+        simulation.supervisor.step()
+        found.append(float(world.d.qpos[slide]) - start)
+    assert abs(found[-1]) < 1e-4 < 5e-4 < abs(max(found, key=abs)), "it gives way and comes back"
+    push = interventions.pushed
+    assert push is not None and push.robot == 0
+    assert push.force == share * world.m.actuator_forcerange[world.motion.axes.actuator[0], 1]
+    assert push.gave == pytest.approx(abs(max(found, key=abs)), rel=0.1)
+    return max(found, key=abs)
+
+
+def test_a_pushed_robot_gives_way_and_comes_back() -> None:
+    """Robots wait at their B ends, and A, where they deliver, is 0."""
+    assert moved(1.0) < 2 * moved(0.5) < 0 < moved(-1.0)
+
+
+@pytest.mark.parametrize("pushed", [False, True])
+def test_a_run_with_interventions_refines_the_net(pushed: bool) -> None:
+    """Slowed and blocked at random, and in one of two runs pushed, the run still refines the net
+    and makes its products. Without pushes, which the monitor cannot tell from faults, the monitor
+    agrees."""
+    simulation = Simulation(paper_layout(), RunRequest(units=12))
+    interventions, watcher = Interventions(simulation), beside(simulation)
+    draw, ticks = np.random.default_rng(5), 0
+
+    def act(state: State) -> None:
+        nonlocal ticks
+        ticks += 1
+        watcher.observe(state)
+        if ticks > 2500:
+            for part in PARTS:
+                interventions.free(part)
+        elif ticks % 40 == 0:
+            robot, part = int(draw.integers(6)), PARTS[draw.integers(3)]
+            if pushed:
+                interventions.push(robot, float(draw.choice([-0.5, 0.5])), 0.1)
+            interventions.slow(robot, float(draw.choice([0.1, 0.5, 1.0])))
+            (interventions.block if draw.random() < 0.5 else interventions.free)(part)
+
+    run = simulation.run([act])
+    assert run.products == 12 and run.trouble is None and run.refines_net
+    assert pushed or watcher.report().refines_net, watcher.report().violations[:3]
+    assert run.physics is not None and run.physics.product_error_max_mm < 0.1
+
+
+def test_the_ideal_world_has_nothing_to_push() -> None:
+    with pytest.raises(InputError, match="nothing to push"):
+        Interventions(Simulation(paper_layout(), RunRequest("ideal")))
+
+
+# --- a session ---------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def running() -> Iterator[Running]:
+    made = Running()
+    yield made
+    made.close()
+
+
+def test_pause_step_and_play(running: Running) -> None:
+    send = running.session.send
+    running.until(lambda f: f.time > 0.2)
+    send(Command("pause"))
+    still = running.until(lambda f: not f.playing)
+    send(Command("slow", robot=1, factor=0.5))
+    assert running.until(lambda f: f.slowed).time == still.time, "it looks, and stands"
+    send(Command("slow", robot=1, factor=1.0))
+    fired = still.count
+    for _ in range(4):
+        send(Command("step"))
+        after = running.until(lambda f, n=fired: f.count > n and not f.playing)
+        fired = after.count
+        (last,) = {t for t, _ in running.session.fired(after.run, fired - 1, fired)}
+        assert after.time - last < 0.011, "it stops within a tick of the firing"
+    assert after.time > still.time
+    names = [e.transition for e in running.session.simulation.supervisor.events]
+    assert replay(paper_layout().factory.net, names).refines
+    send(Command("play"))
+    running.until(lambda f: f.time > after.time + 0.2)
+
+
+def test_it_keeps_in_step_with_the_clock(running: Running) -> None:
+    for speed in (1.0, 2.0, 0.25):
+        running.session.send(Command("speed", factor=speed))
+        running.until(lambda f, s=speed: f.speed == s and f.pace == pytest.approx(s, rel=0.25))
+
+
+def test_a_blocked_feeder_stops_the_net_and_frees_it_again(running: Running) -> None:
+    send = running.session.send
+    send(Command("speed", factor=0.0))
+    running.until(lambda f: f.products > 0)
+    send(Command("block", part="part2", blocked=True))
+    quiet = running.until(lambda f: "feeder of part2" in f.note)
+    assert quiet.blocked == ("part2",)
+    factory = running.session.simulation.layout.factory
+    waits = {factory.net.threaded.places[p].mode for p in quiet.marked}
+    assert waits == {"wait"}, "every token waits"
+    assert running.until(lambda f: f.time > quiet.time + 1).count == quiet.count
+    send(Command("block", part="part2", blocked=False))
+    running.until(lambda f: f.products > quiet.products + 1 and not f.note)
+
+
+def test_restart(running: Running) -> None:
+    send = running.session.send
+    send(Command("speed", factor=0.0))
+    send(Command("slow", robot=2, factor=0.5))
+    before = running.until(lambda f: f.count > 20 and f.slowed == {2: 0.5})
+    send(Command("pause"))
+    send(Command("restart"))
+    fresh = running.until(lambda f: f.run == 1)
+    assert (fresh.time, fresh.count, fresh.slowed, fresh.playing) == (0.0, 0, {}, False)
+    assert running.session.fired(before.run, 0, 5) == []
+
+
+def test_it_says_when_the_engine_gives_up(running: Running) -> None:
+    running.session.simulation.world.d.qvel[:] = np.nan
+    note = running.until(lambda f: bool(f.note)).note
+    assert "unstable" in note and "restart it" in note
+    running.session.send(Command("restart"))
+    running.until(lambda f: f.run == 1 and not f.note and f.time > 0.1)
+
+
+# --- a server ----------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def server(running: Running) -> Iterator[Server]:
+    with Server(running.session, b"<p>the page") as made:
+        yield made
+
+
+def asked(server: Server, path: str, **headers: str) -> tuple[int, str, dict[str, str]]:
+    """Status, body and headers of an answer."""
+    connection = HTTPConnection("127.0.0.1", server.port, timeout=10)
+    connection.putrequest("GET", path, skip_host="Host" in headers)
+    for name, value in headers.items():
+        connection.putheader(name, value)
+    connection.endheaders()
+    answer = connection.getresponse()
+    return answer.status, answer.read().decode(), dict(answer.getheaders())
+
+
+def path_of(server: Server) -> str:
+    return "/" + server.address.split("/", 3)[3]
+
+
+def socket_of(server: Server, **options: Any) -> Any:
+    address = server.address.replace("http", "ws") + "live"
+    return websockets.connect(address, proxy=None, **options)
+
+
+def unpacked(message: bytes) -> tuple[dict[str, Any], np.ndarray]:
+    length = int.from_bytes(message[:4], "little")
+    return json.loads(message[4 : 4 + length]), np.frombuffer(message[4 + length :], "<f4")
+
+
+def test_the_page_is_at_the_address_and_nowhere_else(server: Server) -> None:
+    status, body, headers = asked(server, path_of(server))
+    assert (status, body) == (200, "<p>the page")
+    assert headers["Cache-Control"] == "no-store" and headers["X-Frame-Options"] == "DENY"
+    for path in ("/", "/live", "/../etc/passwd", path_of(server)[:-2] + "x/", "/" + "x" * 500):
+        assert asked(server, path)[0] == 404
+    with Server(a_session(True), b"") as other:
+        assert path_of(other) != path_of(server)
+
+
+def test_other_names_and_other_pages_are_refused(server: Server) -> None:
+    """A page of another origin whose name resolves to this machine, and one with the address."""
+    assert asked(server, path_of(server), Host="evil.example:80")[0] == 403
+    assert asked(server, path_of(server), Host="localhost:9000")[0] == 200
+    from websockets.exceptions import InvalidStatus
+
+    with pytest.raises(InvalidStatus, match="403"), socket_of(server, origin="http://evil.example"):
+        pass
+    with socket_of(server, origin=server.address.rsplit("/", 2)[0]) as watcher:
+        assert watcher.recv(10)
+
+
+def test_no_more_may_watch_than_it_can_serve(
+    server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from websockets.exceptions import InvalidStatus
+
+    monkeypatch.setattr("factory.apps.live.server.MOST", 2)
+    with socket_of(server) as one, socket_of(server) as other:
+        assert one.recv(10) and other.recv(10)
+        with pytest.raises(InvalidStatus, match="503"), socket_of(server):
+            pass
+
+
+def test_watchers_see_frames_and_are_obeyed(server: Server, running: Running) -> None:
+    running.until(lambda f: f.count > 3)
+    with socket_of(server) as one, socket_of(server) as other:
+        frame, poses = unpacked(one.recv(10))
+        assert poses.size == 7 * len(running.session.bodies) and np.isfinite(poses).all()
+        assert len(frame["fired"]) == frame["count"] > 3
+        other.send('{"do": "slow", "robot": 1, "factor": 0.5}')
+        while not frame["slowed"]:
+            frame, _ = unpacked(one.recv(10))
+        assert frame["slowed"] == {"1": 0.5}
+        other.send('{"do": "fly"}')
+        while isinstance(message := other.recv(10), bytes):
+            pass
+        assert "'do' is 'fly'" in json.loads(message)["error"]
+        other.send("x" * 100_000)
+    running.until(lambda f, n=running.session.frame.number: f.number > n)
+
+
+def test_every_firing_is_told_once(server: Server, running: Running) -> None:
+    with socket_of(server) as watcher:
+        running.session.send(Command("speed", factor=0.0))
+        told: list[tuple[float, int]] = []
+        while len(told) < 150:
+            frame, _ = unpacked(watcher.recv(10))
+            told += map(tuple, frame["fired"])
+            assert len(told) == frame["count"]
+    assert told == running.session.fired(0, 0, len(told))
+
+
+def test_it_listens_on_loopback_only(running: Running) -> None:
+    for host in ("0.0.0.0", "::", "192.0.2.1", "example.org"):
+        with pytest.raises(InputError, match="other machines"):
+            Server(running.session, b"", host)
+    with Server(running.session, b"") as server:
+        assert server._server.socket.getsockname()[0] == "127.0.0.1"
+    with Server(running.session, b"", "0.0.0.0", exposed=True) as server:
+        path = path_of(server)
+        assert asked(server, path, Host="factory.example:80")[0] == 200
+        assert asked(server, "/")[0] == 404
+
+
+def test_a_port_that_is_taken(running: Running) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        with pytest.raises(InputError, match=r"cannot listen on 127\.0\.0\.1, port"):
+            Server(running.session, b"", port=taken.getsockname()[1])
+
+
+def test_the_page_names_every_robot_and_part(running: Running) -> None:
+    made = page(Session(lambda: Simulation(paper_layout(), RunRequest(units=9)))).decode()
+    data = json.loads(made.split('id="data">')[1].split("</script>")[0])
+    assert data["parts"] == [o.label for o in paper_layout().factory.leaves]
+    assert len(data["frames"]["reach"][0]) == len(data["frames"]["moving"])
+    assert "connect-src 'self'" in made and 'class="station"' in made
+
+
+def test_robots_are_drawn_in_one_piece() -> None:
+    """A carriage is 60 mm wide; the finger is on its arm."""
+    layout = paper_layout()
+    drawn = floor_plan(stage_of(Simulation(layout)), labels_of(layout.factory))
+    groups = next(g for g in ElementTree.fromstring(drawn) if g.get("class") == "robots")
+    for path, group in zip(layout.guidepaths, groups, strict=True):
+        for shape in group:
+            corners = [tuple(map(float, p.split(","))) for p in shape.get("points", "").split()]
+            assert len(corners) >= 4
+            assert max(np.hypot(x, y) for x, y in corners) <= 1e3 * path.reach + 31
+
+
+def test_a_push_answers() -> None:
+    """Which robot, with what force, how far it gave way; while the factory stands, that it will."""
+    running = Running()
+    try:
+        running.session.send(Command("pause"))
+        running.until(lambda f: not f.playing)
+        running.session.send(Command("push", robot=2, share=-1.0))
+        running.until(lambda f: "r3 is pushed back with" in f.pushed)
+        running.session.send(Command("play"))
+        running.until(lambda f: re.fullmatch(ANSWER, f.pushed) is not None)
+    finally:
+        running.close()
+
+
+ANSWER = r"r3 was pushed back with \d+ N and displaced by [1-9]\d*\.\d mm"
+
+
+# --- the command -------------------------------------------------------------------------------
+
+
+def test_the_command_serves_until_it_is_interrupted() -> None:
+    words = ("view", PAPER, "--port", 0, "--json", "--jitter", 0.2)
+    with started(*words, stdout=PIPE, stderr=PIPE, text=True) as process:
+        told = json.loads(process.stdout.readline())
+        assert told["address"].startswith(f"http://127.0.0.1:{told['port']}/")
+        with websockets.connect(
+            told["address"].replace("http", "ws") + "live", proxy=None
+        ) as watcher:
+            assert unpacked(watcher.recv(10))[0]["playing"]
+            process.stdout.close()  # nothing reads it from now on
+            process.send_signal(signal.SIGINT)
+            assert process.wait(20) == 130
+        assert process.stderr.read().strip() == "Interrupted stopped by the user"
+
+
+def test_other_hosts_need_a_word(run: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The error comes before anything is laid out."""
+    monkeypatch.setattr("factory.pipeline.read", None)
+    done = run("view", PAPER, "--host", "0.0.0.0", "--json")
+    assert done.status == 2 and done.codes == ["BadValue"]
+    assert "--expose" in done.json["errors"][0]["hint"]
+
+
+def test_what_is_missing_is_said_first(run: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("factory.pipeline.read", None)
+    monkeypatch.setitem(sys.modules, "websockets.sync.server", None)
+    done = run("view", PAPER, "--json")
+    assert done.status == 3 and done.codes == ["Missing"]
+    assert done.json["errors"][0]["hint"] == "pip install 'klavins-factory[live]'"
+
+
+def test_every_key_of_a_command_is_checked() -> None:
+    keys = {key for keys in (*KEYS.values(), *FAULTS.values()) for key in keys}
+    assert keys == {field.name for field in fields(Command)} - {"do"}

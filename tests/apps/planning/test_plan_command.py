@@ -1,0 +1,328 @@
+"""`factory plan` from end to end: what it is asked for, and what it says and writes."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable
+from itertools import count, pairwise
+from pathlib import Path
+from types import SimpleNamespace
+
+import imageio.v3 as iio
+import pytest
+
+from factory.apps.planning.blocking import blocking
+from factory.apps.planning.cannot import interlocks
+from factory.apps.planning.command_line.plan import _by_label
+from factory.apps.planning.interlocked import PAINTS
+from factory.pipeline import read
+from factory.support.progress import StepBar
+from tests.apps.planning.test_plan_puzzles import CHAIN, LOADED, PEG
+from tests.command_line import Done, Terminal
+from tests.opengl import needs_gl
+from tests.paths import ROOT, files_in
+from tests.plan_puzzles import Parts, block, pinwheel, source, tub
+
+EXAMPLES = ROOT / "examples"
+Planning = Callable[..., Done]
+
+
+@pytest.fixture
+def planning(run: Terminal, tmp_path: Path) -> Planning:
+    """Plans a puzzle, or a PAG, with its tree thrown away, into `out`."""
+
+    def planned(what: Parts | Path, *words: object, out: str = "out") -> Done:
+        file = what if isinstance(what, Path) else puzzle(tmp_path, what)
+        return run("plan", file, "--replan", "-o", tmp_path / out, *words, "--json")
+
+    return planned
+
+
+def puzzle(folder: Path, parts: Parts) -> Path:
+    source(folder, parts)
+    return folder / "puzzle.pag"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["gearbox", "chest", "truck", "chair"])
+def test_a_plan_is_free_and_no_slower_than_the_tree_drawn_by_hand(
+    planning: Planning, run: Terminal, name: str
+) -> None:
+    from factory.engine.timing.timed import pace
+
+    done = planning(EXAMPLES / f"{name}.pag", "--no-look", "--no-screws")
+    assert done.status == 0, done.err
+    checked = run("check", done.json["pag"], "--json").json
+    assert checked["live"] and checked["approaches"]["blocked"] == 0
+    assert checked["robots"] == done.json["figures"]["robots"]
+    by_hand, planned = read(EXAMPLES / f"{name}.pag"), read(Path(done.json["pag"]))
+    cycles = [pace(one.layout, one.settings)[0].seconds for one in (planned, by_hand)]
+    assert cycles[0] <= cycles[1]
+    assert cycles[0] == pytest.approx(done.json["figures"]["cycle"])
+
+
+def test_few_robots_a_small_floor_or_a_short_cycle(planning: Planning) -> None:
+    asked = {}
+    for aim in ("cycle", "robots", "floor"):
+        done = planning(LOADED, "--for", aim, "--no-look", out=aim)
+        assert done.status == 0, done.err
+        assert done.json["optimal"], "a product whose trees are proved to the end"
+        asked[aim] = done.json["figures"]
+    slack = 1.01  # figures that differ by less are as good as each other
+    assert asked["robots"]["robots"] < asked["cycle"]["robots"]
+    assert asked["cycle"]["cycle"] <= slack * min(one["cycle"] for one in asked.values())
+    assert asked["floor"]["area"] <= slack * min(one["area"] for one in asked.values())
+
+
+def test_each_operation_has_its_room(planning: Planning, run: Terminal, tmp_path: Path) -> None:
+    joins = planning(PEG, "--no-look").json["joins"]
+    assert {join["label"] for join in joins} == labels_of(tmp_path / "out" / "puzzle.pag")
+    rooms = [join["clearance"] for join in joins]
+    assert all(room is None or room >= -1e-5 for room in rooms)
+    words = ("plan", tmp_path / "puzzle.pag", "--replan", "-o", tmp_path / "out", "--no-look")
+    told = run(*words, "-v").out
+    for join in joins:
+        (line,) = [line for line in told.splitlines() if line.startswith(f"  {join['label']}: ")]
+        room = join["clearance"]
+        assert line.endswith("nothing near" if room is None else f"room {1e3 * room:.2f} mm")
+
+
+@pytest.mark.parametrize("drawn", [False, True])
+def test_the_report_has_the_way_and_the_room_of_an_operation(
+    planning: Planning, run: Terminal, tmp_path: Path, drawn: bool
+) -> None:
+    """That of the plan; and that a pair is left out that is drawn into each other, by 0.03 mm which
+    nobody has allowed."""
+    wall = (-20, -20, 0.2), (-4.97 if drawn else -5.2, 20, 30.2)
+    done = planning({**PEG, "cap": [*PEG["cap"][1:], wall]}, "--no-look")
+    (join,), to = done.json["joins"], tmp_path / "report.html"
+    assert run("report", done.json["pag"], "--units", 1, "-o", to).status == int(drawn)
+    text = to.read_text().partition("How parts come together")[2].partition("</table>")[0]
+    (row,) = [row for row in text.split("<tr>") if f">{join['label']}<" in row]
+    assert "<td>peg + cap</td><td>cap is lowered " in row
+    room = f"{1e3 * abs(join['clearance']):.2f} mm"
+    assert (f">overlap of {room} as drawn<" if drawn else f">{room}<") in row
+    assert (">cap - peg<" if drawn else ">none<") in row
+
+
+def labels_of(pag: Path) -> set[str]:
+    matings = read(pag).matings
+    assert matings is not None
+    return {mating.label for mating in matings.all}
+
+
+@needs_gl
+def test_what_interlocks_is_said_and_drawn_and_nothing_else_is_written(
+    planning: Planning, tmp_path: Path
+) -> None:
+    done = planning(pinwheel())
+    assert (done.status, done.codes) == (2, ["CannotAssemble"])
+    (error,) = done.json["errors"]
+    assert "a, b, c" in error["message"] and "puzzle-interlocked.png" in error["message"]
+    assert "--allow" in error["hint"]
+    (lock,) = done.json["interlocks"]
+    assert lock["parts"] == ["a", "b", "c"]
+    assert sorted(lock["circuits"]) == ["+x", "+y", "+z", "-x", "-y", "-z"]
+    assert all(set(way) == {"a", "b", "c"} for way in lock["circuits"].values())
+    assert done.json["removal"]["smallest"] and len(done.json["removal"]["labels"]) == 1
+    assert list(files_in(tmp_path / "out")) == ["puzzle-interlocked.png"]
+    pixels = iio.imread(tmp_path / "out" / "puzzle-interlocked.png")
+    assert all((pixels == paint).all(axis=2).any() for paint in PAINTS[:3])
+
+
+@pytest.mark.parametrize("parts", [pinwheel(), CHAIN])
+def test_a_circuit_is_a_proof(tmp_path: Path, parts: Parts) -> None:
+    """Each part of it may not go out past the next one, and all that interlock are in it."""
+    found = blocking(source(tmp_path, parts))
+    (lock,) = interlocks(found)
+    assert len(lock.circuits) == 6
+    for (axis, side), way in lock.circuits:
+        assert set(way) == set(lock.labels)
+        locks = found.locks[axis] if side > 0 else found.locks[axis].T
+        units = [found.labels.index(label) for label in (*way, way[0])]
+        assert all(locks[one, other] for one, other in pairwise(units))
+
+
+def test_joins_find_their_operations_whenever_screws_are_driven() -> None:
+    """Screw s is driven before b comes, and screw t before c: the joins of b and c omit them."""
+    labels = ["a", "b", "c", "s", "t"]
+    operations = [("as", "a", "s"), ("ab", "as", "b"), ("abt", "ab", "t"), ("abc", "abt", "c")]
+    steps = [SimpleNamespace(label=whole, inputs=(one, other)) for whole, one, other in operations]
+    made = [("a", "b"), ("ab", "c"), ("a", "s"), ("ab", "t")]
+    joins = [SimpleNamespace(pile=tuple(pile), come=(come,)) for pile, come in made]
+    parts = [(label, [SimpleNamespace(label=label)]) for label in labels]
+    project = SimpleNamespace(
+        pag=SimpleNamespace(postorder=lambda: steps), matings=SimpleNamespace(all=steps)
+    )
+    told = _by_label(
+        SimpleNamespace(units=lambda: parts), SimpleNamespace(operations=joins), project
+    )
+    assert {label: join.come for label, join in told.items()} == {
+        whole: (come,) for whole, _, come in operations
+    }
+
+
+def test_what_interlocks_is_not_drawn_where_no_pictures_are_wanted(
+    planning: Planning, tmp_path: Path
+) -> None:
+    done = planning(CHAIN, "--no-look")
+    assert (done.status, done.codes, done.json["files"]) == (2, ["CannotAssemble"], [])
+    assert not (tmp_path / "out").exists()
+
+
+def test_clashes_that_are_allowed_are_counted_and_written(
+    planning: Planning, run: Terminal
+) -> None:
+    """Of a part that may pass through all others, or of a pair, whatever overlaps when finished:
+    `check` knows that they are allowed, as deep as they are and no deeper."""
+    refused = planning(CHAIN, "--no-look")
+    (label,) = refused.json["removal"]["labels"]
+    done = planning(CHAIN, "--allow", label, "--no-look")
+    assert done.status == 0, done.err
+    assert done.json["figures"]["blocked"] == done.json["approaches"]["blocked"] > 0
+    assert planning(CHAIN, "--allow", f"{label}s", "--no-look").codes == ["Usage"]
+    pairs = [a.parts for a in read(Path(done.json["pag"])).pag.allowed]
+    again = planning(
+        CHAIN, *(w for pair in pairs for w in ("--allow", ":".join(pair))), "--no-look"
+    )
+    for one in (done, again):
+        found = read(Path(one.json["pag"])).pag
+        assert found.allowed and all(0 < a.depth < 0.1 for a in found.allowed)
+        checked = run("check", one.json["pag"], "--json").json
+        codes = [w["code"] for w in (*one.json["warnings"], *checked["warnings"])]
+        assert checked["approaches"]["blocked"] > 0 and "Blocked" not in codes
+
+
+STACK = """root = stack; stack = mate ( pair, third );
+pair = press ( two, dwell = 0.5 ); two = mate ( first, second );
+first = atomic ( box = ( 0.1, 0.1, 0.1 ), pos = ( 0, 0, 0.05 ) );
+second = atomic ( box = ( 0.1, 0.1, 0.1 ), pos = ( 0, 0, 0.15 ) );
+third = atomic ( box = ( 0.1, 0.1, 0.1 ), pos = ( 0, 0, 0.25 ) )
+"""
+
+
+def test_a_sub_tree_is_kept(run: Terminal, tmp_path: Path) -> None:
+    (tmp_path / "stack.pag").write_text(STACK)
+    words = ("--keep", "pair", "--no-look", "-o", tmp_path / "out")
+    done = run("plan", tmp_path / "stack.pag", *words, "--json")
+    assert done.status == 0, done.err
+    assert done.json["kept"] == ["pair"]
+    after = read(Path(done.json["pag"])).pag
+    assert (after["pair"].operation, after["pair"].inputs) == ("press", ("two",))
+    assert (after["two"].operation, after["two"].inputs) == ("mate", ("first", "second"))
+    (join,) = done.json["joins"]
+    assert {*join["pile"], *join["come"]} == {"pair", "third"}
+
+
+MANY: Parts = {
+    "tube": [*tub(20, 20, 0, 140)],
+    **{f"disc{n}": [block(19, 19, 10 * n + 0.2, 10 * n + 10)] for n in range(13)},
+}
+"""More parts than a proof is sure to be made for."""
+
+
+def test_a_tree_is_found_in_no_time(planning: Planning) -> None:
+    done = planning(MANY, "--no-look", "--seconds", 0.001)
+    assert done.status == 0, done.err
+    figures = done.json["figures"]
+    assert figures["layouts"] == 1 and figures["blocked"] == 0 and not done.json["optimal"]
+
+
+def test_the_best_so_far_is_kept_on_a_signal(
+    planning: Planning, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown = count()
+
+    def stop(*words: object) -> None:
+        if next(shown) == 1:  # the first tree
+            os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(StepBar, "show", stop)
+    done = planning(MANY, "--no-look", "--seconds", 600)
+    assert done.status == 0, done.err
+    figures = done.json["figures"]
+    assert figures["layouts"] == 1 and figures["blocked"] == 0 and not done.json["optimal"]
+    assert labels_of(Path(done.json["pag"]))
+
+
+def test_the_time_that_is_asked_for_bounds_proofs_of_small_products(planning: Planning) -> None:
+    """Of one whose trees are proved to the end where none is asked for."""
+    done = planning(LOADED, "--no-look", "--seconds", 0.001)
+    assert done.status == 0, done.err
+    assert done.json["figures"]["layouts"] == 1 and not done.json["optimal"]
+
+
+@pytest.mark.parametrize(
+    ("where", "kept"),
+    [
+        ("factory.apps.planning.plan.blocking", False),
+        ("factory.apps.planning.exploded.ExplodedView.film", True),
+    ],
+)
+def test_a_signal_is_heard_at_once(
+    planning: Planning, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, where: str, kept: bool
+) -> None:
+    """While there is no tree yet, and while pictures are made, when the plan is written already."""
+
+    def stop(*_: object) -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        raise AssertionError("the signal was not heard")
+
+    monkeypatch.setattr("factory.apps.planning.exploded.ExplodedView.still", lambda *_: None)
+    monkeypatch.setattr(where, stop)
+    done = planning(LOADED, "--seconds", 0.001)
+    assert (done.status, done.codes) == (130, ["Interrupted"])
+    assert (tmp_path / "out" / "puzzle.pag").exists() == kept
+    assert not list(tmp_path.glob("out/*.mp4"))
+
+
+def test_the_answer_does_not_wait_for_pictures(
+    run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(*_: object) -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr("factory.apps.planning.exploded.ExplodedView.still", stop)
+    done = run("plan", puzzle(tmp_path, PEG), "--replan", "-o", tmp_path / "out")
+    assert done.status == 130
+    assert "robots, cycle time about" in done.out and "factory run" in done.out
+
+
+def test_no_pictures_are_made_after_a_signal(
+    planning: Planning, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown = count()
+
+    def stop(*_: object) -> None:
+        if next(shown) == 1:  # the first tree
+            os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(StepBar, "show", stop)
+    done = planning(LOADED)
+    assert done.status == 0, done.err
+    assert "interrupt again to stop at once" in done.err
+    assert not [name for name in files_in(tmp_path / "out") if name.endswith(("png", "mp4"))]
+
+
+HEAVY = """root = all; all = mate ( stem, slab );
+stem = atomic ( box = ( 0.02, 0.01, 0.6 ), pos = ( 0, 0, 0.3 ) );
+slab = atomic ( box = ( 0.6, 0.6, 0.1 ), pos = ( 0, 0, 0.65 ), density = 8000 )
+"""
+
+
+def test_what_is_too_heavy_for_every_hand_is_said_by_plan_and_check(
+    run: Terminal, tmp_path: Path
+) -> None:
+    (tmp_path / "all.pag").write_text(HEAVY)
+    words = ("--replan", "--no-look", "-o", tmp_path / "out")
+    done = run("plan", tmp_path / "all.pag", *words, "--json")
+    checked = run("check", done.json["pag"], "--json")
+    for warnings in (done.json["warnings"], checked.json["warnings"]):
+        grips = [w for w in warnings if w["code"] == "NoGrip"]
+        assert {w["message"] for w in grips} == {
+            "no hand can hold 'slab'",
+            "no hand can hold 'all'",
+        }
+        assert any("not even a pin bears the load" in w["hint"] for w in grips)
+        assert any("times its strength" in w["hint"] for w in grips)

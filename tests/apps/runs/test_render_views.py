@@ -1,0 +1,270 @@
+"""What cameras show: all that moves, large, with nothing in front of it; found without drawing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from factory.apps.log import Log, LogWriter, read_log
+from factory.apps.log.model import model_of
+from factory.apps.monitor.record import recorded_subject
+from factory.engine.mjcf import names
+from factory.engine.mjcf.replica import Replica
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.film.action import FAINT, Action, Fading, action_of, placed, shape_of
+from factory.film.camerawork import Take
+from factory.film.following import Viewpoint
+from factory.film.junction import handover_view
+from factory.film.picture import Picture, orbit, overview
+from factory.film.shot import moment_of, recorded_take
+from factory.floor.geometry.sight import Framing, View, fit, towards
+from factory.support.engine import mujoco
+from factory.theory.problem.pag import NOPART
+from tests.examples import without_hands
+from tests.pag_texts import laid_out
+
+WIDE, BESIDE_PANELS = Framing(16 / 9, below=0.1), Framing(716 / 720, below=0.1)
+
+
+@pytest.fixture(scope="module", params=["paper", "lamp"])
+def log(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Log:
+    """The log of a factory without lifts, and of one with."""
+    path = tmp_path_factory.mktemp("log") / "run.log"
+    layout = without_hands(request.param)
+    simulation = Simulation(layout, RunRequest("mujoco", units=2))
+    with LogWriter(path, simulation) as writer:
+        simulation.run([writer.observe])
+    return read_log(path)
+
+
+@pytest.fixture(scope="module")
+def take(log: Log) -> Take:
+    return recorded_take(log, lambda: (model_of(log), recorded_subject(log.header)), Picture())
+
+
+@pytest.fixture(scope="module")
+def replica(take: Take) -> Replica:
+    return Replica(take.m)
+
+
+@pytest.fixture(scope="module")
+def action(replica: Replica) -> Action:
+    return action_of(replica.m, Replica(replica.m).d)
+
+
+def seen(view: View, points: np.ndarray) -> np.ndarray:
+    """Where points are in a view (n, 2): from -1 to 1 within the frame, either way."""
+    right, up, ahead = view.axes @ (points - view.position).T
+    assert (ahead > 0).all()
+    return np.stack([right / ahead / view.wide, up / ahead / view.tall], axis=1)
+
+
+def moving(replica: Replica, row: np.ndarray) -> np.ndarray:
+    """Corners of what moves in a state: robots, and parts that are in sight and not in the shed."""
+    m, d = replica.m, replica.d
+    replica.place(row)
+    wall = m.geom("outfeed/wall1")
+    mouth = float(wall.pos[0] - wall.size[0])
+    found = []
+    for g in range(m.ngeom):
+        body = m.body(int(m.body_rootid[m.geom_bodyid[g]]))
+        inside = body.name.startswith("part/") and d.xpos[body.id, 2] > 0
+        if (inside and d.xpos[body.id, 0] < mouth) or names.kind(body.name) == "robot":
+            found.append(placed(m, d, g))
+    return np.concatenate(found)
+
+
+# --- framing --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("camera", ["overview", "orbit", "top"])
+@pytest.mark.parametrize("framing", [WIDE, BESIDE_PANELS, Framing(9 / 16, below=0.1)])
+def test_all_that_moves_is_in_the_frame_all_the_time(log, take, replica, camera, framing) -> None:
+    viewpoint = Viewpoint(Replica(take.m), camera, framing, take.subject)
+    for row in range(0, len(log), max(1, len(log) // 60)):
+        moment = moment_of(log, row)
+        view = viewpoint.view(moment.shown, 1 / 30, 7 * moment.time)
+        assert np.abs(seen(view, moving(replica, moment.shown.qpos))).max() < 1
+
+
+@pytest.mark.parametrize("framing", [WIDE, BESIDE_PANELS])
+def test_the_frame_is_filled_one_way(replica, action, framing) -> None:
+    view = overview(action.points, framing)
+    filled = np.ptp(seen(view, action.points), axis=0) / 2
+    assert filled.max() > 0.85
+
+
+def test_lifts_are_seen_up_and_down(replica, action) -> None:
+    m = replica.m
+    strokes = [2 * m.geom(g).size[1] for g in range(m.ngeom) if m.geom(g).name.endswith("/column")]
+    if not strokes:
+        pytest.skip("this factory has no lift")
+    loads = action.robots[:, :, 2]
+    assert np.ptp(loads, axis=1).max() > max(strokes)
+
+
+def test_a_fused_body_may_be_made_of_shells_alone() -> None:
+    """All its parts overlap what comes later, so each has a body of its own in it."""
+    layout = laid_out(
+        "root = all; all = mate(both, c); both = mate(a, b);"
+        "a = atomic(); b = atomic(pos = (0.05, 0, 0)); c = atomic(pos = (0.025, 0.02, 0))"
+    )
+    m = Simulation(layout, RunRequest(fuse=True)).physical.m
+    body = m.body(names.part("both", 1)).id
+    assert m.body_geomnum[body] == 0
+    assert np.ptp(shape_of(m, body), axis=0)[0] > 0.04
+
+
+def test_an_orbit_is_as_near_as_it_can_be_and_calm() -> None:
+    """A camera at an even distance is as far away everywhere as the widest side asks."""
+    points = np.random.default_rng(3).uniform((-3, -1, 0), (3, 1, 0.4), (60, 3))
+    tight = Framing(16 / 9, 0.0, 0.0, 0.0)
+    look = orbit(points, tight)
+    views = [look(time) for time in np.arange(0.0, 45.0, 0.25)]
+    assert max(np.abs(seen(view, points)).max() for view in views) < 1.002
+    away = np.array([view.distance for view in views])
+    widest = max(fit(points, view.axes, tight).distance for view in views)
+    assert away.max() < 1.05 * widest and away.min() < 0.93 * away.max()
+    steps = np.abs(np.diff(away)) / away[1:]
+    assert steps.max() < 0.02 and np.abs(np.diff(away, 2)).max() < 0.01 * away.mean()
+
+
+@pytest.mark.parametrize("camera", ["product", "part:{}"])
+def test_what_is_followed_is_watched_in_all_its_eighths(log, take, replica, camera) -> None:
+    """A post that hides an eighth of a product stands in front of it."""
+    label = take.subject.factory.leaves[0].label
+    viewpoint = Viewpoint(Replica(take.m), camera.format(label), WIDE, take.subject)
+    moment = moment_of(log, len(log) // 2)
+    view = viewpoint.view(moment.shown, 0.0, moment.time)
+    eighths = viewpoint.watched
+    assert eighths.shape == (8, 8, 3) and np.abs(seen(view, eighths.reshape(-1, 3))).max() < 1
+    sizes = np.ptp(eighths, axis=1)
+    assert np.allclose(2 * sizes, np.ptp(eighths.reshape(-1, 3), axis=0))
+
+
+# --- fading ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("framing", [WIDE, BESIDE_PANELS])
+def test_each_hand_over_is_seen_from_near_by(log, take, framing) -> None:
+    """When the operation that takes a label ends, its parts are where the camera looks, and in the
+    frame with the pads of the robots; they fill it."""
+    factory, m = take.subject.factory, take.m
+    for node in factory.pag.nodes:
+        viewpoint = Viewpoint(Replica(m), f"handover:{node.label}", framing, take.subject)
+        taking = factory.operations[factory.parents[factory.by_label[node.label].index]]
+        times = (t for t, name in log.events if name == f"{taking.label}_e")
+        row = log.row_at(next(times)) - 1
+        replica, moment = Replica(m), moment_of(log, row)
+        replica.place(log.qpos[row])
+        view = viewpoint.view(moment.shown, 0.0, moment.time)
+        there = np.concatenate([placed(m, replica.d, g) for g in _geoms_of(m, factory, node.label)])
+        assert np.abs(there.min(axis=0) - viewpoint.watched[0].min(axis=0)).max() < 2e-3
+        assert np.abs(there.max(axis=0) - viewpoint.watched[0].max(axis=0)).max() < 2e-3
+        at = seen(view, np.concatenate([there, *viewpoint.watched]))
+        assert np.abs(at).max() < 1.0
+        assert np.ptp(at, axis=0).max() > 0.7, node.label
+        assert len(viewpoint.watched) > 1, "no pad is seen"
+        share = shown_share(replica, _geoms_of(m, factory, node.label), view.position)
+        assert share > 0.3, f"{node.label}: {share:.2f} is seen"
+
+
+def shown_share(replica: Replica, geoms: list[int], eye: np.ndarray) -> float:
+    """The share of rays from a camera to geoms that meet these first, or a post, which fades."""
+    m, d, found = replica.m, replica.d, []
+    for geom in geoms:
+        box = placed(m, d, geom)
+        for weights in np.random.default_rng(0).dirichlet(np.ones(8), 40):
+            ray, hit = weights @ box - eye, np.zeros(1, np.int32)
+            mujoco.mj_ray(m, d, eye, ray, None, 1, -1, hit, None)
+            name = m.geom(int(hit[0])).name if hit[0] >= 0 else ""
+            found.append(hit[0] in geoms or name.endswith(("/post", "/boom")))
+    return float(np.mean(found))
+
+
+def _geoms_of(m: mujoco.MjModel, factory, label: str) -> list[int]:
+    """The geoms of the first copies of a label's parts."""
+    bodies = {names.part(part, 1) for part in factory.contents[label]}
+    return [g for g in range(m.ngeom) if m.body(int(m.geom_bodyid[g])).name in bodies]
+
+
+def test_a_hand_over_is_seen_from_aside(take) -> None:
+    """No robot stands in front of it, or behind it, where it can be otherwise; what the view was
+    taken from is left as it was found."""
+    replica = Replica(take.m)
+    before = replica.d.qpos.copy()
+    for label in ("part1", "sub1"):
+        if label not in take.subject.factory.by_label:
+            return
+        _, view = handover_view(replica, take.subject, label, WIDE)
+        assert (replica.d.qpos == before).all()
+        ahead = view.axes[2][:2] / np.linalg.norm(view.axes[2][:2])
+        taking = take.subject.factory.by_label["sub1" if label == "part1" else "sub2"]
+        held = zip(taking.robots, taking.before, taking.after, strict=True)
+        for robot in [robot for robot, *labels in held if set(labels) != {NOPART}]:
+            body = replica.m.body(names.carriage(take.subject.factory.robots[robot].name)).id
+            along = replica.d.xaxis[replica.m.body_jntadr[body]][:2]
+            assert abs(ahead @ along) < 0.9
+
+
+def opacity(replica: Replica, feeder: str) -> float:
+    """How opaque a feeder's post is."""
+    return float(replica.m.geom(f"{feeder}/post").rgba[3])
+
+
+def first_feeder(m: mujoco.MjModel) -> str:
+    posts = (m.geom(g).name for g in range(m.ngeom))
+    return next(name for name in posts if name.endswith("/post")).removesuffix("/post")
+
+
+def test_a_post_in_front_fades_and_one_behind_does_not(take) -> None:
+    replica = Replica(take.m)
+    fading, feeder = Fading(replica), first_feeder(take.m)
+    post = placed(replica.m, replica.d, replica.m.geom(f"{feeder}/post").id)
+    for azimuth in (-90.0, 0.0, 90.0, 180.0):
+        axes = towards(azimuth, 10.0)
+        ahead = np.array([axes[2][0], axes[2][1], 0.0])
+        view = fit(post, axes, WIDE)
+        fading.fade(view, (post + 0.3 * ahead)[None])
+        assert opacity(replica, feeder) < FAINT + 0.05
+        fading.fade(fit(post, axes, WIDE), (post - 0.3 * ahead)[None])
+        assert opacity(replica, feeder) == 1.0
+
+
+def test_what_fades_keeps_its_colour_and_robots_never_fade(take, action) -> None:
+    replica = Replica(take.m)
+    before = replica.m.geom_rgba.copy()
+    fading = Fading(replica)
+    fading.fade(overview(action.points, WIDE), action.robots)
+    changed = np.flatnonzero((replica.m.geom_rgba != before).any(axis=1))
+    faded = [g for g in changed if replica.m.geom_rgba[g, 3] < 1]
+    assert faded
+    m, material = replica.m, take.m.geom_matid
+    for g in changed:
+        assert names.kind(m.geom(g).name) in ("feeder", "outfeed")
+        worn = m.mat_rgba[material[g]] if material[g] >= 0 else before[g]
+        assert np.allclose(m.geom_rgba[g, :3], worn[:3])
+
+
+def test_fading_is_of_the_view_alone(take, action) -> None:
+    """Films and stills, runs and logs show the same: what was seen before plays no part."""
+    one, other = Replica(take.m), Replica(take.m)
+    look = orbit(action.points, WIDE)
+    first, second = Fading(one), Fading(other)
+    for time in (0.0, 9.0, 20.0, 31.0):
+        first.fade(look(time), action.robots)
+    second.fade(look(31.0), action.robots)
+    assert (one.m.geom_rgba == other.m.geom_rgba).all()
+
+
+def test_what_fades_in_an_orbit_takes_a_quarter_of_a_second_at_least(take, action) -> None:
+    replica = Replica(take.m)
+    fading, look = Fading(replica), orbit(action.points, WIDE)
+    last, steps = None, []
+    for time in np.arange(0.0, 45.0, 1 / 15):
+        fading.fade(look(float(time)), action.robots)
+        alpha = replica.m.geom_rgba[fading.geoms, 3].copy()
+        steps += [] if last is None else [np.abs(alpha - last).max()]
+        last = alpha
+    assert 0.01 < max(steps) < 0.3

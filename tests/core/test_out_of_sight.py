@@ -1,0 +1,225 @@
+"""Nothing appears or vanishes in sight: a body that jumps changes no pixel of any picture."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import atan2, cos, degrees, hypot, sin
+
+import numpy as np
+import pytest
+
+from factory.engine.mjcf import names
+from factory.engine.mjcf.parts import HIDDEN
+from factory.engine.mjcf.replica import SHOWN, Replica
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.dimensions import RISE
+from factory.floor.layout.feeding import feeder_of
+from factory.floor.layout.layout import Layout
+from factory.support import gl
+from factory.support.engine import mujoco
+from factory.support.resource import Closing
+from tests.examples import without_hands
+from tests.opengl import needs_gl
+
+SIZE = 240, 320
+"""Height and width of a picture."""
+
+EYES = 0.3
+"""Height of the low cameras [m]."""
+
+AWAY = 1.0
+"""How far from where they look they are at least [m]."""
+
+FAR = 0.02
+"""A body jumps when it is further than this from where it was a timestep before [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Jump:
+    """What a body does between two states: how all joints and welds are, and where it is, before
+    and after."""
+
+    body: str
+    before: np.ndarray
+    after: np.ndarray
+    places: tuple[np.ndarray, np.ndarray]
+
+    @property
+    def in_sight(self) -> np.ndarray:
+        """Where it is above the floor."""
+        low, high = sorted(self.places, key=lambda place: float(place[2]))
+        assert low[2] < HIDDEN < high[2]
+        return high
+
+
+def jumps(layout: Layout, units: int, fuse: bool = False) -> Iterator[Jump]:
+    """What jumps in a run. The state after a jump is that of the body alone: nothing else moves."""
+    simulation = Simulation(layout, RunRequest(units=units, fuse=fuse))
+    m, d, welds = simulation.physical.m, simulation.physical.d, simulation.physical.parts.welds
+    found: list[Jump] = []
+    write = welds._put
+
+    def put() -> None:
+        before, places = d.qpos.copy(), d.xpos.copy()
+        write()
+        for body in np.flatnonzero(np.linalg.norm(d.xpos - places, axis=1) > FAR).tolist():
+            name = m.body(body).name
+            found.append(Jump(name, before, d.qpos.copy(), (places[body], d.xpos[body].copy())))
+
+    welds._put = put  # type: ignore[method-assign]
+    run = simulation.run()
+    assert run.products == units and run.physics and not run.physics.unintended_contacts
+    yield from found
+
+
+def cameras(layout: Layout, at: np.ndarray) -> Iterator[mujoco.MjvCamera | str]:
+    """The overview, the one from above, and low ones from every side that look at a place, no
+    steeper than housings are made for."""
+    yield from ("overview", "top")
+    size = float(max(layout.product.high - layout.product.low))
+    away = max(AWAY, 3 * size, (at[2] - EYES) / RISE)
+    for turn in np.arange(4) * np.pi / 2 + 0.3:
+        eye = np.array([at[0] + away * cos(turn), at[1] + away * sin(turn), EYES])
+        look = at - eye
+        camera = mujoco.MjvCamera()
+        camera.lookat[:], camera.distance = at, float(np.linalg.norm(look))
+        camera.azimuth = degrees(atan2(look[1], look[0]))
+        camera.elevation = degrees(atan2(look[2], hypot(look[0], look[1])))
+        yield camera
+
+
+class Eye(Closing):
+    """Looks at a model, of which some geoms may be left out or changed."""
+
+    def __init__(self, layout: Layout, m: mujoco.MjModel) -> None:
+        self.layout, self.replica = layout, Replica(m)
+        self._held = gl.context(SIZE[1], SIZE[0])
+        self._scene = mujoco.MjvScene(m, maxgeom=10_000)
+        self._drawing = mujoco.MjrContext(m, mujoco.mjtFontScale.mjFONTSCALE_150.value)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._drawing)
+
+    def close(self) -> None:
+        self._held.make_current()
+        self._drawing.free()
+        self._held.free()
+
+    def geom(self, name: str) -> int:
+        return int(self.replica.m.geom(name).id)
+
+    def sees(self, jump: Jump) -> Iterator[int]:
+        """How many pixels of each picture a jump changes."""
+        for camera in cameras(self.layout, jump.in_sight):
+            before, after = (self._picture(q, camera) for q in (jump.before, jump.after))
+            yield int((before != after).sum())
+
+    def _picture(self, qpos: np.ndarray, camera: mujoco.MjvCamera | str) -> np.ndarray:
+        m, d = self.replica.m, self.replica.d
+        self.replica.place(qpos)
+        mujoco.mj_camlight(m, d)
+        if isinstance(camera, str):
+            number, camera = m.camera(camera).id, mujoco.MjvCamera()
+            camera.type, camera.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, number
+        everything = mujoco.mjtCatBit.mjCAT_ALL.value
+        mujoco.mjv_updateScene(m, d, mujoco.MjvOption(), None, camera, everything, self._scene)
+        self._held.make_current()
+        rectangle, pixels = mujoco.MjrRect(0, 0, SIZE[1], SIZE[0]), np.empty((*SIZE, 3), np.uint8)
+        mujoco.mjr_render(rectangle, self._scene, self._drawing)
+        mujoco.mjr_readPixels(pixels, None, rectangle, self._drawing)
+        return pixels
+
+
+def model_of(layout: Layout, units: int) -> mujoco.MjModel:
+    return Simulation(layout, RunRequest(units=units)).physical.m
+
+
+@pytest.fixture(scope="module")
+def paper() -> Layout:
+    return without_hands("paper")
+
+
+@pytest.fixture(scope="module")
+def found(paper: Layout) -> list[Jump]:
+    return list(jumps(paper, 2))
+
+
+def fed(found: list[Jump]) -> list[Jump]:
+    """Those into a housing."""
+    return [jump for jump in found if jump.places[1][2] > HIDDEN]
+
+
+def gone(found: list[Jump]) -> list[Jump]:
+    """Those out of the shed."""
+    return [jump for jump in found if jump.places[0][2] > HIDDEN]
+
+
+def test_every_part_is_fed_and_every_product_goes(paper: Layout, found: list[Jump]) -> None:
+    """A copy of each part is in its feeder when the run begins."""
+    parts = len(paper.factory.leaves)
+    assert len(fed(found)) == parts and len(gone(found)) == 2 * parts
+
+
+def test_parts_get_into_their_housings(paper: Layout, found: list[Jump]) -> None:
+    for jump in fed(found):
+        feeder = feeder_of(paper, names.label_of(jump.body))
+        solid = paper.product.solids[names.label_of(jump.body)]
+        low, high = (jump.in_sight + end - solid.centre for end in (solid.low, solid.high))
+        xlo, xhi, ylo, yhi = feeder.housing
+        assert xlo < low[0] and high[0] < xhi and ylo < low[1] and high[1] < yhi
+        assert feeder.low < low[2] and high[2] < feeder.high
+
+
+def test_products_go_from_within_the_shed(paper: Layout, found: list[Jump]) -> None:
+    xlo, xhi, ylo, yhi = paper.shed
+    for jump in gone(found):
+        solid = paper.product.solids[names.label_of(jump.body)]
+        low, high = (jump.in_sight + end - solid.centre for end in (solid.low, solid.high))
+        assert xlo < low[0] and high[0] < xhi and ylo < low[1] and high[1] < yhi
+
+
+@pytest.fixture
+def eye(paper: Layout) -> Iterator[Eye]:
+    with Eye(paper, model_of(paper, 2)) as eye:
+        yield eye
+
+
+@needs_gl
+def test_no_jump_changes_a_pixel(eye: Eye, found: list[Jump]) -> None:
+    """Into every housing, and of a whole unit out of the shed."""
+    for jump in (*fed(found), *gone(found)[: len(fed(found))]):
+        assert not any(eye.sees(jump)), jump.body
+
+
+@needs_gl
+@pytest.mark.parametrize("missing", ["wall1", "wall-1", "end1", "end-1", "lid"])
+def test_a_housing_without_a_wall_is_seen_through(
+    eye: Eye, found: list[Jump], missing: str
+) -> None:
+    jump = fed(found)[0]
+    feeder = names.feeder(names.label_of(jump.body))
+    eye.replica.m.geom_group[eye.geom(f"{feeder}/{missing}")] = SHOWN
+    assert any(eye.sees(jump))
+
+
+@needs_gl
+@pytest.mark.parametrize("missing", ["roof", "back", "wall1", "wall-1", "shutter"])
+def test_a_shed_that_is_open_is_looked_into(eye: Eye, found: list[Jump], missing: str) -> None:
+    eye.replica.m.geom_group[eye.geom(f"outfeed/{missing}")] = SHOWN
+    assert any(any(eye.sees(jump)) for jump in gone(found))
+
+
+@needs_gl
+def test_a_roof_that_is_too_short_shows(eye: Eye, found: list[Jump]) -> None:
+    eye.replica.m.geom_size[eye.geom("outfeed/roof"), 0] /= 2
+    assert any(any(eye.sees(jump)) for jump in gone(found))
+
+
+@needs_gl
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["truck", "chair", "gearbox"])
+def test_no_jump_of_an_example_changes_a_pixel(name: str) -> None:
+    layout = without_hands(name)
+    with Eye(layout, model_of(layout, 2)) as eye:
+        for jump in jumps(layout, 2):
+            assert not any(eye.sees(jump)), jump.body

@@ -1,0 +1,330 @@
+"""The documentation: what the tutorial shows is what the commands print, the reference is complete,
+pages and pictures that are linked are there, and the site is built without warnings."""
+
+from __future__ import annotations
+
+import ast
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+import pytest
+
+from factory.apps.exports import exporters
+from factory.commands import commands
+from factory.pipeline import all_templates
+from factory.support.explanations import codes
+from factory.support.settings import RANGES
+from factory.theory.lang.values import GEOMETRY
+from factory.theory.problem.robot_types import load_catalogue
+from tests.command_line import Terminal
+from tests.paths import ROOT
+
+DOCS = ROOT / "docs"
+PAGES = [p for p in sorted(DOCS.rglob("*.md")) if "_build" not in p.parts]
+WRITTEN = [p for p in PAGES if p.parent.name != "reference" or p.name == "index.md"]
+EXAMPLES = sorted(path.stem for path in (ROOT / "examples").glob("*.pag"))
+
+FENCE = re.compile(
+    r"^```(\{code-block\} text|console)\n(?::caption: (\S+)\n)?(.*?)^```$", re.M | re.S
+)
+
+# --- what is shown is what is printed -------------------------------------------------------------
+
+
+def shown(page: str) -> Iterator[tuple[str, str]]:
+    """The blocks of a page to be carried out, in order: a file's name and its text, or "" and a
+    session in the shell."""
+    for kind, caption, text in FENCE.findall((DOCS / page).read_text("utf-8")):
+        if kind == "console" or caption:
+            yield caption, text
+
+
+def session(text: str) -> Iterator[tuple[list[str], list[str]]]:
+    """The commands of a session, each with the lines that it is said to print."""
+    for block in re.split(r"^\$ ", text, flags=re.M)[1:]:
+        command, *lines = block.splitlines()
+        yield shlex.split(command, comments=True), [line for line in lines if line.strip()]
+
+
+FIGURE = re.compile(r"\d+\.\d+|\d+(?= %)")
+TIMED = re.compile(r"\d+\.\d+(?= times real time)")
+"""A figure; and one that depends on how busy the machine is."""
+
+
+def words(line: str) -> str:
+    """A line with single blanks and without figures."""
+    return " ".join(FIGURE.sub("#", line).split())
+
+
+def is_said(line: str, printed: list[str]) -> bool:
+    """Whether a line is printed, with figures that differ by no more than 2 %, or by 2 in the last
+    digit: a machine may round in another way."""
+    known = FIGURE.findall(TIMED.sub("#", line))
+    return any(
+        all(map(close, known, FIGURE.findall(TIMED.sub("#", other))))
+        for other in printed
+        if words(other) == words(line)
+    )
+
+
+def close(said: str, printed: str) -> bool:
+    digits = len(said.partition(".")[2])
+    return abs(float(said) - float(printed)) <= max(0.02 * float(said), 2.01 * 10**-digits)
+
+
+@pytest.fixture
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, here: None) -> Path:
+    """A folder with the examples, in which pictures are small; sweeps need no further process."""
+    shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("FACTORY_SIZE", "64x48")
+    monkeypatch.setenv("FACTORY_FPS", "2")
+    return tmp_path
+
+
+def follow(page: str, run: Terminal, monkeypatch: pytest.MonkeyPatch) -> int:
+    """Does what a page says; how many commands of ours that were."""
+    done = 0
+    for name, text in shown(page):
+        if name:
+            Path(name).parent.mkdir(exist_ok=True)
+            Path(name).write_text(text, "utf-8")
+            continue
+        for command, lines in session(text):
+            if command[0] == "cd":
+                monkeypatch.chdir(command[1])
+                continue
+            assert command[0] == "factory", command
+            ended = run(*command[1:])
+            printed = (ended.out + ended.err).splitlines()
+            missing = [line for line in lines if not is_said(line, printed)]
+            assert not missing, f"{shlex.join(command)} does not print {missing}"
+            assert ended.status == (2 if "broken" in command else 0)
+            done += 1
+    return done
+
+
+def test_the_tutorial_shows_what_is_printed(
+    run: Terminal, elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert follow("tutorial.md", run, monkeypatch) >= 15
+    made = {path.name for path in elsewhere.rglob("*")}
+    assert {"paper.mp4", "paper.png", "paper.xml", "results.db", "bell.log"} <= made
+
+
+@pytest.mark.parametrize(
+    "page",
+    [
+        *("index.md", "ten-minutes.md"),
+        *("guide/products.md", "guide/pace.md", "guide/faults.md", "guide/plc.md"),
+        "guide/revise.md",
+    ],
+)
+def test_the_way_in_shows_what_is_printed(
+    page: str, run: Terminal, elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert follow(page, run, monkeypatch) >= 1
+
+
+QUOTED = re.compile(r"^    \$ factory (.*examples/\w+\.pag.*)\n((?:     ?.*\n)+)", re.M)
+"""A command on an example, and what a page says that it prints, both indented."""
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/guide/products.md"])
+def test_what_a_page_quotes_is_printed(page: str, run: Terminal, elsewhere: Path) -> None:
+    quoted = QUOTED.findall((ROOT / page).read_text("utf-8"))
+    assert quoted
+    for command, lines in quoted:
+        ended = run(*shlex.split(command))
+        printed = (ended.out + ended.err).splitlines()
+        missing = [
+            line
+            for line in lines.splitlines()
+            if line.strip() not in ("", "...") and not is_said(line, printed)
+        ]
+        assert not missing, f"{command} does not print {missing}"
+
+
+# --- the reference --------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def reference() -> Iterator[dict[str, str]]:
+    """The pages that are written from the code, by name."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(DOCS / "_extensions"))
+        from factory_reference import PAGES as written
+
+        yield {name: page() for name, page in written.items()}
+
+
+def headings(page: str) -> list[str]:
+    """The headings of a page under its title, code left out."""
+    bare = re.sub(r"^````.*?^````$", "", page, flags=re.M | re.S)
+    return re.findall(r"^## (.*)$", bare, re.M)
+
+
+def test_the_reference_has_everything_there_is(reference: dict[str, str]) -> None:
+    assert headings(reference["commands"]) == [f"factory {name}" for name in commands()]
+    assert headings(reference["diagnostics"]) == list(codes())
+    assert headings(reference["operations"]) == sorted(all_templates())
+    assert headings(reference["robots"]) == [*load_catalogue().types, "The catalogue"]
+    for page, names in (("settings", RANGES), ("language", GEOMETRY), ("formats", exporters())):
+        rows = re.findall(r"^\| `([\w-]+)` \|", reference[page], re.M)
+        assert set(names) <= set(rows), page
+
+
+def test_every_option_is_told(reference: dict[str, str]) -> None:
+    sections = dict(
+        re.findall(r"^## factory (\S+)\n(.*?)(?=^## |\Z)", reference["commands"], re.M | re.S)
+    )
+    for name, command in commands().items():
+        for option in command.params:
+            if isinstance(option, click.Option):
+                assert option.help, f"factory {name} {option.opts[-1]} has no help"
+            if option.name not in ("as_json", "quiet", "verbose") and option.opts[0][0] == "-":
+                assert option.opts[-1] in sections[name], f"factory {name} {option.opts[-1]}"
+
+
+def test_every_page_of_the_reference_is_in_its_index(reference: dict[str, str]) -> None:
+    index = (DOCS / "reference" / "index.md").read_text("utf-8")
+    assert sorted(re.findall(r"^(\w+)$", index, re.M)) == sorted(reference)
+
+
+def test_every_command_and_example_is_in_the_guide_or_the_gallery() -> None:
+    guide, gallery = (
+        (DOCS / "guide" / "commands.md").read_text("utf-8"),
+        (DOCS / "gallery.md").read_text("utf-8"),
+    )
+    for name in commands():
+        assert re.search(rf"`factory {name}\b", guide), name
+    for name in EXAMPLES:
+        assert f"examples/{name}.pag" in gallery, name
+
+
+def test_the_readme_is_a_page_that_names_the_two_commands() -> None:
+    readme = (ROOT / "README.md").read_text("utf-8")
+    assert len(readme.splitlines()) <= 130
+    targets = re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text("utf-8"), re.M)
+    named = re.findall(r"^ {4}make ([\w-]+)", readme, re.M)
+    assert named == ["demo", "test"] and set(named) <= set(targets)
+
+
+# --- the map --------------------------------------------------------------------------------------
+
+WAY = re.compile(r"^\| (\d+) \| `([\w/]+\.py)` ((?:`\w+(?:\.\w+)?`(?:, )?)+) \|", re.M)
+"""A row of the way from text to film: its number, a file, and functions or classes in it."""
+
+
+def test_the_way_from_text_to_film_is_there_and_short() -> None:
+    rows = WAY.findall((DOCS / "design.md").read_text("utf-8"))
+    assert [int(number) for number, _, _ in rows] == list(range(1, len(rows) + 1))
+    assert 10 <= len(rows) <= 15
+    package = ROOT / "factory"
+    for _, file, names in rows:
+        found = set(defined(ast.parse((package / file).read_text("utf-8"))))
+        missing = [name for name in re.findall(r"`([\w.]+)`", names) if name not in found]
+        assert not missing, f"{file} has no {missing}"
+
+
+def defined(tree: ast.Module) -> Iterator[str]:
+    """Functions and classes of a module, and methods, alone and as `Class.method`."""
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            yield node.name
+        for inner in node.body if isinstance(node, ast.ClassDef) else ():
+            if isinstance(inner, ast.FunctionDef):
+                yield inner.name
+                yield f"{node.name}.{inner.name}"
+
+
+def test_files_that_the_map_and_the_decisions_name_are_there() -> None:
+    package = ROOT / "factory"
+    for page in (DOCS / "design.md", *sorted((DOCS / "decisions").glob("*.md"))):
+        folders = re.findall(r"`([\w]+(?:/[\w]+)*/)`", page.read_text("utf-8"))
+        files = re.findall(r"`([\w]+(?:/[\w]+)+\.(?:py|op))`", page.read_text("utf-8"))
+        for name in (*folders, *files):
+            assert (package / name).exists() or (ROOT / name).exists(), f"{page.name}: {name}"
+
+
+def test_every_decision_is_in_the_index() -> None:
+    index = (DOCS / "decisions" / "index.md").read_text("utf-8")
+    pages = {page.stem for page in (DOCS / "decisions").glob("*.md")} - {"index"}
+    assert set(re.findall(r"\]\(([\w-]+)\.md\)", index)) == pages
+    assert set(re.findall(r"^[a-z-]+$", index, re.M)) == pages
+    for page in pages:
+        text = (DOCS / "decisions" / f"{page}.md").read_text("utf-8")
+        headings_of = re.findall(r"^## (.*)$", text, re.M)
+        assert headings_of[:3] == ["Context", "Decision", "Figures"], page
+
+
+# --- links and pictures ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "page", [ROOT / "README.md", *WRITTEN], ids=lambda p: p.relative_to(ROOT).as_posix()
+)
+def test_links_lead_somewhere(page: Path, reference: dict[str, str]) -> None:
+    text = re.sub(r"^```.*?^```$|^    .*$", "", page.read_text("utf-8"), flags=re.M | re.S)
+    generated = {(DOCS / "reference" / f"{name}.md").resolve() for name in reference}
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if re.match(r"https?:", target):
+            continue
+        path, _, anchor = target.partition("#")
+        found = (page.parent / path).resolve() if path else page
+        assert found.exists() or found in generated, f"{page.name} links to {target}"
+        if anchor:
+            assert anchor in anchors(found), f"{page.name} links to {target}"
+
+
+def anchors(page: Path) -> set[str]:
+    """What a page's headings are linked by."""
+    titles = re.findall(r"^#+ (.*)$", page.read_text("utf-8"), re.M)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_the_gallery_has_small_stills(name: str) -> None:
+    for kind in ("factory", "product"):
+        still = DOCS / "gallery" / f"{name}-{kind}.png"
+        assert 5_000 < still.stat().st_size < 200_000
+
+
+SHOWN = re.compile(r"literalinclude} (\S+)\n(?::[^p].*\n)*:pyobject: (\S+)")
+
+
+def test_code_that_is_shown_is_there() -> None:
+    """Each object of a module that a page includes."""
+    found = 0
+    for page in WRITTEN:
+        text = page.read_text("utf-8")
+        for file, name in SHOWN.findall(text):
+            inside = ast.parse((page.parent / file).read_text("utf-8")).body
+            for part in name.split("."):
+                named = [node for node in inside if getattr(node, "name", "") == part]
+                assert named, f"{page.name} shows {name} of {file}"
+                inside = named[0].body
+            found += 1
+    assert found > 20
+
+
+# --- the site -------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_the_site_is_built_without_a_warning_and_needs_no_network(tmp_path: Path) -> None:
+    pytest.importorskip("furo", reason="the extra `docs` is not installed")
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-d", tmp_path / "trees"]
+    done = subprocess.run([*command, DOCS, tmp_path / "site"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    for page in (tmp_path / "site").rglob("*.html"):
+        loaded = re.findall(
+            r'<(?:script|img|link)[^>]+(?:src|href)="(https?:[^"]+)"', page.read_text("utf-8")
+        )
+        assert not loaded, f"{page.name} loads {loaded}"

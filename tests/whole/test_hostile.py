@@ -1,0 +1,303 @@
+"""Input that is too large, endless or beyond all bounds: refused before it costs memory or time."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from factory.apps.foreign_nets import pnml_reader
+from factory.support import files, xml_tree
+from factory.support.errors import SHOWN, InputError, did_you_mean
+from factory.support.files import MESH, MIB, NET, RECORD, TABLE, TEXT, read_bytes
+from factory.theory.lang import load_templates, read_pag
+from tests.command_line import Terminal
+from tests.paths import PAPER, ROOT
+
+PART = 'root = p; p = atomic(mesh = "p.obj");'
+NET_OF = '<pnml><net id="n" type="x/ptnet"><page id="g">{}</page></net></pnml>'
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+READERS = [
+    (["check", "F"], "", TEXT),
+    (["check", "F.pnml"], "", NET),
+    (["check", PAPER, "--templates", "own"], "own/x.op", TEXT),
+    (["check", "p.pag"], "factory.toml", TABLE),
+    (["check", "p.pag"], "p.obj", MESH),
+    (["import", "F.json", "-o", "out"], "", TEXT),
+    (["import", "F.yaml", "-o", "out"], "", TEXT),
+    (["import", "F.csv", "-o", "out"], "", TEXT),
+    (["import", "F.ldr", "-o", "out"], "", TEXT),
+    (["import", "t.json", "-o", "out"], "p.obj", MESH),
+    (["import", "m.ldr", "--library", "own", "-o", "out"], "own/LDConfig.ldr", TEXT),
+    (["monitor", "F"], "", RECORD),
+]
+"""Commands, the file that they read, where they do not name it, and the most that they read."""
+
+
+@pytest.mark.parametrize(("words", "name", "most"), READERS, ids=str)
+def test_a_file_that_is_too_large_is_not_read(
+    run: Terminal, here: Path, words: list[object], name: str, most: int
+) -> None:
+    file = _prepare(here, words, name)
+    with file.open("wb") as stream:
+        stream.truncate(most + 1)
+    done = run(*words, "--json")
+    assert done.status == 2
+    assert (
+        f"larger than {most // MIB} MiB, the most that is read" in done.json["errors"][0]["message"]
+    )
+
+
+@pytest.mark.parametrize(("words", "name", "most"), READERS, ids=str)
+def test_devices_and_silent_pipes_are_not_waited_for(
+    run: Terminal,
+    here: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    words: list[object],
+    name: str,
+    most: int,
+) -> None:
+    monkeypatch.setattr(files, "PATIENCE", 0.01)
+    file = _prepare(here, words, name)
+    for put in (lambda: file.symlink_to("/dev/zero"), lambda: os.mkfifo(file)):
+        put()
+        done = run(*words, "--json")
+        found = {"factory.toml": 0, "own/LDConfig.ldr": 0}.get(name, 2)
+        assert done.status == found, done
+        file.unlink()
+
+
+def _prepare(folder: Path, words: list[object], name: str) -> Path:
+    """The file that a command reads, which is not there yet, beside others that are right."""
+    (folder / "own").mkdir()
+    (folder / "p.pag").write_text(PART if name == "p.obj" else "root = p; p = atomic();")
+    (folder / "t.json").write_text('{"name": "t", "children": ["p.obj", "p.obj"]}')
+    (folder / "m.ldr").write_text("3 16 0 0 0 10 0 0 0 10 0\n1 4 0 0 0 1 0 0 0 1 0 0 0 1 a.dat\n")
+    (folder / "a.dat").write_text("3 16 0 0 0 10 0 0 0 10 0\n3 16 0 0 0 10 0 0 0 0 10\n")
+    own = next((str(word) for word in words if str(word)[0] == "F"), name)
+    return folder / own
+
+
+def test_what_comes_through_a_pipe_is_read_as_far_as_a_file_is(tmp_path: Path) -> None:
+    for size, is_read in ((0, False), (1, True), (3 * MIB, True), (3 * MIB + 1, False)):
+        pipe = tmp_path / f"pipe{size}"
+        os.mkfifo(pipe)
+        writer = f"import sys; open({str(pipe)!r}, 'wb').write(b'x' * {size})"
+        with subprocess.Popen([sys.executable, "-c", writer], stderr=subprocess.DEVNULL):
+            if is_read:
+                assert read_bytes(pipe, 3 * MIB) == b"x" * size
+            else:
+                with pytest.raises(
+                    OSError, match="larger than 3 MiB" if size else "nothing is wri"
+                ):
+                    read_bytes(pipe, 3 * MIB)
+
+
+def test_process_substitution_and_stdin() -> None:
+    command = f"{sys.executable} -m factory check"
+    for words in (f"{command} <(cat {PAPER}) -q", f"cat {PAPER} | {command} /dev/stdin -q"):
+        done = subprocess.run(["bash", "-c", words], cwd=ROOT, capture_output=True, check=False)
+        assert (done.returncode, done.stderr) == (0, b"")
+
+
+def test_looking_at_a_pipe_takes_nothing_from_it(tmp_path: Path) -> None:
+    """Whether a file is a log or a net is seen from its first bytes, of regular files alone."""
+    from factory.apps.log import is_log
+
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    assert not is_log(pipe)
+    assert not files.is_net(pipe)
+
+
+def test_a_mesh_names_no_further_file_that_is_read(
+    run: Terminal, here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import trimesh
+
+    asked: list[str] = []
+    monkeypatch.setattr(
+        trimesh.resolvers.FilePathResolver, "get", lambda _, name: asked.append(name)
+    )
+    cube = trimesh.creation.box((0.1, 0.1, 0.1)).export(file_type="obj")
+    (here / "p.obj").write_text("mtllib /dev/zero\n" + cube)
+    (here / "p.pag").write_text(PART)
+    assert run("check", "p.pag").status == 0
+    assert asked == []
+
+
+def test_of_many_errors_the_first_are_told_and_the_others_counted(
+    run: Terminal, here: Path
+) -> None:
+    unused = "".join(f"p{i} = atomic();\n" for i in range(SHOWN + 23))
+    (here / "p.pag").write_text(f"root = a; a = atomic();\n{unused}")
+    done = run("check", "p.pag", "--json")
+    assert done.status == 2
+    assert len(done.json["errors"]) == SHOWN and done.json["errors_left_out"] == 23
+    assert done.err.count("UnreachableLabel") == SHOWN
+    assert done.err.endswith("... and 23 more errors\n")
+    with pytest.raises(InputError) as caught:
+        read_pag((here / "p.pag").read_text(), load_templates([ROOT / "templates"]))
+    assert len(caught.value.diagnostics) == SHOWN + 23
+    assert str(caught.value).endswith("... and 23 more errors")
+
+
+def test_few_errors_leave_none_out(run: Terminal, here: Path) -> None:
+    (here / "p.pag").write_text("root = a; a = atomic(); b = atomic();")
+    assert "errors_left_out" not in run("check", "p.pag", "--json").json
+
+
+def test_an_input_of_itself_is_told_once(run: Terminal, here: Path) -> None:
+    """And is not looked for again at each of its mentions."""
+    (here / "p.pag").write_text(f"root = a; a = mate({', '.join('a' * 30)});")
+    assert run("check", "p.pag", "--json").codes == ["PagNotTree"]
+
+
+def test_unknown_nodes_of_a_net_get_few_suggestions(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+    monkeypatch.setattr(pnml_reader, "did_you_mean", lambda name, *_: asked.append(name) or "")
+    arcs = "".join(f'<arc id="a{i}" source="s{i}" target="t{i}"/>' for i in range(500))
+    with pytest.raises(InputError) as caught:
+        pnml_reader.read_pnml(NET_OF.format(arcs))
+    assert len(caught.value.diagnostics) == 1000
+    assert len(asked) == pnml_reader.SUGGESTIONS
+
+
+def test_a_net_of_too_many_elements(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(xml_tree, "MOST", 10)
+    with pytest.raises(InputError, match="1:31: BadNet it has more than 10 elements"):
+        pnml_reader.read_pnml("<a>" * 11 + "</a>" * 11)
+
+
+def test_entities_are_not_expanded(run: Terminal, here: Path) -> None:
+    """A billion laughs."""
+    names = "".join(f'<!ENTITY l{i} "{f"&l{i - 1};" * 10}">' for i in range(1, 10))
+    (here / "n.pnml").write_text(f'<!DOCTYPE l [<!ENTITY l0 "ha">{names}]><pnml>&l9;</pnml>')
+    (error,) = run("check", "n.pnml", "--json").json["errors"]
+    assert error["message"] == "a document type declaration is not accepted"
+
+
+def test_aliases_are_not_multiplied(run: Terminal, here: Path) -> None:
+    """A YAML document of 2^40 nodes in 40 lines."""
+    lines = [f"  - &b{i} {{name: n{i}, children: [*b{i - 1}, *b{i - 1}]}}" for i in range(1, 41)]
+    first = "  - &b0 {name: n0, box: [1, 1, 1]}"
+    (here / "t.yaml").write_text("\n".join(["name: top", "children:", first, *lines]))
+    assert run("import", "t.yaml", "-o", "out", "--json").codes == ["TooLarge"]
+
+
+@pytest.mark.parametrize("value", ["1e300", "86401"])
+def test_a_dwell_has_an_end(run: Terminal, here: Path, value: str) -> None:
+    (here / "p.pag").write_text(f"root = b; b = weld(a, dwell = {value}); a = atomic();")
+    (error,) = run("run", "p.pag", "--json").json["errors"]
+    assert error["code"] == "BadValue"
+    assert error["message"] == f"'dwell' takes a number from 0 to 86400, not '{value}'"
+    own = (ROOT / "templates" / "weld.op").read_text()
+    for old, new in (("dwell = 1.0", f"dwell = {value}"), ("for dwell", f"for {value}")):
+        assert old in own
+        (here / "weld.op").write_text(own.replace(old, new))
+        done = run("check", PAPER, "--templates", here, "--json")
+        assert done.codes == ["BadTemplate"]
+        assert "from 0 to 86400" in done.json["errors"][0]["hint"]
+
+
+@pytest.mark.parametrize(
+    ("words", "bound"),
+    [
+        (["run", PAPER, "--max-time", "1e300"], "0<x<=1000000000.0"),
+        (["run", PAPER, "--seed", str(2**63)], f"0<=x<={2**63 - 1}"),
+        (["report", PAPER, "-o", "o.html", "--max-time", "1e10"], "0<x<=1000000000.0"),
+        (["build", PAPER, "--cycle", "1e300"], "0<x<=1000000000.0"),
+        (["build", PAPER, "--floor", "1e300x1"], "two positive numbers up to 100000"),
+        (["build", PAPER, "--speed", "1e300"], "not between 0.001 and 100"),
+    ],
+    ids=str,
+)
+def test_numbers_have_bounds(run: Terminal, here: Path, words: list[object], bound: str) -> None:
+    (error,) = run(*words, "--json").json["errors"]
+    assert bound in error["message"]
+
+
+def test_messages_and_hints_are_cut(run: Terminal, here: Path) -> None:
+    (here / "n.pnml").write_text(
+        NET_OF.format(
+            f'<place id="p"><initialMarking><text>{"1" * 10**6}</text></initialMarking></place>'
+        )
+    )
+    (here / "p.pag").write_text(f"root = a; a = mate(b, c{'c' * 10**6}); b = atomic();")
+    for file in ("n.pnml", "p.pag"):
+        done = run("check", file, "--json")
+        assert done.status == 2
+        assert len(done.out) < 5_000 and len(done.err) < 5_000
+
+
+def test_very_long_words_are_not_compared() -> None:
+    assert did_you_mean("inspekt", ["inspect"]) == "did you mean 'inspect'?"
+    assert did_you_mean("inspect" * 10**6, ["inspect"]) == "valid names: inspect"
+
+
+def test_references_lead_to_their_node_in_a_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A chain of references is walked once, not once from each of its links."""
+    count = 300
+    chain = "".join(f'<referencePlace id="r{i}" ref="r{i + 1}"/>' for i in range(count))
+    net = NET_OF.format(f'{chain}<place id="r{count}"/>')
+    reader = pnml_reader._Reader(xml_tree.XmlDocument("<text>", net.split("\n"), "BadNet"))
+    looked_up: list[str] = []
+
+    class Nodes(dict[str, xml_tree.Element]):
+        def __getitem__(self, name: str) -> xml_tree.Element:
+            looked_up.append(name)
+            return super().__getitem__(name)
+
+    reader.nodes = Nodes()
+    reader.net(reader.document.read(net, frozenset()))
+    assert len(looked_up) < 4 * count
+
+
+def test_yaml_is_not_nested_without_end(run: Terminal, here: Path) -> None:
+    (here / "t.yaml").write_text("[" * 20_000)
+    (error,) = run("import", "t.yaml", "-o", "out", "--json").json["errors"]
+    assert error["message"] == "more than 1000 values are nested here"
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"speed = " + b"9" * 5000, "a number has too many digits"),
+        (b"speed = 1 # \xff", "byte 0xff is not UTF-8 text"),
+        (b"speed = " + b"[" * 5000, "the file is nested too deeply"),
+    ],
+)
+def test_settings_are_refused_in_plain_words(
+    run: Terminal, here: Path, content: bytes, words: str
+) -> None:
+    (here / "p.pag").write_text("root = p; p = atomic();")
+    (here / "factory.toml").write_bytes(content)
+    (error,) = run("check", "p.pag", "--json").json["errors"]
+    assert (error["code"], error["message"]) == ("Syntax", words)
+
+
+def test_a_long_text_in_quotes_takes_little_memory(here: Path) -> None:
+    (here / "p.pag").write_text(f'root = a; a = atomic(mesh = "{"x" * 15_000_000}.obj");')
+    words = f"ulimit -v 2000000; {sys.executable} -m factory check p.pag --json"
+    done = subprocess.run(["bash", "-c", words], capture_output=True, text=True, check=False)
+    assert done.returncode == 2, done.stderr[:1000]
+    assert "there is no mesh file" in done.stdout
+
+
+def test_a_named_pipe_is_opened_once(here: Path) -> None:
+    """Its content cannot be had a second time, for the receipt of a build."""
+    os.mkfifo("pipe")
+    words = f"cat {PAPER} > pipe & {sys.executable} -m factory build pipe --mjcf m.xml -q"
+    done = subprocess.run(["bash", "-c", words], timeout=60, capture_output=True, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")

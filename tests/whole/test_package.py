@@ -1,0 +1,372 @@
+"""The Python package: its functions do what the commands do, its values are checked and show
+themselves, its types reach a user's script, and the clash of its import name is said."""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import shutil
+import subprocess
+import sys
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import factory
+from factory.pipeline import read
+from factory.support import namesake
+from tests.apps.planning.test_plan_puzzles import PEG
+from tests.command_line import Terminal
+from tests.opengl import needs_gl
+from tests.paths import PAPER, ROOT
+from tests.plan_puzzles import pinwheel, source
+
+# --- values are checked when made, with the codes of the command line -----------------------------
+
+WRONG: tuple[tuple[Callable[[Any], object], tuple[object, ...]], ...] = (
+    (lambda p: factory.run(p, world="moojoco"), ("run", PAPER, "--world", "moojoco")),
+    (lambda p: factory.run(p, units=-1), ("run", PAPER, "--units", -1)),
+    (lambda p: factory.run(p, units=2.5), ("run", PAPER, "--units", 2.5)),
+    (lambda p: factory.run(p, seed=-1), ("run", PAPER, "--seed", -1)),
+    (lambda p: factory.run(p, jitter=2), ("run", PAPER, "--jitter", 2)),
+    (lambda p: factory.run(p, max_time=0), ("run", PAPER, "--max-time", 0)),
+    (lambda p: factory.run(p, start="nowhere"), ("run", PAPER, "--from", "nowhere")),
+    (
+        lambda p: factory.run(p, distributed=True, spares=1),
+        ("run", PAPER, "--distributed", "--spares", 1),
+    ),
+    (lambda p: factory.Settings(clearance=-3), ("run", PAPER, "--clearance", -3)),
+    (lambda p: factory.Settings(speed=float("nan")), ("run", PAPER, "--speed", "nan")),
+    (lambda p: factory.lay_out(p, floor=(0, 3)), ("build", PAPER, "--floor", "0x3")),
+    *(
+        (lambda p, floor=floor: factory.lay_out(p, floor=floor), ("build", PAPER, "--floor", floor))
+        for floor in ("4", "4x3x2", "fourx3", "-4x3", "nanx3", "1e9x3", "\u0664x3", "")
+    ),
+    (lambda p: factory.lay_out(p, floor=(0.3, 0.3)), ("build", PAPER, "--floor", "0.3x0.3")),
+    (
+        lambda p: factory.lay_out(p, relay=True, tile=0.24),
+        ("build", PAPER, "--relay", "--tile", 0.24),
+    ),
+    (lambda p: factory.compile(p, robots=0), ("check", PAPER, "--robots", 0)),
+    (lambda p: factory.compile(p, robots=2), ("check", PAPER, "--robots", 2)),
+    (lambda p: factory.compile(p, cycle=-1), ("check", PAPER, "--cycle", -1)),
+    (lambda p: factory.compile(p, parallel={"sub9": 2}), ("check", PAPER, "--parallel", "sub9=2")),
+    (lambda p: factory.build(p, wip=0), ("build", PAPER, "--wip", 0)),
+    (lambda p: factory.export(p, "pnlm"), ("export", PAPER, "--format", "pnlm")),
+    (lambda p: factory.export(p, "csv"), ("export", PAPER, "--format", "csv")),
+    (
+        lambda p: factory.export(p, "dot", of="nose"),
+        ("export", PAPER, "--format", "dot", "--of", "nose"),
+    ),
+    (lambda p: factory.analyze(p, second=["r99"]), ("analyze", PAPER, "--second", "r99")),
+    (lambda p: factory.analyze(p, faster={"r1": -3}), ("analyze", PAPER, "--faster", "r1=-3")),
+    (
+        lambda p: factory.sweep(p, "a.db", {"sed": [1]}),
+        ("sweep", PAPER, "--vary", "sed=1", "-o", "a.db"),
+    ),
+    (
+        lambda p: factory.sweep(p, "a.db", {"jitter": [7]}),
+        ("sweep", PAPER, "--vary", "jitter=7", "-o", "a.db"),
+    ),
+    (lambda p: factory.render(p, "a.gif"), ("render", PAPER, "-o", "a.gif")),
+    (
+        lambda p: factory.render(p, "a.png", camera="nose"),
+        ("render", PAPER, "-o", "a.png", "--camera", "nose"),
+    ),
+    (lambda p: factory.render(p, "a.png", at=-1), ("render", PAPER, "-o", "a.png", "--at", -1)),
+    (lambda p: factory.load_pag("nowhere.pag"), ("check", "nowhere.pag")),
+    (lambda p: factory.plan("nowhere", "a", aim="speed"), ("plan", "nowhere", "--for", "speed")),
+    (lambda p: factory.plan("nowhere", "a"), ("plan", "nowhere")),
+)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    WRONG,
+    ids=lambda value: " ".join(map(str, value[2:4])) if isinstance(value, tuple) else "",
+)
+def test_a_wrong_call_gives_the_code_of_the_command(
+    call: Callable[[Any], object],
+    words: tuple[object, ...],
+    run: Terminal,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(factory.FactoryError) as caught:
+        call(PAPER)
+    done = run(*words, "--json")
+    assert done.status == caught.value.exit_status
+    assert done.codes == [diagnostic.code for diagnostic in caught.value.diagnostics]
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("floor", [(4,), (4, "3"), (True, 3), 4, b"4x3", {3.0, 4.0}], ids=repr)
+def test_a_floor_is_two_lengths(floor: Any) -> None:
+    with pytest.raises(factory.InputError, match="is not two positive lengths"):
+        factory.lay_out(PAPER, floor=floor)
+
+
+def test_a_floor_is_given_in_numbers_or_as_a_command_takes_it() -> None:
+    layouts = [factory.lay_out(PAPER, floor=floor) for floor in ("2x1.5", (2, 1.5), [2.0, 1.5])]
+    assert len({str(layout.guidepaths) for layout in layouts}) == 1
+    width, depth = (layouts[0].floor[i + 2] - layouts[0].floor[i] for i in (0, 1))
+    assert 0 < width <= 2 and 0 < depth <= 1.5
+
+
+def test_what_is_no_product_is_told() -> None:
+    with pytest.raises(factory.InputError, match="42 is no path"):
+        factory.run(42)  # type: ignore[arg-type]
+
+
+# --- the functions do what the commands do --------------------------------------------------------
+
+
+def test_every_stage_gives_the_same_run() -> None:
+    pag = factory.load_pag(PAPER)
+    plan = factory.compile(pag)
+    layout = factory.lay_out(plan)
+    stages = (str(PAPER), PAPER, pag, plan, layout, read(PAPER))
+    runs = [factory.run(stage, units=2, seed=3, jitter=0.2).events for stage in stages]
+    assert all(run == runs[0] for run in runs)
+
+
+def test_a_layout_is_not_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    layout = factory.lay_out(PAPER, clearance=0.03)
+    monkeypatch.setattr("factory.floor.layout.request.Ground.lay_out", None)
+    built = factory.build(layout)
+    assert built.model.settings.clearance == 0.03
+    assert factory.analyze(layout).timing.layout is layout
+    with pytest.raises(TypeError):
+        factory.build(layout.factory)  # the fault that is planted: this one is laid out
+
+
+def test_a_build_is_that_of_the_command(run: Terminal, tmp_path: Path) -> None:
+    assert run("build", PAPER, "-o", tmp_path / "command").status == 0
+    built = factory.build(PAPER, tmp_path / "function")
+    names = {path.relative_to(tmp_path / "command") for path in (tmp_path / "command").rglob("*.*")}
+    assert names == {path.relative_to(tmp_path / "function") for path in built.files}
+    for name in names:
+        same = (tmp_path / "command" / name).read_bytes() == (
+            tmp_path / "function" / name
+        ).read_bytes()
+        assert same, name
+    again = factory.run(tmp_path / "function" / "plan.json", units=2)
+    assert again.events == factory.run(PAPER, units=2).events
+
+
+def test_an_export_is_that_of_the_command(run: Terminal, tmp_path: Path) -> None:
+    for form in ("pnml", "svg", "st"):
+        text = factory.export(PAPER, form, tmp_path / form)
+        assert isinstance(text, str)
+        assert run("export", PAPER, "--format", form).out == text.rstrip("\n") + "\n"
+        assert (tmp_path / form).read_text() == text
+
+
+def test_a_log_serves_report_analysis_and_export(run: Terminal, tmp_path: Path) -> None:
+    log, told = tmp_path / "run.log", list[tuple[float, int]]()
+    made = factory.run(PAPER, units=4, log=log, progress=lambda *so_far: told.append(so_far))
+    assert told[-1] == (pytest.approx(made.sim_time_s), 4)
+    assert told == sorted(told)
+    page = factory.report(log, tmp_path / "page.html")
+    assert run("report", log, "-o", tmp_path / "same.html").status == 0
+    assert (tmp_path / "same.html").read_text() == page.text == (tmp_path / "page.html").read_text()
+    for measured in (made, log):
+        compared = factory.analyze(PAPER, measured=measured).measured
+        assert compared is not None and compared.cycle.measured == made.cycle_time_s
+    assert str(factory.export(log, "csv")).startswith("time_s,")
+
+
+def test_a_plan_is_a_product_and_what_interlocks_is_refused(tmp_path: Path) -> None:
+    source(tmp_path, PEG)
+    made = factory.plan(tmp_path / "puzzle.pag", tmp_path / "out", replan=True, seconds=1)
+    assert made.pag == factory.load_pag(made.files[0]) and made.planned.optimal
+    assert {part.label for part in made.pag.parts()} == {*PEG}
+    source(tmp_path, pinwheel())
+    with pytest.raises(factory.InputError) as caught:
+        factory.plan(tmp_path / "puzzle.pag", tmp_path / "none", replan=True)
+    assert [diagnostic.code for diagnostic in caught.value.diagnostics] == ["CannotAssemble"]
+    assert not (tmp_path / "none").exists()
+
+
+def test_a_layout_keeps_the_settings_and_the_ground_of_its_plan(tmp_path: Path) -> None:
+    """What a call does not choose is that of the plan.json, or of the layout."""
+    factory.build(PAPER, tmp_path, settings=factory.Settings(acceleration=1.5))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        layout = factory.lay_out(tmp_path / "plan.json")
+    kept = factory.build(tmp_path / "plan.json").model.settings
+    assert kept.acceleration == 1.5 and factory.lay_out(layout) is layout
+    wider = factory.lay_out(layout, clearance=0.03)
+    assert (wider.clearance, wider.hands[0]) == (0.03, layout.hands[0])
+
+
+def test_settings_replace_those_of_a_project() -> None:
+    slow = factory.Settings(speed=0.1)
+    assert factory.analyze(read(PAPER), settings=slow).timing.settings.speed == 0.1
+
+
+def test_a_sweep_runs_in_a_script(tmp_path: Path) -> None:
+    """Its processes do not run the script again."""
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import factory\nprint('begun')\n"
+        f"made = factory.sweep({str(PAPER)!r}, 'a.db', {{'seed': range(2)}}, world='ideal')\n"
+        "print(made.done)\n"
+    )
+    env = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, script], cwd=tmp_path, env=env, capture_output=True)
+    assert done.stdout.decode().split() == ["begun", "2"], done.stderr.decode()
+
+
+# --- values show themselves -----------------------------------------------------------------------
+
+
+def test_values_are_shown_in_a_line_and_as_a_picture() -> None:
+    plan = factory.compile(factory.load_pag(PAPER))
+    layout = factory.lay_out(plan)
+    for value in (plan.pag, plan, plan.net, layout):
+        assert len(repr(value)) < 100 and "\n" not in repr(value)
+        assert "<svg" in str(value._repr_svg_())
+    made = factory.run(layout, world="ideal")
+    assert repr(made) == f"<Run in ideal: succeeded, 1 of 1 products in {made.sim_time_s:.2f} s>"
+    assert "1 of 1 products" in str(made._repr_html_())
+    assert "<script" in factory.report(layout, units=1)._repr_html_().replace("&lt;", "<")
+
+
+def test_what_is_too_large_is_not_drawn(tmp_path: Path) -> None:
+    file = tmp_path / "many.pag"
+    rows = [f"s{n} = mate ( s{n + 1}, p{n} ); p{n} = atomic();" for n in range(250)]
+    file.write_text("root = s0;\n" + "\n".join(rows) + "\ns250 = atomic()\n")
+    pag = factory.load_pag(file)
+    assert pag._repr_svg_() is None
+    assert factory.compile(pag)._repr_svg_() is None
+
+
+# --- the notebook ---------------------------------------------------------------------------------
+
+
+def cells() -> list[str]:
+    """The code of the notebook, cell by cell; it has no outputs."""
+    document = json.loads((ROOT / "docs" / "notebook.ipynb").read_text("utf-8"))
+    assert document["nbformat"] == 4
+    code = [cell for cell in document["cells"] if cell["cell_type"] == "code"]
+    assert not any(cell["outputs"] or cell["execution_count"] for cell in code)
+    return ["".join(cell["source"]) for cell in code]
+
+
+@needs_gl
+def test_the_notebook_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT / "docs")
+    names: dict[str, Any] = {}
+    shown = []
+    for text in cells():
+        *before, last = ast.parse(text).body
+        if isinstance(last, ast.Expr):
+            exec(compile(ast.Module(before, []), "<cell>", "exec"), names)
+            shown.append(eval(compile(ast.Expression(last.value), "<cell>", "eval"), names))
+        else:
+            exec(text, names)
+    pictures = [value._repr_svg_() for value in shown if hasattr(value, "_repr_svg_")]
+    assert len(pictures) == 4 and all(pictures)
+    assert "iframe" in names["run"]._repr_html_()
+    assert (names["folder"] / "paper.png").stat().st_size > 10_000
+    shutil.rmtree(names["folder"])
+
+
+# --- types ----------------------------------------------------------------------------------------
+
+SCRIPT = """
+import factory
+reveal_type(factory.load_pag("p.pag"))
+reveal_type(factory.compile("p.pag"))
+reveal_type(factory.lay_out("p.pag"))
+reveal_type(factory.run("p.pag"))
+reveal_type(factory.run("p.pag").cycle_time_s)
+reveal_type(factory.verify("p.pag").live)
+reveal_type(factory.build("p.pag").files)
+reveal_type(factory.analyze("p.pag").bottlenecks)
+reveal_type(factory.plan("a", "b").pag)
+factory.run("p.pag", world="moojoco")
+factory.run("p.pag", unit=3)
+"""
+TYPES = (
+    "factory.theory.problem.pag.PAG",
+    "factory.theory.plant.factory.Factory",
+    "factory.floor.layout.layout.Layout",
+    "factory.engine.simulation.run.Run",
+    "float | None",
+    "bool | None",
+    "tuple[pathlib.Path, ...]",
+    "tuple[str, ...]",
+    "factory.theory.problem.pag.PAG",
+)
+
+
+@pytest.mark.slow
+def test_types_reach_the_script_of_a_user(tmp_path: Path) -> None:
+    api = pytest.importorskip("mypy.api", reason="mypy is in the extra `dev`")
+    (tmp_path / "script.py").write_text(SCRIPT)
+    environment = {**os.environ, "MYPYPATH": str(ROOT)}
+    words = ["--strict", "--follow-imports=silent", "--config-file", ROOT / "pyproject.toml"]
+    done = subprocess.run(
+        [sys.executable, "-m", api.__name__.split(".")[0], *words, tmp_path / "script.py"],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+    )
+    lines = done.stdout.splitlines()
+    revealed = [line.split('"')[1] for line in lines if "Revealed type" in line]
+    assert tuple(revealed) == TYPES, done.stdout + done.stderr
+    assert any("arg-type" in line and "Literal" in line for line in lines)
+    assert any('Unexpected keyword argument "unit"' in line for line in lines)
+    assert (ROOT / "factory" / "py.typed").is_file()
+
+
+# --- the other package of this name ---------------------------------------------------------------
+
+
+def installed(folder: Path, files: dict[str, str]) -> dict[str, str]:
+    """This package in a folder, with files written over it; the environment of a process that
+    imports it from there."""
+    shutil.copytree(ROOT / "factory", folder / "factory", ignore=shutil.ignore_patterns("*.pyc"))
+    for name in ("templates", "mjcf"):
+        (folder / name).symlink_to(ROOT / name)
+    for name, text in files.items():
+        (folder / "factory" / name).write_text(text)
+    return {**os.environ, "PYTHONPATH": str(folder)}
+
+
+def python(*words: str, folder: Path, env: dict[str, str]) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, *words], cwd=folder, env=env, capture_output=True, text=True
+    )
+
+
+def test_factory_boy_installed_before_is_told_at_import(tmp_path: Path) -> None:
+    env = installed(tmp_path, {"declarations.py": ""})
+    done = python("-c", "import factory; print(factory.load_pag)", folder=tmp_path, env=env)
+    assert done.stdout and "factory_boy is broken by this package: give each" in done.stderr
+
+
+def test_factory_boy_installed_after_is_told_by_doctor(tmp_path: Path) -> None:
+    env = installed(tmp_path, {"declarations.py": "", "__init__.py": "class Factory: ...\n"})
+    (tmp_path / "factory_boy-3.3.3.dist-info").mkdir()
+    (tmp_path / "factory_boy-3.3.3.dist-info" / "METADATA").write_text("Version: 3.3.3\n")
+    done = python("-m", "factory", "doctor", "--json", folder=tmp_path, env=env)
+    name = next(c for c in json.loads(done.stdout)["checks"] if c["name"] == "import name")
+    assert done.returncode == 3 and not name["ok"] and "environment" in name["mend"]
+    assert "factory_boy 3.3.3: it was installed after this package" in name["found"]
+
+
+def test_nothing_is_said_without_factory_boy(
+    run: Terminal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert not namesake.clash()
+    monkeypatch.setattr("factory.support.namesake.release", lambda name: "3.3.3")
+    assert "factory_boy 3.3.3, which has the same import name" in run("doctor").out

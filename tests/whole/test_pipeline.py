@@ -1,0 +1,126 @@
+"""A project is a PAG with all that follows from it; options travel as values with types."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import click
+import pytest
+from click.testing import CliRunner
+
+from factory.commands.options import MOTION, OUTPUT, SOURCE
+from factory.commands.requests import OutputOptions, ProjectOptions
+from factory.floor.layout.request import Ground
+from factory.pipeline import read
+from factory.support.errors import InputError
+from factory.support.settings import Settings
+from factory.theory.problem.plan import Plan
+from tests.apps.relay.test_relay_hands import sawn
+from tests.command_line import Terminal
+from tests.paths import PAPER, ROOT
+
+
+def test_each_stage_is_computed_when_it_is_first_used() -> None:
+    project = read(PAPER)
+    assert project.name == "paper" and project.file == PAPER
+    assert len(project.factory.robots) == 6
+    assert not project.has_geometry
+    assert project.factory is project.plain
+    assert project.layout.factory.net == project.factory.net
+    assert project.has_geometry
+    assert project.layout is project.layout
+
+
+def test_the_factory_of_a_project_has_the_relays_of_its_layout(tmp_path: Path) -> None:
+    (tmp_path / "slab.pag").write_text(sawn(4))
+    project = read(tmp_path / "slab.pag", ground=Ground(relay=True))
+    assert project.factory is project.layout.factory
+    assert len(project.factory.robots) > len(project.plain.robots)
+
+
+FAMILY = ROOT / "examples" / "family.pag"
+
+UNFIT = (
+    (PAPER, "--relay", "--parallel", "sub2=2"),
+    (PAPER, "--relay", "--robots", "least"),
+    (FAMILY, "--relay"),
+    (FAMILY, "--relay", "--parallel", "body=2"),
+    (FAMILY, "--demand", 3, "--distributed"),
+    (PAPER, "--demand", 3, "--world", "ideal"),
+    (PAPER, "--fuse", "--world", "ideal"),
+)
+"""Files and options that do not go together."""
+
+
+@pytest.mark.parametrize("words", UNFIT, ids=lambda words: " ".join(map(str, words[1:])))
+def test_options_that_do_not_go_together_are_refused_before_any_work(
+    words: tuple[object, ...], run: Terminal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def work(*_: object) -> None:
+        raise AssertionError("something was compiled")
+
+    monkeypatch.setattr("factory.pipeline.compile_pag", work)
+    done = run("run", *words, "--json")
+    assert done.status == 2 and done.codes[0] in ("BadValue", "BadDemand", "Usage")
+
+
+def test_no_plan_with_several_tours_gets_relays() -> None:
+    project = read(PAPER).with_plan(Plan(turns=((0, 1, 2, 3, 4, 4),)))
+    with pytest.raises(InputError, match="several tours"):
+        project.with_ground(Ground(relay=True))
+    with pytest.raises(InputError, match="several tours"):
+        read(PAPER, ground=Ground(relay=True)).with_plan(project.plan)
+
+
+def test_a_project_is_laid_out_for_its_settings() -> None:
+    near = read(PAPER)
+    far = replace(near, settings=Settings(clearance=0.1))
+    assert far.layout.area > near.layout.area
+
+
+def test_a_project_of_default_boxes_has_no_matings() -> None:
+    assert read(PAPER).matings is None and not read(PAPER).approaches
+    lamp = read(ROOT / "examples" / "lamp.pag")
+    assert lamp.matings is not None
+    assert lamp.approaches == lamp.matings.approaches
+
+
+@click.command()
+@SOURCE
+@MOTION
+@OUTPUT
+def shown(options: ProjectOptions, out: OutputOptions) -> None:
+    click.echo(repr((options, out)))
+
+
+def test_a_command_gets_its_options_as_values() -> None:
+    done = CliRunner().invoke(shown, ["a.pag", "--templates", "x", "--speed", "0.2", "--stage"])
+    expected = ProjectOptions(Path("a.pag"), (Path("x"),), speed=0.2, stage=True)
+    assert done.output.strip() == repr((expected, OutputOptions()))
+
+
+def test_options_become_settings_and_ground() -> None:
+    given = ProjectOptions(PAPER, speed=0.2, stage=True, floor="4x3", cycle=2.0)
+    assert given.settings() == Settings(speed=0.2, stage=1)
+    assert given.ground() == Ground((4.0, 3.0), False, 2.0)
+    with pytest.raises(InputError, match="--floor takes two positive numbers"):
+        replace(given, floor="4").ground()
+
+
+def loose(text: str) -> Iterator[str]:
+    """Parameters of functions that are dictionaries of anything."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.arg) and node.annotation is not None:
+            words = ast.unparse(node.annotation)
+            if words.startswith(("dict[str, Any]", "Mapping[str, Any]")):
+                yield node.arg
+
+
+def test_no_command_passes_a_dictionary_of_options() -> None:
+    planted = "from typing import Any\ndef run(options: dict[str, Any]) -> None: ..."
+    assert list(loose(planted)) == ["options"]
+    for path in (ROOT / "factory" / "commands").glob("*.py"):
+        assert not list(loose(path.read_text("utf-8"))), path.name
