@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from factory.engine.mjcf import names as names
     from factory.engine.mjcf.model import Model as Model
     from factory.engine.mjcf.parts import HIDDEN as HIDDEN
+    from factory.engine.mjcf.replica import Geoms as Geoms
     from factory.engine.mjcf.replica import Replica as Replica
     from factory.engine.record.ending import CutOff as CutOff
     from factory.engine.record.failures import Failing as Failing
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from factory.engine.record.state import Recordable as Recordable
     from factory.engine.record.state import Recorder as Recorder
     from factory.engine.record.state import State as State
+    from factory.engine.record.subject import MonitorSubject as MonitorSubject
     from factory.engine.record.verdict import RunVerdict as RunVerdict
     from factory.engine.simulation.modelling import physical_model as physical_model
     from factory.engine.simulation.mujoco.world import MujocoWorld as MujocoWorld
@@ -35,6 +37,8 @@ if TYPE_CHECKING:
     from factory.engine.timing.timed import pace as pace
     from factory.engine.timing.timing import Timing as Timing
     from factory.film.film import Film as Film
+    from factory.film.picture import Picture as Picture
+    from factory.film.shot import Shot as Shot
     from factory.floor.geometry.meshes import Mesh as Mesh
     from factory.floor.geometry.solids import Product as Product
     from factory.floor.geometry.solids import Solid as Solid
@@ -150,13 +154,14 @@ HOMES = {
     "engine.mjcf": "names",
     "engine.mjcf.model": "Model",
     "engine.mjcf.parts": "HIDDEN",
-    "engine.mjcf.replica": "Replica",
+    "engine.mjcf.replica": "Geoms Replica",
     "engine.timing.timed": "pace",
     "engine.timing.timing": "Timing",
     "engine.record.ending": "CutOff",
     "engine.record.failures": "Failing Failures",
     "engine.record.findings": "Report",
     "engine.record.state": "Event Observation Observer Recordable Recorder State",
+    "engine.record.subject": "MonitorSubject",
     "engine.record.verdict": "RunVerdict",
     "engine.simulation.modelling": "physical_model",
     "engine.simulation.mujoco.world": "MujocoWorld",
@@ -165,6 +170,8 @@ HOMES = {
     "engine.simulation.simulation": "Simulation",
     "engine.simulation.world": "World",
     "film.film": "Film",
+    "film.picture": "Picture",
+    "film.shot": "Shot",
     "pipeline": "Project",
 }
 """The names by the modules that define them, in the order of the house."""

@@ -63,9 +63,9 @@ def render(
     """
     from factory.apps.log import read_log
     from factory.apps.runs.options import RunOptions
-    from factory.apps.runs.pictures import Shot
     from factory.apps.runs.pictures import render as taken
     from factory.film.picture import Picture
+    from factory.film.shot import Shot
 
     asked = RunOptions("mujoco", units, seed, jitter, wip, max_time=max_time)
     picture = Picture(size, camera, panels=tuple(panels), title=title, renderer=renderer)

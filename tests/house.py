@@ -256,7 +256,7 @@ def reach_ins(house: House) -> Iterator[str]:
     there = {
         (module.room.removeprefix("apps."), name)
         for module in house.modules.values()
-        if module.room.startswith("apps.")
+        if re.fullmatch(r"apps\.\w+", module.room)
         for name in house.names(module)
         if not name.startswith(("api.", "apps."))
     }

@@ -12,6 +12,7 @@ import numpy as np
 
 from benches.speed.factories import balanced
 from benches.speed.factories import laid_out as floor_of
+from factory.apps.few_robots.parallel import in_parallel
 from factory.engine.simulation.mujoco.stepping import SingleSteps
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
@@ -19,7 +20,6 @@ from factory.floor.layout.layout import Layout
 from factory.pipeline import Project, all_templates, read
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
-from factory.theory.compiler.parallel import in_parallel
 from factory.theory.lang import read_pag
 from tests.examples import without_hands
 from tests.paths import ROOT

@@ -48,8 +48,8 @@ def render(
 ) -> int:
     """Film FILE.pag, or the run in a LOG written by `run --log`, headless through EGL."""
     from factory.apps.log import is_log
-    from factory.apps.runs.pictures import Shot
     from factory.apps.runs.pictures import render as taken
+    from factory.film.shot import Shot
 
     file = options.file
     if is_log(file):

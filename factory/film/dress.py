@@ -23,7 +23,7 @@ from factory.film.look import CLASSIC_FLOOR, PART, FloorPaint, Surface
 from factory.film.look import paint as paint_model
 from factory.film.outfits import Half, Layer, Outfit
 from factory.film.skins import Skin
-from factory.floor.geometry.sight import Array
+from factory.support.arrays import Array
 from factory.support.engine import mujoco
 
 LEAST = 4e-4

@@ -25,7 +25,8 @@ from factory.film.ink import Pixels
 from factory.film.marks import THIN, Mark
 from factory.film.picture import RendererName, Size
 from factory.film.studio import GOLDEN, SIZE, environment, moved, sun
-from factory.floor.geometry.sight import Array, View
+from factory.floor.geometry.sight import View
+from factory.support.arrays import Array
 from factory.support.engine import mujoco
 from factory.support.errors import Diagnostic, InputError, MissingError
 from factory.support.gl import loads

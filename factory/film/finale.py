@@ -14,7 +14,8 @@ from factory.film.camerawork import Camerawork, Moment, Take
 from factory.film.caption import draw_title
 from factory.film.ink import Pixels
 from factory.film.picture import orbit
-from factory.floor.geometry.sight import Array, Framing
+from factory.floor.geometry.sight import Framing
+from factory.support.arrays import Array
 from factory.support.engine import mujoco
 from factory.theory.lang.source import counted
 

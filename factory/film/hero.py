@@ -9,7 +9,8 @@ import shapely
 from factory.engine.mjcf import names
 from factory.engine.mjcf.replica import SHOWN, Replica
 from factory.film.action import Snapshot, outlines, placed
-from factory.floor.geometry.sight import Array, Framing, View, fit, towards
+from factory.floor.geometry.sight import Framing, View, fit, towards
+from factory.support.arrays import Array
 from factory.support.engine import mujoco
 
 USUAL, ELEVATION = -122.0, 38.0

@@ -14,7 +14,7 @@ import shapely
 
 from factory.engine.mjcf import names
 from factory.engine.mjcf.pads import Pads
-from factory.engine.mjcf.replica import Replica, shown
+from factory.engine.mjcf.replica import Geoms, Replica
 from factory.engine.mjcf.weld_frames import held_at
 from factory.engine.record.subject import MonitorSubject
 from factory.film.action import box_of, is_stand, outlines, placed, shape_of
@@ -114,7 +114,7 @@ def _stands(replica: Replica) -> Array:
     """The boxes (n, 8, 3) round what stands still and does not fade: housings and the shed."""
     m, d = replica.m, replica.d
     bodies = [b for b in range(1, m.nbody) if names.kind(m.body(b).name) in ("feeder", "outfeed")]
-    geoms = (g for b in bodies if m.body_weldid[b] == 0 for g in shown(m, b))
+    geoms = (g for b in bodies if m.body_weldid[b] == 0 for g in Geoms(m).shown(b))
     boxes = [placed(m, d, g) for g in geoms if not is_stand(m.geom(g).name)]
     return np.array(boxes).reshape(-1, 8, 3)
 

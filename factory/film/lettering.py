@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 
 from factory.film.skins import Indices, Skin
-from factory.floor.geometry.sight import Array
+from factory.support.arrays import Array
 
 GLYPHS = {
     "A": "00,24,40 11,31",

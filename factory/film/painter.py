@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from functools import cache
 
 import numpy as np
 
 from factory.engine.mjcf import names
-from factory.engine.mjcf.loose_parts import loose_parts
 from factory.engine.mjcf.replica import SHOWN, Replica
 from factory.engine.record.subject import MonitorSubject
 from factory.film.action import Fading, Snapshot
@@ -21,7 +19,7 @@ from factory.film.smoothing import smooth
 from factory.film.studio import GOLDEN, moved, sun
 from factory.floor.geometry.sight import Framing, View
 from factory.support import gl
-from factory.support.arrays import Array, Indices
+from factory.support.arrays import Array
 from factory.support.engine import mujoco
 from factory.support.resource import Closing
 
@@ -34,8 +32,6 @@ STILL_SHADOWS, FILM_SHADOWS = 4096, 2048
 SOFT = 0.04
 """Radius of the sun as a still sees it [rad]: the softness of shadows."""
 
-LOOSE_SAMPLES = 12
-"""A still of loose parts, which is drawn while a user waits, is the mean of so many pictures."""
 
 Sample = tuple[int, int]
 """The number of one of several pictures that a still is the mean of, and how many there are."""
@@ -171,36 +167,6 @@ class Renderer(Closing):
             elif light.castshadow:
                 light.dir = -self.sun if sample is None else _spread_sun(self.sun, sample)
                 light.pos = middle - sum(view.range) / 2 * np.asarray(light.dir, float)
-
-
-class LooseParts(Closing):
-    """Draws the parts of a product alone, moved from their places, with a GL context of its own.
-    Its arguments are those of `loose_parts`. Raises MissingError where there is no GL."""
-
-    def __init__(
-        self,
-        surfaces: Mapping[str, tuple[Array, Indices]],
-        colours: Sequence[tuple[float, ...]],
-        floor: float,
-        extent: float,
-        size: Size,
-    ) -> None:
-        gl.probe()
-        model = loose_parts(surfaces, colours, floor, extent)
-        model.vis.global_.offwidth, model.vis.global_.offheight = size
-        self.replica = Replica(model)
-        self.framing = Framing(size[0] / size[1], 0.06, 0.06, 0.06)
-        self.renderer = Renderer(self.replica, size)
-
-    def close(self) -> None:
-        """Give the GL context back."""
-        self.renderer.close()
-
-    def move(self, offsets: Array) -> None:
-        """Move each part by an offset (n, 3) [m] from its place in the product."""
-        upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(offsets), 1))
-        self.replica.place(np.hstack([offsets, upright]).ravel())
-        mujoco.mj_camlight(self.replica.m, self.replica.d)
 
 
 ROUND = (

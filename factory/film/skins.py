@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.floor.geometry.sight import Array
+from factory.support.arrays import Array
 
 Indices = NDArray[np.int64]
 

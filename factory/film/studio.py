@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.floor.geometry.sight import Array
+from factory.support.arrays import Array
 
 SIZE, LEAST = 128, 16
 """Texels along an edge of the sharpest level and of the bluntest."""

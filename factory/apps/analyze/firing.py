@@ -12,8 +12,8 @@ from types import MappingProxyType
 import numpy as np
 
 from factory.api import Array, MarkedNet, token_free
+from factory.apps.foreign_nets.behaviour import dead_ends
 from factory.theory.nets.cycle_ratio import CycleRatio
-from factory.theory.nets.marked import dead_ends
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,14 +22,14 @@ from factory.apps.exports.certificate.writer import certificate
 from factory.apps.exports.dot import write_dot
 from factory.apps.exports.floor_sheet import write_svg
 from factory.apps.exports.pnml import write_pnml
-from factory.apps.exports.stock import written
+from factory.apps.exports.program_text import write_program
+from factory.apps.exports.stock import model_files, written
 from factory.apps.exports.ways import ways
 from factory.apps.log.plan_file import LAYOUT_NAME, PLAN_NAME, plan_files
-from factory.engine.mjcf.model import model_files
 from factory.floor.layout.exclusions import coordinated
 from factory.floor.modes.modes import operation_modes
 from factory.support.files import own_names
-from factory.theory.plant.programs import program_of, write_program
+from factory.theory.plant.programs import program_of
 
 
 def _json(document: object) -> str:

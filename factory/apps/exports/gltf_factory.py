@@ -67,7 +67,8 @@ def write_factory(replica: Replica, binary: bool) -> bytes:
     """A factory in its present state as a glTF: a node for each body, named as in the MJCF, within
     it one for each shape; shapes of equal size and colour share a mesh. Spare parts are left
     out."""
-    from factory.engine.mjcf.replica import paint, shown, triangles
+    from factory.api import Geoms
+    from factory.apps.exports.geoms import triangles
 
     m, d = replica.m, replica.d
     scene = new_scene(FACTORY)
@@ -81,8 +82,8 @@ def write_factory(replica: Replica, binary: bool) -> bytes:
             parent = int(m.body_parentid[body])
             there, here = _pose(replica, parent), _pose(replica, body)
             scene.graph.update(node, _node(replica, parent), matrix=np.linalg.solve(there, here))
-        for geom in shown(m, body):
-            kind, colour = (int(m.geom_type[geom]), int(m.geom_dataid[geom])), paint(m, geom)
+        for geom in Geoms(m).shown(body):
+            kind, colour = (int(m.geom_type[geom]), int(m.geom_dataid[geom])), Geoms(m).colour(geom)
             key = (*kind, *m.geom_size[geom].tolist(), *colour.tolist())
             if key not in meshes:
                 meshes[key] = f"mesh{len(meshes)}"

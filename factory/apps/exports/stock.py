@@ -11,8 +11,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
+from xml.sax.saxutils import quoteattr
 
 from factory.api import Layout, Model, names
 from factory.engine.mjcf.driving import GRAVITY
@@ -145,3 +147,11 @@ def _add_sensors(root: Element) -> None:
             part = {"objtype": "xbody", "objname": weld.get("body2")}
             holder = {"reftype": "xbody", "refname": weld.get("body1")}
             add(sensor, "framepos", name=weld.get("name"), **part, **holder)
+
+
+def model_files(model: Model, path: Path) -> dict[Path, bytes]:
+    """The XML at `path` and, beside it, its mesh folder `NAME_meshes`: what to write where."""
+    folder = path.with_name(f"{path.stem}_meshes")
+    xml = model.xml.replace('meshdir="meshes"', f"meshdir={quoteattr(folder.name)}", 1)
+    meshes = {folder / name: content for name, content in model.files.items()}
+    return {path: xml.encode(errors="surrogateescape"), **meshes}

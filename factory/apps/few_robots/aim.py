@@ -16,10 +16,10 @@ from math import inf
 from typing import Literal
 
 from factory.api import NOPART, PAG, Template
+from factory.apps.few_robots.parallel import Branches
 from factory.support.bounds import check_values
 from factory.support.settings import LEAST
 from factory.theory.compiler.expanding import Node, expand
-from factory.theory.compiler.parallel import Branches
 
 SHOWN = 6
 """Number of labels of a proof that are shown."""

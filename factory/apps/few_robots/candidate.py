@@ -8,9 +8,9 @@ from functools import cached_property
 
 from factory.api import FactoryError, Project, Timing, pace
 from factory.apps.few_robots.bundles import Filling
+from factory.apps.few_robots.parallel import Branches
 from factory.apps.few_robots.sharing import with_branches
 from factory.engine.timing.cycle_time import CycleTime, cycle_time
-from factory.theory.compiler.parallel import Branches
 
 
 @dataclass(frozen=True)

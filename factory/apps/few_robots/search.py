@@ -18,7 +18,7 @@ from factory.apps.few_robots.aim import Aim, least_robots, usual_effort
 from factory.apps.few_robots.bundles import Filling
 from factory.apps.few_robots.candidate import Candidate
 from factory.apps.few_robots.estimating import Estimator
-from factory.theory.compiler.folding import kept_apart, lines_of
+from factory.apps.few_robots.folding import kept_apart, lines_of
 from factory.theory.problem.plan import THIRD
 
 CHANGES = 60

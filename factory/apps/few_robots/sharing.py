@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from factory.api import Project
-from factory.theory.compiler.folding import fold, lines_of_labels
-from factory.theory.compiler.parallel import Branches, in_parallel
-from factory.theory.compiler.tees import with_tees as tees_in_plan
+from factory.apps.few_robots.folding import fold, lines_of_labels
+from factory.apps.few_robots.parallel import Branches, in_parallel
+from factory.apps.few_robots.tees import with_tees as tees_in_plan
 
 
 def with_lines(project: Project, lines: Sequence[Sequence[str]]) -> Project:

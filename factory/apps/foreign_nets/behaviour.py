@@ -8,7 +8,7 @@ Theorem 21: a marking is reachable where it keeps the tokens of every circuit).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
@@ -27,8 +27,8 @@ from factory.api import (
 )
 from factory.apps.foreign_nets.discover import discover
 from factory.apps.foreign_nets.explore import LIMIT, Exploration, explore
-from factory.theory.nets.composition import compose, cover
-from factory.theory.nets.marked import dead_ends, stuck_circuit
+from factory.theory.nets.composition import compose
+from factory.theory.nets.marked import stuck_circuit
 from factory.theory.nets.train import no_way_back
 from factory.theory.nets.verdict import Defect, verdict
 from factory.theory.nets.verify import legality_defects, shape_defects
@@ -280,3 +280,19 @@ def _explored(net: MarkedNet, exploration: Exploration) -> Iterator[Defect]:
         yield Defect("reversible", "no way back", reason, transitions=one_way)
     elif not exploration.complete:
         yield Defect("reversible", "undecided", text)
+
+
+def cover(net: MarkedNet, closed: Iterable[bool]) -> list[int]:
+    """For each place a gear through it that has at most one token and keeps it, or NONE."""
+    covered = [NONE] * len(net.tokens)
+    for number, (gear, good) in enumerate(zip(net.gears, closed, strict=False)):
+        if good and sum(net.tokens[p] for p in gear.places) <= 1:
+            for place in gear.places:
+                covered[place] = number
+    return covered
+
+
+def dead_ends(net: MarkedNet) -> tuple[int, ...]:
+    """The places with a consumer but no producer: what they feed stops (marked graphs)."""
+    pairs = enumerate(zip(net.left, net.right, strict=True))
+    return tuple(p for p, (before, after) in pairs if before == NONE and after != NONE)

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from factory.api import Array, Diagnostic, Indices, InputError
+from factory.apps.importing.zipping import zipped
 from factory.floor.geometry.glb_reader import Colour
-from factory.floor.geometry.mending import zipped
 from factory.floor.geometry.mesh_file import MeshFile, areas_of
 from factory.floor.geometry.meshes import is_closed, volume_of
 from factory.floor.geometry.pieces import MOST_PIECES, components, submeshes

@@ -92,7 +92,7 @@ def import_product(
 
 def _allowing(pag: PAG, files: Mapping[str, bytes]) -> PAG:
     """An LDraw model in which parts may overlap as much as drawings without fits do."""
-    from factory.floor.geometry.overlapping import everywhere
+    from factory.apps.importing.draft import everywhere
     from factory.floor.geometry.product import product_geometry
 
     try:

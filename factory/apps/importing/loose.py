@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from factory.api import PAG, Array, Assembly, Diagnostic, Indices, InputError, Position, read_bytes
+from factory.apps.importing.alike import alike
 from factory.apps.importing.bodies import Bodies, FileBody, apart, check_count, unit_of
 from factory.apps.importing.draft import (
     PART,
@@ -18,13 +19,13 @@ from factory.apps.importing.draft import (
     label_of,
 )
 from factory.apps.importing.importer import Imported
-from factory.apps.importing.mesh_files import MeshStore
+from factory.apps.importing.mesh_files import MeshStore, natural, obj_of
 from factory.apps.importing.part_maker import Placement
 from factory.apps.importing.scene_file import MESHES, SCENES, read_one, read_scene
-from factory.floor.geometry.alike import alike, shape_of
-from factory.floor.geometry.mesh_file import ANEW, UnreadableMesh, obj_of
+from factory.floor.geometry.alike import shape_of
+from factory.floor.geometry.mesh_file import ANEW, UnreadableMesh
 from factory.floor.geometry.solids import colour
-from factory.support.files import MESH, natural
+from factory.support.files import MESH
 from factory.theory.lang.source import quoted
 from factory.theory.problem.pag import Parameter
 

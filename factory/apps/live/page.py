@@ -7,14 +7,13 @@ from html import escape
 
 import numpy as np
 
-from factory.api import HIDDEN, Array, Operation, Simulation, names
+from factory.api import HIDDEN, Array, MonitorSubject, Operation, Simulation, names
 from factory.apps.live.commands import FACTORS, SPEEDS
 from factory.apps.live.session import Session
 from factory.apps.report.drawings import data, floor_plan, labels_of, net_drawing
 from factory.apps.report.page import counts, filled, options
 from factory.apps.report.scene import DrawnFactory, Pack, scene, stations
 from factory.apps.report.sections import assembly_tree
-from factory.engine.record.subject import subject_of_run
 
 SCRIPTS = (
     "report/three.min.js",
@@ -91,7 +90,7 @@ def stage_of(simulation: Simulation) -> DrawnFactory:
         d.xpos.copy(),
         d.xquat.copy(),
         np.stack([low, high]),
-        subject_of_run(simulation).as_json()["places"],
+        MonitorSubject.of_run(simulation).as_json()["places"],
         stations(factory, m, _ends(simulation)),
     )
 

@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.api import Diagnostic, InputError
-from factory.support.files import AGAIN, LOG, Content
+from factory.apps.log.content import AGAIN, Content
+from factory.support.files import LOG
 
 STATES = ("qpos", "qvel", "ctrl")
 

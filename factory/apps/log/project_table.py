@@ -30,9 +30,9 @@ from factory.api import (
     value_of,
     write_pag,
 )
+from factory.apps.log.content import AGAIN
 from factory.floor.layout.saved import LayoutTable
 from factory.pipeline import all_templates
-from factory.support.files import AGAIN
 from factory.support.tables import MISFITS
 from factory.theory.compiler.assigning import shared
 from factory.theory.compiler.compiler import compile_pag

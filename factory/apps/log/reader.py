@@ -29,11 +29,17 @@ from factory.apps.log.blocks import (
     locked,
     without_states,
 )
-from factory.apps.log.checks import check_block, check_course, check_header, state_bytes
+from factory.apps.log.checks import (
+    check_block,
+    check_course,
+    check_figures,
+    check_header,
+    state_bytes,
+)
+from factory.apps.log.content import Content, content_of
 from factory.apps.log.failed import Placed, failures_of, failures_so_far, undone_in
-from factory.engine.record.verdict import check_figures
 from factory.support.claim import is_claimed
-from factory.support.files import LOG, RECORD, Content, content_of, head_of
+from factory.support.files import LOG, RECORD, head_of
 from factory.theory.nets.undone import lasting
 
 Index = NDArray[np.int32]

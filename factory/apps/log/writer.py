@@ -21,6 +21,7 @@ from factory.api import (
     Event,
     FactoryError,
     InputError,
+    MonitorSubject,
     Observation,
     Project,
     Recordable,
@@ -30,14 +31,14 @@ from factory.api import (
     table_of,
 )
 from factory.apps.log.blocks import LENGTH, MAGIC, STATES, Arrays, bad_log, block, pack_rows
+from factory.apps.log.content import content_of
 from factory.apps.log.failed import Written
 from factory.apps.log.project_table import project_table
 from factory.apps.log.reader import digest_of, header_in
-from factory.engine.record.subject import subject_of_run
 from factory.engine.record.verdict import HEADER, kept_figures
 from factory.floor.layout.saved import LayoutTable
 from factory.support.claim import claimed
-from factory.support.files import RECORD, content_of, unwritten
+from factory.support.files import RECORD, unwritten
 from factory.support.settings import AUTO
 from factory.support.version import release
 
@@ -309,7 +310,7 @@ def _header(
         **({"demand": table_of(demand)} if (demand := simulation.request.demand) else {}),
         "fuse": simulation.request.fuse,
         "start": sorted(simulation.start),
-        "monitor": subject_of_run(simulation).as_json(),
+        "monitor": MonitorSubject.of_run(simulation).as_json(),
         "robots": [robot.name for robot in factory.robots],
         "places": [place.name for place in net.places],
         "transitions": [transition.name for transition in net.transitions],

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 
-from factory.api import Entry, PetriNet, Undone
+from factory.api import Entry, MonitorSubject, PetriNet, Undone
 from factory.engine.record.findings import Firing, Violation
-from factory.engine.record.subject import MonitorSubject
 
 ROUNDING = 1e-9
 """Times that differ by less are equal [s]."""

@@ -4,13 +4,23 @@ names in the model and its kinematic tree."""
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from factory.api import Array, Factory, Index, names
-from factory.engine.mjcf.weld_frames import GRIP, KINDS, WeldFrames, check_holders
+from factory.engine.mjcf.weld_frames import HINGE, SLIDE, WeldFrames
 from factory.floor.layout.way import Ways
+
+if TYPE_CHECKING:
+    from factory.api import mujoco
+
+PARK, FEED, GRIP, HOLD = range(4)
+
+
+KINDS = {"park": PARK, "feed": FEED, "grip": GRIP, "hold": HOLD}
+"""What holds a part, by the first word of a weld's name: its parking place, its feeder, a robot,
+the outfeed's tray."""
 
 Bent = tuple[tuple[int, ...], Ways]
 """The robots (index) whose guidepaths have bends, and the ways that these are."""
@@ -140,3 +150,17 @@ def _part(words: list[str]) -> str:
     """The label in a weld's name: `grip/r3/part1`, `park/part1#2`, `feed/part1`."""
     label = words[-1] if words[0] == "grip" else "/".join(words[1:])
     return label.rpartition("#")[0] if words[0] == "park" else label
+
+
+def check_holders(m: mujoco.MjModel, welds: Index) -> None:
+    """Raises ValueError where the first body of a weld does more than slide, or turn about the
+    vertical on what slides."""
+    joints, up = m.body_jntnum, m.body_parentid
+    first = np.minimum(m.body_jntadr, m.njnt - 1)
+    last = m.jnt_type[np.minimum(m.body_jntadr + np.maximum(joints, 1), m.njnt) - 1]
+    slides = (joints == 0) | (joints <= 2) & (m.jnt_type[first] == SLIDE) & (last == SLIDE)
+    upright = abs(m.jnt_axis[first, 2]) == 1.0
+    turns = (joints == 1) & (m.jnt_type[first] == HINGE) & upright
+    for body in np.unique(m.eq_obj1id[welds]):
+        if not ((slides | turns)[body] and slides[up[body]] and m.body_weldid[up[up[body]]] == 0):
+            raise ValueError(f"{m.body(int(body)).name} holds parts and does more than slide")

@@ -16,13 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from factory.api import Factory, Marking, Observation, Report, names
+from factory.api import Factory, Marking, MonitorSubject, Observation, Report, names
 from factory.apps.log.reader import Log
 from factory.apps.monitor.agreement import ROUNDING
 from factory.apps.monitor.anatomy import Anatomy
 from factory.apps.monitor.monitor import MOST, Monitor
 from factory.engine.record.findings import Firing
-from factory.engine.record.subject import MonitorSubject
 
 SHORT = 0.2
 """Shorter spells are not judged [s]."""

@@ -12,9 +12,8 @@ from collections import deque
 from dataclasses import dataclass, field
 from math import inf
 
-from factory.api import marked, token_free
+from factory.api import MonitorSubject, marked, token_free
 from factory.engine.record.findings import Firing, Violation
-from factory.engine.record.subject import MonitorSubject
 from factory.engine.timing.pool import with_wip
 
 

@@ -9,10 +9,9 @@ from math import radians
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import Array, Index, Observation
-from factory.apps.monitor.anatomy import Anatomy
-from factory.engine.mjcf.weld_frames import GRIP, HOLD, WeldFrames
-from factory.engine.record.subject import MonitorSubject
+from factory.api import Array, Index, MonitorSubject, Observation
+from factory.apps.monitor.anatomy import GRIP, HOLD, Anatomy
+from factory.engine.mjcf.weld_frames import WeldFrames
 
 HANGS = 2e-3
 """Distance from its place above which a part is not held [m], in addition to twice the radius of

@@ -14,6 +14,7 @@ from factory.api import (
     Diagnostic,
     Factory,
     Failures,
+    MonitorSubject,
     Observation,
     Report,
     RunVerdict,
@@ -29,7 +30,7 @@ from factory.apps.monitor.monitor import Monitor
 from factory.apps.monitor.recount import differences, recounted, worst
 from factory.engine.mjcf.weld_frames import SLIDE
 from factory.engine.record.findings import Violation
-from factory.engine.record.subject import MonitorSubject, MonitorTable
+from factory.engine.record.subject import MonitorTable
 from factory.engine.record.verdict import FAULTS, judged
 from factory.theory.nets.replay import replay
 from factory.theory.plant.demand import Word

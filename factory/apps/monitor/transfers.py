@@ -5,11 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from factory.api import NOPART, Operation
-from factory.apps.monitor.anatomy import Anatomy, Holder
+from factory.api import NOPART, MonitorSubject, Operation
+from factory.apps.monitor.anatomy import FEED, GRIP, HOLD, PARK, Anatomy, Holder
 from factory.apps.monitor.grips import Switch
-from factory.engine.mjcf.weld_frames import FEED, GRIP, HOLD, PARK
-from factory.engine.record.subject import MonitorSubject
 
 Blame = Callable[[str, int, str, str], None]
 """Records a violation: its code, the robot (-1 for none), the label, and the message."""

@@ -18,8 +18,8 @@ from factory.apps.few_robots.candidate import Candidate
 from factory.apps.few_robots.estimating import Estimate
 from factory.apps.importing.mesh_files import MeshStore
 from factory.apps.log.plan_file import PLAN_NAME, plan_files
+from factory.apps.runs.options import fusing_pays
 from factory.apps.runs.watched import watched
-from factory.floor.geometry.fused_bodies import fusing_pays
 
 MESHES = "meshes"
 """A folder that all points share."""

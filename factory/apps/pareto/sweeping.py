@@ -21,9 +21,9 @@ from factory.api import Allowance, FactoryError, Plan, Project
 from factory.apps.few_robots.aim import Aim, least_robots, usual_effort
 from factory.apps.few_robots.candidate import Candidate
 from factory.apps.few_robots.estimating import Estimate, Estimator
+from factory.apps.few_robots.parallel import Branches
 from factory.apps.few_robots.search import SINGLE, Search
 from factory.apps.pareto.front import FrontPoint, ParetoFront, candidates_front, undominated
-from factory.theory.compiler.parallel import Branches
 from factory.theory.problem.plan import THIRD
 
 WIDE = 2

@@ -10,9 +10,9 @@ import numpy as np
 
 from factory.api import Array, Indices
 from factory.apps.planning.cannot import Interlock
+from factory.apps.planning.loose_parts import LOOSE_SAMPLES, LooseParts
 from factory.apps.planning.parts import InPlace
 from factory.film.ink import GROUND, INK, Colour, Ink, Pixels, fitted, width
-from factory.film.painter import LOOSE_SAMPLES, LooseParts
 from factory.film.picture import Size
 from factory.film.reel import write_still
 from factory.film.video import check_output

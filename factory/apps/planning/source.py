@@ -24,6 +24,7 @@ from factory.api import (
     rotation,
 )
 from factory.apps.importing import Imported, Options, import_product
+from factory.apps.importing.alike import alike
 from factory.apps.importing.bodies import check_count
 from factory.apps.importing.draft import file_stem
 from factory.apps.importing.importer import LDRAW
@@ -33,7 +34,7 @@ from factory.apps.importing.scene_file import MESHES, SCENES
 from factory.apps.planning.faults import check_in_place, check_places, raise_if_any
 from factory.apps.planning.parts import EXTRA, InPlace, Kept, PlacedPart, hull_stands
 from factory.apps.planning.shanks import screws_among
-from factory.floor.geometry.alike import alike, shape_of
+from factory.floor.geometry.alike import shape_of
 from factory.floor.geometry.decomposition import can_decompose
 from factory.floor.geometry.mesh_file import ANEW
 from factory.floor.geometry.meshes import hull_mesh

@@ -13,7 +13,6 @@ from factory.api import Array, Event, Factory, Limits, Operation, Settings
 from factory.apps.plc.corridors import SLACK
 from factory.apps.plc.interlock import PlantInterlock
 from factory.apps.plc.signals import NOBODY, AxisDrives, Commands, Controller, Refusal, Sensed
-from factory.engine.record.state import Event
 from factory.engine.simulation.active import Active
 from factory.engine.simulation.ordering import Ordering
 from factory.engine.timing.distributed import Scan

@@ -25,13 +25,12 @@ from factory.api import (
     collector_paused,
     load_catalogue,
 )
-from factory.apps.relay.splitting import split
+from factory.apps.relay.splitting import origin_of, split
 from factory.apps.relay.ways import Way, ways
 from factory.floor.layout.durations import cycle_of, gear_times
 from factory.floor.layout.optimising import optimised
 from factory.floor.layout.outfeed import away
 from factory.support.resources import templates_folder
-from factory.theory.compiler.expanding import origin_of
 from factory.theory.lang.template_reader import load_templates
 
 WITHIN = 1.05

@@ -22,7 +22,7 @@ from factory.api import (
 from factory.apps.relay.in_line import InLine, hands_in_line
 from factory.apps.relay.ways import Way
 from factory.floor.layout.visits import visits_of
-from factory.theory.compiler.expanding import origin_of, relay_label
+from factory.theory.compiler.expanding import RELAY, relay_label
 from factory.theory.compiler.relays import with_relays
 
 
@@ -113,3 +113,9 @@ def _path(path: Guidepath, piece: Piece, lane: float) -> Guidepath:
         offset=round(path.offset + lane, 3),
         aside=-lane,
     )
+
+
+def origin_of(label: str) -> str:
+    """Label before hand-overs."""
+    origin, _, last = label.rpartition("/")
+    return origin if last.startswith(RELAY) else label

@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from factory.api import Array, Factory, Operation, marked, names, rotation
+from factory.api import Array, Factory, Geoms, Operation, marked, names, rotation
 from factory.apps.drawing.canvas import Canvas, Point, hexadecimal, hull, millimetres
 from factory.apps.exports.svg import NetDrawing
 from factory.apps.report.scene import DrawnFactory, owner, placed, stands_for
-from factory.engine.mjcf.replica import paint, shown
 
 Link = dict[str, list[int]]
 """Numbers of `robots`, `labels`, `transitions`, `places` and `operations`; `solids` are the labels
@@ -221,7 +220,7 @@ class _Plan:
         [m]."""
         for member in np.flatnonzero(self.m.body_weldid == body).tolist():
             place, turn = self.m.body_pos[member], rotation(self.m.body_quat[member])
-            for geom in shown(self.m, member):
+            for geom in Geoms(self.m).shown(member):
                 points = placed(self.m, geom)[0]
                 yield geom, points if member == body else points @ turn.T + place
 
@@ -260,7 +259,7 @@ class _Plan:
         name, (geoms, shapes) = self.m.body(body).name, zip(*self._rigid(body), strict=True)
         points = np.concatenate(shapes)
         spare = "hidden" if self.stage.position[body, 2] < 0 else None
-        fill = hexadecimal(paint(self.m, geoms[0]))
+        fill = hexadecimal(Geoms(self.m).colour(geoms[0]))
         with self.canvas.group(**self._meant(name), data_body=body, hidden=spare):
             title = names.label_of(name)
             self.canvas.polygon(self._outline(points), "part", fill=fill, title=title)

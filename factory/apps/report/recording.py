@@ -16,6 +16,7 @@ from factory.api import (
     Factory,
     InputError,
     Layout,
+    MonitorSubject,
     Operation,
     Report,
     RunError,
@@ -26,7 +27,6 @@ from factory.apps.analyze.measured import conditions
 from factory.apps.exports.motion import BodyMotion, motion_of
 from factory.apps.log import Log, read_log
 from factory.apps.log.project_table import factory_of, project_of
-from factory.apps.monitor import subject_of
 from factory.apps.monitor.record import verdict_on, watch_log
 from factory.apps.report.scene import DrawnFactory, stations
 from factory.apps.resume.remade import forged, model_faults
@@ -129,7 +129,7 @@ def _laid_out(log: Log, beside: Path) -> Layout:
     layout."""
     header, made = log.header, conditions(log.header)
     layout = project_of(header, beside).layout
-    goals = subject_of(layout, made.settings, made.jitter, None, made.wip).as_json()["goals"]
+    goals = MonitorSubject.of(layout, made.settings, made.jitter, None, made.wip).as_json()["goals"]
     if goals != header["monitor"]["goals"]:
         raise ValueError("the run was in another layout than the one its PAG gets now")
     return layout

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import Array, Factory, Operation, Replica, mujoco, names, rotation
-from factory.engine.mjcf.replica import paint, shown, triangles
+from factory.api import Array, Factory, Geoms, Operation, Replica, mujoco, names, rotation
+from factory.apps.exports.geoms import triangles
 from factory.engine.mjcf.robots import ROLES
 from factory.floor.geometry.pieces import joined
 
@@ -100,7 +100,7 @@ def _look(m: mujoco.MjModel, geoms: Sequence[int]) -> tuple[list[NDArray[Any]], 
     """Several geoms of a body as one: vertices (n, 3) [m] in its frame, faces (k, 3), colours
     (n, 3) from 0 to 255; and how opaque it is."""
     meshes = [placed(m, geom) for geom in geoms]
-    paints = np.array([paint(m, geom) for geom in geoms])
+    paints = np.array([Geoms(m).colour(geom) for geom in geoms])
     counts = [len(points) for points, _ in meshes]
     vertices, faces = joined(meshes)
     colours = np.round(255 * np.clip(paints[:, :3], 0, 1)).astype(np.uint8)
@@ -136,12 +136,12 @@ def scene(stage: DrawnFactory, labels: dict[str, int], pack: Pack) -> dict[str, 
 def _groups(m: mujoco.MjModel) -> Iterator[tuple[int, list[int]]]:
     """The geoms that make one thing: those of a body; of the world those of a robot."""
     owned: dict[str, list[int]] = {}
-    for geom in shown(m, 0):
+    for geom in Geoms(m).shown(0):
         owned.setdefault(owner(m.geom(geom).name), []).append(geom)
     for geoms in owned.values():
         yield 0, geoms
     for body in range(1, m.nbody):
-        if geoms := list(shown(m, body)):
+        if geoms := list(Geoms(m).shown(body)):
             yield body, geoms
 
 

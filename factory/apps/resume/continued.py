@@ -7,9 +7,9 @@ from io import FileIO
 
 from factory.api import Diagnostic, Entry, Event, InputError, Recordable, Recorder, State, Undone
 from factory.apps.log.blocks import blocks
+from factory.apps.log.content import AGAIN, Content
 from factory.apps.log.reader import Log, header_in
 from factory.apps.log.writer import LogWriter
-from factory.support.files import AGAIN, Content
 
 HINT = (
     "the log was changed or comes from another machine, or something took part in its run that a "

@@ -17,6 +17,7 @@ from factory.api import (
     Diagnostic,
     FactoryError,
     Layout,
+    MonitorSubject,
     RunRequest,
     Simulation,
     State,
@@ -28,7 +29,6 @@ from factory.apps.log.project_table import project_of, settings_of
 from factory.apps.log.reader import digest_of
 from factory.apps.log.writer import packed, versions
 from factory.engine.mjcf.reservations import reservations_of
-from factory.engine.record.subject import subject_of_run
 from factory.engine.record.verdict import FAULTS, HEADER, RESERVATIONS
 
 TAG = re.compile(r"<[^>]+>")
@@ -90,7 +90,7 @@ def model_faults(
         layout = layout or project_of(log.header, beside).layout
         request = request_of(log.header)
         made = Simulation(layout, request)
-        if subject_of_run(made).as_json()["goals"] != log.header["monitor"]["goals"]:
+        if MonitorSubject.of_run(made).as_json()["goals"] != log.header["monitor"]["goals"]:
             return (), "the run was in another layout than the one that its PAG gets now"
     except FactoryError as error:
         first = error.diagnostics[0]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from factory.api import Diagnostic, InputError, usage_error
+from factory.api import Diagnostic, Factory, InputError, Product, usage_error
 from factory.support.bounds import WORLDS, WorldName, check_choice, check_values
 
 if TYPE_CHECKING:
@@ -109,7 +109,6 @@ class RunOptions:
         """The request of a run; `shown`: whether it is filmed or logged. Raises InputError."""
         from factory.api import RunRequest
         from factory.apps.runs.demand_file import demand_of
-        from factory.floor.geometry.fused_bodies import fusing_pays
         from factory.theory.nets.history import legal_marking
 
         self.check_combination()
@@ -141,3 +140,20 @@ def check_ideal(fuse: bool | None, monitor: bool = False) -> None:
     for wanted, purpose in ((monitor, "for a monitor to observe"), (fuse, "that could become one")):
         if wanted:
             raise usage_error(f"the ideal world has no bodies {purpose}", "leave out --world ideal")
+
+
+FUSE_FROM = 40
+"""From so many robots on, runs are fused unless told otherwise."""
+
+
+GEOMS = 100
+"""But not where sub-assemblies would have more convex bodies than this for each part: each has
+those of all that it is made of, so that a chain of n parts has n / 2 for each."""
+
+
+def fusing_pays(factory: Factory, product: Product) -> bool:
+    """Whether one body for each sub-assembly makes a run faster, as measured."""
+    pieces = {o.label: len(product.solids[o.label].pieces) for o in factory.leaves}
+    wholes = [factory.contents[o.label] for o in factory.making if len(o.inputs) > 1]
+    geoms = sum(pieces[part] for parts in wholes for part in parts)
+    return len(factory.robots) >= FUSE_FROM and geoms <= GEOMS * len(factory.leaves)

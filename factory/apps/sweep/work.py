@@ -13,12 +13,12 @@ from typing import Any, TypeVar
 
 from factory.api import Diagnostic, FactoryError, Layout, Run, RunRequest, Settings, Simulation
 from factory.apps.recovery import Campaign, WorldFault, recover
+from factory.apps.runs.options import fusing_pays
 from factory.apps.runs.watched import watched
 from factory.apps.sweep.grid import FAULT_RATE, SETTINGS, Point
 from factory.apps.sweep.recipe import Recipe
 from factory.engine.mjcf.timestep import timed
 from factory.engine.simulation.simulation import Compiled, compiled
-from factory.floor.geometry.fused_bodies import fusing_pays
 from factory.floor.layout.saved import LAID_FOR
 from factory.theory.nets.verify import proved
 

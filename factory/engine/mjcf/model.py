@@ -44,7 +44,6 @@ from factory.floor.layout.feeding import outlets_of
 from factory.floor.layout.hanging import Hanging
 from factory.floor.layout.layout import Layout
 from factory.support.errors import Diagnostic
-from factory.support.markup import quoteattr
 from factory.support.settings import Settings
 from factory.theory.control.profile import SpeedProfile
 from factory.theory.plant.approaches import Pair
@@ -212,14 +211,6 @@ def product_name(factory: Factory) -> str:
     """The name of the model: that of the PAG file, without folder and ending."""
     name = "".join(c if c.isprintable() else "?" for c in Path(factory.pag.file).stem)
     return name or "factory"
-
-
-def model_files(model: Model, path: Path) -> dict[Path, bytes]:
-    """The XML at `path` and, beside it, its mesh folder `NAME_meshes`: what to write where."""
-    folder = path.with_name(f"{path.stem}_meshes")
-    xml = model.xml.replace('meshdir="meshes"', f"meshdir={quoteattr(folder.name)}", 1)
-    meshes = {folder / name: content for name, content in model.files.items()}
-    return {path: xml.encode(errors="surrogateescape"), **meshes}
 
 
 def _hoists(layout: Layout, masses: Mapping[str, float], settings: Settings) -> dict[int, Hoist]:

@@ -7,8 +7,8 @@ from math import ceil
 
 import numpy as np
 
+from factory.support.arrays import Array, Index
 from factory.support.settings import MOST
-from factory.theory.control.mode import Array, Index
 from factory.theory.control.navigation import Bundle
 
 ROUNDED = 1e-6

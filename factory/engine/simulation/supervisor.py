@@ -20,8 +20,7 @@ from factory.engine.simulation.ordering import Ordering
 from factory.engine.simulation.world import World
 from factory.engine.timing.distributed import Scan
 from factory.floor.modes.staging import HeadStart
-from factory.support.arrays import Array, Index
-from factory.theory.control.mode import STILL, Limits, Mode
+from factory.support.arrays import Array, Truth
 from factory.theory.control.mode import STILL, Limits, Mode
 from factory.theory.control.navigation import Bundle
 from factory.theory.nets.petri import Marking

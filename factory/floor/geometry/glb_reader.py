@@ -88,12 +88,6 @@ def gamma_encoded(light: float) -> float:
     return float(12.92 * light if light <= 0.0031308 else 1.055 * light ** (1 / 2.4) - 0.055)
 
 
-def linear(component: float) -> float:
-    """The inverse of `gamma_encoded`."""
-    encoded = component / 12.92 if component <= 0.04045 else ((component + 0.055) / 1.055) ** 2.4
-    return float(encoded)
-
-
 def _chunks(content: bytes) -> tuple[Object, bytes]:
     """The JSON document and the binary chunk of a file."""
     if content[:4] != b"glTF" or len(content) < 20:

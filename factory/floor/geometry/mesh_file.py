@@ -64,14 +64,6 @@ def checked(bodies: Iterable[tuple[Array, Indices]], suffix: str) -> MeshFile:
     return MeshFile(tuple(meshes))
 
 
-def obj_of(vertices: Array, faces: Indices, comment: str) -> bytes:
-    """An OBJ file with a comment in its first line."""
-    lines = [f"# {comment}"]
-    lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in (np.round(vertices, 9) + 0.0).tolist()]
-    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces.tolist()]
-    return ("\n".join(lines) + "\n").encode()
-
-
 @np.errstate(all="ignore")
 def _merged(vertices: Array, faces: Indices) -> tuple[Array, Indices]:
     import trimesh

@@ -25,7 +25,7 @@ from factory.apps.log import LogWriter, read_log
 from factory.apps.runs.pictures import render_log
 from factory.engine.mjcf.mesh_files import corner_normals, face_normals, mesh_file
 from factory.engine.record.state import State
-from factory.engine.record.subject import subject_of_run
+from factory.engine.record.subject import MonitorSubject
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.film import Film, Picture, Still, check_output
@@ -35,6 +35,7 @@ from factory.film.finale import LASTS
 from factory.film.painter import Painter, Renderer
 from factory.film.picture import from_above, overview
 from factory.film.reel import HOLD
+from factory.film.shot import Shot
 from factory.film.video import ENCODERS, VideoFile
 from factory.floor.geometry.meshes import Mesh
 from factory.floor.geometry.sight import Framing, fit, towards
@@ -115,7 +116,7 @@ def test_a_film_ends_with_all_units_for_a_second(
     held = pictures[-HELD - TURNED : -TURNED]
     assert all(np.array_equal(held[-1], one) for one in held)
     monkeypatch.setattr(Caption, "draw", drawn)
-    render_log(read_log(taken[0] / "run.log"), tmp_path / "again.mp4", SMALL, FPS)
+    render_log(read_log(taken[0] / "run.log"), Shot(tmp_path / "again.mp4", SMALL, FPS))
     assert said[0] == 0 and said[-1] == 1
 
 
@@ -156,7 +157,7 @@ def test_the_same_pictures_are_encoded_the_same_every_time(taken, tmp_path: Path
     log = read_log(taken[0] / "run.log")
     films = set()
     for _ in range(3):
-        render_log(log, tmp_path / "again.mp4", SMALL, 5.0)
+        render_log(log, Shot(tmp_path / "again.mp4", SMALL, 5.0))
         films.add((tmp_path / "again.mp4").read_bytes())
     assert len(films) == 1
 
@@ -166,15 +167,15 @@ def test_a_log_gives_the_same_pictures_as_its_run(taken, tmp_path: Path) -> None
     folder = taken[0]
     log = read_log(folder / "run.log")
     with drawn() as pictures:
-        count = render_log(log, tmp_path / "log.mp4", SMALL, FPS)
+        count = render_log(log, Shot(tmp_path / "log.mp4", SMALL, FPS))
     one, other = np.array(taken[3]), np.array(pictures)
     assert one.shape == other.shape == (count, SIZE[1], SIZE[0], 3)
     assert np.abs(one.astype(int) - other).max() <= 2
     assert len(film_of(tmp_path / "log.mp4")) == count
-    assert render_log(log, tmp_path / "log.png", PRODUCT) == 1
+    assert render_log(log, Shot(tmp_path / "log.png", PRODUCT)) == 1
     pictures = [iio.imread(p).astype(int) for p in (folder / "end.png", tmp_path / "log.png")]
     assert np.abs(pictures[0] - pictures[1]).max() <= 2
-    assert render_log(log, tmp_path / "then.png", SMALL, at=1.0) == 1
+    assert render_log(log, Shot(tmp_path / "then.png", SMALL, at=1.0)) == 1
     assert iio.imread(tmp_path / "then.png").shape == (SIZE[1], SIZE[0], 3)
 
 
@@ -374,7 +375,7 @@ def test_no_more_facets_are_drawn_than_are_seen(layout, tmp_path: Path) -> None:
     """Faces are whole, cylinders have two rings, the sky behind the floor is left out; a picture
     with all of that shows the same."""
     simulation = Simulation(layout, RunRequest("mujoco", units=1))
-    subject = subject_of_run(simulation)
+    subject = MonitorSubject.of_run(simulation)
     seen = simulation.state().observation
     shown = Snapshot.of(seen.qpos, seen.welds)
     look = Framing(16 / 9)
@@ -460,7 +461,7 @@ def test_the_ideal_world_has_no_picture(layout, tmp_path: Path) -> None:
     with LogWriter(tmp_path / "log", simulation) as log:
         simulation.run([log.observe])
     with pytest.raises(InputError, match="ideal world"):
-        render_log(read_log(tmp_path / "log"), tmp_path / "a.mp4")
+        render_log(read_log(tmp_path / "log"), Shot(tmp_path / "a.mp4"))
     assert not (tmp_path / "a.mp4").exists()
 
 

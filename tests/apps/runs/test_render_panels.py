@@ -11,10 +11,11 @@ import pytest
 
 import factory
 from factory.apps.log import Log, LogWriter, read_log
+from factory.apps.log.model import model_of
 from factory.apps.monitor.record import recorded_subject
-from factory.apps.runs.pictures import moment_of, render_log, take_of
+from factory.apps.runs.pictures import render_log
 from factory.engine.record.state import State
-from factory.engine.record.subject import subject_of_run
+from factory.engine.record.subject import MonitorSubject
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.film import Film, Picture, Still, camera_named, panels_named
@@ -39,6 +40,7 @@ from factory.film.sheet import (
     Rows,
     neighbourhood,
 )
+from factory.film.shot import Shot, moment_of, recorded_take
 from factory.pipeline import all_templates
 from factory.support.errors import InputError
 from factory.theory.lang import read_pag
@@ -268,7 +270,7 @@ def test_the_product_followed_is_the_same_when_parts_become_one_body(tmp_path: P
     found = []
     for fuse in (False, True):
         simulation = Simulation(layout, RunRequest("mujoco", units=2, fuse=fuse))
-        followed = Followed(simulation.world.m, subject_of_run(simulation))
+        followed = Followed(simulation.world.m, MonitorSubject.of_run(simulation))
         track: list[np.ndarray] = []
 
         def look(state: State, d=simulation.world.d, followed=followed, track=track) -> None:
@@ -289,7 +291,7 @@ def test_the_product_followed_is_the_same_when_parts_become_one_body(tmp_path: P
 @pytest.mark.parametrize("fuse", [False, True])
 def test_a_part_is_followed_from_its_feeder_to_the_dropoff(fuse: bool) -> None:
     simulation = Simulation(laid_out("paper"), RunRequest("mujoco", units=2, fuse=fuse))
-    followed = Followed(simulation.world.m, subject_of_run(simulation), "part1")
+    followed = Followed(simulation.world.m, MonitorSubject.of_run(simulation), "part1")
     ranks, labels = [], []
 
     def look(state: State) -> None:
@@ -397,7 +399,8 @@ def test_ink_is_where_it_is_put_to_a_fraction_of_a_pixel() -> None:
 
 
 def test_the_poster_is_when_the_product_has_become_whole_and_most_is_there(paper: Log) -> None:
-    take = take_of(paper, Picture(SIZE))
+    scene = model_of(paper), recorded_subject(paper.header)
+    take = recorded_take(paper, lambda: scene, Picture(SIZE))
     poster, completions = Poster(take, Path("poster.png")), Completions(take)
     firings = list(zip(paper.fired_t.tolist(), paper.fired.tolist(), strict=True))
     for row in range(len(paper)):
@@ -427,7 +430,7 @@ def test_a_film_with_everything(tmp_path: Path) -> None:
     assert frames.shape == (int(run.sim_time_s * 2 + 1e-6) + 7, 490, 560, 3)
     assert iio.imread(tmp_path / "p.png").shape == (490, 560, 3)
     again = tmp_path / "again.mp4"
-    render_log(read_log(log), again, picture, 2)
+    render_log(read_log(log), Shot(again, picture, 2))
     assert np.abs(frames - iio.imread(again, plugin="pyav")).max() <= 2
     panels = shared(size, PANELS)[1]
     for area in panels.values():

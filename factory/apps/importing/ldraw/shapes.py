@@ -17,8 +17,7 @@ from factory.apps.importing.ldraw.lines import (
     key_of,
     read_lines,
 )
-from factory.apps.importing.mesh_files import first_file, path_inside
-from factory.floor.geometry.mesh_file import obj_of
+from factory.apps.importing.mesh_files import first_file, obj_of, path_inside
 from factory.theory.lang.source import quoted, source_of
 
 ROOMS = ("parts", "p", "models", "unofficial/parts", "unofficial/p")

@@ -20,12 +20,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import accumulate
 from math import lcm
 
-from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
+from factory.api import NOPART, Diagnostic, Factory, InputError, Plan, Position, did_you_mean
 from factory.support.settings import MOST_BRANCHES
 from factory.theory.compiler.tees import ROOM
-from factory.theory.plant.factory import Factory
-from factory.theory.problem.pag import NOPART
-from factory.theory.problem.plan import Plan
 
 Branches = Sequence[tuple[str, int]]
 """Labels, and how often the branch that brings each is to be there."""

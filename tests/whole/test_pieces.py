@@ -20,8 +20,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from manifold3d import Manifold, OpType
 
+from factory.apps.exports.stock import model_files
 from factory.engine.mjcf import names
-from factory.engine.mjcf.model import model_files
 from factory.engine.simulation.modelling import physical_model
 from factory.floor.geometry import decomposition
 from factory.floor.geometry.glb_reader import UPRIGHT

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from factory.apps.few_robots.folding import folded
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.clearance import certify
@@ -14,7 +15,7 @@ from factory.floor.layout.layout import Layout
 from factory.floor.layout.request import Ground
 from factory.pipeline import Project, all_templates
 from factory.support.settings import Settings
-from factory.theory.compiler.folding import folded, kind_of
+from factory.theory.compiler.folding import kind_of
 from factory.theory.problem.robot_types import load_catalogue
 from tests.fold_values import fold_layout, table_of
 from tests.layout_values import with_visits

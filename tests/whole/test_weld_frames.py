@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from factory.engine.mjcf.weld_frames import WeldFrames, check_holders, gaps, held_at
+from factory.apps.monitor.anatomy import check_holders
+from factory.engine.mjcf.weld_frames import WeldFrames, gaps, held_at
 from factory.engine.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from tests.examples import without_hands
