@@ -17,10 +17,10 @@ import numpy as np
 
 from factory.engine.mjcf import names
 from factory.engine.mjcf.elements import add, numbers
-from factory.engine.mjcf.replica import SHOWN, paint
+from factory.engine.mjcf.replica import SHOWN, Geoms
 from factory.film import housings, outfits
 from factory.film.look import CLASSIC_FLOOR, PART, FloorPaint, Surface
-from factory.film.look import paint as paint_model
+from factory.film.look import paint
 from factory.film.outfits import Half, Layer, Outfit
 from factory.film.skins import Skin
 from factory.support.arrays import Array
@@ -65,7 +65,7 @@ def dressed(xml: str, m: mujoco.MjModel, facing: float, floor: FloorPaint = CLAS
     """The MJCF of the drawn model of a run's model `m`, whose MJCF this is; it has the same mesh
     files. What is written on it can be read from an azimuth `facing` [degrees]."""
     root = ElementTree.fromstring(xml)
-    paint_model(root, floor)
+    paint(root, floor)
     Dress(root, m, radians(facing)).put_on()
     return ElementTree.tostring(root, encoding="unicode")
 
@@ -163,11 +163,15 @@ class Dress:
 
     def _is_rubber(self, solid: DressedGeom) -> bool:
         geom = self.m.geom(solid.name).id
-        return solid.material.endswith("rubber") or float(paint(self.m, geom)[:3].max()) < 0.3
+        return (
+            solid.material.endswith("rubber") or float(Geoms(self.m).colour(geom)[:3].max()) < 0.3
+        )
 
     def _colour(self, solid: DressedGeom) -> str:
         """The material of a part: one for each colour."""
-        red, green, blue, opacity = paint(self.m, self.m.geom(solid.name).id).round(4).tolist()
+        red, green, blue, opacity = (
+            Geoms(self.m).colour(self.m.geom(solid.name).id).round(4).tolist()
+        )
         surface = replace(PART, colour=(red, green, blue), opacity=opacity)
         if surface not in self.paints:
             self.paints[surface] = f"part/{len(self.paints) + 1}"
