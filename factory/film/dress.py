@@ -19,8 +19,7 @@ from factory.engine.mjcf import names
 from factory.engine.mjcf.elements import add, numbers
 from factory.engine.mjcf.replica import SHOWN, Geoms
 from factory.film import housings, outfits
-from factory.film.look import CLASSIC_FLOOR, PART, FloorPaint, Surface
-from factory.film.look import paint
+from factory.film.look import CLASSIC_FLOOR, PART, FloorPaint, Surface, paint
 from factory.film.outfits import Half, Layer, Outfit
 from factory.film.skins import Skin
 from factory.support.arrays import Array
@@ -169,9 +168,7 @@ class Dress:
 
     def _colour(self, solid: DressedGeom) -> str:
         """The material of a part: one for each colour."""
-        red, green, blue, opacity = (
-            Geoms(self.m).colour(self.m.geom(solid.name).id).round(4).tolist()
-        )
+        red, green, blue, opacity = self._rgba(solid).round(4).tolist()
         surface = replace(PART, colour=(red, green, blue), opacity=opacity)
         if surface not in self.paints:
             self.paints[surface] = f"part/{len(self.paints) + 1}"
