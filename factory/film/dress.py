@@ -161,10 +161,10 @@ class Dress:
         return by_name.get(kind, outfits.block)(solid.half)
 
     def _is_rubber(self, solid: DressedGeom) -> bool:
-        geom = self.m.geom(solid.name).id
-        return (
-            solid.material.endswith("rubber") or float(Geoms(self.m).colour(geom)[:3].max()) < 0.3
-        )
+        return solid.material.endswith("rubber") or float(self._rgba(solid)[:3].max()) < 0.3
+
+    def _rgba(self, solid: DressedGeom) -> Array:
+        return Geoms(self.m).colour(self.m.geom(solid.name).id)
 
     def _colour(self, solid: DressedGeom) -> str:
         """The material of a part: one for each colour."""
