@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from factory.apps.exports import Made
     from factory.apps.exports.build import Built
     from factory.apps.exports.subject import Source
-    from factory.engine.simulation.executing import Tell
+    from factory.apps.runs.executing import Tell
     from factory.engine.simulation.run import Run
     from factory.floor.layout.layout import Layout
     from factory.pipeline import Project
@@ -117,7 +117,7 @@ def compile(
     """
     from factory.apps.few_robots.aim import Aim
     from factory.apps.few_robots.search import allocated
-    from factory.sharing import with_branches
+    from factory.apps.few_robots.sharing import with_branches
 
     project, branches = project_of(product, settings, templates), tuple((parallel or {}).items())
     aim = Aim(robots, cycle, effort, inf if seconds is None else seconds, branches)

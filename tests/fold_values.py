@@ -8,6 +8,8 @@ from dataclasses import replace
 from functools import cache
 from itertools import combinations
 
+from factory.apps.few_robots.folding import fold, folded, mismatch
+from factory.apps.few_robots.parallel import in_parallel
 from factory.floor.layout.durations import Pace
 from factory.floor.layout.embedding import lay_out
 from factory.floor.layout.layout import Layout
@@ -16,8 +18,7 @@ from factory.pipeline import Project, all_templates
 from factory.support.settings import Settings
 from factory.theory.compiler.assigning import gear_net, shared
 from factory.theory.compiler.compiler import compile_pag
-from factory.theory.compiler.folding import Line, fold, folded, line_of, mismatch, sides_of
-from factory.theory.compiler.parallel import in_parallel
+from factory.theory.compiler.folding import Line, line_of, sides_of
 from factory.theory.nets.gears import GearNet
 from factory.theory.nets.marked import MarkedNet, marked
 from factory.theory.plant.approaches import Approach

@@ -8,6 +8,7 @@ from __future__ import annotations
 import ast
 import graphlib
 import re
+import tomllib
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -32,13 +33,14 @@ FLOORS = (
     ("engine.record",),
     ("engine.simulation",),
     ("pipeline",),
-    ("sharing",),
     ("film",),
+    ("api",),
 )
 """Rooms of the core from the ground up. A room imports itself and the floors below it, nothing
 beside it. Above them are the apps, then the commands."""
 
 APPS = (
+    ("drawing",),
     ("foreign_nets", "importing", "few_robots", "relay", "platen", "revise", "log", "deviations"),
     ("monitor", "recovery", "planning", "analyze", "exports"),
     ("runs", "resume"),
@@ -48,12 +50,15 @@ APPS = (
     ("pareto", "live"),
     ("plc",),
 )
-"""The apps, from those that use no other app up. An app imports the core, itself, and the apps
+"""The apps, from those that use no other app up. An app imports `factory.api`, itself, and the apps
 below it."""
 
-ENTRANCES = ("commands", "stages", "studies", "notebook", "__init__", "__main__")
-"""Above the core and the apps, from the lowest up: the command line, the functions that a user
-calls, how values are shown."""
+ENTRANCES = (
+    *("commands", "apps.*.command_line"),
+    *("stages", "studies", "notebook", "__init__", "__main__"),
+)
+"""Above the core and the apps, from the lowest up: the command line, the commands that apps give,
+the functions that a user calls, how values are shown."""
 
 ENGINE_ROOMS = (
     "support",
@@ -61,6 +66,7 @@ ENGINE_ROOMS = (
     "engine/record",
     "engine/simulation/mujoco",
     "film",
+    "api",
     "apps",
 )
 """Rooms, or parts of rooms, that may import the engine."""
@@ -73,6 +79,7 @@ ENGINE_WRITERS = (
     "engine/mjcf",
     "apps/deviations",
     "apps/recovery",
+    "apps/fidelity/solid",
 )
 """Where the engine's model and data are written: those of a run, and those of a replica that no run
 uses."""
@@ -97,12 +104,18 @@ VARIANT_ROOMS = ("theory/compiler", "theory/problem/plan", "apps/relay", "apps/f
 
 VARIANT_MARKS = {
     **{"commands": 31, "theory.lang": 28, "apps.pareto": 23, "apps.planning": 17, "pipeline": 11},
-    **{"stages": 8, "apps.exports": 7, "floor.layout": 7, "sharing": 6, "floor.mating": 5},
+    **{
+        "stages": 8,
+        "apps.exports": 7,
+        "floor.layout": 7,
+        "floor.mating": 5,
+    },
     **{"support": 5, "apps.foreign_nets": 4, "engine.timing": 3, "theory.plant": 2},
     **{"apps.sweep": 1},
 }
-"""How many identifiers of other rooms may still name a variant. A mark may fall, and never rises:
-what needs it is told by the plan, or by what the factory is."""
+"""How many identifiers of other rooms may still name a variant; the command lines of apps count as
+`commands`. A mark may fall, and never rises: what needs it is told by the plan, or by what the
+factory is."""
 
 STOREYS = ("theory", "floor", "engine", "apps")
 """Folders whose folders are rooms."""
@@ -123,10 +136,11 @@ class Module:
 
     @property
     def room(self) -> str:
-        """Its room, with the storey where that has several: `theory.nets`."""
+        """Its room, with the storey where that has several: `theory.nets`; the command line of an
+        app is one of its own."""
         first, *rest = self.name.split(".")
         if first in STOREYS and rest:
-            return f"{first}.{rest[0]}"
+            return ".".join([first, rest[0], *(n for n in rest[1:2] if n == "command_line")])
         return first or "__init__"
 
     @cached_property
@@ -170,16 +184,26 @@ class House:
             loose = len(parts) == 1 and parts[0] != "__init__"
             name = ".".join(parts if loose or parts[-1] != "__init__" else parts[:-1])
             self.modules[name] = Module(name, path.read_text("utf-8"))
+        kept = root / "tests" / "reach_ins.toml"
+        self.reach_ins: dict[str, dict[str, list[str]]] = (
+            tomllib.loads(kept.read_text("utf-8")) if kept.exists() else {}
+        )
+
+    def names(self, module: Module) -> set[str]:
+        """What a module imports of the house, at run time, inside functions, for typing: modules,
+        and names of modules (`theory.nets.petri.Place`)."""
+        tops = ((*name.partition("."),) for name in module.imports)
+        return {inside for top, _, inside in tops if top == "factory"}
 
     def imports(self, module: Module) -> set[str]:
-        """Modules of the house that a module imports: at run time, inside functions, for typing.
-        `from factory.room import x` is resolved to the module x where there is one."""
-        found: set[str] = set()
-        for name in module.imports:
-            top, _, inside = name.partition(".")
-            if top == "factory":
-                found.add(inside if inside in self.modules else inside.rpartition(".")[0])
-        return found - {module.name}
+        """Modules of the house that a module imports. `from factory.room import x` is resolved to
+        the module x where there is one."""
+        names = self.names(module)
+        return {self.home(name) for name in names} - {module.name}
+
+    def home(self, name: str) -> str:
+        """The module that a name of the house lies in, or is."""
+        return name if name in self.modules else name.rpartition(".")[0]
 
     def needs(self, module: Module) -> set[str]:
         """Modules of the house that a test imports, itself or by the tests and benches it
@@ -197,6 +221,7 @@ class House:
 
 def floor(room: str) -> int:
     """The number of a room's floor from the ground up, of the core, the apps, the entrances."""
+    room = re.sub(r"^apps\.\w+\.command_line$", "apps.*.command_line", room)
     if room in ENTRANCES:
         return len(FLOORS) + len(APPS) + ENTRANCES.index(room)
     rooms = (*FLOORS, *(tuple(f"apps.{name}" for name in names) for names in APPS))
@@ -217,6 +242,26 @@ def upward_imports(house: House) -> Iterator[str]:
             room = house.modules[other].room
             if room != module.room and floor(room) >= floor(module.room):
                 yield f"{module.name} imports {other or 'factory'}"
+
+
+def reach_ins(house: House) -> Iterator[str]:
+    """Imports of an app from the core past `factory.api` that `reach_ins.toml` does not list, and
+    lines of that list that nothing needs."""
+    listed = {
+        (app, f"{module}.{name}")
+        for app, modules in house.reach_ins.items()
+        for module, names in modules.items()
+        for name in names
+    }
+    there = {
+        (module.room.removeprefix("apps."), name)
+        for module in house.modules.values()
+        if re.fullmatch(r"apps\.\w+", module.room)
+        for name in house.names(module)
+        if not name.startswith(("api.", "apps."))
+    }
+    yield from (f"the app {app} reaches {name}" for app, name in sorted(there - listed))
+    yield from (f"the app {app} no longer reaches {name}" for app, name in sorted(listed - there))
 
 
 def circles(house: House) -> Iterator[str]:
@@ -242,7 +287,8 @@ def engine_imports(house: House) -> Iterator[str]:
                 else []
             )
         }
-        reaches = "mujoco" in direct or "support.engine" in house.imports(module)
+        doors = {"support.engine", "api.mujoco"} & (house.imports(module) | house.names(module))
+        reaches = "mujoco" in direct or bool(doors)
         if reaches and not module.within(ENGINE_ROOMS):
             yield f"{module.name} imports the engine"
         if "mujoco" in direct and module.name != "support.engine":
@@ -357,7 +403,8 @@ def variants(house: House) -> Iterator[str]:
     found: Counter[str] = Counter()
     for module in house.modules.values():
         if not module.within(VARIANT_ROOMS):
-            found[module.room] += sum(map(bool, map(VARIANTS.search, identifiers(module))))
+            room = "commands" if module.room.endswith(".command_line") else module.room
+            found[room] += sum(map(bool, map(VARIANTS.search, identifiers(module))))
     for room, count in found.items():
         if count > (most := VARIANT_MARKS.get(room, 0)):
             yield f"{room}: names variants {count} times; at most {most}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from factory.theory.control.mode import Array
+from factory.support.arrays import Array
 from factory.theory.control.navigation import KAPPA, Bundle
 
 

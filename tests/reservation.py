@@ -21,7 +21,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from factory.theory.control.mode import Array, Truth
+from factory.support.arrays import Array, Truth
 
 EXACT = 1e-12
 """Distances [m] that differ by less are the same: sums of the same lengths."""

@@ -29,7 +29,8 @@ from itertools import permutations, product
 
 import numpy as np
 
-from factory.theory.control.mode import Array, Index, Truth, lock
+from factory.support.arrays import Array, Index, Truth
+from factory.theory.control.mode import lock
 from factory.theory.control.profile import landing_speed
 from tests.reservation import drive, stopping
 

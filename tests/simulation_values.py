@@ -12,12 +12,12 @@ import numpy as np
 
 from benches.speed.factories import balanced
 from benches.speed.factories import laid_out as floor_of
+from factory.apps.few_robots.parallel import in_parallel
 from factory.engine.simulation.mujoco.stepping import SingleSteps
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.layout import Layout
 from factory.pipeline import Project, all_templates, read
-from factory.sharing import with_branches
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
 from factory.theory.lang import read_pag
@@ -51,7 +51,8 @@ def layout_of(name: str) -> Layout:
     if name == "bar":
         return laid_out_with_lifts(BAR)
     if name == "tee":
-        return with_branches(read(ROOT / "examples" / "paper.pag"), [("part3", 2)]).layout
+        paper = read(ROOT / "examples" / "paper.pag")
+        return paper.with_plan(in_parallel(paper.planned, [("part3", 2)])).layout
     return without_hands(name)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.theory.control.mode import Array, Truth
+from factory.support.arrays import Array, Truth
 from tests import reservation
 from tests.ring import SPARE, Spots, Tee, TeeState
 

@@ -27,8 +27,9 @@ from factory.floor.layout.exclusions import awaited_positions, coordinated
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.machines import presences
 from factory.floor.layout.presence import ROUNDING, Span
+from factory.support.arrays import Array, Index
 from factory.support.engine import mujoco
-from factory.theory.control.mode import REST, Array, Index
+from factory.theory.control.mode import REST
 from factory.theory.control.navigation import Bundle
 from factory.theory.nets.petri import Marking
 from tests.token_game import enabled, follower

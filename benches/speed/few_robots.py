@@ -13,9 +13,9 @@ from benches.speed.factories import require
 from benches.tables import table
 from factory.apps.few_robots.aim import Aim, least_robots
 from factory.apps.few_robots.search import allocated
+from factory.apps.runs.options import fusing_pays
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
-from factory.floor.geometry.fused_bodies import fusing_pays
 from factory.pipeline import read
 from factory.theory.nets.verify import verify
 

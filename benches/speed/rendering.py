@@ -14,7 +14,7 @@ import numpy as np
 from benches.speed.factories import Case, Steady, laid_out, robots_at_least, run_until
 from benches.speed.processes import ROOT, fresh, interleaved, median, ratio, serve, spread
 from benches.tables import table
-from factory.engine.record.subject import subject_of_run
+from factory.engine.record.subject import MonitorSubject
 from factory.engine.simulation.simulation import Simulation
 from factory.film.action import Snapshot
 from factory.film.camerawork import Camerawork, Moment, Take
@@ -42,7 +42,7 @@ def work(robots: int, frames: int) -> dict[str, Any]:
     simulation = Case(robots, 0.002).simulation(layout, shown=True)
     run_until(simulation, Steady.of(layout, None).since)
     moments = recorded(simulation, frames)
-    subject = subject_of_run(simulation)
+    subject = MonitorSubject.of_run(simulation)
     take = Take(simulation.world.m, subject, "product", 1, Picture(SIZE), History(subject))
     return {
         "robots": len(layout.factory.robots),

@@ -14,15 +14,16 @@ from typing import TYPE_CHECKING, Any
 import click
 from reference_text import code, definition, heading, prose, table
 
-from factory.commands import cli
 from factory.apps.exports import exporters
-from factory.theory.lang.values import GEOMETRY
+from factory.commands import cli
+from factory.commands import commands as every_command
 from factory.pipeline import all_templates
-from factory.theory.problem.robot_types import load_catalogue
 from factory.support.explanations import codes, explain
 from factory.support.resources import mjcf_folder
 from factory.support.settings import RANGES, Settings
 from factory.support.user_defaults import OPTIONS
+from factory.theory.lang.values import GEOMETRY
+from factory.theory.problem.robot_types import load_catalogue
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
@@ -50,14 +51,14 @@ ERRORS = ("FactoryError", "InputError", "MissingError", "RunError", "Diagnostic"
 def commands() -> str:
     """Every command with its options, as click knows them."""
     top = click.Context(cli, info_name="factory", **cli.context_settings)
-    shared = {p.name for p in cli.commands["doctor"].params}
+    shared = {p.name for p in every_command()["doctor"].params}
     lines = [heading(1, "Commands"), prose(cli.help or "")]
     lines.append(
         "Every command takes `--json` (one document on stdout), `-q`, `-v` and `-h`. Exit status: "
         "0 ok, 1 a check or run failed, 2 bad input, 3 something missing on the machine, 130 "
         "interrupted. `factory --version` and `factory --explain CODE` stand alone."
     )
-    for name, command in sorted(cli.commands.items()):
+    for name, command in every_command().items():
         context = click.Context(command, top, info_name=name)
         lines += [heading(2, f"factory {name}"), prose(command.help or "")]
         lines.append(code(" ".join([context.command_path, *command.collect_usage_pieces(context)])))

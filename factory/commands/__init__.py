@@ -1,41 +1,24 @@
-"""The command line. Each command, a module, reads, calls the stages and writes."""
+"""The command line. Each command, a module, reads, calls the stages and writes.
+
+The commands here know the core and what goes with its runs; apps give the others.
+"""
 
 from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from difflib import get_close_matches
-from pathlib import Path
+from functools import cache
+from types import MappingProxyType
 from typing import Any
 from warnings import simplefilter
 
 import click
-from click.core import ParameterSource
 
-from factory.commands.analyze import analyze
-from factory.commands.build import build
-from factory.commands.check import check
-from factory.commands.doctor import doctor
-from factory.commands.export import export
-from factory.commands.fidelity import fidelity
-from factory.commands.import_ import import_
-from factory.commands.mix import mix
-from factory.commands.monitor import monitor
-from factory.commands.new import new
-from factory.commands.pareto import pareto
-from factory.commands.plan import plan
-from factory.commands.plant import plant
-from factory.commands.programs import programs
-from factory.commands.render import render
-from factory.commands.report import report
-from factory.commands.requests import PLANNED
-from factory.commands.revise import revise
-from factory.commands.run import run
-from factory.commands.sweep import sweep
-from factory.commands.templates import templates
-from factory.commands.view import view
+from factory.commands.defaults import set_in_advance
+from factory.support.apps import App, apps, at, shipped
 from factory.support.console import STDOUT, emit, fail, say
 from factory.support.errors import (
     Diagnostic,
@@ -46,58 +29,11 @@ from factory.support.errors import (
     did_you_mean,
     usage_error,
 )
+from factory.support.extensions import bad_extension, position_of
 from factory.support.files import NO_ROOM
 from factory.support.guard import guarded
 from factory.support.interruption import interrupt, stop_on_signals
 from factory.support.version import __version__
-
-PARAMETERS = {"templates": "folders"}
-"""Names of parameters that are not those of their options."""
-
-META = "factory.toml"
-"""The key of the defaults in a click context."""
-
-
-def with_defaults(command: click.Command) -> click.Command:
-    """The command, whose options that are not given are taken from the environment (FACTORY_UNITS
-    and so on), or else from the `factory.toml` for its FILE."""
-    from factory.support.user_defaults import OPTIONS
-
-    parameters = {parameter.name: parameter for parameter in command.params}
-    for key in OPTIONS:
-        if parameter := parameters.get(PARAMETERS.get(key, key)):
-            parameter.envvar = f"FACTORY_{key.upper()}"
-    parameters["file"].callback = _read
-    return command
-
-
-def _read(context: click.Context, parameter: click.Parameter, file: Path) -> Path:
-    """FILE itself; values of its `factory.toml` become the defaults of all other options. Raises
-    InputError."""
-    from factory.support.files import is_plan
-    from factory.support.user_defaults import defaults_for
-
-    defaults = context.meta[META] = defaults_for(file)
-    planned = PLANNED if is_plan(file) else {}
-    named = {PARAMETERS.get(key, key): value for key, value in defaults.options().items()}
-    context.default_map = {key: value for key, value in named.items() if key not in planned}
-    return file
-
-
-def set_in_advance(error: click.BadParameter) -> Diagnostic | None:
-    """Error of a bad value from the environment or from `factory.toml`, with its place; None if it
-    was given as an option."""
-    parameter, context = error.param, error.ctx
-    if parameter is None or context is None or not parameter.name:
-        return None
-    source = context.get_parameter_source(parameter.name)
-    if source is ParameterSource.ENVIRONMENT:
-        message = f"{error.format_message()} It is in the environment: {parameter.envvar}."
-        return Diagnostic("Usage", message, None, f"see {context.command_path} --help")
-    if source is ParameterSource.DEFAULT_MAP:
-        key = next((k for k, name in PARAMETERS.items() if name == parameter.name), parameter.name)
-        return Diagnostic("BadValue", f"{key}: {error.message}", context.meta[META].at(key))
-    return None
 
 
 def code_names(ctx: click.Context, param: click.Parameter, begun: str) -> list[str]:
@@ -243,15 +179,69 @@ MEANT = {
 """The command that a mistaken word probably means."""
 
 
+OWN = App(
+    "commands",
+    commands={
+        name: f"factory.commands.{name}:{name}"
+        for name in ("build", "check", "doctor", "new", "programs", "render", "run", "templates")
+    },
+)
+"""The commands that need the core, and what goes with its runs."""
+
+
+@cache
+def places() -> Mapping[str, str]:
+    """The places of all commands, by their names in order. Raises InputError (BadExtension) for a
+    name that two apps give."""
+    by_name = dict[str, str]()
+    for app in (OWN, *apps().values()):
+        for name, place in app.commands.items():
+            if name in by_name:
+                message = f"the app '{app.name}' gives the command '{name}', which is there already"
+                raise bad_extension(message, None)
+            by_name[name] = place
+    return MappingProxyType(dict(sorted(by_name.items())))
+
+
+def _tables() -> Iterator[Mapping[str, str]]:
+    """Tables in which a command is looked up, the next one only where the one before has it not:
+    what is called is found without what other packages give."""
+    yield OWN.commands
+    yield from (app.commands for app in shipped().values())
+    yield places()
+
+
+def commands() -> dict[str, click.Command]:
+    """All commands by their names, loaded. Raises InputError (BadExtension)."""
+    return {name: _loaded(name, place) for name, place in places().items()}
+
+
+def _loaded(name: str, place: str) -> click.Command:
+    made = at(place)
+    if not isinstance(made, click.Command):
+        message = f"the command '{name}' of an app is no click.Command: {place}"
+        raise bad_extension(message, position_of(made))
+    return made
+
+
 class _Commands(click.Group):
-    """A group that suggests the nearest command."""
+    """A group that loads the command that is called alone, and suggests the nearest one."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return [*places()]
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """A command by its name, loaded; None where there is none. Raises InputError
+        (BadExtension)."""
+        place = next((table[cmd_name] for table in _tables() if cmd_name in table), None)
+        return _loaded(cmd_name, place) if place else None
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
         try:
             return super().resolve_command(ctx, args)
         except click.UsageError as error:
             meant = MEANT.get(args[0].lower().lstrip("-"), "")
-            hint = did_you_mean(args[0], list(self.commands), "commands")
+            hint = did_you_mean(args[0], self.list_commands(ctx), "commands")
             if args[0].endswith(".pag"):
                 hint = f"the command comes first: factory run {args[0]}"
             elif meant:
@@ -286,24 +276,4 @@ def cli(ctx: click.Context, version: bool, explain: str | None, as_json: bool) -
         raise click.UsageError("--json comes after the command", ctx)
 
 
-ON_A_FILE = (
-    *(check, build, run, plant, render, view, fidelity),
-    *(analyze, pareto, report, programs, export),
-)
-"""The commands on a FILE whose options have defaults in its `factory.toml`."""
-
-for _command in (
-    new,
-    import_,
-    plan,
-    *map(with_defaults, ON_A_FILE),
-    mix,
-    revise,
-    sweep,
-    monitor,
-    templates,
-    doctor,
-):
-    cli.add_command(_command)
-
-__all__ = ["cli", "main", "run_command"]
+__all__ = ["cli", "commands", "main", "run_command"]

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
 from factory.commands.options import FLOOR, MOTION, OUT, OUTPUT, RELAY, SOURCE, UNITS, WIP
 from factory.commands.outputs import writable, writable_folder
@@ -30,6 +31,7 @@ SHOWN = 20
 """The most files that are listed, unless `-v` asks for all."""
 
 
+@with_defaults
 @click.command(cls=Grouped)
 @SOURCE
 @click.option("--mjcf", type=OUT, help="Write the MJCF model as one XML file.")

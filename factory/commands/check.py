@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from factory.commands.allowing import ALLOW
+from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
 from factory.commands.options import (
     OUT,
@@ -60,6 +61,7 @@ POOLED = 8
 """The most parts whose copies are printed."""
 
 
+@with_defaults
 @click.command(cls=Grouped)
 @SOURCE
 @click.option("--certificate", type=OUT, help="Write the proof to this file.")

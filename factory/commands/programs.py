@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import click
 
+from factory.commands.defaults import with_defaults
 from factory.commands.options import OUTPUT, RELAY, SOURCE
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.support.console import emit, say
 from factory.support.errors import did_you_mean, usage_error
 
 
+@with_defaults
 @click.command()
 @SOURCE
 @click.option("--robot", help="Only this robot, for example r3.")
@@ -17,7 +19,8 @@ from factory.support.errors import did_you_mean, usage_error
 @OUTPUT
 def programs(options: ProjectOptions, out: OutputOptions, robot: str | None) -> int:
     """Print each robot's program, in the paper's form."""
-    from factory.theory.plant.programs import program_of, write_program
+    from factory.apps.exports.program_text import write_program
+    from factory.theory.plant.programs import program_of
 
     factory = options.project(out.silent).factory
     names = [r.name for r in factory.robots]

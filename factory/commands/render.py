@@ -9,6 +9,7 @@ import click
 
 from factory.apps.runs.options import RunOptions
 from factory.commands import options as shared
+from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
 from factory.commands.outputs import for_a_pag, writable
 from factory.commands.requests import OutputOptions, PictureOptions, ProjectOptions
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     Moment = float | Literal["end"]
 
 
+@with_defaults
 @click.command(cls=Grouped)
 @shared.SOURCE
 @click.option(
@@ -46,8 +48,8 @@ def render(
 ) -> int:
     """Film FILE.pag, or the run in a LOG written by `run --log`, headless through EGL."""
     from factory.apps.log import is_log
-    from factory.apps.runs.pictures import Shot
     from factory.apps.runs.pictures import render as taken
+    from factory.film.shot import Shot
 
     file = options.file
     if is_log(file):

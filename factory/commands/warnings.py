@@ -8,10 +8,10 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from factory.apps.importing.mesh_files import natural
 from factory.commands.requests import OutputOptions
 from factory.support.console import say, warn
 from factory.support.errors import Diagnostic
-from factory.support.files import natural
 
 if TYPE_CHECKING:
     from factory.apps.log import Log

@@ -18,10 +18,11 @@ import shapely
 from numpy.typing import NDArray
 
 from factory.engine.mjcf import names
-from factory.engine.mjcf.replica import Replica, mesh_of, paint, shown
+from factory.engine.mjcf.replica import Geoms, Replica
 from factory.engine.mjcf.weld_frames import WeldFrames
-from factory.floor.geometry.sight import Array, View
+from factory.floor.geometry.sight import View
 from factory.floor.geometry.solids import rotation
+from factory.support.arrays import Array
 from factory.support.engine import mujoco
 
 FAINT = 0.16
@@ -46,11 +47,11 @@ class Fading:
         stands: list[tuple[int, str]] = []
         for body in range(1, self.m.nbody):
             if names.kind(name := self.m.body(body).name) == "feeder":
-                geoms = shown(self.m, body)
-                stands += [(g, name) for g in geoms if self.m.geom(g).name.endswith(STANDS)]
+                geoms = Geoms(self.m).shown(body)
+                stands += [(g, name) for g in geoms if is_stand(self.m.geom(g).name)]
         self.geoms = np.array([g for g, _ in stands], np.intp)
         self.groups = np.unique([group for _, group in stands], return_inverse=True)[1]
-        self.paint = np.array([paint(self.m, g) for g in self.geoms]).reshape(-1, 4)
+        self.paint = np.array([Geoms(self.m).colour(g) for g in self.geoms]).reshape(-1, 4)
         self.boxes = np.array([placed(self.m, d, g) for g in self.geoms]).reshape(-1, 8, 3)
 
     def fade(self, view: View, watched: Array) -> None:
@@ -79,6 +80,11 @@ class Fading:
         greatest = np.zeros(int(self.groups.max()) + 1)
         np.maximum.at(greatest, pairs // count, together)
         return greatest
+
+
+def is_stand(geom: str) -> bool:
+    """Whether a geom of a feeder is its post or its boom, or a skin of one."""
+    return not set(STANDS).isdisjoint(geom.split("/")[2:])
 
 
 def outlines(view: View, boxes: Array) -> tuple[Array, Array]:
@@ -111,7 +117,7 @@ class Snapshot:
 def corners(m: mujoco.MjModel, geom: int) -> Array:
     """The corners (8, 3) of a geom's box in its own frame, or the vertices of its mesh."""
     if m.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH:
-        return mesh_of(m, geom)[0]
+        return Geoms(m).mesh(geom)[0]
     box = m.geom_aabb[geom]
     return np.asarray(box[:3] + SIGNS * box[3:])
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from factory.engine.mjcf.model import product_name
 from factory.engine.record.state import Recorder, State
-from factory.engine.record.subject import subject_of_run
+from factory.engine.record.subject import MonitorSubject
 from factory.film.action import Snapshot, held
 from factory.film.camerawork import Moment, Take, When, past_the_end, pictureless
 from factory.film.history import TIE, History
@@ -28,10 +28,10 @@ class _Observer(Recorder):
             raise pictureless()
         factory = simulation.layout.factory
         picture.check(factory.pag)
-        subject = subject_of_run(simulation)
-        m, self.history = simulation.physical.m, History(subject)
+        subject = MonitorSubject.of_run(simulation)
+        m, made, self.history = simulation.physical.m, simulation.model, History(subject)
         name, units = product_name(factory), simulation.request.units
-        self.take = Take(m, subject, name, units, picture, self.history)
+        self.take = Take(m, made.xml, made.files, subject, name, units, picture, self.history)
         self.last = self._moment(simulation.state())
 
     def _moment(self, state: State) -> Moment:
@@ -81,6 +81,9 @@ class Film(_Observer):
     def close(self) -> None:
         """Finish the file, and write the poster."""
         self.reel.close()
+
+    def __exit__(self, *raised: object) -> None:
+        self.reel.__exit__(*raised)
 
 
 class Still(_Observer):

@@ -21,7 +21,7 @@ from factory.film.ink import (
     width,
 )
 from factory.film.sheet import FOOT, PanelRow, PanelSheet, Rows
-from factory.theory.control.mode import Array
+from factory.support.arrays import Array
 
 CYCLES = 2.2
 """How many rounds of the busiest robot are shown."""
@@ -79,7 +79,7 @@ class GanttPanel:
         colours |= {"dead": DEAD} if self.history.deaths() else {}
         colours |= {"undone": FLASH} if self.history.undone else {}
         for name, colour in reversed(colours.items()):
-            if x - width(name, small) < self.sheet.size[0] / 3:
+            if x - width(name, small) < 0.52 * self.sheet.size[0]:
                 break
             ink.words(x, y, name, small, FAINT, "r")
             x -= width(name, small) + 0.5 * small

@@ -12,7 +12,7 @@ from math import inf
 from factory.engine.record.failures import Death, Failing, Stood, deaths
 from factory.engine.record.subject import MonitorSubject
 from factory.floor.layout.durations import Pace
-from factory.theory.control.mode import Array
+from factory.support.arrays import Array
 from factory.theory.nets.undone import Entry, Undone
 from factory.theory.plant.factory import Factory, Operation
 

@@ -31,7 +31,7 @@ from factory.film.ink import (
 )
 from factory.film.sheet import PanelRow, PanelSheet, Rows, robots_shown
 from factory.floor.layout.layout import Point2
-from factory.theory.control.mode import Array
+from factory.support.arrays import Array
 from factory.theory.plant.factory import Operation
 
 WORK = 0.66

@@ -27,12 +27,6 @@ def claimed(path: Path) -> FileIO:
     return file
 
 
-def claimed_again(path: Path) -> FileIO:
-    """An existing file opened for writing at its beginning, with its content kept. It is
-    claimed as by `claimed`, which raises the same."""
-    return _claimed(path, "r+")
-
-
 def _claimed(path: Path, mode: str) -> FileIO:
     file = FileIO(path, mode)
     if path.is_file() and not _lock(file):
@@ -40,17 +34,6 @@ def _claimed(path: Path, mode: str) -> FileIO:
         words, hint = IN_USE
         raise InputError(Diagnostic("BadFile", f"'{path}' {words}", None, hint))
     return file
-
-
-def is_claimed(path: Path) -> bool:
-    """Whether a process, this one included, holds a file at the moment."""
-    try:
-        if not path.is_file():
-            return False
-        with FileIO(path) as file:
-            return not _lock(file)
-    except OSError:
-        return False
 
 
 def _lock(file: FileIO) -> bool:
@@ -64,3 +47,20 @@ def _lock(file: FileIO) -> bool:
     except (ImportError, OSError):  # a system, or a file system, that has no such locks
         return True
     return True
+
+
+def is_claimed(path: Path) -> bool:
+    """Whether a process, this one included, holds a file at the moment."""
+    try:
+        if not path.is_file():
+            return False
+        with FileIO(path) as file:
+            return not _lock(file)
+    except OSError:
+        return False
+
+
+def claimed_again(path: Path) -> FileIO:
+    """An existing file opened for writing at its beginning, with its content kept. It is
+    claimed as by `claimed`, which raises the same."""
+    return _claimed(path, "r+")

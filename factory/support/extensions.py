@@ -13,14 +13,12 @@ import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from traceback import extract_tb
 from types import MappingProxyType, ModuleType
 from typing import Any
 
 from factory.support.errors import Diagnostic, FactoryError, InputError, Position
-from factory.support.guard import reading
 
 HINT = "mend that line; docs: Extensions"
 
@@ -69,21 +67,6 @@ def extension_files() -> Iterator[Path]:
         yield from (path for path in inside if "__pycache__" not in path.parts)
         if spec.submodule_search_locations is None and spec.origin:
             yield Path(spec.origin)
-
-
-def user_modules(folder: Path) -> Iterator[ModuleType]:
-    """The modules in a folder of the user, by name. Raises InputError: Usage, BadExtension."""
-    if not folder.is_dir():
-        message = f"'{folder}' is no folder"
-        raise InputError(Diagnostic("Usage", message, None, "give a folder with modules (*.py)"))
-    for path in sorted(folder.glob("*.py")):
-        reading(path)
-        spec = spec_from_file_location(f"factory_user_{path.stem}", path)
-        assert spec is not None and spec.loader is not None
-        module = module_from_spec(spec)
-        with blaming(path.name, path):
-            spec.loader.exec_module(module)
-        yield module
 
 
 @contextmanager

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import re
 import select
 import shutil
 import stat
@@ -12,13 +11,9 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
-from weakref import finalize
 
 from factory.support.errors import Diagnostic, InputError
 from factory.support.guard import about_to_write, declare, reading
-
-AGAIN = "record it again: `factory run FILE.pag --log OUT`"
-"""What helps where a log cannot be used."""
 
 LOG = b"factory-log "
 """The first bytes of a log of a run, in every version."""
@@ -30,8 +25,6 @@ TEXT, TABLE, NET, MESH, RECORD = 32 * MIB, MIB, 256 * MIB, 256 * MIB, 4096 * MIB
 table in TOML, a net or a certificate, a mesh, a log. A text takes up to 150 times its bytes of
 memory, a net 15 times. 10^6 labels are 20 MiB of text, and a net of 10,000 parts is 40 MiB."""
 
-LARGE = MIB
-"""A record of more is read in pieces."""
 
 PATIENCE = 2.0
 """Time to wait for the first byte of a pipe that no process has open for writing [s]."""
@@ -68,36 +61,6 @@ def read_bytes(path: Path, most: int) -> bytes:
     if is_pipe and not content:
         raise OSError(errno.EPIPE, "nothing is written to this pipe", str(path))
     return b"".join(content)
-
-
-class Stored:
-    """The content of a file on the disk, of which what is asked for alone is read."""
-
-    def __init__(self, path: Path) -> None:
-        self._file = os.open(path, os.O_RDONLY)
-        self._size = os.fstat(self._file).st_size
-        finalize(self, os.close, self._file)
-
-    def __len__(self) -> int:
-        return self._size
-
-    def __getitem__(self, part: slice) -> bytes:
-        first, end, _ = part.indices(self._size)
-        return os.pread(self._file, max(0, end - first), first)
-
-
-Content = bytes | Stored
-"""The bytes of a file; slices of it are bytes."""
-
-
-def content_of(path: Path, most: int) -> Content:
-    """The content of a file, or what comes through a pipe, as `read_bytes` gives it; of a large
-    file what is asked for alone is read."""
-    reading(path)
-    status = os.stat(path)
-    if stat.S_ISREG(status.st_mode) and LARGE < status.st_size <= most:
-        return Stored(path)
-    return read_bytes(path, most)
 
 
 def _open(path: str, flags: int) -> int:
@@ -229,9 +192,3 @@ def _remove(files: Iterable[Path], folders: list[Path]) -> None:
     for folder in reversed(folders):
         with suppress(OSError):
             folder.rmdir()
-
-
-def natural(name: str) -> tuple[tuple[int, str], ...]:
-    """Sort key of names with numbers: `part2` comes before `part10`."""
-    words = re.split(r"(\d+)", name.lower())
-    return tuple((int(word), "") if word.isdigit() else (-1, word) for word in words)

@@ -163,14 +163,6 @@ def _is_number(number: object) -> bool:
     return type(number) is int and 1 <= number <= MOST_BRANCHES
 
 
-def key_position(path: Path, text: str, key: str) -> Position:
-    """Position of a key in TOML: its first occurrence at the start of a line or in a header."""
-    for number, line in enumerate(text.splitlines(), 1):
-        if match := re.match(rf"""\s*\[*\s*["']?({re.escape(key)})\b""", line):
-            return Position(str(path), number, match.start(1) + 1, line)
-    return Position(str(path), 1, 1)
-
-
 def read_toml(path: Path, hint: str) -> tuple[str, dict[str, Any]]:
     """Text and content of a TOML file. Raises InputError, with the hint: BadFile if it cannot be
     read, Syntax if it is not TOML."""
@@ -201,3 +193,11 @@ def _broken(path: Path, text: str, words: str, hint: str) -> Diagnostic:
     line, column = int(match[1]), int(match[2])
     at = Position(str(path), line, column, text.splitlines()[line - 1])
     return Diagnostic("Syntax", words.replace(match[0], ""), at, hint)
+
+
+def key_position(path: Path, text: str, key: str) -> Position:
+    """Position of a key in TOML: its first occurrence at the start of a line or in a header."""
+    for number, line in enumerate(text.splitlines(), 1):
+        if match := re.match(rf"""\s*\[*\s*["']?({re.escape(key)})\b""", line):
+            return Position(str(path), number, match.start(1) + 1, line)
+    return Position(str(path), 1, 1)

@@ -6,8 +6,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from factory.support.arrays import Array
 from factory.theory.control.governor import follow, govern
-from factory.theory.control.mode import Array, Limits, Mode
+from factory.theory.control.mode import Limits, Mode
 from factory.theory.control.navigation import Bundle
 from factory.theory.control.profile import SpeedProfile, landing_speed
 from tests.navigation_functions import potential

@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from factory.support.arrays import Array
 from factory.theory.control.governed import GovernedAxis, mode_ticks, trajectories
 from factory.theory.control.governor import follow
-from factory.theory.control.mode import STILL, Array, Limits, Mode
+from factory.theory.control.mode import STILL, Limits, Mode
 from factory.theory.control.navigation import Bundle
 from factory.theory.control.profile import SpeedProfile
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.theory.control.mode import Array
+from factory.support.arrays import Array
 from tests import reservation
 from tests.reservation import admitted, braking, drive, gaps
 from tests.tee_runs import adversary

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from factory.support.arrays import Array
 from factory.support.engine import mujoco
-from factory.theory.control.mode import Array
 from tests.ring import TeeState
 from tests.tee_runs import DT, TEE, arrived, reachable
 

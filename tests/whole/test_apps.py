@@ -12,9 +12,11 @@ from typing import Any
 
 import pytest
 
+from factory import commands
 from factory.support import apps
 from factory.support.apps import App, layout_variant
 from factory.support.errors import InputError, MissingError
+from tests.command_line import Terminal
 from tests.paths import ROOT
 
 
@@ -44,17 +46,29 @@ def test_what_is_no_app_of_its_own_is_refused(
         apps.apps.cache_clear()
 
 
-def built(folder: Path) -> Any:
-    """What `build --relay` says of the paper's example with the package in a folder."""
-    words = ["-m", "factory", "build", str(ROOT / "examples" / "paper.pag"), "--relay", "--json"]
-    done = subprocess.run(
-        [sys.executable, *words],
+def factory_in(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    """What `factory` does with the packages in a folder."""
+    return subprocess.run(
+        [sys.executable, "-m", "factory", *words],
         cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(folder)},
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (folder, ROOT)))},
         capture_output=True,
         text=True,
         check=False,
     )
+
+
+def install(folder: Path, name: str) -> None:
+    """Make a package of a folder one that gives its `app:APP` by an entry point."""
+    info = folder / f"{name}-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Name: {name}\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(f"[factory.apps]\n{name} = {name}.app:APP\n")
+
+
+def built(folder: Path) -> Any:
+    """What `build --relay` says of the paper's example with the packages in a folder."""
+    done = factory_in(folder, "build", str(ROOT / "examples" / "paper.pag"), "--relay", "--json")
     document = json.loads(done.stdout)
     return done.returncode, {k: v for k, v in document.items() if k != "compile_s"}
 
@@ -70,8 +84,71 @@ def test_an_app_of_the_house_works_as_well_from_a_package_of_its_own(tmp_path: P
     moved.mkdir()
     for file in package.glob("*.py"):
         (moved / file.name).write_text(file.read_text().replace("factory.apps.relay", "relaying"))
-    info = tmp_path / "relaying-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Name: relaying\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text("[factory.apps]\nrelaying = relaying.app:APP\n")
+    install(tmp_path, "relaying")
     assert built(tmp_path) == built(ROOT)
+
+
+HELLO = '''import click
+from factory.commands.options import OUTPUT
+from factory.support.console import emit, say
+
+@click.command()
+@click.argument("name")
+@OUTPUT
+def hello(name, out):
+    """Greet NAME."""
+    emit({"hello": name}) if out.as_json else say(f"hello, {name}")
+    return 1
+'''
+
+
+def test_an_app_from_outside_gives_a_command(tmp_path: Path) -> None:
+    package = tmp_path / "greeting"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    (package / "words.py").write_text(HELLO)
+    (package / "app.py").write_text(
+        "from factory.support.apps import App\n"
+        "APP = App('greeting', commands={'hello': 'greeting.words:hello'})\n"
+    )
+    install(tmp_path, "greeting")
+    assert "\n  hello      Greet NAME.\n" in factory_in(tmp_path, "--help").stdout
+    done = factory_in(tmp_path, "hello", "you", "--json")
+    assert (done.returncode, json.loads(done.stdout)["hello"]) == (1, "you")
+    assert "did you mean 'hello'?" in factory_in(tmp_path, "helo").stderr
+
+
+@pytest.mark.parametrize(
+    ("word", "place", "why"),
+    [
+        ("run", "os:getcwd", "gives the command 'run', which is there already"),
+        ("plan", "os:getcwd", "gives the command 'plan', which is there already"),
+        ("hello", "nowhere.at.all:hello", "No module named 'nowhere'"),
+        ("hello", "os:hello", "has no attribute 'hello'"),
+        ("hello", "json:dumps", "the command 'hello' of an app is no click.Command"),
+    ],
+)
+def test_what_is_no_command_of_its_own_is_refused(
+    word: str, place: str, why: str, run: Terminal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    app = App("greeting", commands={word: place})
+    monkeypatch.setattr(apps, "extensions", lambda kind: {"greeting": app})
+    _forget()
+    try:
+        done = run("hello", "--json")
+        assert (done.status, done.codes) == (2, ["BadExtension"])
+        assert why in done.json["errors"][0]["message"]
+        assert run("templates").status == 0  # what this package gives needs no other
+    finally:
+        _forget()
+
+
+def _forget() -> None:
+    apps.apps.cache_clear()
+    commands.places.cache_clear()
+
+
+@pytest.mark.parametrize("table", [{"hello": 3}, {"hello": "module"}, {3: "module:hello"}])
+def test_a_table_of_an_app_has_places(table: Any) -> None:
+    with pytest.raises(TypeError, match="is no place"):
+        App("greeting", commands=table)

@@ -11,8 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from benches.fidelity.products import layout
-from factory.engine.mjcf import binary, loading
-from factory.engine.mjcf.binary import beside, kept, key_of, packed, seal_of, sealed
+from factory.apps.exports import binary
+from factory.apps.exports.binary import beside, kept, key_of, packed, seal_of, sealed
+from factory.engine.mjcf import loading
 from factory.engine.mjcf.model import Model
 from factory.engine.simulation.modelling import physical_model
 from tests.command_line import Terminal

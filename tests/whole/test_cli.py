@@ -15,7 +15,7 @@ import pytest
 
 from factory.apps.exports.certificate.check import check_certificate
 from factory.apps.log import read_log
-from factory.commands import cli
+from factory.commands import commands
 from factory.support.version import EXTRAS
 from tests.command_line import Terminal
 from tests.paths import PAPER, ROOT, files_in
@@ -235,7 +235,7 @@ def test_help_is_in_sections(run: Terminal) -> None:
         "Printing",
     ]
     assert out.index("Run:") < out.index("--units") < out.index("Failures:") < out.index("--swap")
-    for name, command in cli.commands.items():
+    for name, command in commands().items():
         shown = run(name, "--help").out
         for option in command.params:
             if isinstance(option, click.Option) and not option.hidden:

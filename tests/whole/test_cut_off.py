@@ -21,9 +21,9 @@ import pytest
 
 from factory.apps.log import LogWriter, read_log
 from factory.apps.report import page, recording_of
+from factory.apps.runs.executing import carry_out
 from factory.engine.record.ending import CutOff
 from factory.engine.record.state import State
-from factory.engine.simulation.executing import carry_out
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.film.video import VideoFile

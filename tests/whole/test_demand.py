@@ -16,8 +16,8 @@ from factory.apps.log import read_log
 from factory.apps.monitor import beside
 from factory.apps.monitor.record import watch_log, word_of
 from factory.apps.recovery import recover
+from factory.apps.runs.demand_file import demand_of, read_demand
 from factory.apps.runs.watched import watched
-from factory.engine.simulation.demand_file import demand_of, read_demand
 from factory.engine.simulation.mujoco.supply import Supply
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.run import Run

@@ -16,7 +16,7 @@ import click
 import pytest
 
 from factory.apps.exports import exporters
-from factory.commands import cli
+from factory.commands import commands
 from factory.pipeline import all_templates
 from factory.support.explanations import codes
 from factory.support.settings import RANGES
@@ -171,7 +171,7 @@ def headings(page: str) -> list[str]:
 
 
 def test_the_reference_has_everything_there_is(reference: dict[str, str]) -> None:
-    assert headings(reference["commands"]) == [f"factory {name}" for name in sorted(cli.commands)]
+    assert headings(reference["commands"]) == [f"factory {name}" for name in commands()]
     assert headings(reference["diagnostics"]) == list(codes())
     assert headings(reference["operations"]) == sorted(all_templates())
     assert headings(reference["robots"]) == [*load_catalogue().types, "The catalogue"]
@@ -184,7 +184,7 @@ def test_every_option_is_told(reference: dict[str, str]) -> None:
     sections = dict(
         re.findall(r"^## factory (\S+)\n(.*?)(?=^## |\Z)", reference["commands"], re.M | re.S)
     )
-    for name, command in cli.commands.items():
+    for name, command in commands().items():
         for option in command.params:
             if isinstance(option, click.Option):
                 assert option.help, f"factory {name} {option.opts[-1]} has no help"
@@ -202,7 +202,7 @@ def test_every_command_and_example_is_in_the_guide_or_the_gallery() -> None:
         (DOCS / "guide" / "commands.md").read_text("utf-8"),
         (DOCS / "gallery.md").read_text("utf-8"),
     )
-    for name in cli.commands:
+    for name in commands():
         assert re.search(rf"`factory {name}\b", guide), name
     for name in EXAMPLES:
         assert f"examples/{name}.pag" in gallery, name
@@ -251,6 +251,18 @@ def test_files_that_the_map_and_the_decisions_name_are_there() -> None:
         files = re.findall(r"`([\w]+(?:/[\w]+)+\.(?:py|op))`", page.read_text("utf-8"))
         for name in (*folders, *files):
             assert (package / name).exists() or (ROOT / name).exists(), f"{page.name}: {name}"
+
+
+def test_the_glossary_names_what_is_there() -> None:
+    """Each term with the file of its definition, and the class or function there; and no two are
+    one term."""
+    page = (DOCS / "glossary.md").read_text("utf-8")
+    rows = re.findall(r"^\| ([^|]+) \| .+ \| `([^`]+)`(?: `(\w+)`)? \|$", page, re.M)
+    assert len(rows) >= 60
+    assert len({term for term, *_ in rows}) == len(rows)
+    for term, path, name in rows:
+        text = (ROOT / "factory" / path).read_text("utf-8")
+        assert re.search(rf"^(class|def) {name}\b" if name else "^", text, re.M), term
 
 
 def test_every_decision_is_in_the_index() -> None:

@@ -11,13 +11,13 @@ import trimesh
 from manifold3d import Manifold, Mesh64
 
 from factory.floor.geometry.facets import sagitta
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.overlap import common, merged
 from factory.floor.geometry.overlapping import overlaps_of
 from factory.floor.geometry.product import product_geometry
 from factory.floor.mating.findings import LEFT_OUT, NO_DEEPER
 from factory.floor.mating.mating import matings
 from factory.pipeline import all_templates
+from factory.support.arrays import Array
 from factory.theory.compiler.expanding import expand
 from factory.theory.lang.pag_reader import load_pag
 from tests.command_line import Terminal

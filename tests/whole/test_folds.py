@@ -19,6 +19,8 @@ from factory.apps.exports.certificate.check import check_certificate
 from factory.apps.exports.certificate.listing import digest
 from factory.apps.exports.certificate.writer import certificate
 from factory.apps.exports.pnml import write_pnml
+from factory.apps.exports.program_text import write_program
+from factory.apps.few_robots.folding import fold, folded, kept_apart, lines_of_labels
 from factory.apps.foreign_nets.behaviour import analyse, play
 from factory.apps.foreign_nets.pnml_reader import read_pnml
 from factory.engine.simulation.request import RunRequest
@@ -30,7 +32,7 @@ from factory.support.errors import InputError, RunError
 from factory.support.settings import Settings
 from factory.theory.compiler import folding
 from factory.theory.compiler.assigning import shared
-from factory.theory.compiler.folding import Line, fold, folded, kept_apart, line_of, lines_of_labels
+from factory.theory.compiler.folding import Line, line_of
 from factory.theory.lang import write_pag
 from factory.theory.nets.cycle_ratio import max_cycle_ratio
 from factory.theory.nets.gears import Gear, GearNet
@@ -40,7 +42,7 @@ from factory.theory.nets.petri import Marking
 from factory.theory.nets.verdict import BEHAVIOUR
 from factory.theory.nets.verify import proved, verify
 from factory.theory.plant.factory import Factory
-from factory.theory.plant.programs import program_of, write_program
+from factory.theory.plant.programs import program_of
 from tests.command_line import Terminal
 from tests.fold_values import (
     fold_layout,

@@ -13,13 +13,14 @@ from hypothesis import strategies as st
 import factory
 from factory.apps.deviations import Deviation, deviate
 from factory.apps.monitor import beside
+from factory.apps.runs.options import FUSE_FROM, fusing_pays
 from factory.engine.mjcf.masks import robot_code
 from factory.engine.simulation.modelling import physical_model
 from factory.engine.simulation.mujoco.fusing import SETTLING, Fusion, rotations
 from factory.engine.simulation.mujoco.holdings import Holdings
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
-from factory.floor.geometry.fused_bodies import FUSE_FROM, bodies_of, fused_copies, fusing_pays
+from factory.floor.geometry.fused_bodies import bodies_of, fused_copies
 from factory.floor.geometry.product import product_geometry
 from factory.support.engine import mujoco
 from factory.support.settings import MOST, Settings
@@ -276,7 +277,7 @@ def test_large_factories_are_fused_by_themselves(tmp_path: Path) -> None:
     chain += "".join(f"n{k} = mate(n{k - 1}, q{k});\n" for k in range(2, 240))
     assert not fuses(tmp_path, chain + ";\n".join(f"q{n} = atomic()" for n in range(240)))
     with pytest.MonkeyPatch.context() as patch:  # convex pieces count, not parts
-        patch.setattr("factory.floor.geometry.fused_bodies.FUSE_FROM", 1)
+        patch.setattr("factory.apps.runs.options.FUSE_FROM", 1)
         assert fusing_pays(small.factory, small.product)
         assert not fusing_pays(many.factory, many.product)
 

@@ -18,6 +18,7 @@ from tests.house import (
     engine_writes,
     long_modules,
     misplaced_tests,
+    reach_ins,
     strangers,
     this_house,
     twins,
@@ -26,6 +27,7 @@ from tests.house import (
     vague,
     variants,
 )
+from tests.interface import interface, undocumented
 from tests.paths import ROOT
 
 Law = Callable[[House], Iterator[str]]
@@ -42,6 +44,8 @@ LAWS: tuple[Law, ...] = (
     misplaced_tests,
     variants,
     vague,
+    reach_ins,
+    interface,
 )
 BREACHES: tuple[tuple[Law, dict[str, str], str], ...] = (
     (strangers, {"factory/loose.py": ""}, "loose: on no floor"),
@@ -101,6 +105,31 @@ BREACHES: tuple[tuple[Law, dict[str, str], str], ...] = (
         "apps.log.a imports apps.report.b",
     ),
     (
+        upward_imports,
+        {
+            "factory/apps/log/a.py": "from factory.apps.log.command_line.b import c",
+            "factory/apps/log/command_line/b.py": "from factory.commands.options import c",
+            "factory/commands/options.py": "",
+        },
+        "apps.log.a imports apps.log.command_line.b",
+    ),
+    (
+        upward_imports,
+        {
+            "factory/commands/a.py": "from factory.apps.log.command_line.b import c",
+            "factory/apps/log/command_line/b.py": "",
+        },
+        "commands.a imports apps.log.command_line.b",
+    ),
+    (
+        upward_imports,
+        {
+            "factory/apps/log/command_line/a.py": "from factory.apps.plc.command_line.b import c",
+            "factory/apps/plc/command_line/b.py": "",
+        },
+        "apps.log.command_line.a imports apps.plc.command_line.b",
+    ),
+    (
         circles,
         {
             "factory/theory/nets/a.py": "from factory.theory.nets import b",
@@ -121,6 +150,11 @@ BREACHES: tuple[tuple[Law, dict[str, str], str], ...] = (
             "factory/support/engine.py": "import mujoco",
         },
         "theory.nets.a imports the engine",
+    ),
+    (
+        engine_imports,
+        {"factory/commands/a.py": "from factory.api import mujoco"},
+        "commands.a imports the engine",
     ),
     (
         engine_imports,
@@ -185,6 +219,55 @@ BREACHES: tuple[tuple[Law, dict[str, str], str], ...] = (
         {"factory/theory/nets/a.py": "def f(plan):\n    return plan.is_folded, Relays(parallel=1)"},
         "theory.nets: names variants 3 times; at most 0",
     ),
+    (
+        reach_ins,
+        {"factory/apps/log/a.py": "def late():\n    from factory.theory.nets.b import C"},
+        "the app log reaches theory.nets.b.C",
+    ),
+    (
+        reach_ins,
+        {
+            "factory/apps/log/a.py": "from factory.api import C",
+            "tests/reach_ins.toml": "[log]\n'theory.nets.b' = ['C']",
+        },
+        "the app log no longer reaches theory.nets.b.C",
+    ),
+    (
+        interface,
+        {"factory/api.py": f"HOMES = {{'pipeline': '{' '.join(map('n{}'.format, range(101)))}'}}"},
+        "api: 101 names; at most 100",
+    ),
+    (
+        interface,
+        {"factory/api.py": "HOMES = {'theory.nets.b': 'C', 'theory.nets.a': 'C'}"},
+        "api.C: twice",
+    ),
+    (
+        interface,
+        {"factory/api.py": "from factory.theory.nets.b import C\nHOMES = {'theory.nets.a': 'C'}"},
+        "api: theory.nets.a.C is in one list only",
+    ),
+    (
+        undocumented,
+        {"factory/api.py": "HOMES = {'pipeline': 'read'}", "factory/pipeline.py": "read = 1"},
+        "api.read: no docstring in pipeline",
+    ),
+    (
+        undocumented,
+        {
+            "factory/api.py": "HOMES = {'pipeline': 'read'}",
+            "factory/pipeline.py": "def read(path):\n    'Args:\\n    file: of a PAG.'",
+        },
+        "api.read: 'path' is not under Args",
+    ),
+    (
+        undocumented,
+        {
+            "factory/api.py": "HOMES = {'pipeline': 'Project'}",
+            "factory/pipeline.py": "class Project:\n    'A project of a PAG.'\n    pag: PAG",
+        },
+        "api.Project: 'pag' is not under Attributes",
+    ),
 )
 
 
@@ -213,7 +296,7 @@ def test_a_planted_breach_is_found(
 
 
 def test_every_law_has_a_planted_breach() -> None:
-    assert {law for law, *_ in BREACHES} == {*LAWS}
+    assert {law for law, *_ in BREACHES} == {*LAWS, undocumented}
 
 
 @pytest.mark.parametrize(

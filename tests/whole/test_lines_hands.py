@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import factory
+from factory.apps.few_robots.sharing import with_lines
 from factory.apps.fidelity.hidden import HiddenPenetrations
 from factory.apps.runs.watched import watched
 from factory.engine.simulation.request import RunRequest
@@ -31,7 +32,6 @@ from factory.floor.layout.hands.places import places as found_places
 from factory.floor.layout.hanging import Hanging
 from factory.floor.layout.layout import Layout
 from factory.pipeline import Project, read
-from factory.sharing import with_lines
 from tests.layout_values import with_visits
 from tests.random_products import random_product
 

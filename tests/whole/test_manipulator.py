@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from factory.apps.exports import stock
 from factory.apps.exports.ways import ways
-from factory.engine.mjcf import stock
+from factory.apps.few_robots.folding import folded
 from factory.engine.mjcf.loading import load
 from factory.engine.mjcf.model import build_model
 from factory.engine.mjcf.names import turn
@@ -28,7 +29,6 @@ from factory.floor.modes.modes import operation_mode
 from factory.pipeline import read
 from factory.support.errors import InputError
 from factory.support.settings import Settings
-from factory.theory.compiler.folding import folded
 from factory.theory.problem.robot_types import load_catalogue
 from tests.clearance_values import check
 from tests.command_line import Terminal

@@ -13,6 +13,7 @@ import pytest
 
 from factory.apps.exports.certificate.check import check_certificate
 from factory.apps.exports.certificate.writer import certificate
+from factory.apps.few_robots.sharing import with_lines
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.engine.timing.cycle_time import cycle_time
@@ -21,7 +22,6 @@ from factory.floor.geometry.product import product_geometry
 from factory.floor.layout.bounds import least_times
 from factory.floor.layout.durations import Pace
 from factory.pipeline import Project, all_templates, read
-from factory.sharing import with_lines
 from factory.support.errors import InputError
 from factory.theory.compiler.mixing import even, orders
 from factory.theory.lang.pag_reader import read_pag

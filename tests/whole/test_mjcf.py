@@ -18,10 +18,10 @@ import pytest
 import trimesh
 
 import factory
+from factory.apps.exports.stock import model_files, written
 from factory.engine.mjcf import names
 from factory.engine.mjcf.loading import load
-from factory.engine.mjcf.model import Model, model_files
-from factory.engine.mjcf.stock import written
+from factory.engine.mjcf.model import Model
 from factory.engine.simulation.modelling import physical_model
 from factory.floor.layout.layout import Layout
 from factory.support.errors import InputError, RunError

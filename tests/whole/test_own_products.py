@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 import factory
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.product import product_geometry
 from factory.floor.geometry.solids import Product
+from factory.support.arrays import Array
 from tests.command_line import Terminal
 from tests.paths import ROOT, files_in
 

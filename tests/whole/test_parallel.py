@@ -16,6 +16,9 @@ from factory.apps.analyze.analysing import least_wip
 from factory.apps.analyze.timed import flow, timed_net
 from factory.apps.exports.certificate.check import check_certificate
 from factory.apps.exports.certificate.writer import certificate
+from factory.apps.exports.program_text import write_program
+from factory.apps.few_robots.parallel import in_parallel
+from factory.apps.few_robots.sharing import with_branches
 from factory.apps.report.drawings import about, labels_of, links
 from factory.apps.runs.watched import watched
 from factory.engine.simulation.request import RunRequest, WorldName
@@ -32,15 +35,13 @@ from factory.floor.layout.hands.hand import Hand
 from factory.floor.layout.stops import stops_of
 from factory.floor.mating.mating import judged
 from factory.pipeline import Project, all_templates, read
-from factory.sharing import with_branches
 from factory.support.errors import InputError
-from factory.theory.compiler.parallel import in_parallel
 from factory.theory.nets.history import legal_marking
 from factory.theory.nets.marked import marked
 from factory.theory.nets.replay import replay
 from factory.theory.nets.verify import verify
 from factory.theory.plant.factory import Factory
-from factory.theory.plant.programs import program_of, write_program
+from factory.theory.plant.programs import program_of
 from factory.theory.problem.pag import PAG, Parameter
 from factory.theory.problem.robot_types import load_catalogue
 from tests.command_line import Terminal

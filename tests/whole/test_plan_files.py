@@ -17,6 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from factory.apps.analyze import Timing, analyse
+from factory.apps.few_robots.sharing import with_branches, with_lines
 from factory.apps.log.plan_file import plan_files, read_plan
 from factory.apps.report import page, recording_of
 from factory.engine.simulation.modelling import physical_model
@@ -25,7 +26,6 @@ from factory.floor.layout.layout import Layout
 from factory.floor.layout.request import Ground
 from factory.floor.layout.saved import LayoutTable
 from factory.pipeline import Project, read
-from factory.sharing import with_branches, with_lines
 from factory.support.errors import Diagnostic, InputError
 from factory.support.tables import table_of, value_of
 from factory.theory.problem.plan import Plan

@@ -31,8 +31,8 @@ from factory.floor.layout.presence import Presence
 from factory.floor.layout.request import Ground
 from factory.pipeline import read
 from factory.support.settings import LEAST
-from tests import test_demand, test_tees
 from tests.random_products import random_blocks, random_product
+from tests.whole import test_demand, test_tees
 
 OFF = SPARE
 """A robot is no further outside its presences: lifts that are to be up, and robots that are to be

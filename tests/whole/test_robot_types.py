@@ -15,10 +15,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from factory.apps.few_robots.sharing import with_branches
 from factory.engine.mjcf.driving import RESERVE
 from factory.floor.layout.certificate import CARRIAGE_BODY
 from factory.pipeline import Project, all_templates
-from factory.sharing import with_branches
 from factory.support.errors import InputError
 from factory.support.extensions import extensions
 from factory.theory.lang.pag_reader import load_pag

@@ -17,10 +17,10 @@ import numpy as np
 import pytest
 
 from benches.fidelity.products import layout
+from factory.apps.exports.stock import model_files, scales_of, written
 from factory.engine.mjcf import names
 from factory.engine.mjcf.loading import load
-from factory.engine.mjcf.model import Model, model_files
-from factory.engine.mjcf.stock import scales_of, written
+from factory.engine.mjcf.model import Model
 from factory.engine.mjcf.timestep import timed
 from factory.engine.simulation.modelling import physical_model
 from factory.support.files import write_all

@@ -18,10 +18,10 @@ from factory.engine.simulation.modelling import physical_model
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.dimensions import Clearance
+from factory.support.arrays import Array, Index
 from factory.support.engine import mujoco
 from factory.support.resources import mjcf_folder
 from factory.support.settings import TICK, Settings
-from factory.theory.control.mode import Array, Index
 from factory.theory.problem.robot_bodies import CARRIAGE, CARRIAGE_TOP
 from tests.simulation_values import layout_of
 

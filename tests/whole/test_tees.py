@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from factory.apps.few_robots.parallel import in_parallel
+from factory.apps.few_robots.sharing import with_branches, with_tees
 from factory.apps.runs.watched import watched
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.run import Run
@@ -17,10 +19,8 @@ from factory.floor.layout.clearance import certify
 from factory.floor.layout.fork import Fork
 from factory.floor.layout.layout import Layout
 from factory.pipeline import Project, all_templates, read
-from factory.sharing import with_branches, with_tees
 from factory.support.errors import InputError
 from factory.support.settings import Settings
-from factory.theory.compiler.parallel import in_parallel
 from factory.theory.compiler.tees import heads, on_stems
 from factory.theory.nets.verify import verify
 from factory.theory.problem.pag import PAG, Parameter

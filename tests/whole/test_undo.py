@@ -11,10 +11,10 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from factory.apps.foreign_nets.behaviour import play
+from factory.apps.recovery.undo import marking_after, tokens_after, undo
 from factory.theory.nets.history import firings
 from factory.theory.nets.marked import MarkedNet, marked, token_free
 from factory.theory.nets.petri import Marking
-from factory.theory.nets.undo import marking_after, tokens_after, undo
 from factory.theory.nets.undone import Joins, Undone
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.pag import NOPART

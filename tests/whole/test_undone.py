@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from factory.apps.recovery.undo import marking_after, tokens_after, undo
 from factory.theory.nets.history import firings
 from factory.theory.nets.replay import ReplayVerdict, replay
-from factory.theory.nets.undo import marking_after, tokens_after, undo
 from factory.theory.nets.undone import Entry, Joins, Undone, lasting
 from factory.theory.plant.factory import Factory
 from tests.fold_values import inserted, plain, random_fold, three_robots

@@ -16,6 +16,7 @@ from benches.speed.factories import balanced
 from factory.apps.deviations import Deviation, deviate
 from factory.apps.deviations.interference import Interference
 from factory.apps.log import read_log
+from factory.apps.log.checks import check_figures
 from factory.apps.log.writer import LogWriter
 from factory.apps.monitor import beside
 from factory.apps.monitor.record import verdict_on, watch_log
@@ -23,7 +24,7 @@ from factory.apps.runs.watched import watched
 from factory.engine.mjcf import loading, names
 from factory.engine.mjcf.model import Model
 from factory.engine.record.findings import Report, Violation
-from factory.engine.record.verdict import LIMITS, RunVerdict, check_figures, judged
+from factory.engine.record.verdict import LIMITS, RunVerdict, judged
 from factory.engine.simulation.mujoco import world as mujoco_world
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation

@@ -16,8 +16,8 @@ from factory.engine.simulation.mujoco.world import MujocoWorld
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.engine.simulation.world import Hooks, World
+from factory.support.arrays import Array
 from factory.support.errors import InputError
-from factory.theory.control.mode import Array
 from factory.theory.plant.factory import Operation
 from tests.simulation_values import FINE, layout_of, ready
 

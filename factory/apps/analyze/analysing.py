@@ -6,14 +6,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from factory.api import Diagnostic, Factory, InputError, Timing, did_you_mean, usage_error
 from factory.apps.analyze.firing import slacks
 from factory.apps.analyze.measured import Comparison, RunRecord, compare
 from factory.apps.analyze.timed import Circuit, Flow, TimedNet, flow, timed_net
 from factory.engine.timing.pool import part_pool
 from factory.engine.timing.timed import SAME
-from factory.engine.timing.timing import AS_IT_IS, Change, Timing
-from factory.support.errors import Diagnostic, InputError, did_you_mean, usage_error
-from factory.theory.plant.factory import Factory
+from factory.engine.timing.timing import AS_IT_IS, Change
 
 MOST: Mapping[str, float] = {"faster": 1e6, "shorter": 100.0}
 """The most that a robot is faster, and its ways are shorter [percent]."""

@@ -10,10 +10,10 @@ from math import inf
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from factory.api import Array, MarkedNet, token_free
+from factory.apps.foreign_nets.behaviour import dead_ends
 from factory.theory.nets.cycle_ratio import CycleRatio
-from factory.theory.nets.marked import MarkedNet, dead_ends, token_free
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,16 +86,13 @@ def circuits(ratio: CycleRatio, places: Iterable[int]) -> tuple[Slack, ...]:
     return tuple(sorted(kept.values(), key=lambda slack: (slack.seconds, min(slack.circuit))))
 
 
-Floats = NDArray[np.float64]
-
-
 def earliest_firings(
     net: MarkedNet,
     seconds: Sequence[float],
     count: int,
     first: Mapping[int, float] = MappingProxyType({}),
     ready: Mapping[int, float] = MappingProxyType({}),
-) -> Floats:
+) -> Array:
     """(count, T): dates of the first `count` firings of every transition [s].
 
     The k-th firing takes the k-th token of each place before it: an initial token, available at

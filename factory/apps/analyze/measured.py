@@ -10,17 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.apps.analyze.firing import Floats
+from factory.api import Array, Diagnostic, Event, Factory, InputError, Run, Settings, Timing
 from factory.apps.analyze.timed import Flow, TimedNet
 from factory.apps.log import Log
 from factory.apps.log.project_table import settings_of
-from factory.engine.record.state import Event
-from factory.engine.simulation.run import Run, mean_interval
-from factory.engine.timing.timing import Timing
-from factory.support.errors import Diagnostic, InputError
-from factory.support.settings import Settings
+from factory.engine.simulation.run import mean_interval
 from factory.theory.control.profile import World
-from factory.theory.plant.factory import Factory
 
 HINT = "`factory run FILE.pag --log OUT` writes one that fits"
 
@@ -167,7 +162,7 @@ def robot_times(factory: Factory, spent: Sequence[Sequence[float]]) -> list[floa
     return busy
 
 
-def dropoff_times(time: Floats, delivered: NDArray[np.int32]) -> tuple[float, ...]:
+def dropoff_times(time: Array, delivered: NDArray[np.int32]) -> tuple[float, ...]:
     """Dates of the dropoffs [s], to a tick, by the ticks of a log."""
     return tuple(time[np.flatnonzero(np.diff(delivered)) + 1].tolist())
 

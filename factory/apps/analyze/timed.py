@@ -9,12 +9,10 @@ from functools import cached_property
 
 import numpy as np
 
-from factory.apps.analyze.firing import Floats, Slack, circuits, earliest_firings
-from factory.engine.simulation.run import steady_from
+from factory.api import NONE, Array, MarkedNet, PetriNet, Place, Timing, steady_from
+from factory.apps.analyze.firing import Slack, circuits, earliest_firings
 from factory.engine.timing.timed import FEEDER, OUTFEED, SAME, Timed, timed
-from factory.engine.timing.timing import AS_IT_IS, Change, Timing
-from factory.theory.nets.marked import NONE, MarkedNet
-from factory.theory.nets.petri import PetriNet, Place
+from factory.engine.timing.timing import AS_IT_IS, Change
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +95,7 @@ class TimedNet(Timed):
         slack = self.pace * circuit.products - circuit.seconds
         return slack if slack > SAME * self.pace else 0.0
 
-    def firings(self, units: int) -> Floats:
+    def firings(self, units: int) -> Array:
         """(cycles, T): the earliest dates [s] of the firings of each transition, from the initial
         marking, for at least `units` products."""
         cycles = -(-units // self.units)
@@ -239,11 +237,11 @@ class Flow:
     first: float
     last: float
     shares: tuple[Share, ...] = field(repr=False)
-    durations: Floats = field(repr=False)
+    durations: Array = field(repr=False)
     busy: tuple[float, ...] = field(repr=False)
 
     @property
-    def lasting(self) -> Floats:
+    def lasting(self) -> Array:
         """(operations,): mean duration of each [s], without its first occurrence if there are
         others: robots start that one from other positions."""
         later = self.durations[min(1, len(self.durations) - 1) :]
@@ -268,7 +266,7 @@ def flow(timing: Timing, net: TimedNet, units: int) -> Flow:
     )
 
 
-def leaving_dates(timing: Timing, dates: Floats) -> Floats:
+def leaving_dates(timing: Timing, dates: Array) -> Array:
     """Date of the dropoff of each product [s], by those of all firings (cycles, T)."""
     ends = dates[:, [o.end for o in timing.factory.dropoffs]] - timing.tick
     return np.asarray(ends.ravel())
@@ -300,7 +298,7 @@ def steady_units(timing: Timing) -> int:
     return reached(dates, net.pace, net.units)
 
 
-def reached(dates: Floats, pace: float, period: int = 1) -> int:
+def reached(dates: Array, pace: float, period: int = 1) -> int:
     """The same number, for the `dates` [s] of at least 4 dropoffs, with `period` of them in a
     cycle; the number of all if the pace is not reached."""
     least = steady_from(period)

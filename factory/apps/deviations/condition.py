@@ -11,14 +11,20 @@ from typing import Protocol
 
 import numpy as np
 
+from factory.api import (
+    Array,
+    Diagnostic,
+    Index,
+    InputError,
+    Limits,
+    MujocoWorld,
+    Operation,
+    Simulation,
+    did_you_mean,
+)
 from factory.apps.deviations.deviation import Deviation, Vector
 from factory.apps.deviations.interference import Interference, Measure
 from factory.apps.deviations.pushes import Push, Pushes
-from factory.engine.simulation.mujoco.world import MujocoWorld
-from factory.engine.simulation.simulation import Simulation
-from factory.support.errors import Diagnostic, InputError, did_you_mean
-from factory.theory.control.mode import Array, Index, Limits
-from factory.theory.plant.factory import Operation
 
 
 class Breakable(Protocol):

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from math import inf
 from types import MappingProxyType
 
+from factory.api import Operation
 from factory.apps.deviations.condition import PlantCondition
 from factory.apps.deviations.deviation import Deviation
-from factory.theory.plant.factory import Operation
 
 EARLY, LATE = 0.1, 0.9
 """A robot drops what it carries after a share of its operation's time between these."""

@@ -12,10 +12,8 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
+from factory.api import Array, Index, MujocoWorld, mujoco
 from factory.engine.simulation.mujoco.drives import INPUTS
-from factory.engine.simulation.mujoco.world import MujocoWorld
-from factory.support.engine import mujoco
-from factory.theory.control.mode import Array, Index
 
 Measure = Callable[[Array, Array], tuple[Array, Array]]
 """True positions [m] and speeds [m/s] of the axes -> measured ones; called once a timestep."""

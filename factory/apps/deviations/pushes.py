@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from factory.api import MujocoWorld
 from factory.apps.deviations.deviation import Vector
 from factory.apps.deviations.interference import Interference
-from factory.engine.simulation.mujoco.world import MujocoWorld
 
 
 @dataclass(slots=True)

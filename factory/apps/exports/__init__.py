@@ -17,8 +17,8 @@ from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType, ModuleType
 
-from factory.apps.exports.subject import Subject
-from factory.support.extensions import bad_extension, extensions, position_of, user_modules
+from factory.apps.exports.subject import Subject, user_modules
+from factory.support.extensions import bad_extension, extensions, position_of
 
 Made = str | bytes | Mapping[str, bytes]
 """What an exporter gives: a text, bytes, or files by their names."""

@@ -7,25 +7,29 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from factory.api import (
+    Certificate,
+    Model,
+    Project,
+    RunError,
+    Verdict,
+    certify,
+    physical_model,
+    write_all,
+)
+from factory.apps.exports.binary import beside, kept, key_of, packed, seal_of, sealed
 from factory.apps.exports.certificate.writer import certificate
 from factory.apps.exports.dot import write_dot
 from factory.apps.exports.floor_sheet import write_svg
 from factory.apps.exports.pnml import write_pnml
+from factory.apps.exports.program_text import write_program
+from factory.apps.exports.stock import model_files, written
 from factory.apps.exports.ways import ways
 from factory.apps.log.plan_file import LAYOUT_NAME, PLAN_NAME, plan_files
-from factory.engine.mjcf.binary import beside, kept, key_of, packed, seal_of, sealed
-from factory.engine.mjcf.model import Model, model_files
-from factory.engine.mjcf.stock import written
-from factory.engine.simulation.modelling import physical_model
-from factory.floor.layout.certificate import Certificate
-from factory.floor.layout.clearance import certify
 from factory.floor.layout.exclusions import coordinated
 from factory.floor.modes.modes import operation_modes
-from factory.pipeline import Project
-from factory.support.errors import RunError
-from factory.support.files import own_names, write_all
-from factory.theory.nets.verdict import Verdict
-from factory.theory.plant.programs import program_of, write_program
+from factory.support.files import own_names
+from factory.theory.plant.programs import program_of
 
 
 def _json(document: object) -> str:

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from factory.api import Product
+from factory.apps.drawing.canvas import shortened
 from factory.apps.exports.product_view import (
     EDGE,
     ROW,
@@ -16,9 +18,7 @@ from factory.apps.exports.product_view import (
     bodies_of,
     picture_names,
 )
-from factory.floor.geometry.solids import Product
 from factory.floor.mating.findings import Mating, Matings
-from factory.support.canvas import shortened
 
 TOP = 150.0
 """Upper edge of the views."""

@@ -12,13 +12,11 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import astuple, dataclass
 
+from factory.api import Factory, Undone
 from factory.apps.exports.subject import Subject
 from factory.apps.log import Log
 from factory.apps.log.project_table import factory_of
 from factory.support.errors import one_line
-from factory.theory.nets.undone import Undone
-from factory.theory.plant.factory import Factory
-from factory.theory.problem.ids import TransitionId, is_end
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,15 +60,13 @@ def rows(log: Log) -> Iterator[EventRow]:
         yield _row(factory, time, number, units[number])
 
 
-def _row(
-    factory: Factory, time: float, number: TransitionId, unit: int, undone: str = ""
-) -> EventRow:
+def _row(factory: Factory, time: float, number: int, unit: int, undone: str = "") -> EventRow:
     operation = factory.operation_of(number)
     at = operation.position
     return EventRow(
         round(time, 9),
         factory.net.threaded.transitions[number].name,
-        ("end" if is_end(number) else "start") + undone,
+        ("end" if number == operation.end else "start") + undone,
         operation.label,
         operation.template.name,
         unit,

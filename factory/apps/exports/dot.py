@@ -5,12 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from factory.api import PAG, GearNet, MarkedNet, marked
 from factory.apps.exports.subject import Subject
 from factory.apps.exports.svg import pag_of, view_of
 from factory.apps.exports.swimlanes import colour
-from factory.theory.nets.gears import GearNet
-from factory.theory.nets.marked import MarkedNet, marked
-from factory.theory.problem.pag import PAG
 
 FORMAT, TAKES, OF = "dot", "net", "net or tree"
 

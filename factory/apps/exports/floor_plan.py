@@ -8,14 +8,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from factory.floor.geometry.solids import Solid
+from factory.api import Layout, Point2, Solid
+from factory.apps.drawing.canvas import hexadecimal, hull
 from factory.floor.layout.certificate import ALWAYS, PAYLOAD_BODY
 from factory.floor.layout.feeding import feeder_of
 from factory.floor.layout.hands.limbs import limbs
-from factory.floor.layout.layout import Box, Extent, Layout, Point2
+from factory.floor.layout.layout import Box, Extent
 from factory.floor.layout.sweeps import piles, regions
 from factory.floor.layout.tiles import tiles_of
-from factory.support.canvas import hexadecimal, hull
 from factory.theory.problem.robot_bodies import ARM_WIDTH
 
 JUNCTION = 0.008

@@ -7,10 +7,10 @@ from math import dist, floor, sqrt
 
 import numpy as np
 
+from factory.api import Layout
+from factory.apps.drawing.canvas import LETTER, Box, Canvas, Point, millimetres, page_box
 from factory.apps.exports.floor_plan import Flat, flat_shapes, stations
 from factory.floor.layout.feeding import feeder_of
-from factory.floor.layout.layout import Layout
-from factory.support.canvas import LETTER, Box, Canvas, Point, millimetres, page_box
 
 FONT = 17.0
 """Size of a label on the floor [mm]."""

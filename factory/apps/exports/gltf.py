@@ -10,12 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from factory.api import PAG, Array, Indices, Mesh, Product, rotation
 from factory.apps.exports.subject import Subject, triangles, wanted
 from factory.engine.mjcf.mesh_files import corner_normals
-from factory.floor.geometry.glb_reader import UPRIGHT, linear
-from factory.floor.geometry.meshes import Array, Indices, Mesh
-from factory.floor.geometry.solids import Product, rotation
-from factory.theory.problem.pag import PAG
+from factory.floor.geometry.glb_reader import UPRIGHT
 
 WORLD = "/world"
 """The outermost node."""
@@ -126,3 +124,9 @@ def write_gltf(pag: PAG, product: Product, label: str, binary: bool) -> bytes:
             geometry=shared[key],
         )
     return written(scene, binary)
+
+
+def linear(component: float) -> float:
+    """The inverse of `gamma_encoded`."""
+    encoded = component / 12.92 if component <= 0.04045 else ((component + 0.055) / 1.055) ** 2.4
+    return float(encoded)

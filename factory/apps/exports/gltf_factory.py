@@ -8,18 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from factory.api import HIDDEN, Array, Diagnostic, InputError, Mesh, names, physical_model, rotation
 from factory.apps.exports.gltf import new_scene, pose, shaded, written
 from factory.apps.exports.subject import Subject
 from factory.apps.log import Log
-from factory.engine.mjcf import names
-from factory.engine.mjcf.parts import HIDDEN
-from factory.engine.simulation.modelling import physical_model
-from factory.floor.geometry.meshes import Array, Mesh
-from factory.floor.geometry.solids import rotation
-from factory.support.errors import Diagnostic, InputError
 
 if TYPE_CHECKING:
-    from factory.engine.mjcf.replica import Replica
+    from factory.api import Replica
 
 FORMAT, TAKES, BINARY, OF, ENDING = "gltf-factory", "factory", True, "a time of a log [s]", "glb"
 
@@ -38,9 +33,9 @@ def export(subject: Subject) -> bytes:
 
 def _state(subject: Subject) -> Replica:
     """The engine's model in the requested state."""
+    from factory.api import Replica
     from factory.apps.log.model import model_of
     from factory.engine.mjcf.loading import load
-    from factory.engine.mjcf.replica import Replica
 
     if isinstance(subject.source, Log):
         replica = Replica(model_of(subject.log))
@@ -72,7 +67,8 @@ def write_factory(replica: Replica, binary: bool) -> bytes:
     """A factory in its present state as a glTF: a node for each body, named as in the MJCF, within
     it one for each shape; shapes of equal size and colour share a mesh. Spare parts are left
     out."""
-    from factory.engine.mjcf.replica import paint, shown, triangles
+    from factory.api import Geoms
+    from factory.apps.exports.geoms import triangles
 
     m, d = replica.m, replica.d
     scene = new_scene(FACTORY)
@@ -86,8 +82,8 @@ def write_factory(replica: Replica, binary: bool) -> bytes:
             parent = int(m.body_parentid[body])
             there, here = _pose(replica, parent), _pose(replica, body)
             scene.graph.update(node, _node(replica, parent), matrix=np.linalg.solve(there, here))
-        for geom in shown(m, body):
-            kind, colour = (int(m.geom_type[geom]), int(m.geom_dataid[geom])), paint(m, geom)
+        for geom in Geoms(m).shown(body):
+            kind, colour = (int(m.geom_type[geom]), int(m.geom_dataid[geom])), Geoms(m).colour(geom)
             key = (*kind, *m.geom_size[geom].tolist(), *colour.tolist())
             if key not in meshes:
                 meshes[key] = f"mesh{len(meshes)}"

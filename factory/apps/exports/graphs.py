@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from factory.support.errors import Position
-from factory.theory.nets.gears import GearNet
-from factory.theory.nets.marked import MarkedNet, marked
-from factory.theory.plant.factory import Factory
-from factory.theory.problem.pag import PAG
+from factory.api import PAG, Factory, GearNet, MarkedNet, Position, marked
 
 if TYPE_CHECKING:
     import networkx as nx

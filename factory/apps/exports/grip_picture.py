@@ -9,11 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+from factory.api import Array, Product
+from factory.apps.drawing.canvas import shortened
 from factory.apps.exports.product_view import EDGE, ROW, PartView, ViewSheet, picture_names
-from factory.floor.geometry.meshes import Array
-from factory.floor.geometry.solids import Product
 from factory.floor.layout.hands.misses import Miss, NoGrip
-from factory.support.canvas import shortened
 
 HEAD, GAP, INDENT = 92.0, 108.0, 150.0
 """Height of the title, height of the words above a row of views, indentation of these."""

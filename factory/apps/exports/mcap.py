@@ -12,13 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from factory.api import Array, optional
 from factory.apps.exports.csv import EventRow, rows
 from factory.apps.exports.motion import BodyMotion, motion_of
 from factory.apps.exports.subject import Subject
 from factory.apps.log import Log
-from factory.floor.geometry.meshes import Array
-from factory.support.version import optional
-from factory.theory.control.mode import Truth
+from factory.support.arrays import Truth
 
 FORMAT, TAKES, BINARY = "mcap", "log", True
 
@@ -106,19 +105,19 @@ class _Recorder:
 
     def _shapes(self, body: int) -> dict[str, list[Any]]:
         """Foxglove's primitives of a body by the field of the entity that they belong to."""
-        from factory.engine.mjcf.replica import half_sizes, mesh_of, paint, shown
-        from factory.support.engine import mujoco
+        from factory.api import Geoms, mujoco
+        from factory.apps.exports.geoms import half_sizes
 
         m, kinds, messages = self.m, mujoco.mjtGeom, self.messages
         shapes = {name: list[Any]() for name in ("cubes", "cylinders", "spheres", "triangles")}
-        for geom in shown(m, body):
-            red, green, blue, alpha = (round(float(c), 4) for c in paint(m, geom))
+        for geom in Geoms(m).shown(body):
+            red, green, blue, alpha = (round(float(c), 4) for c in Geoms(m).colour(geom))
             at, turn = self._vector(m.geom_pos[geom]), self._quaternion(m.geom_quat[geom])
             pose = messages.Pose(position=at, orientation=turn)
             look = {"pose": pose, "color": messages.Color(r=red, g=green, b=blue, a=alpha)}
             kind, size = m.geom_type[geom], 2 * m.geom_size[geom]
             if kind == kinds.mjGEOM_MESH:
-                vertices, faces = mesh_of(m, geom)
+                vertices, faces = Geoms(m).mesh(geom)
                 points = [messages.Point3(x=x, y=y, z=z) for x, y, z in vertices.tolist()]
                 look |= {"points": points, "indices": faces.ravel().tolist()}
                 shapes["triangles"].append(messages.TriangleListPrimitive(**look))

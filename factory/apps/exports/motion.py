@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from factory.api import HIDDEN, Array, Indices
 from factory.apps.log import Log
-from factory.engine.mjcf.parts import HIDDEN
-from factory.floor.geometry.meshes import Array, Indices
-from factory.theory.control.mode import Truth
+from factory.support.arrays import Truth
 
 if TYPE_CHECKING:
-    from factory.support.engine import mujoco
+    from factory.api import mujoco
 
 RATE = 50.0
 """Greatest rate of frames [1/s]."""
@@ -63,8 +62,8 @@ class BodyMotion:
 
 def motion_of(log: Log) -> BodyMotion:
     """The motion of a log. Raises InputError for a log of the ideal world or one without a tick."""
+    from factory.api import Replica
     from factory.apps.log.model import model_of
-    from factory.engine.mjcf.replica import Replica
 
     m = model_of(log)
     replica, rows = Replica(m), _frames(log, m.nbody)
@@ -82,7 +81,7 @@ def motion_of(log: Log) -> BodyMotion:
 
 def _relative(d: mujoco.MjData, parent: int, body: int, position: Array, turn: Array) -> None:
     """Write the pose of a body relative to its parent into `position` and `turn`."""
-    from factory.support.engine import mujoco
+    from factory.api import mujoco
 
     back = np.zeros(4)
     mujoco.mju_negQuat(back, d.xquat[parent])

@@ -9,17 +9,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from xml.sax.saxutils import escape, quoteattr
 
+from factory.api import GearNet, MarkedNet, Place, Point2, Position, Project, Transition, marked
 from factory.apps.exports.subject import Subject
 from factory.apps.exports.swimlanes import Swimlanes, swimlanes
 from factory.floor.layout.exclusions import coordinated
-from factory.floor.layout.layout import Point2
-from factory.pipeline import Project
-from factory.support.errors import Position
-from factory.theory.nets.gears import Gear, GearNet
-from factory.theory.nets.marked import MarkedNet, marked
-from factory.theory.nets.petri import Place, Transition
+from factory.support.markup import escape, quoteattr
+from factory.theory.nets.gears import Gear
 from factory.theory.nets.threaded import Redistribution
 
 FORMAT, TAKES = "pnml", "net"

@@ -5,11 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from factory.api import Mesh, rotation
 from factory.apps.exports.subject import Subject, triangles, wanted
 from factory.engine.mjcf.mesh_files import stl
-from factory.floor.geometry.meshes import Mesh
 from factory.floor.geometry.pieces import joined
-from factory.floor.geometry.solids import rotation
 
 FORMAT, TAKES, BINARY, FOLDER, OF = "stl", "pag", True, True, "a label"
 

@@ -5,17 +5,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 
+from factory.api import (
+    Diagnostic,
+    GearNet,
+    InputError,
+    MarkedNet,
+    Mesh,
+    Project,
+    Solid,
+    did_you_mean,
+)
 from factory.apps.log import Log
-from factory.floor.geometry.meshes import Mesh
-from factory.floor.geometry.solids import Solid
-from factory.pipeline import Project
-from factory.support.errors import Diagnostic, InputError, did_you_mean
-from factory.theory.nets.gears import GearNet
-from factory.theory.nets.marked import MarkedNet
+from factory.support.extensions import blaming
+from factory.support.guard import reading
 
 Source = Project | GearNet | MarkedNet | Log
 """Source of an export."""
@@ -109,3 +117,18 @@ def file_name(label: str, taken: set[str]) -> str:
         name, number = f"{safe[:80]}~{number}", number + 1
     taken.add(name.casefold())
     return name
+
+
+def user_modules(folder: Path) -> Iterator[ModuleType]:
+    """The modules in a folder of the user, by name. Raises InputError: Usage, BadExtension."""
+    if not folder.is_dir():
+        message = f"'{folder}' is no folder"
+        raise InputError(Diagnostic("Usage", message, None, "give a folder with modules (*.py)"))
+    for path in sorted(folder.glob("*.py")):
+        reading(path)
+        spec = spec_from_file_location(f"factory_user_{path.stem}", path)
+        assert spec is not None and spec.loader is not None
+        module = module_from_spec(spec)
+        with blaming(path.name, path):
+            spec.loader.exec_module(module)
+        yield module

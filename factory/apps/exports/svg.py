@@ -7,14 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from factory.api import PAG, Assembly, Diagnostic, InputError, MarkedNet, Project, marked
+from factory.apps.drawing.canvas import Canvas, Point, hexadecimal, shortened
 from factory.apps.exports.subject import Subject
 from factory.apps.exports.swimlanes import COLOURS, LEFT, SHARED, apart, swimlanes
 from factory.floor.geometry.solids import colour
-from factory.pipeline import Project
-from factory.support.canvas import Canvas, Point, hexadecimal, shortened
-from factory.support.errors import Diagnostic, InputError
-from factory.theory.nets.marked import MarkedNet, marked
-from factory.theory.problem.pag import PAG, Assembly
 
 RADIUS, HEAD = 12.0, (8.0, 3.5)
 """Radius of a place; length and half width of an arrowhead."""

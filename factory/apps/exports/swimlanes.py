@@ -13,8 +13,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 
-from factory.support.canvas import Point
-from factory.theory.nets.marked import MarkedNet, token_free
+from factory.api import MarkedNet, token_free
+from factory.apps.drawing.canvas import Point
 
 COLOURS = (
     "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8c6d00", "#56b4e9", "#7f3c8d", "#e73f74",

@@ -16,19 +16,17 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from factory.api import Array, Mesh, names, physical_model, rotation
+from factory.apps.exports.stock import written
 from factory.apps.exports.subject import Subject
-from factory.engine.mjcf import names
 from factory.engine.mjcf.elements import add, exact, numbers
 from factory.engine.mjcf.mesh_files import stl
-from factory.engine.mjcf.stock import written
-from factory.engine.simulation.modelling import physical_model
-from factory.floor.geometry.meshes import Array, Mesh, hull_mesh
-from factory.floor.geometry.solids import rotation
+from factory.floor.geometry.meshes import hull_mesh
 from factory.floor.geometry.turning import upright
 from factory.floor.layout.guidepath import LEVER
 
 if TYPE_CHECKING:
-    from factory.support.engine import mujoco
+    from factory.api import mujoco
 
 FORMAT, TAKES = "urdf", "pag"
 
@@ -54,10 +52,9 @@ class _Writer:
     """Writes the bodies of a compiled model as links; `files`: the meshes that these refer to."""
 
     def __init__(self, m: mujoco.MjModel, speed: float, folder: str) -> None:
-        from factory.engine.mjcf import replica
-        from factory.support.engine import mujoco
+        from factory.api import mujoco
 
-        self.m, self.speed, self.folder, self.replica = m, speed, folder, replica
+        self.m, self.speed, self.folder = m, speed, folder
         self.geom, joint = mujoco.mjtGeom, mujoco.mjtJoint
         self.kinds = {int(joint.mjJNT_SLIDE): "prismatic", int(joint.mjJNT_HINGE): "revolute"}
         self.files: dict[str, bytes] = {}
@@ -76,14 +73,16 @@ class _Writer:
         return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
     def _link(self, root: Element, body: int) -> None:
-        m, seen = self.m, set(self.replica.shown(self.m, body))
+        from factory.api import Geoms
+
+        m, seen = self.m, set(Geoms(self.m).shown(body))
         link = add(root, "link", name=m.body(body).name)
         if m.body_jntnum[body]:
             self._inertial(link, body)
         first = m.body_geomadr[body]
         for geom in range(first, first + m.body_geomnum[body]):
             if geom in seen:
-                rgba = numbers(round(float(c), 4) for c in self.replica.paint(m, geom))
+                rgba = numbers(round(float(c), 4) for c in Geoms(m).colour(geom))
                 for visual in self._shapes(link, "visual", geom):
                     add(add(visual, "material", name=f"geom{geom}"), "color", rgba=rgba)
             collides = m.geom_contype[geom] or m.geom_conaffinity[geom]
@@ -143,9 +142,11 @@ class _Writer:
     def _shapes(self, link: Element, tag: str, geom: int) -> list[Element]:
         """The elements of a geom's shape; a capsule has three. A mesh is a file: of one that
         collides its convex hull, as which the engine takes it."""
+        from factory.apps.exports.geoms import half_sizes
+
         m, size = self.m, self.m.geom_size[geom]
         kind, radius = self.geom(m.geom_type[geom]), numbers([size[0]])
-        shapes = [("box", {"size": numbers(2 * self.replica.half_sizes(m, geom))}, 0.0)]
+        shapes = [("box", {"size": numbers(2 * half_sizes(m, geom))}, 0.0)]
         if kind == self.geom.mjGEOM_MESH:
             shapes = [("mesh", {"filename": self._mesh(geom, tag == "collision")}, 0.0)]
         elif kind == self.geom.mjGEOM_SPHERE:
@@ -166,7 +167,9 @@ class _Writer:
         name = self.m.mesh(int(self.m.geom_dataid[geom])).name
         name = f"{name}{'.hull' if hull else ''}.stl"
         if name not in self.files:
-            mesh = Mesh("", *self.replica.mesh_of(self.m, geom))
+            from factory.api import Geoms
+
+            mesh = Mesh("", *Geoms(self.m).mesh(geom))
             self.files[name] = stl(hull_mesh(name, mesh.vertices) if hull else mesh)
         return f"{self.folder}/{name}"
 

@@ -12,9 +12,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from factory.engine.mjcf import names
-from factory.engine.mjcf.model import Model
-from factory.engine.mjcf.stock import Scale, scales_of
+from factory.api import Model, names
+from factory.apps.exports.stock import Scale, scales_of
 from factory.floor.layout.exclusions import awaited_positions, coordinated
 from factory.floor.layout.hanging import Hanging
 from factory.floor.layout.machines import presences

@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from factory.api import GearNet, MarkedNet, Project, did_you_mean, usage_error
 from factory.apps.exports import TAKEN, Exporter, Made, exporters
 from factory.apps.exports.subject import Source, Subject
 from factory.apps.log import Log, is_log, read_log
-from factory.pipeline import Project
-from factory.support.errors import did_you_mean, usage_error
 from factory.support.extensions import bad_extension, blaming, position_of
 from factory.support.files import is_net
-from factory.theory.nets.gears import GearNet
-from factory.theory.nets.marked import MarkedNet
 
 
 def exporter(form: str, of: str = "", folders: Sequence[Path] = ()) -> Exporter:

@@ -15,12 +15,11 @@ from itertools import pairwise
 from math import inf
 from typing import Literal
 
+from factory.api import NOPART, PAG, Template
+from factory.apps.few_robots.parallel import Branches
 from factory.support.bounds import check_values
 from factory.support.settings import LEAST
 from factory.theory.compiler.expanding import Node, expand
-from factory.theory.compiler.parallel import Branches
-from factory.theory.problem.pag import NOPART, PAG
-from factory.theory.problem.template import Template
 
 SHOWN = 6
 """Number of labels of a proof that are shown."""

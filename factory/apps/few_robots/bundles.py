@@ -13,11 +13,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from math import inf
 
-from factory.floor.layout.durations import Pace
+from factory.api import NOPART, Factory, Operation, Pace
 from factory.floor.layout.guidepath import Box
 from factory.theory.compiler.folding import Line, begun_by, kind_of, sides_of
-from factory.theory.plant.factory import Factory, Operation
-from factory.theory.problem.pag import NOPART
 
 BETWEEN = 0.08
 """Distance between two sub-assemblies at the ends of a guidepath [m]."""

@@ -6,14 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+from factory.api import FactoryError, Project, Timing, pace
 from factory.apps.few_robots.bundles import Filling
+from factory.apps.few_robots.parallel import Branches
+from factory.apps.few_robots.sharing import with_branches
 from factory.engine.timing.cycle_time import CycleTime, cycle_time
-from factory.engine.timing.timed import pace
-from factory.engine.timing.timing import Timing
-from factory.pipeline import Project
-from factory.sharing import with_branches
-from factory.support.errors import FactoryError
-from factory.theory.compiler.parallel import Branches
 
 
 @dataclass(frozen=True)

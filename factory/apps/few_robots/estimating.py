@@ -7,25 +7,19 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
 
+from factory.api import Allowance, Factory, Operation, Pace, Plan, Product, Project, payload_boxes
 from factory.apps.few_robots.aim import STEP
 from factory.apps.few_robots.bundles import Filling
 from factory.apps.few_robots.candidate import Candidate
 from factory.apps.few_robots.forms import FormsTask, Order, best_forms, written_forms
-from factory.apps.few_robots.lines import SLACKS, Shift
+from factory.apps.few_robots.lines import SLACKS, Shift, admitted
+from factory.apps.few_robots.parallel import Branches
 from factory.floor.geometry.fused_bodies import repeated
-from factory.floor.geometry.solids import Product
-from factory.floor.layout.durations import Pace
 from factory.floor.layout.guidepath import Box
 from factory.floor.layout.hands.misses import NoGrip
-from factory.floor.layout.shapes import payload_boxes
-from factory.floor.mating.mating import admitted
-from factory.pipeline import Project
-from factory.support.bounds import Allowance
 from factory.theory.compiler.expanding import expand
 from factory.theory.compiler.folding import Line
-from factory.theory.compiler.parallel import Branches
-from factory.theory.plant.factory import Factory, Operation
-from factory.theory.problem.plan import THIRD, Plan
+from factory.theory.problem.plan import THIRD
 
 WIDE = 1.3
 """Ratio of successive bounds on cycles for LARGE products (else `aim.STEP`)."""

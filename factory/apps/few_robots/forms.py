@@ -18,14 +18,12 @@ from functools import cached_property
 from math import inf
 from typing import Literal
 
-from factory.floor.layout.durations import Pace
+from factory.api import PAG, Assembly, Pace, Template
+from factory.apps.few_robots.lines import Admitted
 from factory.floor.layout.guidepath import Box
 from factory.floor.mating.findings import BLOCKED, NO_DEEPER
-from factory.floor.mating.mating import Admitted
-from factory.theory.compiler.expanding import Node, expand, joins
-from factory.theory.problem.pag import PAG
+from factory.theory.compiler.expanding import Node, expand
 from factory.theory.problem.plan import THIRD
-from factory.theory.problem.template import Template
 
 APART = 0.06
 """Length of guidepath from one station to the next, beside the sub-assembly [m]."""
@@ -232,3 +230,10 @@ def _faults(task: FormsTask, node: Node, axis: int, pile: int) -> tuple[int, int
         lowers = lowers[-1:]
     level = max(admits.slides[axis], *lowers)
     return int(level == BLOCKED), int(level < NO_DEEPER)
+
+
+def joins(node: Assembly) -> Iterator[str]:
+    """The labels of the piles that a statement with two inputs or more makes, in order."""
+    for number in range(2, len(node.inputs)):
+        yield f"{node.label}/{number}"
+    yield node.label

@@ -10,15 +10,20 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
+import numpy as np
+
+from factory.api import Catalogue, Factory, Pace, Plan, Product, marked
 from factory.apps.few_robots.bundles import BETWEEN, LANE, Filling, SizeTiming, bundled
-from factory.floor.layout.durations import Pace
+from factory.apps.few_robots.folding import count_of, fold, folded
 from factory.floor.layout.guidepath import Box
-from factory.theory.compiler.folding import Line, count_of, fold, folded
+from factory.floor.mating.bodies import bodies
+from factory.floor.mating.findings import STRICT
+from factory.floor.mating.mating import UPRIGHT, levels_of
+from factory.floor.mating.meetings import meetings
+from factory.floor.mating.overlaps import Finder
+from factory.theory.compiler.expanding import Node
+from factory.theory.compiler.folding import Line
 from factory.theory.nets.cycle_ratio import max_cycle_ratio
-from factory.theory.nets.marked import marked
-from factory.theory.plant.factory import Factory
-from factory.theory.problem.plan import Plan
-from factory.theory.problem.robot_types import Catalogue
 
 SLACKS = (inf, 1.5, 0.6, 0.25, 0.0)
 """Waits of tours over their own work, from long to short."""
@@ -143,3 +148,26 @@ def estimated_delays(timing: SizeTiming) -> list[float]:
         longest = max(out[robot] for robot in guests or [operation.carrier])
         delays.append(timing.takes(operation.index, max(longest, stands[operation.index])))
     return delays
+
+
+@dataclass(frozen=True, slots=True)
+class Admitted:
+    """The best levels (`findings`) of one operation: its inputs `slides` along x and y from the
+    better side; the first, or the last of them is lowered (`lowers`)."""
+
+    slides: tuple[int, int] = (STRICT, STRICT)
+    lowers: tuple[int, int] = (STRICT, STRICT)
+
+
+def admitted(nodes: Mapping[str, Node], product: Product) -> Mapping[str, Admitted]:
+    """The levels of each operation with two inputs or more, by its label, whichever robot holds the
+    pile: the choice of forms is made from them. As costly as `matings` twice."""
+    met = meetings(nodes)
+    if not met.all:
+        return {}
+    finder, count = Finder(bodies(product, met.parts), met), len(met.all)
+    every = np.ones(count, bool)
+    slides = [levels_of(finder.along(axis, every), count)[0].max(axis=1) for axis in (0, 1)]
+    lowers = levels_of(finder.along(UPRIGHT, every), count)[0]
+    rows = zip(met.all, *(s.tolist() for s in slides), lowers.tolist(), strict=True)
+    return {m.label: Admitted((x, y), (first, last)) for m, x, y, (first, last) in rows}

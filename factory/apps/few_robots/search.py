@@ -13,14 +13,12 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from math import inf
 
+from factory.api import Allowance, Diagnostic, InputError, Project
 from factory.apps.few_robots.aim import Aim, least_robots, usual_effort
 from factory.apps.few_robots.bundles import Filling
 from factory.apps.few_robots.candidate import Candidate
 from factory.apps.few_robots.estimating import Estimator
-from factory.pipeline import Project
-from factory.support.bounds import Allowance
-from factory.support.errors import Diagnostic, InputError
-from factory.theory.compiler.folding import kept_apart, lines_of
+from factory.apps.few_robots.folding import kept_apart, lines_of
 from factory.theory.problem.plan import THIRD
 
 CHANGES = 60

@@ -8,21 +8,24 @@ from dataclasses import dataclass, field, replace
 from itertools import chain
 from statistics import fmean
 
+from factory.api import (
+    Diagnostic,
+    Factory,
+    Layout,
+    Run,
+    RunError,
+    RunRequest,
+    Settings,
+    Simulation,
+    Timing,
+    mujoco,
+)
 from factory.apps.analyze.measured import operation_times
 from factory.apps.analyze.timed import steady_units
 from factory.apps.fidelity.measuring import Measurement
 from factory.apps.fidelity.record import QUANTITIES, Fidelity, SeedRecord
 from factory.apps.sweep.pool import over_processes
 from factory.engine.mjcf.model import product_name
-from factory.engine.simulation.request import RunRequest
-from factory.engine.simulation.run import Run
-from factory.engine.simulation.simulation import Simulation
-from factory.engine.timing.timing import Timing
-from factory.floor.layout.layout import Layout
-from factory.support.engine import mujoco
-from factory.support.errors import Diagnostic, RunError
-from factory.support.settings import Settings
-from factory.theory.plant.factory import Factory
 
 WORST = 10
 """Number of penetrations that are listed for each seed."""

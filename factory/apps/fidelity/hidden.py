@@ -17,15 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from factory.api import Array, Index, Layout, Simulation, mujoco, names, physical_model
 from factory.apps.fidelity.record import Penetration
-from factory.engine.mjcf import names
+from factory.apps.fidelity.solid import SolidReplica
 from factory.engine.mjcf.loading import load
-from factory.engine.mjcf.solid import SolidReplica
-from factory.engine.simulation.modelling import physical_model
-from factory.engine.simulation.simulation import Simulation
-from factory.floor.layout.layout import Layout
-from factory.support.engine import mujoco
-from factory.theory.control.mode import Array, Index
 from factory.theory.plant.approaches import Pair
 
 TOUCH = 1e-6

@@ -12,14 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from factory.api import Array, MujocoWorld, Run, Simulation, State, mujoco
 from factory.apps.fidelity.hidden import HiddenPenetrations
 from factory.apps.monitor import beside
-from factory.engine.record.state import State
-from factory.engine.simulation.mujoco.world import MujocoWorld
-from factory.engine.simulation.run import Run
-from factory.engine.simulation.simulation import Simulation
-from factory.support.engine import mujoco
-from factory.theory.control.mode import Array
 
 FULL = 0.999
 """Share of its limit from which a force is saturated."""

@@ -9,8 +9,8 @@ from dataclasses import asdict, dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
+from factory.api import Diagnostic
 from factory.engine.record.verdict import MOST
-from factory.support.errors import Diagnostic
 
 
 @dataclass(frozen=True, slots=True)

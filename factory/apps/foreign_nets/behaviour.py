@@ -8,21 +8,29 @@ Theorem 21: a marking is reachable where it keeps the tokens of every circuit).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
 import networkx as nx
 
+from factory.api import (
+    NONE,
+    GearNet,
+    MarkedNet,
+    Position,
+    Verdict,
+    collector_paused,
+    listing,
+    marked,
+    token_free,
+)
 from factory.apps.foreign_nets.discover import discover
 from factory.apps.foreign_nets.explore import LIMIT, Exploration, explore
-from factory.support.collector import collector_paused
-from factory.support.errors import Position
-from factory.theory.nets.composition import compose, cover
-from factory.theory.nets.gears import GearNet
-from factory.theory.nets.marked import NONE, MarkedNet, dead_ends, marked, stuck_circuit, token_free
+from factory.theory.nets.composition import compose
+from factory.theory.nets.marked import stuck_circuit
 from factory.theory.nets.train import no_way_back
-from factory.theory.nets.verdict import Defect, Verdict, listing, verdict
+from factory.theory.nets.verdict import Defect, verdict
 from factory.theory.nets.verify import legality_defects, shape_defects
 
 WORK = 5_000_000
@@ -272,3 +280,19 @@ def _explored(net: MarkedNet, exploration: Exploration) -> Iterator[Defect]:
         yield Defect("reversible", "no way back", reason, transitions=one_way)
     elif not exploration.complete:
         yield Defect("reversible", "undecided", text)
+
+
+def cover(net: MarkedNet, closed: Iterable[bool]) -> list[int]:
+    """For each place a gear through it that has at most one token and keeps it, or NONE."""
+    covered: list[int] = [NONE] * len(net.tokens)
+    for number, (gear, good) in enumerate(zip(net.gears, closed, strict=False)):
+        if good and sum(net.tokens[p] for p in gear.places) <= 1:
+            for place in gear.places:
+                covered[place] = number
+    return covered
+
+
+def dead_ends(net: MarkedNet) -> tuple[int, ...]:
+    """The places with a consumer but no producer: what they feed stops (marked graphs)."""
+    pairs = enumerate(zip(net.left, net.right, strict=True))
+    return tuple(p for p, (before, after) in pairs if before == NONE and after != NONE)

@@ -12,11 +12,11 @@ from itertools import islice
 
 import networkx as nx
 
+from factory.api import NONE, MarkedNet, PlaceId, TransitionId, listing
 from factory.theory.nets.composition import MOST, no_gear_net, notation
 from factory.theory.nets.gears import Gear
-from factory.theory.nets.marked import MANY, NONE, MarkedNet
-from factory.theory.nets.verdict import Defect, listing
-from factory.theory.problem.ids import PlaceId, TransitionId
+from factory.theory.nets.marked import MANY
+from factory.theory.nets.verdict import Defect
 
 
 def discover(net: MarkedNet) -> tuple[tuple[Gear, ...], tuple[Defect, ...]]:

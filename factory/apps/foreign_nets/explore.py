@@ -8,8 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from factory.theory.nets.marked import MarkedNet
-from factory.theory.problem.ids import TransitionId
+from factory.api import MarkedNet, TransitionId
 
 LIMIT = 200_000
 """Greatest number of markings that are explored."""

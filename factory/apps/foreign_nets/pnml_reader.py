@@ -12,19 +12,29 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TypeVar
 
-from factory.support.collector import collector_paused
-from factory.support.errors import Position, did_you_mean
+from factory.api import (
+    NONE,
+    GearNet,
+    MarkedNet,
+    PetriNet,
+    Place,
+    PlaceId,
+    Position,
+    Transition,
+    TransitionId,
+    collector_paused,
+    did_you_mean,
+    read_text,
+)
 from factory.support.files import NET
 from factory.support.xml_tree import Element, XmlDocument
-from factory.theory.lang.source import read_text
 from factory.theory.nets.composition import compose
-from factory.theory.nets.gears import Gear, GearNet
-from factory.theory.nets.marked import NONE, MarkedNet
-from factory.theory.nets.petri import PetriNet, Place, Transition
+from factory.theory.nets.gears import Gear
 from factory.theory.nets.threaded import Redistribution, ThreadedNet
-from factory.theory.problem.ids import PlaceId, RobotId, TransitionId
 
 N = TypeVar("N", bound=int)
+Events = list[TransitionId]
+Numbers = Mapping[str, N]
 
 DRAWN = frozenset({"graphics"})
 """Elements that describe the drawing of a net, and are not read."""
@@ -104,7 +114,7 @@ class _Reader:
         """
         place_index, event_index = _numbers(places, PlaceId), _numbers(events, TransitionId)
         gears = tuple(_gear(element, place_index, event_index) for element in elements)
-        robots = _numbers((gear.robot for gear in gears), RobotId)
+        robots = _numbers((gear.robot for gear in gears), int)
         for element, gear in zip(elements, gears, strict=True):
             if len(gear.robot.split()) != 1 or len(robots) < len(gears):
                 message = f"the robots of the gears need names of their own; found '{gear.robot}'"
@@ -201,12 +211,11 @@ class _Reader:
 
     def _connect(
         self, places: Iterable[str], events: Iterable[str], targets: dict[str, str]
-    ) -> tuple[dict[str, list[TransitionId]], dict[str, list[TransitionId]]]:
+    ) -> list[dict[str, Events]]:
         """For each place its producers and consumers, in the order of the arcs."""
-        left: dict[str, list[TransitionId]] = {name: [] for name in places}
-        right: dict[str, list[TransitionId]] = {name: [] for name in left}
-        number = _numbers(events, TransitionId)
-        seen: set[tuple[str, str]] = set()
+        both: list[dict[str, Events]] = [{name: [] for name in places} for _ in range(2)]
+        left, right = both
+        number, seen = _numbers(events, TransitionId), set[tuple[str, str]]()
         for arc in self.arcs:
             ends = self._ends(arc, targets)
             if ends is None:
@@ -222,7 +231,7 @@ class _Reader:
                 kind = self.nodes[ends[0]].name
                 hint = "an arc joins a place and a transition"
                 self.fault(arc, f"an arc from {kind} '{ends[0]}' to {kind} '{ends[1]}'", hint)
-        return left, right
+        return both
 
     def _ends(self, arc: Element, targets: dict[str, str]) -> tuple[str, str] | None:
         ends = []
@@ -268,9 +277,7 @@ class _Reader:
                 return Position(notes.get("file", "?"), int(line), int(column))
         return self.document.at(element)
 
-    def _place(
-        self, key: str, name: str, left: list[TransitionId], right: list[TransitionId]
-    ) -> Place:
+    def _place(self, key: str, name: str, left: Events, right: Events) -> Place:
         element = self.nodes[key]
         mode = next(_notes(element, "mode"), None)
         notes = {} if mode is None else mode.attributes
@@ -300,9 +307,7 @@ def _numbers(names: Iterable[str], kind: Callable[[int], N]) -> dict[str, N]:
     return {name: kind(number) for number, name in enumerate(names)}
 
 
-def _gear(
-    element: Element, places: Mapping[str, PlaceId], events: Mapping[str, TransitionId]
-) -> Gear:
+def _gear(element: Element, places: Numbers[PlaceId], events: Numbers[TransitionId]) -> Gear:
     """A gear; a place that is gone is left out together with the transition before it."""
     notes = element.attributes
     through = [places.get(name, PlaceId(-1)) for name in notes.get("places", "").split()]
@@ -313,10 +318,10 @@ def _gear(
     return Gear(notes.get("robot", ""), notes.get("type", ""), present, tuple(turns))
 
 
-def _slots(place: Element, robots: Mapping[str, RobotId]) -> tuple[RobotId, ...]:
+def _slots(place: Element, robots: Mapping[str, int]) -> tuple[int, ...]:
     """The robots that a place acts on, by number; -1 for one that has no gear."""
     named = (mode.attributes.get("slots", "") for mode in _notes(place, "mode"))
-    return tuple(robots.get(robot, RobotId(-1)) for robot in next(named, "").split())
+    return tuple(robots.get(robot, -1) for robot in next(named, "").split())
 
 
 def _initial(net: MarkedNet) -> tuple[PlaceId, ...] | None:

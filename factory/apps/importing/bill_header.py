@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
+from factory.api import Position, did_you_mean
 from factory.apps.importing.draft import ImportFaults
-from factory.support.errors import Position, did_you_mean
 from factory.theory.lang.source import quoted
 from factory.theory.lang.words import UNITS
 

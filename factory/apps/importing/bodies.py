@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
+from factory.api import Array, Diagnostic, Indices, InputError
+from factory.apps.importing.zipping import zipped
 from factory.floor.geometry.glb_reader import Colour
-from factory.floor.geometry.mending import zipped
 from factory.floor.geometry.mesh_file import MeshFile, areas_of
-from factory.floor.geometry.meshes import Array, Indices, is_closed, volume_of
+from factory.floor.geometry.meshes import is_closed, volume_of
 from factory.floor.geometry.pieces import MOST_PIECES, components, submeshes
 from factory.floor.geometry.touching import bodies as shells
-from factory.support.errors import Diagnostic, InputError
 from factory.theory.lang.source import quoted
 from factory.theory.lang.words import UNITS as LENGTHS
 

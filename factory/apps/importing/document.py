@@ -13,8 +13,7 @@ from typing import Any, Literal
 from lark import Lark, Token, Transformer, v_args
 from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
 
-from factory.support.errors import Diagnostic, InputError, Position
-from factory.support.version import optional
+from factory.api import Diagnostic, InputError, Position, optional
 from factory.theory.lang.source import Source, quoted
 from factory.theory.lang.words import is_number
 

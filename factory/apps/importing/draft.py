@@ -10,10 +10,11 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Literal
 
-from factory.support.errors import Diagnostic, InputError, Position
+from factory.api import PAG, Assembly, Diagnostic, InputError, Position, Product
+from factory.floor.geometry.overlapping import overlaps_of
 from factory.theory.lang.source import where
 from factory.theory.lang.words import is_label
-from factory.theory.problem.pag import PAG, RESERVED, Assembly, Parameter
+from factory.theory.problem.pag import RESERVED, AllowedOverlap, Parameter
 
 Mates = Literal["many", "chain"]
 """How three or more inputs are mated: in one operation, or one after the other."""
@@ -223,3 +224,14 @@ def too_many(position: Position) -> InputError:
     message = f"the product has more than {MOST_NODES} parts and sub-assemblies"
     hint = "import its sub-assemblies one by one"
     return InputError(Diagnostic("TooLarge", message, position, hint))
+
+
+EVERYWHERE = 5e-4
+"""The depth of overlaps in a drawing without fits [m]."""
+
+
+def everywhere(product: Product) -> tuple[AllowedOverlap, ...]:
+    """The allowance for a drawing without fits, such as an LDraw model: any two parts may overlap
+    by up to 0.5 mm. Empty if no overlap needs it."""
+    needed = any(pair.depth <= EVERYWHERE for pair in overlaps_of(product).pairs)
+    return (AllowedOverlap(EVERYWHERE),) if needed else ()

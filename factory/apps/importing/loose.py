@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from factory.api import PAG, Array, Assembly, Diagnostic, Indices, InputError, Position, read_bytes
+from factory.apps.importing.alike import alike
 from factory.apps.importing.bodies import Bodies, FileBody, apart, check_count, unit_of
 from factory.apps.importing.draft import (
     PART,
@@ -17,17 +19,15 @@ from factory.apps.importing.draft import (
     label_of,
 )
 from factory.apps.importing.importer import Imported
-from factory.apps.importing.mesh_files import MeshStore
+from factory.apps.importing.mesh_files import MeshStore, natural, obj_of
 from factory.apps.importing.part_maker import Placement
 from factory.apps.importing.scene_file import MESHES, SCENES, read_one, read_scene
-from factory.floor.geometry.alike import alike, shape_of
-from factory.floor.geometry.mesh_file import ANEW, UnreadableMesh, obj_of
-from factory.floor.geometry.meshes import Array, Indices
+from factory.floor.geometry.alike import shape_of
+from factory.floor.geometry.mesh_file import ANEW, UnreadableMesh
 from factory.floor.geometry.solids import colour
-from factory.support.errors import Diagnostic, InputError, Position
-from factory.support.files import MESH, natural, read_bytes
+from factory.support.files import MESH
 from factory.theory.lang.source import quoted
-from factory.theory.problem.pag import PAG, Assembly, Parameter
+from factory.theory.problem.pag import Parameter
 
 
 def bodies_in(path: Path) -> Bodies:

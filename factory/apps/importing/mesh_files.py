@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path, PurePosixPath
 
+import numpy as np
+
+from factory.api import Array, Assembly, Indices, read_bytes
 from factory.apps.importing.draft import file_stem
-from factory.support.files import MESH, read_bytes
-from factory.theory.problem.pag import Assembly
+from factory.support.files import MESH
 
 
 def path_inside(name: str) -> PurePosixPath | None:
@@ -66,3 +69,17 @@ class MeshStore:
         kept = above + self._read[path]
         values = (replace(p, value=kept) if p.name == "mesh" else p for p in node.parameters)
         return replace(node, parameters=tuple(values))
+
+
+def obj_of(vertices: Array, faces: Indices, comment: str) -> bytes:
+    """An OBJ file with a comment in its first line."""
+    lines = [f"# {comment}"]
+    lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in (np.round(vertices, 9) + 0.0).tolist()]
+    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces.tolist()]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def natural(name: str) -> tuple[tuple[int, str], ...]:
+    """Sort key of names with numbers: `part2` comes before `part10`."""
+    words = re.split(r"(\d+)", name.lower())
+    return tuple((int(word), "") if word.isdigit() else (-1, word) for word in words)

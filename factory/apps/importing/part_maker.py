@@ -9,14 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
+from factory.api import Array, Position, read_bytes, rotation
 from factory.apps.importing.draft import ImportFaults
 from factory.apps.importing.mesh_files import MeshStore, first_file, path_inside
 from factory.floor.geometry.mesh_file import ANEW, UnreadableMesh
 from factory.floor.geometry.mesh_reader import read_mesh
-from factory.floor.geometry.meshes import Array
-from factory.floor.geometry.solids import rotation
-from factory.support.errors import Position
-from factory.support.files import MESH, read_bytes
+from factory.support.files import MESH
 from factory.theory.lang.operations import MESHES
 from factory.theory.lang.source import near_file, quoted
 from factory.theory.lang.values import GEOMETRY

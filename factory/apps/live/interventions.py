@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
+from factory.api import Simulation, names
 from factory.apps.deviations import Campaign, Deviation, FaultInjector
 from factory.apps.recovery import recover
-from factory.engine.mjcf import names
-from factory.engine.simulation.simulation import Simulation
 
 FOR_EVER = 1e9
 """How long a feeder is blocked, until it is freed [s]."""

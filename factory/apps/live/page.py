@@ -7,18 +7,13 @@ from html import escape
 
 import numpy as np
 
+from factory.api import HIDDEN, Array, MonitorSubject, Operation, Simulation, names
 from factory.apps.live.commands import FACTORS, SPEEDS
 from factory.apps.live.session import Session
 from factory.apps.report.drawings import data, floor_plan, labels_of, net_drawing
 from factory.apps.report.page import counts, filled, options
 from factory.apps.report.scene import DrawnFactory, Pack, scene, stations
 from factory.apps.report.sections import assembly_tree
-from factory.engine.mjcf import names
-from factory.engine.mjcf.parts import HIDDEN
-from factory.engine.mjcf.replica import Floats
-from factory.engine.record.subject import subject_of_run
-from factory.engine.simulation.simulation import Simulation
-from factory.theory.plant.factory import Operation
 
 SCRIPTS = (
     "report/three.min.js",
@@ -95,12 +90,12 @@ def stage_of(simulation: Simulation) -> DrawnFactory:
         d.xpos.copy(),
         d.xquat.copy(),
         np.stack([low, high]),
-        subject_of_run(simulation).as_json()["places"],
+        MonitorSubject.of_run(simulation).as_json()["places"],
         stations(factory, m, _ends(simulation)),
     )
 
 
-def _ends(simulation: Simulation) -> Iterator[tuple[Operation, Floats]]:
+def _ends(simulation: Simulation) -> Iterator[tuple[Operation, Array]]:
     """The state of the engine with the robots of an operation where it ends."""
     layout, world = simulation.layout, simulation.physical
     for operation in layout.factory.operations:

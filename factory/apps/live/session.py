@@ -12,14 +12,12 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
+from factory.api import Failing, Observer, Simulation, Undone
 from factory.apps.deviations import Campaign
 from factory.apps.live.commands import LASTS, PUSH, Command
 from factory.apps.live.interventions import Interventions
 from factory.apps.live.outages import Outages, Watch
-from factory.engine.record.failures import Failing
-from factory.engine.record.state import Observer
-from factory.engine.simulation.simulation import FALL, Simulation
-from factory.theory.nets.undone import Undone
+from factory.engine.simulation.simulation import FALL
 
 RATE = 30.0
 """Frames a second."""

@@ -19,8 +19,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.support.errors import Diagnostic, InputError
-from factory.support.files import AGAIN, LOG, Content
+from factory.api import Diagnostic, InputError
+from factory.apps.log.content import AGAIN, Content
+from factory.support.files import LOG
 
 STATES = ("qpos", "qvel", "ctrl")
 

@@ -13,12 +13,12 @@ from collections.abc import Iterator, Mapping
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
+from factory.api import Diagnostic, InputError, mujoco
+from factory.apps.log.content import AGAIN
 from factory.apps.log.reader import Log, Ragged
 from factory.engine.mjcf.loading import compiled
 from factory.engine.mjcf.model import ARENA, broad_phase
-from factory.support.engine import mujoco
-from factory.support.errors import Diagnostic, InputError
-from factory.support.files import AGAIN, MIB
+from factory.support.files import MIB
 
 LARGEST, TAGS, DEEPEST = 256 * MIB, 2_000_000, 32
 """Upper bounds on the bytes of a model's text and of its meshes, on its tags, and on how deep

@@ -12,16 +12,24 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from factory.api import (
+    PAG,
+    Diagnostic,
+    Ground,
+    InputError,
+    Position,
+    Project,
+    Settings,
+    misfit,
+    read_bytes,
+    read_text,
+    table_of,
+    value_of,
+)
 from factory.apps.log.project_table import ProjectTable, project_of, project_table
-from factory.floor.layout.request import Ground
 from factory.floor.layout.saved import LAID_FOR, LayoutTable
-from factory.pipeline import Project
-from factory.support.errors import Diagnostic, InputError, Position
-from factory.support.files import MESH, read_bytes
-from factory.support.settings import Settings
-from factory.support.tables import MISFITS, misfit, table_of, value_of
-from factory.theory.lang.source import read_text
-from factory.theory.problem.pag import PAG
+from factory.support.files import MESH
+from factory.support.tables import MISFITS
 
 PLAN_NAME, LAYOUT_NAME = "plan.json", "layout.json"
 

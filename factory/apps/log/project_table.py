@@ -14,22 +14,30 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from factory.floor.layout.request import Ground
+from factory.api import (
+    PAG,
+    Diagnostic,
+    Factory,
+    Ground,
+    InputError,
+    Plan,
+    Project,
+    Settings,
+    Template,
+    load_catalogue,
+    misfit,
+    table_of,
+    value_of,
+    write_pag,
+)
+from factory.apps.log.content import AGAIN
 from factory.floor.layout.saved import LayoutTable
-from factory.pipeline import Project, all_templates
-from factory.support.errors import Diagnostic, InputError
-from factory.support.files import AGAIN
-from factory.support.settings import Settings
-from factory.support.tables import MISFITS, misfit, table_of, value_of
+from factory.pipeline import all_templates
+from factory.support.tables import MISFITS
 from factory.theory.compiler.assigning import shared
 from factory.theory.compiler.compiler import compile_pag
-from factory.theory.lang import read_pag, read_template, write_pag, write_template
+from factory.theory.lang import read_pag, read_template, write_template
 from factory.theory.nets.history import firings
-from factory.theory.plant.factory import Factory
-from factory.theory.problem.pag import PAG
-from factory.theory.problem.plan import Plan
-from factory.theory.problem.robot_types import load_catalogue
-from factory.theory.problem.template import Template
 
 
 @dataclass(frozen=True, slots=True)

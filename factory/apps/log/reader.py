@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from factory.api import CutOff, Entry, Failures, InputError, misfit
 from factory.apps.log.blocks import (
     LENGTH,
     MAGIC,
@@ -28,16 +29,18 @@ from factory.apps.log.blocks import (
     locked,
     without_states,
 )
-from factory.apps.log.checks import check_block, check_course, check_header, state_bytes
+from factory.apps.log.checks import (
+    check_block,
+    check_course,
+    check_figures,
+    check_header,
+    state_bytes,
+)
+from factory.apps.log.content import Content, content_of
 from factory.apps.log.failed import Placed, failures_of, failures_so_far, undone_in
-from factory.engine.record.ending import CutOff
-from factory.engine.record.failures import Failures
-from factory.engine.record.verdict import check_figures
 from factory.support.claim import is_claimed
-from factory.support.errors import InputError
-from factory.support.files import LOG, RECORD, Content, content_of, head_of
-from factory.support.tables import misfit
-from factory.theory.nets.undone import Entry, lasting
+from factory.support.files import LOG, RECORD, head_of
+from factory.theory.nets.undone import lasting
 
 Index = NDArray[np.int32]
 

@@ -15,25 +15,35 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from factory.api import (
+    Array,
+    Diagnostic,
+    Event,
+    FactoryError,
+    InputError,
+    MonitorSubject,
+    Observation,
+    Project,
+    Recordable,
+    Recorder,
+    State,
+    Undone,
+    table_of,
+)
 from factory.apps.log.blocks import LENGTH, MAGIC, STATES, Arrays, bad_log, block, pack_rows
+from factory.apps.log.content import content_of
 from factory.apps.log.failed import Written
 from factory.apps.log.project_table import project_table
 from factory.apps.log.reader import digest_of, header_in
-from factory.engine.record.state import Array, Event, Observation, Recordable, Recorder, State
-from factory.engine.record.subject import subject_of_run
 from factory.engine.record.verdict import HEADER, kept_figures
 from factory.floor.layout.saved import LayoutTable
-from factory.pipeline import Project
 from factory.support.claim import claimed
-from factory.support.errors import Diagnostic, FactoryError, InputError
-from factory.support.files import RECORD, content_of, unwritten
+from factory.support.files import RECORD, unwritten
 from factory.support.settings import AUTO
-from factory.support.tables import table_of
 from factory.support.version import release
-from factory.theory.nets.undone import Undone
 
 if TYPE_CHECKING:
-    from factory.engine.mjcf.model import Model
+    from factory.api import Model
 
 GRAIN = 2.0**-30
 """What speeds [m/s] and setpoints [m] are whole multiples of, a nanometre: their last bits are
@@ -300,7 +310,7 @@ def _header(
         **({"demand": table_of(demand)} if (demand := simulation.request.demand) else {}),
         "fuse": simulation.request.fuse,
         "start": sorted(simulation.start),
-        "monitor": subject_of_run(simulation).as_json(),
+        "monitor": MonitorSubject.of_run(simulation).as_json(),
         "robots": [robot.name for robot in factory.robots],
         "places": [place.name for place in net.places],
         "transitions": [transition.name for transition in net.transitions],

@@ -5,18 +5,16 @@ net.
 It observes positions, speeds, setpoints and active constraints, and never reads the supervisor, its
 events or its marking. It works beside a run, or on a log (`factory.apps.monitor.record`)."""
 
+from factory.api import MonitorSubject, Recordable, Report
+from factory.apps.monitor.anatomy import Anatomy
 from factory.apps.monitor.engine import EngineMonitor
-from factory.engine.record.anatomy import Anatomy
-from factory.engine.record.findings import Report
-from factory.engine.record.state import Recordable
-from factory.engine.record.subject import MonitorSubject, subject_of, subject_of_run
 
 
 def beside(simulation: Recordable) -> EngineMonitor:
     """A monitor of the engine of a simulation: `observe` is an observer of its run, and `glance`
     one that need not be called after every tick. It uses only the engine, the layout, the start of
     the simulation, and the times at which operations end."""
-    subject = subject_of_run(simulation)
+    subject = MonitorSubject.of_run(simulation)
     anatomy = Anatomy.of(simulation.engine, simulation.layout.factory, subject.bent)
     first = simulation.state().observation
     monitor = EngineMonitor(subject, anatomy, first)
@@ -24,4 +22,4 @@ def beside(simulation: Recordable) -> EngineMonitor:
     return monitor
 
 
-__all__ = ["MonitorSubject", "Report", "beside", "subject_of"]
+__all__ = ["MonitorSubject", "Report", "beside"]

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 
+from factory.api import Entry, MonitorSubject, PetriNet, Undone
 from factory.engine.record.findings import Firing, Violation
-from factory.engine.record.subject import MonitorSubject
-from factory.theory.nets.petri import PetriNet
-from factory.theory.nets.undone import Entry, Undone
 
 ROUNDING = 1e-9
 """Times that differ by less are equal [s]."""

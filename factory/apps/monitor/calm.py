@@ -16,16 +16,12 @@ from typing import Any
 
 import numpy as np
 
+from factory.api import Factory, Marking, MonitorSubject, Observation, Report, names
 from factory.apps.log.reader import Log
 from factory.apps.monitor.agreement import ROUNDING
+from factory.apps.monitor.anatomy import Anatomy
 from factory.apps.monitor.monitor import MOST, Monitor
-from factory.engine.mjcf import names
-from factory.engine.record.anatomy import Anatomy
-from factory.engine.record.findings import Firing, Report
-from factory.engine.record.state import Observation
-from factory.engine.record.subject import MonitorSubject
-from factory.theory.nets.petri import Marking
-from factory.theory.plant.factory import Factory
+from factory.engine.record.findings import Firing
 
 SHORT = 0.2
 """Shorter spells are not judged [s]."""

@@ -12,11 +12,9 @@ from collections import deque
 from dataclasses import dataclass, field
 from math import inf
 
+from factory.api import MonitorSubject, marked, token_free
 from factory.engine.record.findings import Firing, Violation
-from factory.engine.record.subject import MonitorSubject
 from factory.engine.timing.pool import with_wip
-from factory.theory.nets.marked import marked, token_free
-from factory.theory.problem.ids import TransitionId
 
 
 @dataclass(slots=True)
@@ -144,7 +142,7 @@ class _Solver:
     def _violation(
         self, event: int, unit: int, noted: _Seen, cause: int, early: float
     ) -> Violation:
-        operation = self.observed.subject.factory.operation_of(TransitionId(event))
+        operation = self.observed.subject.factory.operation_of(event)
         name, other = self.names[event], self.names[cause]
         never = f"{other} must come first, and was not observed"
         why = f"could not fire before {early:.3f} s, since {other} must come first"

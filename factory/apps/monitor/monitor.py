@@ -9,17 +9,14 @@ from time import perf_counter
 
 import numpy as np
 
+from factory.api import Factory, MonitorSubject, Observation, Operation, Report, collector_paused
 from factory.apps.monitor.agreement import Recorded, disagreements
+from factory.apps.monitor.anatomy import Anatomy
 from factory.apps.monitor.explanation import SeenFirings
+from factory.apps.monitor.grips import Grips, misplaced
 from factory.apps.monitor.motion import AxisMotion, Lags
 from factory.apps.monitor.transfers import Transfers
-from factory.engine.record.anatomy import Anatomy
-from factory.engine.record.findings import Report, Violation
-from factory.engine.record.grips import Grips, misplaced
-from factory.engine.record.state import Observation
-from factory.engine.record.subject import MonitorSubject
-from factory.support.collector import collector_paused
-from factory.theory.plant.factory import Factory, Operation
+from factory.engine.record.findings import Violation
 
 MOST = 100
 """Number of violations that are kept, the first ones: a fault often causes others."""

@@ -9,10 +9,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.engine.record.anatomy import Anatomy
-from factory.engine.record.grips import MISSED
-from factory.engine.record.state import Array, Index, Observation
-from factory.support.settings import Settings
+from factory.api import Array, Index, Observation, Settings
+from factory.apps.monitor.anatomy import Anatomy
+from factory.apps.monitor.grips import MISSED
 
 REST = 0.01
 """Speed below which robots hand over [m/s]."""

@@ -9,25 +9,31 @@ from typing import Any
 
 import numpy as np
 
+from factory.api import (
+    Demand,
+    Diagnostic,
+    Factory,
+    Failures,
+    MonitorSubject,
+    Observation,
+    Report,
+    RunVerdict,
+    value_of,
+)
 from factory.apps.log.model import model_of
 from factory.apps.log.project_table import factory_of, of_its_factory, settings_of
 from factory.apps.log.reader import Ends, Log
 from factory.apps.monitor.agreement import contradictions
+from factory.apps.monitor.anatomy import Anatomy
 from factory.apps.monitor.calm import judge_calm
 from factory.apps.monitor.monitor import Monitor
 from factory.apps.monitor.recount import differences, recounted, worst
 from factory.engine.mjcf.weld_frames import SLIDE
-from factory.engine.record.anatomy import Anatomy
-from factory.engine.record.failures import Failures
-from factory.engine.record.findings import Report, Violation
-from factory.engine.record.state import Observation
-from factory.engine.record.subject import MonitorSubject, MonitorTable
-from factory.engine.record.verdict import FAULTS, RunVerdict, judged
-from factory.support.errors import Diagnostic
-from factory.support.tables import value_of
+from factory.engine.record.findings import Violation
+from factory.engine.record.subject import MonitorTable
+from factory.engine.record.verdict import FAULTS, judged
 from factory.theory.nets.replay import replay
-from factory.theory.plant.demand import Demand, Word
-from factory.theory.plant.factory import Factory
+from factory.theory.plant.demand import Word
 
 JUMP = 3e-4
 """Tolerance of the displacement of a joint in a tick against its speeds [m]; correct logs stay

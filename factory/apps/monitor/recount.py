@@ -14,17 +14,12 @@ from typing import Any
 
 import numpy as np
 
+from factory.api import Array, Index, MonitorSubject, Observation, Replica, mujoco, names
 from factory.apps.log.reader import Log
-from factory.engine.mjcf import names
+from factory.apps.monitor.anatomy import GRIP, HOLD, PARK, Anatomy
 from factory.engine.mjcf.masks import NOBODY, loose_code, masks_of, robot_code
 from factory.engine.mjcf.pads import Pads, trunks
-from factory.engine.mjcf.replica import Replica
-from factory.engine.mjcf.weld_frames import GRIP, HOLD, PARK
-from factory.engine.record.anatomy import Anatomy
 from factory.engine.record.findings import Violation
-from factory.engine.record.state import Array, Index, Observation
-from factory.engine.record.subject import MonitorSubject
-from factory.support.engine import mujoco
 
 PRESSED = 1e-4
 """Largest depth of a part in the pad that holds it, or is about to [m]."""

@@ -5,13 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from factory.engine.mjcf.weld_frames import FEED, GRIP, HOLD, PARK
-from factory.engine.record.anatomy import Anatomy, Holder
-from factory.engine.record.grips import Switch
-from factory.engine.record.subject import MonitorSubject
-from factory.theory.plant.factory import Operation
-from factory.theory.problem.ids import OperationId
-from factory.theory.problem.pag import NOPART
+from factory.api import NOPART, MonitorSubject, Operation
+from factory.apps.monitor.anatomy import FEED, GRIP, HOLD, PARK, Anatomy, Holder
+from factory.apps.monitor.grips import Switch
 
 Blame = Callable[[str, int, str, str], None]
 """Records a violation: its code, the robot (-1 for none), the label, and the message."""
@@ -204,7 +200,7 @@ class Transfers:
         operation = self.subject.factory.operations[number]
         unit = self.ended[number]
         self.ended[number] += 1
-        last = self.subject.factory.drops(OperationId(number))
+        last = self.subject.factory.drops(number)
         holder = (HOLD, -1) if last else (GRIP, operation.carrier)
         label = operation.before[0] if last else operation.label
         load = self.load.get(holder, set())

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from math import floor, log10
 
+from factory.apps.drawing.canvas import Canvas, Point
 from factory.apps.pareto.front import FrontPoint, ParetoFront, point_name
-from factory.support.canvas import Canvas, Point
 
 PAGE = (0.0, 640.0, 0.0, 400.0)
 FIELD = (52.0, 622.0, 26.0, 356.0)

@@ -11,21 +11,15 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
+from factory.api import Observer, Project, RunRequest, Simulation, Timing, steady_from, write_pag
 from factory.apps.analyze.timed import steady_units
 from factory.apps.few_robots.aim import Least
 from factory.apps.few_robots.candidate import Candidate
 from factory.apps.few_robots.estimating import Estimate
 from factory.apps.importing.mesh_files import MeshStore
 from factory.apps.log.plan_file import PLAN_NAME, plan_files
+from factory.apps.runs.options import fusing_pays
 from factory.apps.runs.watched import watched
-from factory.engine.record.state import Observer
-from factory.engine.simulation.request import RunRequest
-from factory.engine.simulation.run import steady_from
-from factory.engine.simulation.simulation import Simulation
-from factory.engine.timing.timing import Timing
-from factory.floor.geometry.fused_bodies import fusing_pays
-from factory.pipeline import Project
-from factory.theory.lang.writer import write_pag
 
 MESHES = "meshes"
 """A folder that all points share."""

@@ -17,14 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
+from factory.api import Array, Indices, Product
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.standing import Feet
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.overlapping import Overlapping
-from factory.floor.geometry.solids import Product
 from factory.floor.mating.bodies import ConvexBodies, bodies
 from factory.floor.mating.mating import AMPLE
-from factory.floor.mating.meetings import Ints, Meeting, Meetings
+from factory.floor.mating.meetings import Meeting, Meetings
 from factory.floor.mating.overlaps import Finder, Overlaps
 from factory.floor.mating.paths import TOLERANCE
 
@@ -170,7 +169,7 @@ def rooms(source: InPlace, axis: int) -> Array:
     return np.where(room >= AMPLE, np.inf, room)
 
 
-def _bodies(source: InPlace) -> tuple[Finder, ConvexBodies, Ints]:
+def _bodies(source: InPlace) -> tuple[Finder, ConvexBodies, Indices]:
     """The convex bodies of all parts, unit by unit, and the unit of each part."""
     units = source.units()
     solids = {part.label: part.solid for _, members in units for part in members}
@@ -183,7 +182,7 @@ def _bodies(source: InPlace) -> tuple[Finder, ConvexBodies, Ints]:
     return Finder(convex, Meetings(tuple(solids), (every,), borders, levels)), convex, unit
 
 
-def _hidden(overlaps: Overlaps, unit: Ints, labels: Sequence[str]) -> tuple[Overlapping, ...]:
+def _hidden(overlaps: Overlaps, unit: Indices, labels: Sequence[str]) -> tuple[Overlapping, ...]:
     """The parts of two units that overlap in the finished product according to hulls alone; any
     axis shows them."""
     finished = overlaps.depths.finished
@@ -196,7 +195,7 @@ def _hidden(overlaps: Overlaps, unit: Ints, labels: Sequence[str]) -> tuple[Over
     return tuple(Overlapping(labels[one], labels[other], depth) for one, other, depth in pairs)
 
 
-def _enter(overlaps: Overlaps, unit: Ints, levels: NDArray[np.int8], deep: Array) -> None:
+def _enter(overlaps: Overlaps, unit: Indices, levels: NDArray[np.int8], deep: Array) -> None:
     """Enter the overlaps along an axis. The later part of a pair leaves to the lower side and the
     earlier one to the upper side, or the other way round."""
     one, other, depths = unit[overlaps.one], unit[overlaps.other], overlaps.depths
@@ -212,7 +211,7 @@ def _enter(overlaps: Overlaps, unit: Ints, levels: NDArray[np.int8], deep: Array
         np.maximum.at(deep, at, depths.path[apart, column])
 
 
-def _touching(finder: Finder, convex: ConvexBodies, unit: Ints, count: int) -> NDArray[np.bool_]:
+def _touching(finder: Finder, convex: ConvexBodies, unit: Indices, count: int) -> NDArray[np.bool_]:
     """Which units touch: those in contact, then those that connect components."""
     touch = np.eye(count, dtype=bool)
     gap, furthest = CONTACT, float((convex.high.max(axis=0) - convex.low.min(axis=0)).max())
@@ -228,7 +227,7 @@ def _touching(finder: Finder, convex: ConvexBodies, unit: Ints, count: int) -> N
     return touch
 
 
-def _within(finder: Finder, unit: Ints, count: int, gap: float) -> NDArray[np.bool_]:
+def _within(finder: Finder, unit: Indices, count: int, gap: float) -> NDArray[np.bool_]:
     """Which units (n, n) are at most so far from each other [m]."""
     near = np.zeros((count, count), bool)
     one, other = finder.near(gap)

@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from factory.api import Array
 from factory.apps.planning.subsets import LEVEL_PRICES, Masks, Subsets
-from factory.floor.geometry.meshes import Array
 
 Late = Callable[[], bool]
 """Tells whether a search must end."""

@@ -23,10 +23,9 @@ from typing import Any
 
 import numpy as np
 
+from factory.api import Array, Pace
 from factory.apps.planning.divisions import Batch, Divisions, Late, TooLate, never
 from factory.apps.planning.subsets import LEVEL_PRICES, Masks, Subsets
-from factory.floor.geometry.meshes import Array
-from factory.floor.layout.durations import Pace
 from factory.theory.plant.approaches import MARGIN
 
 STATION = 0.06

@@ -7,16 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
+from factory.api import Array, Product
 from factory.apps.planning.exploding import Explosion
+from factory.apps.planning.loose_parts import LOOSE_SAMPLES, LooseParts
 from factory.apps.planning.source import surface
 from factory.film.ink import Pixels
-from factory.film.painter import LOOSE_SAMPLES, LooseParts
 from factory.film.picture import Size
 from factory.film.reel import write_still
 from factory.film.video import VideoFile, check_output
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.sight import View, fit, towards
-from factory.floor.geometry.solids import Product
 
 FPS = 15.0
 

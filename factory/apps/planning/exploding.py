@@ -8,11 +8,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array
-from factory.floor.geometry.solids import Product
+from factory.api import PAG, Array, Product
 from factory.floor.mating.findings import Matings
 from factory.theory.plant.approaches import Approach, Kind
-from factory.theory.problem.pag import PAG
 
 ROOM = 0.15
 """The gap between separated inputs, as a share of the product's diagonal."""

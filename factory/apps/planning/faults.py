@@ -13,15 +13,12 @@ from typing import Any
 
 import numpy as np
 
+from factory.api import Array, Diagnostic, InputError, Solid, listing
 from factory.apps.planning.parts import PlacedPart
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.overlap import Common, common, drawn
 from factory.floor.geometry.overlapping import near_pairs
-from factory.floor.geometry.solids import Solid
 from factory.floor.geometry.touching import connected
 from factory.floor.geometry.touching_groups import groups_of
-from factory.support.errors import Diagnostic, InputError
-from factory.theory.nets.verdict import listing
 
 LARGER = 50.0
 """A part that is more than this many times larger than the largest other part, or smaller than the

@@ -15,13 +15,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from factory.api import Array
 from factory.apps.planning.blocking import CLASHES, DEEPER, LOCKED, Blocking
 from factory.apps.planning.cannot import Units
 from factory.apps.planning.divisions import Late, divisions
 from factory.apps.planning.exact import RELAY, Best, Tree, TreeTask
 from factory.apps.planning.judging import Judged, Site
 from factory.apps.planning.subsets import APART, BLOCKED, LOOSE, PASSES, ROOT_AXIS, TIPS, subsets
-from factory.floor.geometry.meshes import Array
 
 Sets = NDArray[np.bool_]
 

@@ -7,11 +7,11 @@ from functools import cached_property
 
 import numpy as np
 
+from factory.api import Array
 from factory.apps.planning.blocking import CLASHES, DEEPER, LOCKED, Blocking
 from factory.apps.planning.cannot import Direction, Units
 from factory.apps.planning.exact import RELAY, Expected, Tree
 from factory.apps.planning.subsets import APART, BLOCKED, LOOSE, PASSES, ROOT_AXIS, TIPS, Stance
-from factory.floor.geometry.meshes import Array
 
 PRICES = {CLASHES: BLOCKED, LOCKED: PASSES, DEEPER: LOOSE}
 """The price of a join by its level of blocking."""

@@ -10,6 +10,21 @@ from time import perf_counter
 
 import numpy as np
 
+from factory.api import (
+    Allowance,
+    FactoryError,
+    Ground,
+    InputError,
+    Plan,
+    Product,
+    Project,
+    Settings,
+    Template,
+    listing,
+    load_catalogue,
+    pace,
+)
+from factory.apps.few_robots.sharing import with_lines
 from factory.apps.planning.exact import Tree
 from factory.apps.planning.judging import Judged
 from factory.apps.planning.parts import InPlace
@@ -17,20 +32,8 @@ from factory.apps.planning.searching import Aim
 from factory.apps.planning.subsets import Stance
 from factory.apps.planning.writing import Screwed, planned_product, screw_lines, screws_in
 from factory.apps.planning.writing import Tree as LabelTree
-from factory.engine.timing.timed import pace
 from factory.floor.geometry.product import product_geometry
-from factory.floor.geometry.solids import Product
-from factory.floor.layout.request import Ground
-from factory.pipeline import Project
-from factory.sharing import with_lines
-from factory.support.bounds import Allowance
-from factory.support.errors import FactoryError, InputError
-from factory.support.settings import Settings
 from factory.theory.lang.pag_reader import read_pag
-from factory.theory.nets.verdict import listing
-from factory.theory.problem.plan import Plan
-from factory.theory.problem.robot_types import load_catalogue
-from factory.theory.problem.template import Template
 
 LAID = 120
 """Trees are laid out until they have more robots together, unless a time is given."""

@@ -6,16 +6,14 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from factory.api import Diagnostic, InputError, Template, listing, write_all
 from factory.apps.planning.cannot import Interlock, named
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.plan import CannotAssemble, Planned
 from factory.apps.planning.posing import in_words
 from factory.apps.planning.writing import planned_product
-from factory.support.errors import Diagnostic, InputError
-from factory.support.files import head_of, own_names, write_all
+from factory.support.files import head_of, own_names
 from factory.support.user_defaults import NAME
-from factory.theory.nets.verdict import listing
-from factory.theory.problem.template import Template
 
 HEAD = b"# written by `factory plan`: equal screws are brought by one robot, and driven in by one\n"
 """The first line of the settings that are written with a plan."""

@@ -8,14 +8,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
+from factory.api import PAG, Array, Assembly, Diagnostic, Indices, InputError, Mesh, Solid, listing
 from factory.floor.geometry.decomposition import FULL
-from factory.floor.geometry.meshes import Array, Indices, Mesh, is_closed
+from factory.floor.geometry.meshes import is_closed
 from factory.floor.geometry.overlap import drawn
 from factory.floor.geometry.overlapping import Overlapping
-from factory.floor.geometry.solids import Solid
-from factory.support.errors import Diagnostic, InputError
-from factory.theory.nets.verdict import listing
-from factory.theory.problem.pag import PAG, AllowedOverlap, Assembly
+from factory.theory.problem.pag import AllowedOverlap
 
 EXTRA = "pip install 'klavins-factory[decompose]'"
 

@@ -9,6 +9,18 @@ from typing import Any
 
 import numpy as np
 
+from factory.api import (
+    PAG,
+    Allowance,
+    Array,
+    Diagnostic,
+    InputError,
+    Pace,
+    Project,
+    Settings,
+    Template,
+    did_you_mean,
+)
 from factory.apps.planning.blocking import (
     CLASHES,
     DEEPER,
@@ -40,18 +52,11 @@ from factory.apps.planning.subsets import BLOCKED, ROOT_AXIS, Stance, stances
 from factory.apps.planning.threads import threads
 from factory.apps.planning.turning import only
 from factory.apps.planning.writing import Tree, planned_product, screws_in
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.overlapping import Overlapping
 from factory.floor.geometry.product import product_geometry
-from factory.floor.layout.durations import Pace
 from factory.floor.mating.mating import matings
-from factory.pipeline import Project, all_templates
-from factory.support.bounds import Allowance
-from factory.support.errors import Diagnostic, InputError, did_you_mean
-from factory.support.settings import Settings
+from factory.pipeline import all_templates
 from factory.theory.compiler.expanding import expand
-from factory.theory.problem.pag import PAG
-from factory.theory.problem.template import Template
 
 LAYING = "laying out"
 """The name of the last stage of planning."""

@@ -8,14 +8,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from factory.api import Array, Diagnostic, InputError, listing
 from factory.apps.planning.blocking import Blocking
 from factory.apps.planning.cannot import Direction, Interlock, interlocks, named
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.standing import TIPS, overhang
 from factory.apps.planning.turning import only, turned, turns
-from factory.floor.geometry.meshes import Array
-from factory.support.errors import Diagnostic, InputError
-from factory.theory.nets.verdict import listing
 
 AS_DRAWN: Direction = (2, +1)
 """z is up."""

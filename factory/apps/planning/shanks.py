@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from factory.api import Array
 from factory.apps.planning.names import Says, says
 from factory.apps.planning.parts import PlacedPart
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.overlap import drawn
 
 HEAD, SHANK, SHORT, ROUND = 0.85, 0.75, 0.5, 0.16

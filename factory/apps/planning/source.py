@@ -9,7 +9,22 @@ from pathlib import Path
 
 import numpy as np
 
+from factory.api import (
+    PAG,
+    Array,
+    Assembly,
+    Diagnostic,
+    Indices,
+    InputError,
+    Solid,
+    Template,
+    collector_paused,
+    did_you_mean,
+    load_pag,
+    rotation,
+)
 from factory.apps.importing import Imported, Options, import_product
+from factory.apps.importing.alike import alike
 from factory.apps.importing.bodies import check_count
 from factory.apps.importing.draft import file_stem
 from factory.apps.importing.importer import LDRAW
@@ -19,18 +34,13 @@ from factory.apps.importing.scene_file import MESHES, SCENES
 from factory.apps.planning.faults import check_in_place, check_places, raise_if_any
 from factory.apps.planning.parts import EXTRA, InPlace, Kept, PlacedPart, hull_stands
 from factory.apps.planning.shanks import screws_among
-from factory.floor.geometry.alike import alike, shape_of
+from factory.floor.geometry.alike import shape_of
 from factory.floor.geometry.decomposition import can_decompose
 from factory.floor.geometry.mesh_file import ANEW
-from factory.floor.geometry.meshes import Array, Indices, hull_mesh
+from factory.floor.geometry.meshes import hull_mesh
 from factory.floor.geometry.product import product_geometry
-from factory.floor.geometry.solids import Solid, rotation
-from factory.support.collector import collector_paused
-from factory.support.errors import Diagnostic, InputError, did_you_mean
-from factory.theory.lang.pag_reader import load_pag
 from factory.theory.lang.source import quoted
-from factory.theory.problem.pag import PAG, SHAPES, Assembly
-from factory.theory.problem.template import Template
+from factory.theory.problem.pag import SHAPES
 
 DECOMPOSE = f"{EXTRA}: then it is decomposed into convex bodies"
 

@@ -13,10 +13,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from factory.api import Array
 from factory.apps.planning.parts import InPlace, PlacedPart
 from factory.apps.planning.source import surface
 from factory.apps.planning.writing import planned_product
-from factory.floor.geometry.meshes import Array, normals_of
+from factory.floor.geometry.meshes import normals_of
 from factory.floor.geometry.product import product_geometry
 
 NEAR = 1e-3

@@ -11,17 +11,15 @@ from typing import Any, Generic, TypeVar, Union
 
 import numpy as np
 
+from factory.api import PAG, Array, Assembly, Template, write_pag
 from factory.apps.importing.draft import file_stem, label_of
 from factory.apps.importing.part_maker import Placement
 from factory.apps.planning.parts import InPlace
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.overlapping import overlaps_of
 from factory.floor.geometry.product import product_geometry
 from factory.floor.mating.mating import matings
 from factory.theory.compiler.expanding import expand
-from factory.theory.lang.writer import write_pag
-from factory.theory.problem.pag import PAG, AllowedOverlap, Assembly, most_allowed
-from factory.theory.problem.template import Template
+from factory.theory.problem.pag import AllowedOverlap, most_allowed
 
 Unit = TypeVar("Unit", str, int)
 

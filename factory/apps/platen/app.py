@@ -1,5 +1,5 @@
 """What the app for platens gives."""
 
-from factory.support.apps import App
+from factory.api import App
 
 APP = App("platen", layouts={"platen": "factory.apps.platen.platen:platen"})

@@ -5,15 +5,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from factory.floor.layout.compacting import compacted
-from factory.floor.layout.durations import Pace
-from factory.floor.layout.embedding import certified
-from factory.floor.layout.guidepath import Point2
-from factory.floor.layout.hands.choosing import Hands
-from factory.floor.layout.layout import Layout
-from factory.floor.layout.request import Ground
-from factory.support.errors import RunError
-from factory.support.settings import Settings
+from factory.api import Ground, Hands, Layout, Pace, Point2, RunError, Settings, certified
+from factory.apps.platen.compacting import compacted
 
 
 def on_platen(layout: Layout, pace: Pace, tile: float, wanted: Point2 | None = None) -> Layout:

@@ -12,12 +12,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from factory.api import Array, Layout, Mode
 from factory.floor.layout.coordinating import Coordinated
 from factory.floor.layout.exclusions import awaited_positions
-from factory.floor.layout.layout import Layout
 from factory.floor.layout.presence import Span
 from factory.floor.layout.staying import Staying, Sweep
-from factory.theory.control.mode import Array, Mode
 from factory.theory.nets.coordinated import Past
 
 SLACK = 1e-3

@@ -9,20 +9,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from factory.api import Array, Event, Factory, Limits, Operation, Settings
 from factory.apps.plc.corridors import SLACK
 from factory.apps.plc.interlock import PlantInterlock
 from factory.apps.plc.signals import NOBODY, AxisDrives, Commands, Controller, Refusal, Sensed
-from factory.engine.record.state import Event
+from factory.engine.simulation.active import Active
 from factory.engine.simulation.ordering import Ordering
-from factory.engine.simulation.supervisor import Active
 from factory.engine.timing.distributed import Scan
-from factory.support.settings import Settings
-from factory.theory.control.mode import Array, Limits
-from factory.theory.plant.factory import Factory, Operation
-from factory.theory.problem.ids import AxisId, TransitionId
 
 if TYPE_CHECKING:
-    from factory.engine.simulation.simulation import Simulation
+    from factory.api import Simulation
 
 
 class DrivenSupervisor:
@@ -77,7 +73,7 @@ class DrivenSupervisor:
     def awaited(self) -> list[Operation]:
         """The operations all of whose robots wait for them."""
         possible = self.interlock.threads.possible
-        return [self.factory.operation_of(TransitionId(event)) for event in sorted(possible)]
+        return [self.factory.operation_of(event) for event in sorted(possible)]
 
     def limit(self, limits: Limits) -> None:
         """Set the limits of the axes."""
@@ -126,7 +122,7 @@ class DrivenSupervisor:
         drives, back, stops = self.drives, self.interlock.held_back, self.drives.stops
         target = self._confined(commands, stops)
         for axis, where in enumerate(target.tolist()):
-            stands = commands.stop or self.tripped or self.factory.robot_of(AxisId(axis)) in back
+            stands = commands.stop or self.tripped or self.factory.robot_of(axis) in back
             drives.target[axis] = stops[axis] if stands else where
         drives.go(self.interlock.world)
 
@@ -150,7 +146,7 @@ class DrivenSupervisor:
         confined = np.clip(commands.target, low, high)
         astray = {*np.flatnonzero(np.abs(confined - commands.target) > SLACK).tolist()}
         for axis in sorted(astray - self._astray):
-            robot = self.factory.robot_of(AxisId(axis))
+            robot = self.factory.robot_of(axis)
             name = self.factory.robots[robot].name + (" lift" if axis != robot else "")
             ends = f"between {low[axis]:.3f} m and {high[axis]:.3f} m now"
             message = f"{name} is sent to {commands.target[axis]:.6g} m: it may go {ends}"

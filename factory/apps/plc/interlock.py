@@ -8,18 +8,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from factory.api import NOPART, Event, Layout, Mode, Operation, World
 from factory.apps.plc.corridors import Corridors
 from factory.apps.plc.signals import Commands, GripStates, Refusal
-from factory.engine.record.state import Event
 from factory.engine.simulation.ordering import Ordering
-from factory.engine.simulation.world import World
 from factory.floor.layout.coordinating import Coordinated
-from factory.floor.layout.layout import Layout
-from factory.theory.control.mode import REST, Mode
+from factory.theory.control.mode import REST
 from factory.theory.nets.threaded import Threads
-from factory.theory.plant.factory import Operation
-from factory.theory.problem.ids import AxisId
-from factory.theory.problem.pag import NOPART
 
 REACH = 1e-3
 """Greatest distance of an axis from where parts change hands at which a grip takes a part [m]."""
@@ -212,7 +207,7 @@ class PlantInterlock:
         worst = int(away.argmax())
         if away[worst] <= REACH:
             return ""
-        robot = self.factory.robots[self.factory.robot_of(AxisId(axes[worst]))].name
+        robot = self.factory.robots[self.factory.robot_of(axes[worst])].name
         far, reach = 1000 * float(away[worst]), 1000 * REACH
         return f"{robot} is {far:.1f} mm from where it has to be, and a grip reaches {reach:g} mm"
 
@@ -223,7 +218,7 @@ class PlantInterlock:
         worst = int(speeds.argmax())
         if speeds[worst] <= REST:
             return ""
-        robot = self.factory.robots[self.factory.robot_of(AxisId(axes[worst]))].name
+        robot = self.factory.robots[self.factory.robot_of(axes[worst])].name
         return f"{robot} still moves at {1000 * float(speeds[worst]):.0f} mm/s"
 
     def _refuse(self, robot: int, message: str) -> None:

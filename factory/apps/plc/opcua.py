@@ -17,16 +17,12 @@ from time import monotonic, sleep
 from types import TracebackType
 from typing import Any
 
+from factory.api import Diagnostic, Factory, InputError, Simulation, optional
 from factory.apps.live.server import check_host
 from factory.apps.plc.driven import DrivenSupervisor, drive
 from factory.apps.plc.opcua_server import OpcuaServer
 from factory.apps.plc.signals import Commands, Refusal, Sensed
 from factory.apps.plc.written import WrittenCommands
-from factory.engine.simulation.simulation import Simulation
-from factory.support.errors import Diagnostic, InputError
-from factory.support.version import optional
-from factory.theory.plant.factory import Factory
-from factory.theory.problem.ids import AxisId
 
 SPACE = "urn:klavins-factory:plant"
 """The namespace of its nodes."""
@@ -177,7 +173,7 @@ class OpcuaPlant:
             for robot in factory.robots
         ]
         for axis in range(len(self._written.kept.target)):
-            robot = factory.robot_of(AxisId(axis))
+            robot = factory.robot_of(axis)
             name = f"Axis_{1 if axis == robot else 2}"
             made = await places[robot].add_object(space, name)
             await made.add_property(space, "MotionProfile", LINEAR)

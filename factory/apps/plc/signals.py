@@ -8,11 +8,8 @@ from typing import Protocol
 
 import numpy as np
 
-from factory.engine.simulation.world import World
+from factory.api import NOPART, Array, Limits, Operation, World
 from factory.theory.control.governor import towards
-from factory.theory.control.mode import Array, Limits
-from factory.theory.plant.factory import Operation
-from factory.theory.problem.pag import NOPART
 
 NOBODY = -1
 """The robot of a refusal that concerns no single one."""

@@ -5,10 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from factory.api import NOPART, Factory, Marking, Operation
 from factory.engine.simulation.supervisor import Supervisor
-from factory.theory.nets.petri import Marking
-from factory.theory.plant.factory import Factory, Operation
-from factory.theory.problem.pag import NOPART
 
 
 class Books:

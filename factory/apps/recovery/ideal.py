@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
 
+from factory.api import NOPART, Operation, Simulation
 from factory.apps.deviations.deviation import Deviation
 from factory.apps.recovery.books import Books
 from factory.apps.recovery.plant import Plant
 from factory.engine.simulation.ideal import IdealWorld
-from factory.engine.simulation.simulation import Simulation
-from factory.theory.plant.factory import Operation
-from factory.theory.problem.pag import NOPART
 
 
 class IdealPlant(Plant):

@@ -5,8 +5,8 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence, Set
 
+from factory.api import Operation
 from factory.apps.deviations.deviation import Deviation
-from factory.theory.plant.factory import Operation
 
 
 class Plant(ABC):

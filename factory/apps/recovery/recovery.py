@@ -9,6 +9,18 @@ from dataclasses import replace
 
 import numpy as np
 
+from factory.api import (
+    Diagnostic,
+    Event,
+    Factory,
+    Failing,
+    Failures,
+    InputError,
+    Operation,
+    Simulation,
+    Undone,
+    table_of,
+)
 from factory.apps.deviations.campaign import Campaign
 from factory.apps.deviations.deviation import KINDS, Deviation
 from factory.apps.deviations.injector import FaultInjector, Hit
@@ -16,14 +28,8 @@ from factory.apps.recovery.books import Books
 from factory.apps.recovery.plant import Plant
 from factory.apps.recovery.responding import Responding
 from factory.apps.recovery.standing import patience
-from factory.engine.record.failures import Failing, Failures, Stood
-from factory.engine.record.state import Event
-from factory.engine.simulation.simulation import Simulation
+from factory.engine.record.failures import Stood
 from factory.engine.simulation.supervisor import Supervisor
-from factory.support.errors import Diagnostic, InputError
-from factory.support.tables import table_of
-from factory.theory.nets.undone import Undone
-from factory.theory.plant.factory import Factory, Operation
 from factory.theory.problem.template import Failure
 
 IN_VAIN = 2.0

@@ -1,5 +1,5 @@
 """The response to a failure: the net fires backwards to the greatest marking without it
-(nets/undo.py); robots return to where they wait in that marking and drop what has become scrap."""
+(undo.py); robots return to where they wait in that marking and drop what has become scrap."""
 
 from __future__ import annotations
 
@@ -8,22 +8,15 @@ from functools import partial
 
 import numpy as np
 
+from factory.api import NOPART, Diagnostic, Failing, Marking, Operation, Simulation, Undone
 from factory.apps.deviations.campaign import Campaign
 from factory.apps.recovery.books import Books
 from factory.apps.recovery.plant import Plant
 from factory.apps.recovery.returning import Goal, Returning, WayBack, order_of
 from factory.apps.recovery.standing import Standing
+from factory.apps.recovery.undo import marking_after, undo
 from factory.apps.recovery.wasting import OnEnd, Wasting
-from factory.engine.record.failures import Failing
-from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.scrapping import not_carried_back
-from factory.support.errors import Diagnostic
-from factory.theory.nets.petri import Marking
-from factory.theory.nets.undo import marking_after, undo
-from factory.theory.nets.undone import Undone
-from factory.theory.plant.factory import Operation
-from factory.theory.problem.ids import start_of
-from factory.theory.problem.pag import NOPART
 
 SCRAPS = 20
 """So many scraps of one operation on end stop the run: something else is wrong."""
@@ -85,7 +78,8 @@ class Responding:
     def make_way(self) -> None:
         """Send robots that block a late part at their feeders out of its way."""
         books, supervisor = self._books, self._books.supervisor
-        away = supervisor.ordering.axes(map(start_of, supervisor.active.operations))
+        active = supervisor.active.operations
+        away = supervisor.ordering.axes(books.factory.operations[n].start for n in active)
         late = self._plant.in_the_way(away)
         for robot in late - self.returning.ways.keys() - self.dead.keys():
             if books.step_of(robot)[1] or books.operation_of(robot).inputs:

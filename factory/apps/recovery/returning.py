@@ -11,13 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from factory.api import Array, Layout, Marking, Mode, Operation
 from factory.engine.simulation.supervisor import Supervisor
 from factory.floor.layout.feeding import passing
-from factory.floor.layout.layout import Layout
 from factory.floor.layout.starting import start_positions
-from factory.theory.control.mode import Array, Mode
-from factory.theory.nets.petri import Marking
-from factory.theory.plant.factory import Operation
 
 Goal = tuple[int, float]
 """An axis and where it goes [m]."""

@@ -6,12 +6,11 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from factory.api import Limits, Mode, Operation, Simulation
 from factory.engine.record.failures import Stood
-from factory.engine.simulation.simulation import Simulation
 from factory.engine.simulation.supervisor import Supervisor
-from factory.theory.control.mode import STILL, Limits, Mode
+from factory.theory.control.mode import STILL
 from factory.theory.control.navigation import Bundle
-from factory.theory.plant.factory import Operation
 
 SLOWEST = 1e-9
 """The speed limit of a robot that stands [m/s]."""

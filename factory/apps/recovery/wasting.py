@@ -6,8 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from factory.theory.plant.factory import Operation
-from factory.theory.problem.pag import NOPART
+from factory.api import NOPART, Operation
 from factory.theory.problem.template import Kind, Response
 
 

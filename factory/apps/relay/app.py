@@ -1,5 +1,5 @@
 """What the app for relays gives."""
 
-from factory.support.apps import App
+from factory.api import App
 
 APP = App("relay", layouts={"relay": "factory.apps.relay.relaying:relay"})

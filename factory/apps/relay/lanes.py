@@ -7,17 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array
-from factory.floor.layout.dimensions import FINGER, Clearance
+from factory.api import Array, Clearance, Factory, Hand, Layout, Operation
+from factory.floor.layout.dimensions import FINGER
 from factory.floor.layout.hands.apart import BESIDE, HandsApart, Swept
-from factory.floor.layout.hands.hand import Hand, Kind, widths
+from factory.floor.layout.hands.hand import Kind, widths
 from factory.floor.layout.hands.holding import Holding, held
 from factory.floor.layout.hands.in_the_way import InTheWay, Passed
 from factory.floor.layout.hands.places import Places
 from factory.floor.layout.hands.surfaces import Way, swept
-from factory.floor.layout.layout import Layout
-from factory.theory.control.mode import Truth
-from factory.theory.plant.factory import Factory, Operation
+from factory.support.arrays import Truth
 
 
 @dataclass(frozen=True, slots=True)

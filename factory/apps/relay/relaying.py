@@ -10,25 +10,28 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from factory.apps.relay.splitting import split
+from factory.api import (
+    NOPART,
+    Clearance,
+    Ground,
+    Hands,
+    Layout,
+    Pace,
+    Point2,
+    Robot,
+    Settings,
+    certified,
+    certify,
+    collector_paused,
+    load_catalogue,
+)
+from factory.apps.relay.splitting import origin_of, split
 from factory.apps.relay.ways import Way, ways
-from factory.floor.layout.clearance import certify
-from factory.floor.layout.dimensions import Clearance
-from factory.floor.layout.durations import Pace, cycle_of, gear_times
-from factory.floor.layout.embedding import certified
-from factory.floor.layout.hands.choosing import Hands
-from factory.floor.layout.layout import Layout, Point2
+from factory.floor.layout.durations import cycle_of, gear_times
 from factory.floor.layout.optimising import optimised
 from factory.floor.layout.outfeed import away
-from factory.floor.layout.request import Ground
-from factory.support.collector import collector_paused
 from factory.support.resources import templates_folder
-from factory.support.settings import Settings
-from factory.theory.compiler.expanding import origin_of
 from factory.theory.lang.template_reader import load_templates
-from factory.theory.plant.robot import Robot
-from factory.theory.problem.pag import NOPART
-from factory.theory.problem.robot_types import load_catalogue
 
 WITHIN = 1.05
 """Where no cycle time is asked for: that of the most relays there can be, times this."""

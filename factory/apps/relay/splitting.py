@@ -9,18 +9,21 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from factory.api import (
+    NOPART,
+    Catalogue,
+    Clearance,
+    Factory,
+    Guidepath,
+    Layout,
+    Template,
+    payload_boxes,
+)
 from factory.apps.relay.in_line import InLine, hands_in_line
 from factory.apps.relay.ways import Way
-from factory.floor.layout.dimensions import Clearance
-from factory.floor.layout.layout import Guidepath, Layout
-from factory.floor.layout.shapes import payload_boxes
 from factory.floor.layout.visits import visits_of
-from factory.theory.compiler.expanding import origin_of, relay_label
+from factory.theory.compiler.expanding import RELAY, relay_label
 from factory.theory.compiler.relays import with_relays
-from factory.theory.plant.factory import Factory
-from factory.theory.problem.pag import NOPART
-from factory.theory.problem.robot_types import Catalogue
-from factory.theory.problem.template import Template
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,3 +113,9 @@ def _path(path: Guidepath, piece: Piece, lane: float) -> Guidepath:
         offset=round(path.offset + lane, 3),
         aside=-lane,
     )
+
+
+def origin_of(label: str) -> str:
+    """Label before hand-overs."""
+    origin, _, last = label.rpartition("/")
+    return origin if last.startswith(RELAY) else label

@@ -15,9 +15,8 @@ from dataclasses import dataclass
 from itertools import accumulate, pairwise
 from math import floor, inf
 
+from factory.api import NOPART, Layout
 from factory.floor.layout.dimensions import up
-from factory.floor.layout.layout import Layout
-from factory.theory.problem.pag import NOPART
 from factory.theory.problem.robot_bodies import MAST
 
 

@@ -9,14 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from factory.api import Array, Factory, Geoms, Operation, marked, names, rotation
+from factory.apps.drawing.canvas import Canvas, Point, hexadecimal, hull, millimetres
 from factory.apps.exports.svg import NetDrawing
 from factory.apps.report.scene import DrawnFactory, owner, placed, stands_for
-from factory.engine.mjcf import names
-from factory.engine.mjcf.replica import Floats, paint, shown
-from factory.floor.geometry.solids import rotation
-from factory.support.canvas import Canvas, Point, hexadecimal, hull, millimetres
-from factory.theory.nets.marked import marked
-from factory.theory.plant.factory import Factory, Operation
 
 Link = dict[str, list[int]]
 """Numbers of `robots`, `labels`, `transitions`, `places` and `operations`; `solids` are the labels
@@ -201,7 +197,7 @@ class _Plan:
         page = float(low[0]), float(high[0]), float(low[1]), float(high[1])
         return canvas.embedded("floor", page, aria_label="Floor plan to scale")
 
-    def _outline(self, points: Floats) -> list[Point]:
+    def _outline(self, points: Array) -> list[Point]:
         """The convex outline of points (n, 3) [m] in plan, on the page, to a tenth [mm]."""
         flat = np.unique(np.round(1e3 * points[:, :2], 1), axis=0)
         return [(x, -y) for x, y in hull(flat)]
@@ -220,12 +216,12 @@ class _Plan:
                     self.reach += corners
                     self.canvas.polygon(corners, style)
 
-    def _rigid(self, body: int) -> Iterator[tuple[int, Floats]]:
+    def _rigid(self, body: int) -> Iterator[tuple[int, Array]]:
         """The geoms of a body, and of those that are fixed to it, with their vertices in its frame
         [m]."""
         for member in np.flatnonzero(self.m.body_weldid == body).tolist():
             place, turn = self.m.body_pos[member], rotation(self.m.body_quat[member])
-            for geom in shown(self.m, member):
+            for geom in Geoms(self.m).shown(member):
                 points = placed(self.m, geom)[0]
                 yield geom, points if member == body else points @ turn.T + place
 
@@ -264,7 +260,7 @@ class _Plan:
         name, (geoms, shapes) = self.m.body(body).name, zip(*self._rigid(body), strict=True)
         points = np.concatenate(shapes)
         spare = "hidden" if self.stage.position[body, 2] < 0 else None
-        fill = hexadecimal(paint(self.m, geoms[0]))
+        fill = hexadecimal(Geoms(self.m).colour(geoms[0]))
         with self.canvas.group(**self._meant(name), data_body=body, hidden=spare):
             title = names.label_of(name)
             self.canvas.polygon(self._outline(points), "part", fill=fill, title=title)

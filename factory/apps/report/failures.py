@@ -7,8 +7,9 @@ from html import escape
 from math import isfinite
 from typing import Any
 
+from factory.api import Failing, Failures
 from factory.apps.report.recording import Recording
-from factory.engine.record.failures import Death, Failing, Failures, deaths
+from factory.engine.record.failures import Death, deaths
 from factory.theory.lang.source import counted
 
 LEGEND = (

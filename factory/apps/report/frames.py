@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from factory.api import HIDDEN, names
 from factory.apps.exports import motion
 from factory.apps.report.recording import Recording
 from factory.apps.report.scene import Pack
-from factory.engine.mjcf import names
-from factory.engine.mjcf.parts import HIDDEN
 
 RATE = motion.RATE / 3
 """Frames a second of a run that is not too long: a third of those in other exports."""

@@ -7,16 +7,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.apps.analyze import Timing
+from factory.api import Event, Timing, Undone, names
 from factory.apps.analyze.measured import conditions, dropoff_times, operation_times
 from factory.apps.analyze.timed import flow, timed_net
 from factory.apps.monitor.recount import worst
 from factory.apps.report.recording import Recording
-from factory.engine.mjcf import names
-from factory.engine.record.state import Event
 from factory.engine.record.verdict import LIMITS, STRENGTH
 from factory.engine.simulation.run import busy_times, mean_interval
-from factory.theory.nets.undone import Undone
 from factory.theory.plant.approaches import Pair
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from factory.api import Factory, Project, Run
 from factory.apps.report.approaches import approaches_section
 from factory.apps.report.drawings import data, floor_plan, labels_of, net_drawing
 from factory.apps.report.failures import failures_data, failures_section
@@ -32,12 +33,9 @@ from factory.apps.report.sections import (
     utilisation,
 )
 from factory.apps.report.words import proof
+from factory.apps.runs.executing import Tell
 from factory.apps.runs.options import RunOptions
 from factory.apps.runs.running import run_project
-from factory.engine.simulation.executing import Tell
-from factory.engine.simulation.run import Run
-from factory.pipeline import Project
-from factory.theory.plant.factory import Factory
 
 SCRIPTS = (
     "report/three.min.js",

@@ -10,20 +10,26 @@ from pathlib import Path
 
 import numpy as np
 
+from factory.api import (
+    Array,
+    Diagnostic,
+    Factory,
+    InputError,
+    Layout,
+    MonitorSubject,
+    Operation,
+    Report,
+    RunError,
+    RunVerdict,
+    misfit,
+)
 from factory.apps.analyze.measured import conditions
 from factory.apps.exports.motion import BodyMotion, motion_of
 from factory.apps.log import Log, read_log
 from factory.apps.log.project_table import factory_of, project_of
-from factory.apps.monitor import Report, subject_of
 from factory.apps.monitor.record import verdict_on, watch_log
 from factory.apps.report.scene import DrawnFactory, stations
 from factory.apps.resume.remade import forged, model_faults
-from factory.engine.record.verdict import RunVerdict
-from factory.floor.geometry.meshes import Array
-from factory.floor.layout.layout import Layout
-from factory.support.errors import Diagnostic, InputError, RunError
-from factory.support.tables import misfit
-from factory.theory.plant.factory import Factory, Operation
 
 
 @dataclass(frozen=True)
@@ -123,7 +129,7 @@ def _laid_out(log: Log, beside: Path) -> Layout:
     layout."""
     header, made = log.header, conditions(log.header)
     layout = project_of(header, beside).layout
-    goals = subject_of(layout, made.settings, made.jitter, None, made.wip).as_json()["goals"]
+    goals = MonitorSubject.of(layout, made.settings, made.jitter, None, made.wip).as_json()["goals"]
     if goals != header["monitor"]["goals"]:
         raise ValueError("the run was in another layout than the one its PAG gets now")
     return layout

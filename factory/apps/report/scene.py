@@ -14,13 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.engine.mjcf import names
-from factory.engine.mjcf.replica import Floats, Replica, paint, shown, triangles
+from factory.api import Array, Factory, Geoms, Operation, Replica, mujoco, names, rotation
+from factory.apps.exports.geoms import triangles
 from factory.engine.mjcf.robots import ROLES
 from factory.floor.geometry.pieces import joined
-from factory.floor.geometry.solids import rotation
-from factory.support.engine import mujoco
-from factory.theory.plant.factory import Factory, Operation
 
 
 class Pack:
@@ -56,9 +53,9 @@ class DrawnFactory:
 
     factory: Factory
     m: mujoco.MjModel = field(repr=False)
-    position: Floats = field(repr=False)
-    quaternion: Floats = field(repr=False)
-    reach: Floats = field(repr=False)
+    position: Array = field(repr=False)
+    quaternion: Array = field(repr=False)
+    reach: Array = field(repr=False)
     places: Mapping[str, Iterable[float]] = field(repr=False)
     stations: Mapping[tuple[float, float], list[str]] = field(repr=False)
 
@@ -78,7 +75,7 @@ class DrawnFactory:
 
 
 def stations(
-    factory: Factory, m: mujoco.MjModel, ends: Iterable[tuple[Operation, Floats]]
+    factory: Factory, m: mujoco.MjModel, ends: Iterable[tuple[Operation, Array]]
 ) -> dict[tuple[float, float], list[str]]:
     """The stations of operations, each with the state of the engine (nq,) as it ends."""
     replica, sites = Replica(m), {m.site(number).name for number in range(m.nsite)}
@@ -93,7 +90,7 @@ def stations(
     return stations
 
 
-def placed(m: mujoco.MjModel, geom: int) -> tuple[Floats, NDArray[np.int64]]:
+def placed(m: mujoco.MjModel, geom: int) -> tuple[Array, NDArray[np.int64]]:
     """A geom's vertices, in the frame of its body [m], and faces."""
     points, faces = triangles(m, geom)
     return points @ rotation(m.geom_quat[geom]).T + m.geom_pos[geom], faces
@@ -103,7 +100,7 @@ def _look(m: mujoco.MjModel, geoms: Sequence[int]) -> tuple[list[NDArray[Any]], 
     """Several geoms of a body as one: vertices (n, 3) [m] in its frame, faces (k, 3), colours
     (n, 3) from 0 to 255; and how opaque it is."""
     meshes = [placed(m, geom) for geom in geoms]
-    paints = np.array([paint(m, geom) for geom in geoms])
+    paints = np.array([Geoms(m).colour(geom) for geom in geoms])
     counts = [len(points) for points, _ in meshes]
     vertices, faces = joined(meshes)
     colours = np.round(255 * np.clip(paints[:, :3], 0, 1)).astype(np.uint8)
@@ -139,12 +136,12 @@ def scene(stage: DrawnFactory, labels: dict[str, int], pack: Pack) -> dict[str, 
 def _groups(m: mujoco.MjModel) -> Iterator[tuple[int, list[int]]]:
     """The geoms that make one thing: those of a body; of the world those of a robot."""
     owned: dict[str, list[int]] = {}
-    for geom in shown(m, 0):
+    for geom in Geoms(m).shown(0):
         owned.setdefault(owner(m.geom(geom).name), []).append(geom)
     for geoms in owned.values():
         yield 0, geoms
     for body in range(1, m.nbody):
-        if geoms := list(shown(m, body)):
+        if geoms := list(Geoms(m).shown(body)):
             yield body, geoms
 
 

@@ -6,17 +6,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from math import comb
 
+from factory.api import PAG, CutOff, Diagnostic, Factory, steady_from
 from factory.apps.fidelity.record import QUANTITIES
 from factory.apps.report.drawings import words_of
 from factory.apps.report.pace import MeasuredPace, Predicted, excluded
 from factory.apps.report.recording import Recording
 from factory.apps.report.words import Proof
 from factory.apps.resume.remade import forged
-from factory.engine.record.ending import CutOff
-from factory.engine.simulation.run import steady_from
-from factory.support.errors import Diagnostic
-from factory.theory.plant.factory import Factory
-from factory.theory.problem.pag import PAG
 
 SIGNS = {True: "✓", False: "✗", None: "?"}
 

@@ -6,11 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
+from factory.api import Factory, Verdict, listing, verify
 from factory.apps.exports.certificate.check import check_certificate
 from factory.apps.exports.certificate.writer import certificate
-from factory.theory.nets.verdict import Verdict, listing
-from factory.theory.nets.verify import verify
-from factory.theory.plant.factory import Factory
 
 NAMES = {
     "gear_net": "Gear net",

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from io import FileIO
 
+from factory.api import Diagnostic, Entry, Event, InputError, Recordable, Recorder, State, Undone
 from factory.apps.log.blocks import blocks
+from factory.apps.log.content import AGAIN, Content
 from factory.apps.log.reader import Log, header_in
 from factory.apps.log.writer import LogWriter
-from factory.engine.record.state import Event, Recordable, Recorder, State
-from factory.support.errors import Diagnostic, InputError
-from factory.support.files import AGAIN, Content
-from factory.theory.nets.undone import Entry, Undone
 
 HINT = (
     "the log was changed or comes from another machine, or something took part in its run that a "

@@ -12,21 +12,24 @@ from typing import Any
 
 import numpy as np
 
+from factory.api import (
+    Demand,
+    Diagnostic,
+    FactoryError,
+    Layout,
+    MonitorSubject,
+    RunRequest,
+    Simulation,
+    State,
+    misfit,
+    value_of,
+)
 from factory.apps.log import Log
 from factory.apps.log.project_table import project_of, settings_of
 from factory.apps.log.reader import digest_of
 from factory.apps.log.writer import packed, versions
 from factory.engine.mjcf.reservations import reservations_of
-from factory.engine.record.state import State
-from factory.engine.record.subject import subject_of_run
 from factory.engine.record.verdict import FAULTS, HEADER, RESERVATIONS
-from factory.engine.simulation.request import RunRequest
-from factory.engine.simulation.simulation import Simulation
-from factory.floor.layout.layout import Layout
-from factory.support.errors import Diagnostic, FactoryError
-from factory.support.tables import misfit, value_of
-from factory.theory.plant.demand import Demand
-from factory.theory.problem.ids import is_end, operation_of
 
 TAG = re.compile(r"<[^>]+>")
 
@@ -87,7 +90,7 @@ def model_faults(
         layout = layout or project_of(log.header, beside).layout
         request = request_of(log.header)
         made = Simulation(layout, request)
-        if subject_of_run(made).as_json()["goals"] != log.header["monitor"]["goals"]:
+        if MonitorSubject.of_run(made).as_json()["goals"] != log.header["monitor"]["goals"]:
             return (), "the run was in another layout than the one that its PAG gets now"
     except FactoryError as error:
         first = error.diagnostics[0]
@@ -155,11 +158,12 @@ def _unlike(log: Log, made: Simulation) -> str:
     in words; "" if it is. Runs with failures are not repeated."""
     if made.request.recovers or log.ctrl is None:
         return ""
-    operations, unlike = made.layout.factory.operations, list[str]()
+    factory, unlike = made.layout.factory, list[str]()
+    joining = {operation.end for operation in factory.operations if len(operation.robots) > 1}
     ends = (
         float(t)
         for t, event in zip(log.fired_t, log.fired.tolist(), strict=True)
-        if is_end(event) and len(operations[operation_of(event)].robots) > 1
+        if event in joining
     )
     until = min(REPEATED, float(log.time[-1]), next(ends, REPEATED))
 

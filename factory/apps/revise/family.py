@@ -11,9 +11,9 @@ from collections import defaultdict
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from factory.api import PAG, Assembly, Diagnostic, InputError
 from factory.apps.revise.matching import Matching, below, matching, shifted
-from factory.support.errors import Diagnostic, InputError
-from factory.theory.problem.pag import PAG, Assembly, Mix
+from factory.theory.problem.pag import Mix
 
 Renamed = dict[str, str]
 """What the labels of a product are called in the family."""

@@ -13,10 +13,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from factory.api import Layout, Point2
 from factory.apps.revise.pairing import Pairing
 from factory.floor.layout.certificate import ALWAYS, Region
-from factory.floor.layout.guidepath import Point2
-from factory.floor.layout.layout import Layout
 
 
 @dataclass(frozen=True)

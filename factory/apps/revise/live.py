@@ -9,13 +9,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from factory.api import Demand, Project, Timing, write_pag
 from factory.apps.revise.family import family
 from factory.engine.timing.on_demand import cycle_of
-from factory.engine.timing.timing import Timing
 from factory.floor.layout.resting import on_demand
-from factory.pipeline import Project
-from factory.theory.lang.writer import write_pag
-from factory.theory.plant.demand import Demand, Word
+from factory.theory.plant.demand import Word
 
 UNITS = 24
 """Number of units of one product from which its cycle time is taken."""

@@ -10,9 +10,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from factory.api import NOPART, Factory, Operation
 from factory.apps.revise.matching import Matching
-from factory.theory.plant.factory import Factory, Operation
-from factory.theory.problem.pag import NOPART
 
 
 @dataclass(frozen=True)

@@ -12,22 +12,30 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import ceil
 
+from factory.api import (
+    Certificate,
+    Clearance,
+    Factory,
+    Hands,
+    Layout,
+    Pace,
+    Product,
+    certify,
+    payload_boxes,
+)
 from factory.apps.revise.pins import Pins
-from factory.floor.geometry.solids import Product
-from factory.floor.layout.certificate import Certificate, Fault
-from factory.floor.layout.clearance import certify, searched
-from factory.floor.layout.dimensions import TOOL_TRAVEL, Clearance, up
+from factory.floor.layout.certificate import Fault
+from factory.floor.layout.clearance import searched
+from factory.floor.layout.dimensions import TOOL_TRAVEL, up
 from factory.floor.layout.drafting import LayoutDraft
-from factory.floor.layout.durations import Pace, cycle_of
-from factory.floor.layout.hands.choosing import Hands
-from factory.floor.layout.layout import Layout, branch_of, carriers
+from factory.floor.layout.durations import cycle_of
+from factory.floor.layout.layout import branch_of, carriers
 from factory.floor.layout.optimising import arrange, shape_of
 from factory.floor.layout.packing import Task
-from factory.floor.layout.shapes import Shape, headings, payload_boxes
+from factory.floor.layout.shapes import Shape, headings
 from factory.floor.layout.sides import admissible
 from factory.floor.layout.stops import carried
 from factory.floor.layout.stretching import Stretched
-from factory.theory.plant.factory import Factory
 
 STEP = 0.02
 """Stations for what is new are so far apart [m]."""

@@ -7,12 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from factory.api import Array, Hand, Layout, Point2, Product
 from factory.apps.revise.pairing import Pairing
-from factory.floor.geometry.meshes import Array
-from factory.floor.geometry.solids import Product
-from factory.floor.layout.guidepath import Point2
-from factory.floor.layout.hands.hand import Hand
-from factory.floor.layout.layout import Layout, carriers
+from factory.floor.layout.layout import carriers
 from factory.floor.layout.stops import carried
 
 SAME = 1e-6

@@ -13,23 +13,26 @@ from functools import cached_property
 from itertools import count
 from typing import Any, Literal, get_args
 
+from factory.api import (
+    NOPART,
+    Clearance,
+    Factory,
+    Ground,
+    Hands,
+    Layout,
+    Pace,
+    Project,
+    RunError,
+    certified,
+    pace,
+    usage_error,
+)
 from factory.apps.revise.inheriting import Inheritance
 from factory.apps.revise.matching import matching, shifted
 from factory.apps.revise.pairing import Pairing
 from factory.apps.revise.pinning import Pinning
 from factory.apps.revise.pins import Pins, StayingRobot, framed, same_module
-from factory.engine.timing.timed import pace
-from factory.floor.layout.dimensions import Clearance
-from factory.floor.layout.durations import Pace
-from factory.floor.layout.embedding import certified
-from factory.floor.layout.hands.choosing import Hands
-from factory.floor.layout.layout import Layout
-from factory.floor.layout.request import Ground
 from factory.floor.mating.mating import judged
-from factory.pipeline import Project
-from factory.support.errors import RunError, usage_error
-from factory.theory.plant.factory import Factory
-from factory.theory.problem.pag import NOPART
 
 Pin = Literal["all", "hands", "none"]
 """What is pinned of the old layout, the most first."""

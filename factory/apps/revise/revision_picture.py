@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from factory.api import Guidepath, Layout, Point2
+from factory.apps.drawing.canvas import Canvas, millimetres, page_box
 from factory.apps.revise.pins import StayingRobot
-from factory.floor.layout.guidepath import Guidepath, Point2
-from factory.floor.layout.layout import Layout
-from factory.support.canvas import Canvas, millimetres, page_box
 from factory.theory.problem.robot_bodies import CARRIAGE
 
 STYLE = """

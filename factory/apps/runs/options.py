@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from factory.api import Diagnostic, Factory, InputError, Product, usage_error
 from factory.support.bounds import WORLDS, WorldName, check_choice, check_values
-from factory.support.errors import Diagnostic, InputError, usage_error
 
 if TYPE_CHECKING:
-    from factory.engine.simulation.request import RunRequest
-    from factory.pipeline import Project
-    from factory.theory.nets.petri import Marking
+    from factory.api import Marking, Project, RunRequest
 
 APART = (
     (
@@ -101,7 +99,7 @@ class RunOptions:
     def check(self, project: Project) -> None:
         """The same, before a project is laid out; the file of a demand is read, but for a pipe,
         which is read once. Raises InputError."""
-        from factory.engine.simulation.demand_file import demand_of
+        from factory.apps.runs.demand_file import demand_of
 
         self.check_combination()
         if self.demand is not None and not Path(self.demand).is_fifo():
@@ -109,9 +107,8 @@ class RunOptions:
 
     def request(self, project: Project, shown: bool = True) -> RunRequest:
         """The request of a run; `shown`: whether it is filmed or logged. Raises InputError."""
-        from factory.engine.simulation.demand_file import demand_of
-        from factory.engine.simulation.request import RunRequest
-        from factory.floor.geometry.fused_bodies import fusing_pays
+        from factory.api import RunRequest
+        from factory.apps.runs.demand_file import demand_of
         from factory.theory.nets.history import legal_marking
 
         self.check_combination()
@@ -143,3 +140,20 @@ def check_ideal(fuse: bool | None, monitor: bool = False) -> None:
     for wanted, purpose in ((monitor, "for a monitor to observe"), (fuse, "that could become one")):
         if wanted:
             raise usage_error(f"the ideal world has no bodies {purpose}", "leave out --world ideal")
+
+
+FUSE_FROM = 40
+"""From so many robots on, runs are fused unless told otherwise."""
+
+
+GEOMS = 100
+"""But not where sub-assemblies would have more convex bodies than this for each part: each has
+those of all that it is made of, so that a chain of n parts has n / 2 for each."""
+
+
+def fusing_pays(factory: Factory, product: Product) -> bool:
+    """Whether one body for each sub-assembly makes a run faster, as measured."""
+    pieces = {o.label: len(product.solids[o.label].pieces) for o in factory.leaves}
+    wholes = [factory.contents[o.label] for o in factory.making if len(o.inputs) > 1]
+    geoms = sum(pieces[part] for parts in wholes for part in parts)
+    return len(factory.robots) >= FUSE_FROM and geoms <= GEOMS * len(factory.leaves)

@@ -8,20 +8,17 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from factory.api import Factory, Run, Simulation
 from factory.apps.deviations.campaign import SWAP, Campaign
 from factory.apps.deviations.campaign_file import read_campaign
+from factory.apps.runs.executing import Go, Opening, Tell, carry_out
 from factory.apps.runs.options import RunOptions
 from factory.apps.runs.watched import watched
-from factory.engine.simulation.executing import Go, Opening, Tell, carry_out
-from factory.engine.simulation.run import Run
-from factory.engine.simulation.simulation import Simulation
 from factory.support.progress import Waiting
 from factory.theory.nets.verify import proved
-from factory.theory.plant.factory import Factory
 
 if TYPE_CHECKING:
-    from factory.engine.record.state import Recorder
-    from factory.pipeline import Project
+    from factory.api import Project, Recorder
 
 Filming = Callable[[Simulation], "Recorder"]
 """Opens the film of a simulation."""

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from factory.api import Observer, Run, Simulation
 from factory.apps.monitor import beside
-from factory.engine.record.state import Observer
-from factory.engine.simulation.run import Run
-from factory.engine.simulation.simulation import Simulation
 
 
 def watched(

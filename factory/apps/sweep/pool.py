@@ -19,7 +19,7 @@ from threading import Thread
 from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
-from factory.support.errors import Diagnostic, RunError
+from factory.api import Diagnostic, RunError
 
 
 def _locked(contents: dict[object, object]) -> MappingProxyType[object, object]:

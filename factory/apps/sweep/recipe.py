@@ -11,21 +11,24 @@ from typing import Any
 
 import numpy as np
 
+from factory.api import (
+    Factory,
+    Ground,
+    Layout,
+    Product,
+    Project,
+    load_catalogue,
+    table_of,
+    usage_error,
+    write_pag,
+)
 from factory.apps.runs.options import check_ideal
 from factory.apps.sweep.grid import DEFAULTS, SETTINGS, Axis, Point, Value
-from factory.floor.geometry.solids import Product
-from factory.floor.layout.layout import Layout
-from factory.floor.layout.request import Ground
 from factory.floor.layout.saved import LayoutTable
-from factory.pipeline import Project
-from factory.support.errors import usage_error
 from factory.support.resources import mjcf_folder
-from factory.support.tables import table_of
 from factory.support.version import __version__
-from factory.theory.lang.writer import write_pag, write_template
+from factory.theory.lang.writer import write_template
 from factory.theory.nets.verify import proved
-from factory.theory.plant.factory import Factory
-from factory.theory.problem.robot_types import load_catalogue
 
 
 @dataclass(frozen=True)

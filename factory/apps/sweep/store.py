@@ -14,10 +14,10 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
+from factory.api import Diagnostic, InputError
 from factory.apps.sweep.grid import FAULT_RATE, KEYS, WHOLE, Value
 from factory.apps.sweep.recipe import name_of
 from factory.apps.sweep.work import FAILING_FIGURES, FIGURES, Outcome
-from factory.support.errors import Diagnostic, InputError
 from factory.support.guard import about_to_write
 from factory.support.resource import Closing
 

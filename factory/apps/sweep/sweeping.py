@@ -9,12 +9,12 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from factory.api import InputError
 from factory.apps.sweep.grid import Axis, Point, check_value, points
 from factory.apps.sweep.pool import over_processes
 from factory.apps.sweep.recipe import Recipe, name_of
 from factory.apps.sweep.store import Store
 from factory.apps.sweep.work import Outcome, Runner, failed
-from factory.support.errors import InputError
 from factory.support.interruption import Interruption
 from factory.support.progress import StepBar
 

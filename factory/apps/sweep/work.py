@@ -11,20 +11,16 @@ from functools import lru_cache
 from time import perf_counter
 from typing import Any, TypeVar
 
+from factory.api import Diagnostic, FactoryError, Layout, Run, RunRequest, Settings, Simulation
 from factory.apps.deviations import Campaign, Deviation
 from factory.apps.recovery import recover
+from factory.apps.runs.options import fusing_pays
 from factory.apps.runs.watched import watched
 from factory.apps.sweep.grid import FAULT_RATE, SETTINGS, Point
 from factory.apps.sweep.recipe import Recipe
 from factory.engine.mjcf.timestep import timed
-from factory.engine.simulation.request import RunRequest
-from factory.engine.simulation.run import Run
-from factory.engine.simulation.simulation import Compiled, Simulation, compiled
-from factory.floor.geometry.fused_bodies import fusing_pays
-from factory.floor.layout.layout import Layout
+from factory.engine.simulation.simulation import Compiled, compiled
 from factory.floor.layout.saved import LAID_FOR
-from factory.support.errors import Diagnostic, FactoryError
-from factory.support.settings import Settings
 from factory.theory.nets.verify import proved
 
 T = TypeVar("T")

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from factory.engine.mjcf.parts import place_in
 from factory.engine.mjcf.robots import heading_quaternion
 from factory.floor.geometry.fused_bodies import FusedBodies
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.turning import fed_of, presented, upright
 from factory.floor.layout.guidepath import Guidepath
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.visits import Visit
+from factory.support.arrays import Array
 
 Point3 = tuple[float, float, float]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from hashlib import sha256
+from typing import TypeAlias
 from xml.etree import ElementTree
 
 from factory.engine.mjcf.arrays import Fingerprint, fingerprint_of
@@ -12,7 +13,7 @@ from factory.support.engine import mujoco, unwarned
 from factory.support.errors import Diagnostic, InputError
 from factory.support.interruption import awaited
 
-EngineModel = mujoco.MjModel
+EngineModel: TypeAlias = mujoco.MjModel
 """The type of the engine's models."""
 
 MANY = 20_000

@@ -14,7 +14,8 @@ import struct
 import numpy as np
 
 from factory.floor.geometry.insets import inset
-from factory.floor.geometry.meshes import Array, Indices, Mesh, hull_mesh, normals_of
+from factory.floor.geometry.meshes import Mesh, hull_mesh, normals_of
+from factory.support.arrays import Array, Indices
 
 CREASE = 31.0
 """Triangles that meet at a smaller angle are shaded as one rounded surface [degrees]."""

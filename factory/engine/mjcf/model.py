@@ -16,7 +16,6 @@ from pathlib import Path
 from types import MappingProxyType
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
-from xml.sax.saxutils import quoteattr
 
 from factory.engine.mjcf.bins import add_bins
 from factory.engine.mjcf.driving import (
@@ -212,14 +211,6 @@ def product_name(factory: Factory) -> str:
     """The name of the model: that of the PAG file, without folder and ending."""
     name = "".join(c if c.isprintable() else "?" for c in Path(factory.pag.file).stem)
     return name or "factory"
-
-
-def model_files(model: Model, path: Path) -> dict[Path, bytes]:
-    """The XML at `path` and, beside it, its mesh folder `NAME_meshes`: what to write where."""
-    folder = path.with_name(f"{path.stem}_meshes")
-    xml = model.xml.replace('meshdir="meshes"', f"meshdir={quoteattr(folder.name)}", 1)
-    meshes = {folder / name: content for name, content in model.files.items()}
-    return {path: xml.encode(errors="surrogateescape"), **meshes}
 
 
 def _hoists(layout: Layout, masses: Mapping[str, float], settings: Settings) -> dict[int, Hoist]:

@@ -8,8 +8,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from factory.engine.mjcf import names
+from factory.support.arrays import Index
 from factory.support.engine import mujoco
-from factory.theory.control.mode import Index
 
 FREE = 6
 """Degrees of freedom of a part's body; what holds parts has fewer."""

@@ -12,12 +12,12 @@ from factory.engine.mjcf.mesh_files import inset_file, inset_name, mesh_file, pi
 from factory.engine.mjcf.names import part, piece
 from factory.engine.mjcf.names import solid as solid_name
 from factory.floor.geometry.fused_bodies import FusedBodies, Inside
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.solids import Product, Solid
 from factory.floor.geometry.turning import presented, upright
 from factory.floor.layout.dimensions import PAYLOAD
 from factory.floor.layout.hanging import Hanging
 from factory.floor.layout.layout import Layout, Point2
+from factory.support.arrays import Array
 
 PARKED = -0.6
 """Height at which the first spare copy of a part is kept, under the floor [m]."""

@@ -9,15 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from factory.support.arrays import Array, Indices
 from factory.support.engine import mujoco
-
-Floats = NDArray[np.float64]
 
 SHOWN = 3
 """Geoms of groups below this one are drawn."""
-
-ROUND = 28
-"""Sides of a cylinder."""
 
 
 class Replica:
@@ -55,47 +51,33 @@ class Replica:
         self.m.body_contype[bodies], self.m.body_conaffinity[bodies] = contype, conaffinity
 
 
-def shown(m: mujoco.MjModel, body: int) -> Iterator[int]:
-    """The geoms of a body that are drawn: no planes, nothing hidden."""
-    first = int(m.body_geomadr[body])
-    for geom in range(first, first + int(m.body_geomnum[body])):
-        plane = m.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE
-        if m.geom_group[geom] < SHOWN and not plane:
-            yield geom
+class Geoms:
+    """What is drawn of a model.
 
+    Attributes:
+        m: the model.
+    """
 
-def paint(m: mujoco.MjModel, geom: int) -> Floats:
-    """The colour (4,) of a geom or of its material, from 0 to 1."""
-    material = m.geom_matid[geom]
-    return np.asarray(m.mat_rgba[material] if material >= 0 else m.geom_rgba[geom], float)
+    def __init__(self, m: mujoco.MjModel) -> None:
+        self.m = m
 
+    def shown(self, body: int) -> Iterator[int]:
+        """The geoms of a body that are drawn: no planes, nothing hidden."""
+        m, first = self.m, int(self.m.body_geomadr[body])
+        for geom in range(first, first + int(m.body_geomnum[body])):
+            plane = m.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE
+            if m.geom_group[geom] < SHOWN and not plane:
+                yield geom
 
-def half_sizes(m: mujoco.MjModel, geom: int) -> Floats:
-    """Half the sides (3,) of a box, or of the box round a geom of another shape [m]."""
-    box = m.geom_type[geom] == mujoco.mjtGeom.mjGEOM_BOX
-    return np.asarray(m.geom_size[geom] if box else m.geom_aabb[geom, 3:], float)
+    def colour(self, geom: int) -> Array:
+        """The colour (4,) of a geom or of its material, from 0 to 1."""
+        m, material = self.m, self.m.geom_matid[geom]
+        return np.asarray(m.mat_rgba[material] if material >= 0 else m.geom_rgba[geom], float)
 
-
-def mesh_of(m: mujoco.MjModel, geom: int) -> tuple[Floats, NDArray[np.int64]]:
-    """The vertices (n, 3) [m] and faces (k, 3) of a geom's mesh, in its frame."""
-    mesh = m.mesh(int(m.geom_dataid[geom]))
-    first, count = int(mesh.vertadr[0]), int(mesh.vertnum[0])
-    vertices = np.asarray(m.mesh_vert[first : first + count], float)
-    first, count = int(mesh.faceadr[0]), int(mesh.facenum[0])
-    return vertices, np.asarray(m.mesh_face[first : first + count], np.int64)
-
-
-def triangles(m: mujoco.MjModel, geom: int) -> tuple[Floats, NDArray[np.int64]]:
-    """A geom's vertices (n, 3), in its own frame [m], and faces (k, 3)."""
-    from trimesh import creation
-
-    kind, size = mujoco.mjtGeom(m.geom_type[geom]), m.geom_size[geom]
-    if kind == mujoco.mjtGeom.mjGEOM_MESH:
-        return mesh_of(m, geom)
-    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
-        made = creation.icosphere(subdivisions=2, radius=size[0])
-    elif kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
-        made = creation.cylinder(size[0], 2 * size[1], sections=ROUND)
-    else:
-        made = creation.box(extents=2 * half_sizes(m, geom))
-    return np.asarray(made.vertices, float), np.asarray(made.faces, np.int64)
+    def mesh(self, geom: int) -> tuple[Array, Indices]:
+        """The vertices (n, 3) [m] and faces (k, 3) of a geom's mesh, in its frame."""
+        m, mesh = self.m, self.m.mesh(int(self.m.geom_dataid[geom]))
+        first, count = int(mesh.vertadr[0]), int(mesh.vertnum[0])
+        vertices = np.asarray(m.mesh_vert[first : first + count], float)
+        first, count = int(mesh.faceadr[0]), int(mesh.facenum[0])
+        return vertices, np.asarray(m.mesh_face[first : first + count], np.int64)

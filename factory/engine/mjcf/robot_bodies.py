@@ -13,10 +13,10 @@ from factory.engine.mjcf.names import carriage
 from factory.engine.mjcf.robots import Drive, Held, Hoist, RobotModel, instantiate, load_robot_model
 from factory.engine.mjcf.scene import add_follower
 from factory.engine.mjcf.stops import stops_of
-from factory.floor.geometry.sight import Array
 from factory.floor.layout.hands.hand import Hand
 from factory.floor.layout.hands.limbs import limbs
 from factory.floor.layout.layout import Guidepath, Layout
+from factory.support.arrays import Array
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.robot_types import Catalogue
 

@@ -13,15 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from factory.theory.control.mode import Array, Index
+from factory.support.arrays import Array, Index
 
 if TYPE_CHECKING:
     from factory.support.engine import mujoco
 
-PARK, FEED, GRIP, HOLD = range(4)
-KINDS = {"park": PARK, "feed": FEED, "grip": GRIP, "hold": HOLD}
-"""What holds a part, by the first word of a weld's name: its parking place, its feeder, a robot,
-the outfeed's tray."""
 
 SLIDE, HINGE = 2, 3
 """The engine's numbers of the joints `mjJNT_SLIDE` and `mjJNT_HINGE`: logs are written and read
@@ -92,20 +88,6 @@ def _joints(m: mujoco.MjModel, d: mujoco.MjData) -> tuple[Index, Array, Array, A
     way = np.where(slides[:, :, None], d.xaxis[joint], 0.0)
     spin = np.where(turns, d.xaxis[joints[:, 0]][:, 2].round(), 0.0)
     return m.jnt_qposadr[joint], way, d.xanchor[joints[:, 0]], spin
-
-
-def check_holders(m: mujoco.MjModel, welds: Index) -> None:
-    """Raises ValueError where the first body of a weld does more than slide, or turn about the
-    vertical on what slides."""
-    joints, up = m.body_jntnum, m.body_parentid
-    first = np.minimum(m.body_jntadr, m.njnt - 1)
-    last = m.jnt_type[np.minimum(m.body_jntadr + np.maximum(joints, 1), m.njnt) - 1]
-    slides = (joints == 0) | (joints <= 2) & (m.jnt_type[first] == SLIDE) & (last == SLIDE)
-    upright = abs(m.jnt_axis[first, 2]) == 1.0
-    turns = (joints == 1) & (m.jnt_type[first] == HINGE) & upright
-    for body in np.unique(m.eq_obj1id[welds]):
-        if not ((slides | turns)[body] and slides[up[body]] and m.body_weldid[up[up[body]]] == 0):
-            raise ValueError(f"{m.body(int(body)).name} holds parts and does more than slide")
 
 
 def held_at(m: mujoco.MjModel, welds: Index, xpos: Array, xmat: Array) -> Array:

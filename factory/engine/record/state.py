@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from factory.engine.record.failures import Account
 from factory.engine.record.figures import PhysicsFigures
 from factory.floor.layout.layout import Layout
+from factory.support.arrays import Array, Index
 from factory.support.errors import Diagnostic
 from factory.support.resource import Closing
 from factory.support.settings import Settings
@@ -26,9 +27,6 @@ from factory.theory.plant.demand import Demand, Word
 if TYPE_CHECKING:
     from factory.engine.mjcf.model import Model
     from factory.support.engine import mujoco
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 
 class Contacts(NamedTuple):

@@ -56,6 +56,57 @@ class MonitorSubject:
         for name in ("places", "bends"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
 
+    @classmethod
+    def of(
+        cls,
+        layout: Layout,
+        settings: Settings,
+        jitter: float = 0.0,
+        start: Marking | None = None,
+        wip: int | None = None,
+        bodies: FusedBodies | None = None,
+    ) -> MonitorSubject:
+        """The subject of a layout, run with these settings from a marking (m_0 where None). Each
+        part is one body unless other `bodies` are given."""
+        factory, product = layout.factory, layout.product
+        goals = tuple(
+            tuple(layout.visits[o.index, robot].at for robot in o.robots)
+            for o in factory.operations
+        )
+        radii = tuple(
+            eps if isinstance(eps := o.template.law.eps, float) else settings.eps
+            for o in factory.operations
+        )
+        centres = (bodies or bodies_of(factory, product)).centre
+        places = {label: (float(c[0]), float(c[1]), float(c[2])) for label, c in centres.items()}
+        slowest = settings.speed * (1 - jitter)
+        longest = max(path.length for path in layout.guidepaths)
+        travel = longest / slowest + slowest / settings.acceleration
+        travel += (4 * longest / settings.acceleration) ** 0.5
+        travel += layout.outfeed_way / settings.outfeed + max(o.dwell for o in factory.operations)
+        marking = factory.net.initial_marking if start is None else start
+        patience, early = round(PATIENCE * travel, 6), frozenset(goes_early(layout))
+        subject = cls(factory, goals, radii, places, settings, marking, patience, wip, early)
+        bent = {robot: layout.guidepaths[robot] for robot in layout.bent[0]}
+        if bent:
+            bends = {robot: (path.bends, path.rounding) for robot, path in bent.items()}
+            subject = replace(subject, bends=bends)
+        return subject
+
+    @classmethod
+    def of_run(cls, simulation: Recordable) -> MonitorSubject:
+        """The subject of a simulation, in either world."""
+        model, demanded = simulation.model, simulation.request.demand is not None
+        subject = cls.of(
+            simulation.layout,
+            simulation.request.settings,
+            simulation.request.jitter,
+            simulation.start,
+            None if demanded else simulation.request.wip,
+            model.carried if model else None,
+        )
+        return replace(subject, word=simulation.word) if demanded else subject
+
     @cached_property
     def bent(self) -> tuple[tuple[int, ...], Ways]:
         """The robots (index) whose guidepaths have bends, and the ways that these are."""
@@ -167,52 +218,3 @@ class MonitorTable:
         same = factory, self.goals, self.radii, self.places, settings, start, self.patience, wip
         bends = {r: (tuple(Bend(*bend) for bend in row), far) for r, far, row in self.bends}
         return MonitorSubject(*same, frozenset(self.early), bends)
-
-
-def subject_of(
-    layout: Layout,
-    settings: Settings,
-    jitter: float = 0.0,
-    start: Marking | None = None,
-    wip: int | None = None,
-    bodies: FusedBodies | None = None,
-) -> MonitorSubject:
-    """The subject of a layout, run with these settings from a marking (m_0 where None). Each part
-    is one body unless other `bodies` are given."""
-    factory, product = layout.factory, layout.product
-    goals = tuple(
-        tuple(layout.visits[o.index, robot].at for robot in o.robots) for o in factory.operations
-    )
-    radii = tuple(
-        eps if isinstance(eps := o.template.law.eps, float) else settings.eps
-        for o in factory.operations
-    )
-    centres = (bodies or bodies_of(factory, product)).centre
-    places = {label: (float(c[0]), float(c[1]), float(c[2])) for label, c in centres.items()}
-    slowest = settings.speed * (1 - jitter)
-    longest = max(path.length for path in layout.guidepaths)
-    travel = longest / slowest + slowest / settings.acceleration
-    travel += (4 * longest / settings.acceleration) ** 0.5
-    travel += layout.outfeed_way / settings.outfeed + max(o.dwell for o in factory.operations)
-    marking = factory.net.initial_marking if start is None else start
-    patience, early = round(PATIENCE * travel, 6), frozenset(goes_early(layout))
-    subject = MonitorSubject(factory, goals, radii, places, settings, marking, patience, wip, early)
-    bent = {robot: layout.guidepaths[robot] for robot in layout.bent[0]}
-    if bent:
-        bends = {robot: (path.bends, path.rounding) for robot, path in bent.items()}
-        subject = replace(subject, bends=bends)
-    return subject
-
-
-def subject_of_run(simulation: Recordable) -> MonitorSubject:
-    """The subject of a simulation, in either world."""
-    model, demanded = simulation.model, simulation.request.demand is not None
-    subject = subject_of(
-        simulation.layout,
-        simulation.request.settings,
-        simulation.request.jitter,
-        simulation.start,
-        None if demanded else simulation.request.wip,
-        model.carried if model else None,
-    )
-    return replace(subject, word=simulation.word) if demanded else subject

@@ -252,28 +252,6 @@ def kept_figures(physics: Any) -> dict[str, Any]:
     return {figure: value for figure, value in kept.items() if value or figure in judged_figures}
 
 
-def check_figures(figures: Any) -> None:
-    """Raises ValueError where the figures do not have the form of `kept_figures`."""
-    if not isinstance(figures, dict):
-        raise ValueError("its figures are not a table")
-    for figure in FIGURES:
-        value = figures.get(figure)
-        if value is not None and type(value) not in (int, float):
-            raise ValueError(f"its figure '{figure}' is not a number")
-    if not isinstance(figures.get(HEADER, ""), str):
-        raise ValueError(f"its figure '{HEADER}' is not a text")
-    for figure in (*NAMES, RESERVATIONS):
-        if not _are_texts(figures.get(figure, [])):
-            raise ValueError(f"its figure '{figure}' is not a list of texts")
-    faults = figures.get(FAULTS, [])
-    if not isinstance(faults, list) or not all(_are_texts(f) and len(f) == 2 for f in faults):
-        raise ValueError(f"its figure '{FAULTS}' is not a list of pairs of texts")
-
-
 def _of(geom: str) -> str:
     """The name of the body of a geom: the label of a part, or else its own name."""
     return names.label_of(geom) if names.kind(geom) == "part" else geom
-
-
-def _are_texts(value: Any) -> bool:
-    return isinstance(value, list) and all(isinstance(text, str) for text in value)

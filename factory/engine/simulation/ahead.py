@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from factory.floor.modes.staging import HeadStart
-from factory.theory.control.mode import Array
+from factory.support.arrays import Array
 from factory.theory.plant.factory import Factory
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from factory.engine.simulation.world import World
-from factory.theory.control.mode import Array
+from factory.support.arrays import Array
 from factory.theory.plant.factory import Factory, Operation
 from factory.theory.problem.ids import operation_of
 

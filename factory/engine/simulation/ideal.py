@@ -12,7 +12,7 @@ from factory.engine.record.state import Observation
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.world import Hooks, Job
 from factory.floor.layout.layout import Layout
-from factory.theory.control.mode import Array, Index
+from factory.support.arrays import Array, Index
 from factory.theory.control.navigation import Bundle
 from factory.theory.nets.coordinated import Past
 from factory.theory.plant.demand import Word

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
-from factory.theory.control.mode import Array
+from factory.support.arrays import Array
 from factory.theory.nets.coordinated import Order, Past
 
 

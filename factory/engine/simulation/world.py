@@ -10,8 +10,8 @@ from typing import Protocol
 from factory.engine.record.failures import Account
 from factory.engine.record.figures import PhysicsFigures
 from factory.engine.record.state import Observation, Observer, State
+from factory.support.arrays import Array, Index
 from factory.support.errors import Diagnostic
-from factory.theory.control.mode import Array, Index
 from factory.theory.control.navigation import Bundle
 from factory.theory.nets.coordinated import Past
 from factory.theory.plant.demand import Word

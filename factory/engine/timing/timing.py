@@ -20,9 +20,10 @@ from factory.floor.layout.outfeed import away, leaving
 from factory.floor.layout.starting import start_positions
 from factory.floor.modes.modes import operation_modes, operation_starts, robot_limits
 from factory.floor.modes.staging import HeadStart, staged, stages_of, with_time
+from factory.support.arrays import Array
 from factory.support.settings import Settings
 from factory.theory.control.governed import GovernedAxis, Trajectory, mode_ticks, trajectories
-from factory.theory.control.mode import ROUNDING, Array, Limits, Mode
+from factory.theory.control.mode import ROUNDING, Limits, Mode
 from factory.theory.control.profile import SpeedProfile, World
 from factory.theory.nets.coordinated import Past
 from factory.theory.plant.factory import Factory

@@ -8,13 +8,12 @@ image.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array, Indices
+from factory.support.arrays import Array, Indices
 
 CLOSE, DIGITS = 2e-5, 1e-6
 """The tolerance for equal vertices: the first share of the shape's size, or the second share of its
@@ -83,16 +82,6 @@ class RigidMotion:
     shift: Array = field(default_factory=lambda: np.zeros(3))
 
 
-@dataclass(frozen=True, slots=True)
-class Alike:
-    """The kind of each shape, as the index of the first shape of that kind, and the motion that
-    maps the first to it. `twins`: the pairs of kinds that are mirror images of each other."""
-
-    kinds: tuple[int, ...]
-    motions: tuple[RigidMotion, ...]
-    twins: tuple[tuple[int, int], ...]
-
-
 @np.errstate(all="ignore")
 def shape_of(vertices: Array, faces: Indices) -> PartShape:
     """The shape of a mesh that may have duplicate and unused vertices."""
@@ -102,29 +91,6 @@ def shape_of(vertices: Array, faces: Indices) -> PartShape:
     body.merge_vertices(merge_tex=True, merge_norm=True)
     used, corners = np.unique(np.asarray(body.faces), return_inverse=True)
     return PartShape(np.asarray(body.vertices)[used], corners.reshape(-1, 3))
-
-
-def alike(shapes: Sequence[PartShape]) -> Alike:
-    """The kinds of shapes, in the order of their first members."""
-    firsts: dict[int, list[int]] = {}
-    kinds: list[int] = []
-    motions: list[RigidMotion] = []
-    for index, shape in enumerate(shapes):
-        same = firsts.setdefault(len(shape.vertices), [])
-        matches = ((first, motion_between(shapes[first], shape)) for first in same)
-        kind, motion = next(((k, m) for k, m in matches if m is not None), (index, RigidMotion()))
-        if kind == index:
-            same.append(index)
-        kinds.append(kind)
-        motions.append(motion)
-    twins = [
-        (first, other)
-        for same in firsts.values()
-        for number, first in enumerate(same)
-        for other in same[number + 1 :]
-        if motion_between(shapes[first].mirrored(), shapes[other]) is not None
-    ]
-    return Alike(tuple(kinds), tuple(motions), tuple(sorted(twins)))
 
 
 def motion_between(one: PartShape, other: PartShape) -> RigidMotion | None:

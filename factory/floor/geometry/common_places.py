@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.solids import Solid
 from factory.floor.geometry.suction import EVEN, NARROWEST, SHARE, WIDEST, Corner, drawn_triangles
+from factory.support.arrays import Array
 
 SPACED = 24
 """The number of evenly spaced candidates along each side of the area of the parts; further

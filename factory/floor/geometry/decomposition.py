@@ -18,9 +18,10 @@ from typing import Any
 import numpy as np
 
 from factory.floor.geometry.alike import PartShape, motion_between, moved, shape_of
-from factory.floor.geometry.meshes import Array, Mesh, is_closed, is_flat, normals_of, volume_of
+from factory.floor.geometry.meshes import Mesh, is_closed, is_flat, normals_of, volume_of
 from factory.floor.geometry.pieces import FLATNESS, closed_bodies, components, is_convex, joined
 from factory.floor.geometry.prisms import prisms
+from factory.support.arrays import Array
 from factory.support.cache import digest, load_arrays, packed, store_arrays, unpacked
 from factory.support.environment import environment
 from factory.support.version import release

@@ -10,18 +10,11 @@ from types import MappingProxyType
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array, sound
+from factory.floor.geometry.meshes import sound
 from factory.floor.geometry.solids import Product
+from factory.support.arrays import Array
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.pag import NOPART
-
-FUSE_FROM = 40
-"""From so many robots on, runs are fused unless told otherwise."""
-
-GEOMS = 100
-"""But not where sub-assemblies would have more convex bodies than this for each part: each has
-those of all that it is made of, so that a chain of n parts has n / 2 for each."""
-
 
 Inside = tuple[str, str]
 """Labels of a body and of a part that it has."""
@@ -143,14 +136,6 @@ def repeated(product: Product, factory: Factory) -> Product:
         if leaf.label not in product.solids
     }
     return replace(product, solids={**product.solids, **further})
-
-
-def fusing_pays(factory: Factory, product: Product) -> bool:
-    """Whether one body for each sub-assembly makes a run faster, as measured."""
-    pieces = {o.label: len(product.solids[o.label].pieces) for o in factory.leaves}
-    wholes = [factory.contents[o.label] for o in factory.making if len(o.inputs) > 1]
-    geoms = sum(pieces[part] for parts in wholes for part in parts)
-    return len(factory.robots) >= FUSE_FROM and geoms <= GEOMS * len(factory.leaves)
 
 
 def fused_copies(bodies: FusedBodies, factory: Factory, units: int | None) -> dict[str, int]:

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.floor.geometry.mesh_file import EXPECTED, UnreadableMesh
-from factory.floor.geometry.meshes import Array, Indices
 from factory.floor.geometry.solids import rotation
+from factory.support.arrays import Array, Indices
 
 MOST = 10_000_000
 """The most numbers of an accessor, and the most triangles of all placed bodies."""
@@ -86,12 +86,6 @@ def gamma_encoded(light: float) -> float:
     """A linear component of a colour in sRGB (IEC 61966-2-1); colours of glTF are linear (section
     3.9.2)."""
     return float(12.92 * light if light <= 0.0031308 else 1.055 * light ** (1 / 2.4) - 0.055)
-
-
-def linear(component: float) -> float:
-    """The inverse of `gamma_encoded`."""
-    encoded = component / 12.92 if component <= 0.04045 else ((component + 0.055) / 1.055) ** 2.4
-    return float(encoded)
 
 
 def _chunks(content: bytes) -> tuple[Object, bytes]:

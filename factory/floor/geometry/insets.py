@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.solids import Solid
+from factory.support.arrays import Array
 
 
 def inset(vertices: Array, depth: float) -> Array:

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.solids import Solid
+from factory.support.arrays import Array
 from factory.support.errors import Diagnostic, Position
 from factory.theory.problem.pag import PAG, SHAPES, Assembly
 

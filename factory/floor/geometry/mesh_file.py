@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array, Indices, normals_of
+from factory.floor.geometry.meshes import normals_of
 from factory.floor.geometry.pieces import joined
+from factory.support.arrays import Array, Indices
 
 EXPECTED = {
     ".obj": "an OBJ file (lines 'v x y z' for vertices, 'f 1 2 3' for faces)",
@@ -61,14 +62,6 @@ def checked(bodies: Iterable[tuple[Array, Indices]], suffix: str) -> MeshFile:
         if not np.isfinite(vertices[faces]).all():
             raise UnreadableMesh("it has vertices that are not finite (nan or inf)")
     return MeshFile(tuple(meshes))
-
-
-def obj_of(vertices: Array, faces: Indices, comment: str) -> bytes:
-    """An OBJ file with a comment in its first line."""
-    lines = [f"# {comment}"]
-    lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in (np.round(vertices, 9) + 0.0).tolist()]
-    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces.tolist()]
-    return ("\n".join(lines) + "\n").encode()
 
 
 @np.errstate(all="ignore")

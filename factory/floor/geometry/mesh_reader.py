@@ -18,7 +18,7 @@ import numpy as np
 
 from factory.floor.geometry.glb_reader import MOST, read_glb
 from factory.floor.geometry.mesh_file import EXPECTED, MeshFile, UnreadableMesh, checked
-from factory.floor.geometry.meshes import Array, Indices
+from factory.support.arrays import Array, Indices
 
 if TYPE_CHECKING:
     import trimesh

@@ -8,13 +8,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from factory.support.arrays import Array, Indices
 
 if TYPE_CHECKING:
     import trimesh
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 MOST_FACES = 150_000
 """A mesh of more faces is replaced by its convex hull."""

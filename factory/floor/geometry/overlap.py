@@ -26,9 +26,10 @@ from weakref import finalize
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array, Indices, is_closed, normals_of
+from factory.floor.geometry.meshes import is_closed, normals_of
 from factory.floor.geometry.pieces import closed_bodies
 from factory.floor.geometry.solids import Solid, rotation
+from factory.support.arrays import Array, Indices
 
 ROUND = 5e-6
 """The largest deviation of the polytope that represents a round body [m]."""

@@ -10,9 +10,9 @@ import numpy as np
 
 from factory.floor.geometry.decomposition import collides_as_hull
 from factory.floor.geometry.facets import sagitta
-from factory.floor.geometry.meshes import Indices
 from factory.floor.geometry.overlap import common, drawn
 from factory.floor.geometry.solids import Product, Solid
+from factory.support.arrays import Indices
 from factory.support.errors import Diagnostic
 from factory.theory.problem.pag import ROUNDING, AllowedOverlap, most_allowed
 
@@ -22,8 +22,6 @@ SILENT = 2e-5
 INSIDE = 0.999
 """A part lies inside another if they have more than this share of its volume in common."""
 
-EVERYWHERE = 5e-4
-"""The depth of overlaps in a drawing without fits [m]."""
 
 Insides = tuple[frozenset[str], ...]
 """The parts of each of several products."""
@@ -111,13 +109,6 @@ def overlaps_of(product: Product, *insides: frozenset[str]) -> DrawnOverlaps:
     """The overlaps of all parts of a product, computed once; `insides`: of the parts of each of
     several products, whose parts are together in it."""
     return product.kept(_found, insides)
-
-
-def everywhere(product: Product) -> tuple[AllowedOverlap, ...]:
-    """The allowance for a drawing without fits, such as an LDraw model: any two parts may overlap
-    by up to 0.5 mm. Empty if no overlap needs it."""
-    needed = any(pair.depth <= EVERYWHERE for pair in overlaps_of(product).pairs)
-    return (AllowedOverlap(EVERYWHERE),) if needed else ()
 
 
 def _found(product: Product, insides: Insides) -> DrawnOverlaps:

@@ -32,8 +32,6 @@ from factory.floor.geometry.mesh_file import ANEW, UnreadableMesh, areas_of
 from factory.floor.geometry.mesh_reader import read_mesh
 from factory.floor.geometry.meshes import (
     SHEETS,
-    Array,
-    Indices,
     MassProperties,
     Mesh,
     Remark,
@@ -43,6 +41,7 @@ from factory.floor.geometry.meshes import (
 )
 from factory.floor.geometry.overlapping import stood_in
 from factory.floor.geometry.solids import Product, Solid, from_mesh, primitive
+from factory.support.arrays import Array, Indices
 from factory.support.cache import digest, load_arrays, packed, program, store_arrays, unpacked
 from factory.support.errors import Diagnostic, InputError
 from factory.support.files import MESH, read_bytes

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from math import cos, radians, sin, tan
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from factory.support.arrays import Array
 
 FIELD = 24.0
 """The angle of view across the shorter side of a picture [degrees]: narrow, for little

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from factory.floor.geometry.meshes import LEAST_MASS, Array, MassProperties, Mesh, sound
+from factory.floor.geometry.meshes import LEAST_MASS, MassProperties, Mesh, sound
 from factory.floor.geometry.pieces import box_piece, cylinder_piece, sphere_piece
+from factory.support.arrays import Array
 from factory.support.errors import Diagnostic
 from factory.support.keeping import Keeping
 from factory.theory.problem.pag import Assembly

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.floor.geometry.meshes import Array, Indices
+from factory.support.arrays import Array, Indices
 
 Mask = NDArray[np.bool_]
 

@@ -14,8 +14,8 @@ from math import ceil, cos, radians, sin
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.solids import Product, Solid
+from factory.support.arrays import Array
 
 STEP = radians(10.0)
 """A turn is looked at in steps no larger than this [rad]."""

@@ -19,10 +19,9 @@ from numpy.typing import NDArray
 from factory.floor.layout.certificate import Fault, fault
 from factory.floor.layout.guidepath import Guidepath, Point2
 from factory.floor.layout.layout import Layout, carriers, delivery
+from factory.support.arrays import Index
 from factory.theory.plant.factory import Operation
 from factory.theory.problem.pag import NOPART
-
-Index = NDArray[np.intp]
 
 CHUNK = 512
 """Boxes looked up at a time, so that a heap of them all in one place takes no more memory."""

@@ -14,7 +14,8 @@ from math import sqrt
 
 import numpy as np
 
-from factory.floor.layout.way import Array, Bend, way_of
+from factory.floor.layout.way import Bend, way_of
+from factory.support.arrays import Array
 
 Box = tuple[float, float, float, float]
 """(xlo, xhi, ylo, yhi) [m]."""

@@ -9,7 +9,6 @@ from math import inf
 import numpy as np
 
 from factory.floor.geometry.common_places import Top, common_places
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.solids import Solid
 from factory.floor.geometry.suction import GAP, PadPlace, pad_place
 from factory.floor.geometry.turning import presented
@@ -17,6 +16,7 @@ from factory.floor.layout.dimensions import PAYLOAD
 from factory.floor.layout.feeding import Outlet, lines_of, outlets_of
 from factory.floor.layout.guidepath import Guidepath
 from factory.floor.layout.layout import Layout
+from factory.support.arrays import Array
 
 BESIDE_HAND = 0.001
 """So far from a hand above a part its feeder's pad stays [m]."""

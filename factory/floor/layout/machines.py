@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array
 from factory.floor.layout.coordinating import Coordinated
 from factory.floor.layout.dimensions import BELT_GAP, BOOM_HEIGHT, PAD, PAYLOAD, TRAY, WALL
 from factory.floor.layout.feeding import Outlet, outlets_of
@@ -17,6 +16,7 @@ from factory.floor.layout.layout import Layout
 from factory.floor.layout.outfeed import dip_of, slot_of, slotted
 from factory.floor.layout.presence import STILL, UP, MachineBodies, Presence, boxed
 from factory.floor.layout.staying import Staying, in_world, upright
+from factory.support.arrays import Array
 
 
 def presences(

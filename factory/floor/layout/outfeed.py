@@ -8,13 +8,13 @@ from math import sqrt
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.solids import Solid
 from factory.floor.layout.dimensions import BEHIND, PLAY, SLOT, Clearance
 from factory.floor.layout.guidepath import Box, Point2
 from factory.floor.layout.hands.limbs import limbs
 from factory.floor.layout.hands.surfaces import Body
 from factory.floor.layout.layout import Layout
+from factory.support.arrays import Array
 from factory.support.settings import Settings
 from factory.theory.control.governed import GovernedAxis, Trajectory
 from factory.theory.control.profile import SpeedProfile

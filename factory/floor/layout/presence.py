@@ -17,12 +17,11 @@ from itertools import product
 import numpy as np
 import shapely
 
-from factory.floor.geometry.meshes import Array
 from factory.floor.layout.crossings import near as near_boxes
 from factory.floor.layout.dimensions import PAYLOADS
 from factory.floor.layout.guidepath import Guidepath
 from factory.floor.mating.depth import Polytope, exact, polytope, rough
-from factory.theory.control.mode import Index, Truth
+from factory.support.arrays import Array, Index, Truth
 
 ACROSS = 5e-5
 """Bodies of machines that work together come no nearer than this: a robot's pad is 0.2 mm off what

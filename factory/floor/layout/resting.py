@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
-from factory.floor.geometry.meshes import Array
 from factory.floor.layout.coordinating import Coordinated
 from factory.floor.layout.exclusions import Further, awaited_positions, exclusions
 from factory.floor.layout.hands.limbs import rises_first
@@ -22,6 +21,7 @@ from factory.floor.layout.machines import magazines
 from factory.floor.layout.presence import Near, Presence
 from factory.floor.layout.starting import start_positions
 from factory.floor.layout.staying import Staying, Sweep, comes_last
+from factory.support.arrays import Array
 from factory.support.errors import InputError
 from factory.theory.nets.petri import Marking
 from factory.theory.problem.ids import OperationId

@@ -15,7 +15,6 @@ from itertools import permutations
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.pieces import cylinder_piece
 from factory.floor.geometry.turning import fed_of, turning_pieces
 from factory.floor.layout.coordinating import HOME, Coordinated
@@ -24,6 +23,7 @@ from factory.floor.layout.guidepath import Guidepath
 from factory.floor.layout.hands.limbs import Limb, limbs, rises_first
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.presence import ROUNDING, MachineBodies, Presence, Span, corners_of
+from factory.support.arrays import Array
 from factory.theory.nets.coordinated import Past
 from factory.theory.plant.factory import Operation
 from factory.theory.problem.ids import end_of, is_end, start_of

@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.solids import Product
 from factory.floor.geometry.turning import turning_box
 from factory.floor.layout.certificate import (
@@ -44,6 +43,7 @@ from factory.floor.layout.hands.hand import ROOT
 from factory.floor.layout.hands.limbs import cross_of
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.visits import Visit
+from factory.support.arrays import Array
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.pag import NOPART
 from factory.theory.problem.robot_bodies import ARM_LOW, ARM_TOP, ARM_WIDTH, CARRIAGE_TOP, MAST
@@ -109,16 +109,6 @@ def regions(layout: Layout, by_label: Mapping[str, Pile]) -> list[Region]:
     return result
 
 
-def regions_of(layout: Layout, robot: int, by_label: Mapping[str, Pile]) -> Iterator[Region]:
-    """The regions of one robot, with its feeder, or with the outfeed."""
-    yield from _bodies(layout, robot)
-    yield from _payloads(layout, robot, by_label)
-    if shown := layout.magazine(robot):
-        yield from _feeder(layout, shown[0], robot)
-    if not robot:
-        yield from _outfeed(layout, by_label)
-
-
 def _outfeed(layout: Layout, by_label: Mapping[str, Pile]) -> Iterator[Region]:
     top = max(pile.z[1] for pile in by_label.values())
     yield from _upright(0, OUTFEED, layout.outfeed, top, "")
@@ -182,3 +172,13 @@ def _upright(robot: int, kind: int, box: Box, top: float, label: str) -> Iterato
     """Something that stands in all layers."""
     for layer in LAYERS:
         yield Region(robot, layer, kind, box, (0.0, top), label)
+
+
+def regions_of(layout: Layout, robot: int, by_label: Mapping[str, Pile]) -> Iterator[Region]:
+    """The regions of one robot, with its feeder, or with the outfeed."""
+    yield from _bodies(layout, robot)
+    yield from _payloads(layout, robot, by_label)
+    if shown := layout.magazine(robot):
+        yield from _feeder(layout, shown[0], robot)
+    if not robot:
+        yield from _outfeed(layout, by_label)

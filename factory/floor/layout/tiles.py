@@ -11,7 +11,7 @@ from factory.floor.layout.guidepath import Box, Point2
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.presence import ROUNDING
 from factory.floor.layout.sweeps import piles, regions
-from factory.theory.control.mode import Array
+from factory.support.arrays import Array
 
 SHIFTS = 12
 """So many places of the tiles' edges are tried along each axis."""

@@ -17,10 +17,8 @@ from functools import lru_cache
 from math import ceil
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
+from factory.support.arrays import Array, Index
 
 FAR = 1e9
 """Where a corner is that a way does not have [m]."""

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.solids import Product, Solid
 from factory.floor.mating.depth import Difference, Polytope, exact, polytope
+from factory.support.arrays import Array
 
 ROUNDING = 1e-9
 """Vertices are the same within this [m]."""

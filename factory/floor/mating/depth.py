@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.floor.geometry.meshes import Array
+from factory.support.arrays import Array
 
 SMALL = 1e-12
 

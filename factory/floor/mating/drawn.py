@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.floor.geometry.meshes import Array, Mesh, hull_of, is_closed, volume_of
+from factory.floor.geometry.meshes import Mesh, hull_of, is_closed, volume_of
 from factory.floor.geometry.overlap import SAMPLES, Common, common, drawn, swept, united
 from factory.floor.mating.bodies import ConvexBodies
-from factory.floor.mating.meetings import Ints
 from factory.floor.mating.paths import CLEAR, LAST, SIGNS, TOLERANCE, Depths
+from factory.support.arrays import Array, Indices
 
 ALIKE = 1e-6
 """Convex bodies are all of a mesh if their volumes differ by no more than this share."""
@@ -80,13 +80,15 @@ class DrawnWays:
         high = np.max([solid.high for solid in self._solids], axis=0)
         return 1.01 * float((high - low).max()) + 1e-3
 
-    def tested(self, one: Ints, other: Ints) -> NDArray[np.bool_]:
+    def tested(self, one: Indices, other: Indices) -> NDArray[np.bool_]:
         """Which pairs of parts (n,) are tested as drawn: at least one is less than its bodies, and
         both bound a volume."""
         either = self.wider[one] | self.wider[other]
         return np.asarray(either & ~self.rough[one] & ~self.rough[other])
 
-    def depths(self, moving: Ints, standing: Ints, still: NDArray[np.bool_], axis: int) -> Depths:
+    def depths(
+        self, moving: Indices, standing: Indices, still: NDArray[np.bool_], axis: int
+    ) -> Depths:
         """The depths of pairs of parts on the ways of the first along an axis; of pairs that stand
         `still` those in the finished product alone."""
         pairs = zip(moving.tolist(), standing.tolist(), still.tolist(), strict=True)
@@ -95,7 +97,7 @@ class DrawnWays:
         path, shift, graze, cuts = (column.reshape(-1, 2) for column in columns)
         return Depths(finished, path, shift, graze, cuts > 0)
 
-    def room(self, moving: Ints, standing: Ints, axis: int, most: float) -> Array:
+    def room(self, moving: Indices, standing: Indices, axis: int, most: float) -> Array:
         """The least room (n, 2) [m] on the ways of pairs of parts from either side, but for the
         last bit, up to `most`; less than 0 where the two overlap on it."""
         rooms = np.empty((len(moving), 2))
@@ -106,7 +108,7 @@ class DrawnWays:
                 rooms[row, column] = gap
         return rooms
 
-    def near(self, one: Ints, other: Ints, gap: float) -> NDArray[np.bool_]:
+    def near(self, one: Indices, other: Indices, gap: float) -> NDArray[np.bool_]:
         """Which pairs of parts (n,) are at most so far from each other in the finished product."""
         pairs = zip(one.tolist(), other.tolist(), strict=True)
         return np.array(

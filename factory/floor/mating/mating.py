@@ -4,7 +4,7 @@ they are blocked; and the room that they have on the way."""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import ceil
 from types import MappingProxyType
 from typing import Literal
@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from factory.floor.geometry.solids import Product
 from factory.floor.mating.bodies import bodies
 from factory.floor.mating.findings import BLOCKED, LEFT_OUT, NO_DEEPER, STRICT, Mating, Matings
-from factory.floor.mating.meetings import Ints, Meeting, Meetings, meetings
+from factory.floor.mating.meetings import Meeting, Meetings, meetings
 from factory.floor.mating.overlaps import Finder, Overlaps
 from factory.floor.mating.paths import SIGNS
+from factory.support.arrays import Indices
 from factory.support.errors import Position
 from factory.theory.compiler.expanding import Node, nodes_of
 from factory.theory.plant.approaches import MARGIN, Approach, Clash, Kind, Overlap, Pair
@@ -198,7 +199,7 @@ class _Judge:
         return parts
 
 
-def levels_of(overlaps: Overlaps, count: int) -> tuple[Ints, Ints]:
+def levels_of(overlaps: Overlaps, count: int) -> tuple[Indices, Indices]:
     """The level of each meeting from each side (count, 2), and how many pairs clash there."""
     clashing, deeper, faulty = (
         np.stack(
@@ -211,66 +212,5 @@ def levels_of(overlaps: Overlaps, count: int) -> tuple[Ints, Ints]:
     return np.select(conditions, [STRICT, NO_DEEPER, LEFT_OUT], BLOCKED), clashing
 
 
-@dataclass(frozen=True, slots=True)
-class Admitted:
-    """The best levels (`findings`) of one operation: its inputs `slides` along x and y from the
-    better side; the first, or the last of them is lowered (`lowers`)."""
-
-    slides: tuple[int, int] = (STRICT, STRICT)
-    lowers: tuple[int, int] = (STRICT, STRICT)
-
-
-def admitted(nodes: Mapping[str, Node], product: Product) -> Mapping[str, Admitted]:
-    """The levels of each operation with two inputs or more, by its label, whichever robot holds the
-    pile: the choice of forms is made from them. As costly as `matings` twice."""
-    met = meetings(nodes)
-    if not met.all:
-        return {}
-    finder, count = Finder(bodies(product, met.parts), met), len(met.all)
-    every = np.ones(count, bool)
-    slides = [levels_of(finder.along(axis, every), count)[0].max(axis=1) for axis in (0, 1)]
-    lowers = levels_of(finder.along(UPRIGHT, every), count)[0]
-    rows = zip(met.all, *(s.tolist() for s in slides), lowers.tolist(), strict=True)
-    return {m.label: Admitted((x, y), (first, last)) for m, x, y, (first, last) in rows}
-
-
 AMPLE = 5e-3
 """More room than this [m] is not measured."""
-
-
-def rooms(
-    nodes: Mapping[str, Node], product: Product, chosen: Mapping[str, Approach]
-) -> Mapping[str, float]:
-    """The least room [m] between the inputs of each operation on the way that was chosen for it
-    (from all of its `sides`), by its label: less than 0 where parts overlap, infinite where it is
-    more than AMPLE. But for the last millimetre: finished parts may touch."""
-    met = meetings(nodes)
-    ways = [_way(meeting, chosen.get(meeting.label)) for meeting in met.all]
-    least = np.full(len(met.all), np.inf)
-    if not met.all:
-        return {}
-    finder = Finder(bodies(product, met.parts), met)
-    for axis in range(3):
-        wanted = np.array([way == axis for way, _ in ways])
-        if not wanted.any():
-            continue
-        other, one, room = finder.rooms(axis, AMPLE)
-        meeting = met.of(one, other)
-        rows = np.flatnonzero(wanted[meeting] & (other >= met.splits[meeting]))
-        sides = np.array([sides for _, sides in ways])[meeting[rows]]
-        np.minimum.at(least, meeting[rows], np.where(sides, room[rows], np.inf).min(axis=1))
-    least[least >= AMPLE] = np.inf
-    labels = [meeting.label for meeting in met.all]
-    return {label: float(r) for label, r in zip(labels, least, strict=True) if label in chosen}
-
-
-def _way(meeting: Meeting, approach: Approach | None) -> tuple[int, tuple[bool, bool]]:
-    """The axis, -1 for none, and the sides from which the last input comes. A lowered input comes
-    from above; if that is another input, the last one comes from below."""
-    if approach is None:
-        return -1, (False, False)
-    if approach.kind == "lower":
-        last = approach.lowered == meeting.inputs[-1]
-        return UPRIGHT, (not last, last)
-    low, high = (sign in approach.sides for sign in SIGNS)
-    return approach.axis, (low, high)

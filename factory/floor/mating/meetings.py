@@ -11,12 +11,10 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from factory.support.arrays import Indices
 from factory.support.errors import Position
 from factory.theory.compiler.expanding import Node
-
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,23 +42,23 @@ class Meetings:
 
     parts: tuple[str, ...]
     all: tuple[Meeting, ...]
-    borders: Ints = field(repr=False)
+    borders: Indices = field(repr=False)
     """(parts - 1,): the meeting of each part with the next one; the lowest of both."""
-    levels: Ints = field(repr=False)
+    levels: Indices = field(repr=False)
     """(meetings,): how deep in the tree each is."""
 
     @cached_property
-    def axes(self) -> Ints:
+    def axes(self) -> Indices:
         """The axis of each meeting (meetings,)."""
         return np.array([m.axis for m in self.all], np.int64)
 
     @cached_property
-    def splits(self) -> Ints:
+    def splits(self) -> Indices:
         """Where the last input of each meeting begins (meetings,)."""
         return np.array([m.split for m in self.all], np.int64)
 
     @cached_property
-    def _table(self) -> list[Ints]:
+    def _table(self) -> list[Indices]:
         """Row k: the highest meeting on 2**k borders from each on, as level * count + number."""
         rows = [self.levels[self.borders] * len(self.all) + self.borders]
         while 2 ** len(rows) <= len(self.borders):
@@ -68,7 +66,7 @@ class Meetings:
             rows.append(np.minimum(rows[-1][:-half], rows[-1][half:]))
         return rows
 
-    def of(self, one: Ints, other: Ints) -> Ints:
+    def of(self, one: Indices, other: Indices) -> Indices:
         """The meetings at which the parts one[i] < other[i] do: the highest between them."""
         highest = np.empty(len(one), np.int64)
         row = np.frexp((other - one).astype(float))[1] - 1

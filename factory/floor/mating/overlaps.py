@@ -17,10 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.floor.geometry import overlap
-from factory.floor.geometry.meshes import Array
 from factory.floor.mating.bodies import BodyShapes, ConvexBodies
 from factory.floor.mating.drawn import DrawnWays
-from factory.floor.mating.meetings import Ints, Meetings
+from factory.floor.mating.meetings import Meetings
 from factory.floor.mating.paths import (
     CLEAR,
     LAST,
@@ -31,6 +30,7 @@ from factory.floor.mating.paths import (
     depths_of,
     sought,
 )
+from factory.support.arrays import Array, Indices
 from factory.support.cache import digest, load_arrays, program, store_arrays
 
 FOLDER = "overlaps"
@@ -50,8 +50,8 @@ CHUNK = 4096
 class BodyPairs:
     """Pairs of convex bodies: their numbers among those of their parts, and their depths (m,)."""
 
-    one: Ints
-    other: Ints
+    one: Indices
+    other: Indices
     depths: Depths = field(repr=False)
 
     def receding(self, rows: slice, side: int) -> list[tuple[int, int, float]]:
@@ -71,14 +71,14 @@ class Overlaps:
     its hull alone; `bodies`: what overlaps of them, those of row i from `starts[i]` to
     `starts[i + 1]` (n + 1,)."""
 
-    meeting: Ints
-    one: Ints
-    other: Ints
+    meeting: Indices
+    one: Indices
+    other: Indices
     depths: Depths = field(repr=False)
     colliding: Depths = field(repr=False)
     rough: NDArray[np.bool_] = field(repr=False)
     bodies: BodyPairs = field(repr=False)
-    starts: Ints = field(repr=False)
+    starts: Indices = field(repr=False)
 
     def of(self, meeting: int) -> Overlaps:
         """Those of one meeting."""
@@ -114,7 +114,7 @@ class Overlaps:
         return self._passing & ~unknown[:, None]
 
 
-Pairs = tuple[Ints, Ints, Ints, Depths]
+Pairs = tuple[Indices, Indices, Indices, Depths]
 """Pairs of bodies, or of parts: their meetings, what moves and what stands, and their depths."""
 
 
@@ -140,7 +140,7 @@ class Finder:
         return self._by_parts(_pairs(kept, KEYS), _pairs(kept, DRAWN), kept[ROUGH])
 
     @cached_property
-    def _meshes(self) -> list[Array | Ints]:
+    def _meshes(self) -> list[Array | Indices]:
         """The surfaces of parts, and where they are."""
         meshed = [(s, s.mesh) for s in self.bodies.solids if s.mesh is not None]
         each = {id(mesh): mesh for _, mesh in meshed}.values()
@@ -176,12 +176,12 @@ class Finder:
         by_bodies = meeting[kept], moving[kept], standing[kept], depths.at(np.flatnonzero(kept))
         return by_bodies, (meeting[first], *by_parts, exact), self.drawn.rough
 
-    def _key_of(self, meeting: Ints, moving: Ints, standing: Ints) -> Ints:
+    def _key_of(self, meeting: Indices, moving: Indices, standing: Indices) -> Indices:
         """A number (n,) of each pair of parts at a meeting, ascending as they are sorted."""
         count = len(self.bodies.solids)
         return (meeting * count + standing) * count + moving
 
-    def _chunks(self, axis: int, apart: float = CLEAR) -> Iterator[tuple[Ints, Ints]]:
+    def _chunks(self, axis: int, apart: float = CLEAR) -> Iterator[tuple[Indices, Indices]]:
         """Pairs (moving, standing) of bodies whose boxes overlap or are at most so far `apart`
         across the axis, the part of the moving one being the later, in chunks."""
         from shapely import STRtree, box
@@ -197,7 +197,7 @@ class Finder:
             later = part[one] > part[other]
             yield one[later], other[later]
 
-    def near(self, gap: float) -> tuple[Ints, Ints]:
+    def near(self, gap: float) -> tuple[Indices, Indices]:
         """Pairs of parts that are at most so far [m] from each other in the finished product, the
         later one first. Bodies that meet with corners may be a little further apart."""
         one, other, depths = self.passing(2, gap, still=True)
@@ -209,7 +209,9 @@ class Finder:
         near[tested] = self.drawn.near(one[tested], other[tested], gap)
         return one[near], other[near]
 
-    def passing(self, axis: int, gap: float, still: bool = False) -> tuple[Ints, Ints, Depths]:
+    def passing(
+        self, axis: int, gap: float, still: bool = False
+    ) -> tuple[Indices, Indices, Depths]:
         """Pairs of bodies (moving, standing) of two parts, the later one moving, whose boxes are at
         most so far [m] from each other in some place of the way along an axis, `still` in the
         finished product, with their depths."""
@@ -219,7 +221,7 @@ class Finder:
         self._refine(one, other, axis, depths)
         return one, other, depths
 
-    def rooms(self, axis: int, most: float) -> tuple[Ints, Ints, Array]:
+    def rooms(self, axis: int, most: float) -> tuple[Indices, Indices, Array]:
         """Pairs of parts (moving, standing), the later one moving, that come near on the way along
         an axis, and the least room (n, 2) [m] on it from either side, but for the last bit; less
         than 0 where they overlap."""
@@ -236,12 +238,16 @@ class Finder:
         room[tested] = self.drawn.room(moving[tested], standing[tested], axis, most)
         return moving, standing, room
 
-    def _beside(self, axis: int, gap: float, still: bool, moving: Ints, standing: Ints) -> Ints:
+    def _beside(
+        self, axis: int, gap: float, still: bool, moving: Indices, standing: Indices
+    ) -> Indices:
         depths = _box_depths(self.bodies, moving, standing, axis)
         near = depths.finished if still else depths.path.max(axis=1)
         return np.asarray(np.stack([moving, standing])[:, near >= -gap])
 
-    def _near(self, axis: int, wanted: NDArray[np.bool_], moving: Ints, standing: Ints) -> Ints:
+    def _near(
+        self, axis: int, wanted: NDArray[np.bool_], moving: Indices, standing: Indices
+    ) -> Indices:
         """Those that meet at a wanted meeting and whose boxes come to overlap there: rows moving,
         standing, meeting (3, n)."""
         meeting = self.meetings.of(self.bodies.part[standing], self.bodies.part[moving])
@@ -249,7 +255,7 @@ class Finder:
         depths = _box_depths(self.bodies, pairs[0], pairs[1], axis)
         return np.asarray(pairs[:, depths.faulty.any(axis=1)])
 
-    def _refine(self, moving: Ints, standing: Ints, axis: int, depths: Depths) -> None:
+    def _refine(self, moving: Indices, standing: Indices, axis: int, depths: Depths) -> None:
         """Replaces the depths of boxes by those of the bodies where these are no boxes."""
         groups: dict[tuple[bytes, bytes], list[int]] = {}
         keys = [key for solid in self.bodies.solids for key in self._shapes.keys[solid.label]]
@@ -306,7 +312,7 @@ def _pairs(kept: Mapping[str, NDArray[Any]], keys: Sequence[str]) -> Pairs:
     return meeting, moving, standing, Depths(*rest)
 
 
-def _box_depths(bodies: ConvexBodies, moving: Ints, standing: Ints, axis: int) -> Depths:
+def _box_depths(bodies: ConvexBodies, moving: Indices, standing: Indices, axis: int) -> Depths:
     """The depths of bounding boxes (see `depth.py`), in closed form."""
     low, high = bodies.low, bodies.high
     up, down = high[standing] - low[moving], high[moving] - low[standing]

@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.floor.geometry.meshes import Array
 from factory.floor.mating.depth import Difference, distinct, summits
-from factory.floor.mating.meetings import Ints
+from factory.support.arrays import Array, Indices
 
 TOLERANCE = 2e-5
 """Overlaps of no more than this [m] do not count: what welds in the engine give way, and far above
@@ -75,11 +74,11 @@ class Depths:
         """Its arrays."""
         return self.finished, self.path, self.shift, self.graze, self.cuts
 
-    def at(self, rows: Ints | slice) -> Depths:
+    def at(self, rows: Indices | slice) -> Depths:
         """Those of some of the pairs."""
         return Depths(*(column[rows] for column in self.columns))
 
-    def put(self, rows: Ints | slice, depths: Depths) -> None:
+    def put(self, rows: Indices | slice, depths: Depths) -> None:
         """Replaces those of some of the pairs."""
         for column, values in zip(self.columns, depths.columns, strict=True):
             column[rows] = values

@@ -16,11 +16,12 @@ from factory.floor.geometry.solids import Product
 from factory.floor.layout.dimensions import Clearance
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.optimising import first_feasible
+from factory.support.arrays import Array
 from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import Settings
 from factory.theory.compiler.domains import EXAMPLE
 from factory.theory.control.laws import Setting, hold, law_of
-from factory.theory.control.mode import Array, Limits, Mode
+from factory.theory.control.mode import Limits, Mode
 from factory.theory.control.navigation import Bundle
 from factory.theory.plant.factory import Factory, Operation
 from factory.theory.problem.pag import NOPART

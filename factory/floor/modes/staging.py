@@ -18,8 +18,9 @@ from factory.floor.layout.exclusions import awaited_positions
 from factory.floor.layout.hands.limbs import rises_first
 from factory.floor.layout.layout import Layout
 from factory.floor.modes.modes import operation_starts
+from factory.support.arrays import Array
 from factory.support.settings import Settings
-from factory.theory.control.mode import ROUNDING, Array, Mode
+from factory.theory.control.mode import ROUNDING, Mode
 from factory.theory.control.profile import World
 from factory.theory.plant.factory import Factory, Operation
 from factory.theory.problem.ids import AxisId, carriage_axis

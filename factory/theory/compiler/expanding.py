@@ -106,12 +106,6 @@ def delivered(label: str, plan: Plan) -> str:
     return relay_label(label, number - 1) if number else label
 
 
-def origin_of(label: str) -> str:
-    """Label before hand-overs."""
-    origin, _, last = label.rpartition("/")
-    return origin if last.startswith(RELAY) else label
-
-
 def nodes_of(factory: Factory) -> dict[str, Node]:
     """The expanded operations of a factory, for the first unit of a period."""
     nodes: dict[str, Node] = {}
@@ -133,13 +127,6 @@ def _in_postorder(nodes: Mapping[str, Node], root: str) -> dict[str, Node]:
         order.append(stack.pop())
         stack += nodes[order[-1]].inputs
     return {label: nodes[label] for label in reversed(order)}
-
-
-def joins(node: Assembly) -> Iterator[str]:
-    """The labels of the piles that a statement with two inputs or more makes, in order."""
-    for number in range(2, len(node.inputs)):
-        yield f"{node.label}/{number}"
-    yield node.label
 
 
 def _operations(

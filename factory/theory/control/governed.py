@@ -12,7 +12,8 @@ from math import ceil, copysign, floor, sqrt
 
 import numpy as np
 
-from factory.theory.control.mode import ROUNDING, STILL, Array, Limits, Mode
+from factory.support.arrays import Array
+from factory.theory.control.mode import ROUNDING, STILL, Limits, Mode
 from factory.theory.control.obstacles import OPEN
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from factory.theory.control.mode import ROUNDING, Array
+from factory.support.arrays import Array
+from factory.theory.control.mode import ROUNDING
 from factory.theory.control.navigation import Bundle
 from factory.theory.control.profile import landing_speed
 

@@ -16,9 +16,10 @@ from types import MappingProxyType
 
 import numpy as np
 
+from factory.support.arrays import Array, Index
 from factory.support.errors import Diagnostic, InputError, did_you_mean
 from factory.support.extensions import bad_extension, blaming, extensions, position_of
-from factory.theory.control.mode import Array, Index, Mode, lock
+from factory.theory.control.mode import Mode, lock
 from factory.theory.problem.template import Point, Template
 
 

@@ -13,9 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
-Truth = NDArray[np.bool_]
+from factory.support.arrays import Array, Index
 
 REACH = 1.5
 """An obstacle of Δ acts on robots up to this many times the touching distance apart."""

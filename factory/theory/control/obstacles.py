@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from factory.theory.control.mode import Array, Index, Mode
+from factory.support.arrays import Array, Index
+from factory.theory.control.mode import Mode
 
 OPEN = 0.8
 """A gate is fully open where its robot is this near to its goal [eps]."""

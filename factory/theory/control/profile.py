@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from factory.theory.control.mode import Array
+from factory.support.arrays import Array
 
 World = Literal["ideal", "mujoco"]
 

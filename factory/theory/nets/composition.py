@@ -77,16 +77,6 @@ def compose(net: MarkedNet) -> Composition:
     return Composition(joints, tuple(defects), closed, fitting)
 
 
-def cover(net: MarkedNet, closed: Iterable[bool]) -> list[int]:
-    """For each place a gear through it that has at most one token and keeps it, or NONE."""
-    covered: list[int] = [NONE] * len(net.tokens)
-    for number, (gear, good) in enumerate(zip(net.gears, closed, strict=False)):
-        if good and sum(net.tokens[p] for p in gear.places) <= 1:
-            for place in gear.places:
-                covered[place] = number
-    return covered
-
-
 def no_gear_net(
     kind: str,
     reason: str,

@@ -11,7 +11,7 @@ from itertools import count, pairwise
 from factory.support.showing import Pictured
 from factory.theory.nets.petri import Marking
 from factory.theory.nets.threaded import Slot, ThreadedNet
-from factory.theory.problem.ids import PlaceId, RobotId, TransitionId
+from factory.theory.problem.ids import PlaceId, TransitionId
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class GearNet(Pictured):
     threaded: ThreadedNet
     gears: tuple[Gear, ...]
     initial: tuple[PlaceId, ...]
-    slots: tuple[tuple[RobotId, ...], ...] = field(repr=False)
+    slots: tuple[tuple[int, ...], ...] = field(repr=False)
 
     def __repr__(self) -> str:
         net = self.threaded.net
@@ -73,7 +73,7 @@ class GearNet(Pictured):
         gears = sum(bool(gear.places) for gear in self.gears)
         return sum(len(on) - 1 for on in self.slots if on) == gears - 1
 
-    def threads_of(self, marked: Marking) -> dict[Slot, RobotId]:
+    def threads_of(self, marked: Marking) -> dict[Slot, int]:
         """f_m of a marking: every slot holds the robot that owns it (Definition 3.3)."""
         return {
             (PlaceId(p), i): robot for p in sorted(marked) for i, robot in enumerate(self.slots[p])

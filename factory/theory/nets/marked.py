@@ -185,12 +185,6 @@ def breadth_first(beside: Sequence[Sequence[int]], onward: Sequence[int]) -> dic
     return tree
 
 
-def dead_ends(net: MarkedNet) -> tuple[int, ...]:
-    """The places with a consumer but no producer: what they feed stops (marked graphs)."""
-    pairs = enumerate(zip(net.left, net.right, strict=True))
-    return tuple(p for p, (before, after) in pairs if before == NONE and after != NONE)
-
-
 def least_tokens(net: MarkedNet, source: int) -> list[int | None]:
     """For each transition the least number of tokens on a path to it from `source`, None where
     there is no path (marked graphs). One search by levels: a 0-1 BFS where m_0 is safe."""

@@ -1,7 +1,7 @@
 """An independent replay of a record of events against a net: does the run refine it?
 
 Tokens are counted and robots followed from place to place, without `PetriNet.follower`. What was
-undone is taken back firing by firing, without `factory.theory.nets.undo`.
+undone is taken back firing by firing, without `factory.apps.recovery.undo`.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ class Undone:
 
     `operation`: label of the operation that failed; `reason`: cause, in words; `asked`: the
     transitions that had to be undone; `transitions`: all that were undone, by number. Names are
-    repeated for each time that they are undone. `factory.theory.nets.undo` has the definition.
+    repeated for each time that they are undone. `factory.apps.recovery.undo` has the definition.
     """
 
     t: float

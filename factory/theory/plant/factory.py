@@ -164,11 +164,11 @@ class Factory(Pictured):
         """The output robot's last operation, for the first unit of a period."""
         return self.operations[-self.period]
 
-    def operation_of(self, transition: TransitionId) -> Operation:
+    def operation_of(self, transition: int) -> Operation:
         """The operation that a transition of the compiled net starts or ends."""
         return self.operations[operation_of(transition)]
 
-    def drops(self, operation: OperationId) -> bool:
+    def drops(self, operation: int) -> bool:
         """Whether an operation (index) is a dropoff."""
         return operation >= len(self.operations) - self.period
 
@@ -271,7 +271,7 @@ class Factory(Pictured):
         """The axis of the lift of each robot (index) that has one."""
         return {robot: AxisId(len(self.robots) + n) for n, robot in enumerate(self.strokes)}
 
-    def robot_of(self, axis: AxisId) -> RobotId:
+    def robot_of(self, axis: int) -> RobotId:
         """The robot (index) of an axis: of its carriage, or of its lift."""
         count = len(self.robots)
         return RobotId(axis) if axis < count else RobotId([*self.strokes][axis - count])
@@ -331,7 +331,7 @@ class Factory(Pictured):
     def joins(self) -> Joins:
         """For the end of each operation its start and the ends of the operations that made its
         inputs: the transitions that are undone as often as the end, since nothing is taken apart
-        (the material rule of `factory.theory.nets.undo`)."""
+        (the material rule of `factory.apps.recovery.undo`)."""
         made = self.by_label
         return {o.end: (o.start, *(made[x].end for x in o.inputs)) for o in self.operations}
 

@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 from factory.apps.exports import exporters
+from factory.apps.exports.stock import written as stock
 from factory.apps.log import read_log
 from factory.apps.log.model import model_of
 from factory.apps.plc.driven import drive
 from factory.engine.mjcf.loading import load
 from factory.engine.mjcf.names import COMPASS
-from factory.engine.mjcf.stock import written as stock
 from factory.engine.simulation.modelling import physical_model
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation

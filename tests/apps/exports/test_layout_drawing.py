@@ -9,11 +9,11 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from factory.apps.drawing.canvas import LONGEST, Canvas, clean, hull, number
 from factory.apps.exports.floor_sheet import write_svg
 from factory.floor.geometry.product import product_geometry
 from factory.floor.layout.embedding import lay_out
 from factory.floor.layout.layout import Layout
-from factory.support.canvas import LONGEST, Canvas, clean, hull, number
 from tests.layout_values import many_layouts, paper_layout, random_layout, row_of_inserts, table_pag
 from tests.pag_values import factory_of
 

@@ -14,8 +14,8 @@ import mujoco
 import numpy as np
 import pytest
 
+from factory.apps.exports import stock
 from factory.apps.exports.ways import ways
-from factory.engine.mjcf import stock
 from factory.engine.mjcf.loading import load
 from factory.engine.mjcf.model import build_model
 from factory.engine.simulation.ordering import Ordering

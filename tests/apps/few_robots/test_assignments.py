@@ -9,15 +9,15 @@ from pathlib import Path
 
 import pytest
 
+from factory.apps.few_robots.folding import fold
 from factory.apps.few_robots.lines import Shift
+from factory.apps.few_robots.parallel import in_parallel
 from factory.floor.layout.durations import Pace
 from factory.floor.layout.shapes import payload_boxes
 from factory.floor.mating.mating import judged
 from factory.pipeline import read
 from factory.support.errors import InputError
 from factory.theory.compiler.assigning import shared
-from factory.theory.compiler.folding import fold
-from factory.theory.compiler.parallel import in_parallel
 from factory.theory.compiler.tees import on_stems
 from factory.theory.nets.verify import verify
 from factory.theory.plant.factory import Factory

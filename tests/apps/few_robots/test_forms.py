@@ -22,17 +22,18 @@ from factory.apps.few_robots.forms import (
     _finished,
     _joined,
     best_forms,
+    joins,
     written_forms,
 )
+from factory.apps.few_robots.lines import Admitted, admitted
 from factory.apps.few_robots.search import Search, allocated
 from factory.floor.layout.durations import Pace
-from factory.floor.mating.mating import Admitted, admitted
 from factory.pipeline import Project, read
 from factory.support.resources import templates_folder
 from factory.support.settings import Settings
 from factory.support.tables import table_of, value_of
 from factory.theory.compiler.compiler import compile_pag
-from factory.theory.compiler.expanding import expand, joins
+from factory.theory.compiler.expanding import expand
 from factory.theory.lang.template_reader import load_templates
 from factory.theory.nets.verify import verify
 from factory.theory.plant.factory import Factory

@@ -10,7 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from factory.apps.few_robots.forms import joins
 from factory.apps.few_robots.lines import Shift
+from factory.apps.few_robots.sharing import with_branches
 from factory.apps.log.plan_file import PLAN_NAME, plan_files, read_plan
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
@@ -20,11 +22,9 @@ from factory.floor.layout.saved import LayoutTable
 from factory.floor.layout.shapes import payload_boxes
 from factory.floor.mating.mating import judged
 from factory.pipeline import Project, read
-from factory.sharing import with_branches
 from factory.support.errors import Diagnostic, InputError, RunError
 from factory.support.settings import Settings
 from factory.theory.compiler.assigning import shared
-from factory.theory.compiler.expanding import joins
 from factory.theory.nets.marked import marked
 from factory.theory.nets.verify import verify
 from factory.theory.problem.plan import THIRD, Plan

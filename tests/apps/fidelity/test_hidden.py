@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from factory.apps.fidelity.hidden import HiddenPenetrations, overlaps_of
-from factory.engine.mjcf.solid import drawn
+from factory.apps.fidelity.solid import drawn
 from factory.engine.record.state import State
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation

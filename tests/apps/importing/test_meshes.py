@@ -13,7 +13,7 @@ import pytest
 import trimesh
 
 from factory.apps.importing.bodies import FileBody, solids_of
-from factory.floor.geometry.mending import zipped
+from factory.apps.importing.zipping import zipped
 from factory.floor.geometry.mesh_file import EXPECTED, MeshFile, UnreadableMesh
 from factory.floor.geometry.mesh_reader import read_mesh
 from factory.floor.geometry.meshes import is_closed, volume_of

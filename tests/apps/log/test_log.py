@@ -91,7 +91,7 @@ def test_a_log_says_what_happened(recorded) -> None:
 def test_a_large_log_is_read_in_pieces(recorded, monkeypatch: pytest.MonkeyPatch) -> None:
     """Only where its bytes come from depends on its size."""
     path, small = recorded[0], read_log(recorded[0])
-    monkeypatch.setattr("factory.support.files.LARGE", 1000)
+    monkeypatch.setattr("factory.apps.log.content.LARGE", 1000)
     large = read_log(path)
     assert small.ends is not None and large.ends is not None
     for one, other in ((small, large), (small.ends, large.ends)):

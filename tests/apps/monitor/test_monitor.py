@@ -16,7 +16,7 @@ import pytest
 
 import factory
 from factory.apps.log import Log, LogWriter, read_log
-from factory.apps.monitor import MonitorSubject, Report, beside, subject_of
+from factory.apps.monitor import MonitorSubject, Report, beside
 from factory.apps.monitor.explanation import SeenFirings
 from factory.apps.monitor.motion import AxisMotion
 from factory.apps.monitor.record import watch_log
@@ -358,7 +358,7 @@ def test_parts_that_the_marking_does_not_account_for(paper: Layout) -> None:
 
 def test_firings_in_an_impossible_order(paper: Layout) -> None:
     """The difference constraints alone: one firing too early is one violation."""
-    subject: MonitorSubject = subject_of(paper, Settings())
+    subject: MonitorSubject = MonitorSubject.of(paper, Settings())
     events = paper.factory.net.threaded.net.transition_index
     explanation = SeenFirings(subject, 0.015)
     for name, t in (("part1_e", 1.0), ("part2_e", 1.0), ("sub1_e", 3.0)):

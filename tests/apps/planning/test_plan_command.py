@@ -14,8 +14,8 @@ import pytest
 
 from factory.apps.planning.blocking import blocking
 from factory.apps.planning.cannot import interlocks
+from factory.apps.planning.command_line.plan import _by_label
 from factory.apps.planning.interlocked import PAINTS
-from factory.commands.plan import _by_label
 from factory.pipeline import read
 from factory.support.progress import StepBar
 from tests.apps.planning.test_plan_puzzles import CHAIN, LOADED, PEG

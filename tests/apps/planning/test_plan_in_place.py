@@ -193,7 +193,7 @@ def test_on_a_terminal_the_user_is_asked(
 ) -> None:
     parts = stool() if name == "unit" else {**stool(), "knob": block((0, 0, 450), (20, 20, 470))}
     words = ("plan", folder_of(tmp_path / "parts", parts, scale), "-o", tmp_path / "out")
-    monkeypatch.setattr("factory.commands.asking.is_terminal", lambda: True)
+    monkeypatch.setattr("factory.apps.planning.command_line.asking.is_terminal", lambda: True)
     monkeypatch.setattr("sys.stdin", io.StringIO(answer))
     done = run(*words, "--no-look", "--seconds", 1)
     assert done.status == status, done.err

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from factory.apps.few_robots.lines import admitted
 from factory.apps.planning.blocking import (
     CLASHES,
     DEEPER,
@@ -32,7 +33,7 @@ from factory.apps.planning.writing import planned_product
 from factory.floor.geometry.product import product_geometry
 from factory.floor.layout.durations import Pace
 from factory.floor.mating.findings import BLOCKED, LEFT_OUT, NO_DEEPER, STRICT
-from factory.floor.mating.mating import admitted, matings
+from factory.floor.mating.mating import matings
 from factory.pipeline import all_templates
 from factory.theory.compiler.expanding import expand
 from factory.theory.lang.pag_reader import read_pag

@@ -15,20 +15,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import factory
+from factory.apps.importing.alike import alike
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.plan import Planned, PlanOptions, plan
 from factory.apps.planning.source import SourceOptions, read_source
 from factory.apps.planning.writing import planned_product
-from factory.floor.geometry.alike import (
-    PartShape,
-    RigidMotion,
-    alike,
-    motion_between,
-    moved,
-    shape_of,
-)
-from factory.floor.geometry.meshes import Array
+from factory.floor.geometry.alike import PartShape, RigidMotion, motion_between, moved, shape_of
 from factory.pipeline import all_templates, read
+from factory.support.arrays import Array
 from factory.support.files import write_all
 from tests.command_line import Terminal
 from tests.paths import ROOT, files_in

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import factory
+from factory.apps.exports.stock import written as stock
 from factory.apps.fidelity.measuring import Measurement
 from factory.apps.monitor import beside
 from factory.engine.mjcf.loading import load
-from factory.engine.mjcf.stock import written as stock
 from factory.engine.simulation.modelling import physical_model
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation

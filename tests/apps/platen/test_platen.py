@@ -10,14 +10,14 @@ import pytest
 
 import factory
 from factory.apps.exports.floor_plan import flat_shapes
+from factory.apps.platen import compacting
+from factory.apps.platen.compacting import compacted
+from factory.apps.platen.placing import Floor, Placing
 from factory.apps.platen.platen import on_platen
-from factory.floor.layout import compacting
 from factory.floor.layout.bending import Detour
 from factory.floor.layout.clearance import searched
-from factory.floor.layout.compacting import compacted
 from factory.floor.layout.durations import Pace, cycle_of
 from factory.floor.layout.layout import Layout
-from factory.floor.layout.placing import Floor, Placing
 from factory.floor.layout.saved import LayoutTable
 from factory.floor.layout.sweeps import piles, regions
 from factory.floor.layout.tiles import fill_of, tiles_of

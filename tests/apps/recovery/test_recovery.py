@@ -14,19 +14,19 @@ import pytest
 import factory.apps.recovery.responding as responding
 from factory.apps.deviations import Campaign, Deviation
 from factory.apps.deviations.deviation import ASKEW, KINDS, SLIPPED
+from factory.apps.few_robots.sharing import with_lines
 from factory.apps.recovery import recover
 from factory.apps.recovery.mujoco.plant import MujocoPlant, Senses
 from factory.apps.recovery.standing import Standing
+from factory.apps.recovery.undo import undo
 from factory.engine.record.failures import Failures
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.run import Run, entries_of
 from factory.engine.simulation.simulation import Simulation, compiled
 from factory.floor.layout.layout import Layout
 from factory.pipeline import read
-from factory.sharing import with_lines
 from factory.support.errors import InputError
 from factory.theory.nets.replay import replay
-from factory.theory.nets.undo import undo
 from factory.theory.nets.undone import Undone
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.template import Failure

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
+from factory.apps.few_robots.sharing import with_lines
 from factory.apps.revise.family import family
 from factory.apps.revise.matching import below, label_digests, matching, shifted
 from factory.apps.revise.revision import Revision, revised
 from factory.floor.layout.certificate import Fault
 from factory.floor.layout.clearance import certify
 from factory.pipeline import Project, all_templates
-from factory.sharing import with_lines
 from factory.support.errors import Diagnostic, InputError, RunError
 from factory.theory.lang import read_pag, write_pag
 from factory.theory.lang.pag_reader import load_pag

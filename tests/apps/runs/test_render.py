@@ -25,15 +25,17 @@ from factory.apps.log import LogWriter, read_log
 from factory.apps.runs.pictures import render_log
 from factory.engine.mjcf.mesh_files import corner_normals, face_normals, mesh_file
 from factory.engine.record.state import State
-from factory.engine.record.subject import subject_of_run
+from factory.engine.record.subject import MonitorSubject
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.film import Film, Picture, Still, check_output
 from factory.film.action import Snapshot
 from factory.film.caption import Caption
+from factory.film.finale import LASTS
 from factory.film.painter import Painter, Renderer
 from factory.film.picture import from_above, overview
 from factory.film.reel import HOLD
+from factory.film.shot import Shot
 from factory.film.video import ENCODERS, VideoFile
 from factory.floor.geometry.meshes import Mesh
 from factory.floor.geometry.sight import Framing, fit, towards
@@ -45,8 +47,8 @@ from tests.paths import ROOT
 
 PAPER = ROOT / "examples" / "paper.pag"
 SIZE, FPS = (160, 96), 10.0
-HELD = round(HOLD * FPS)
-SMALL, PRODUCT = Picture(SIZE), Picture((240, 136), "product")
+HELD, TURNED = round(HOLD * FPS), round(LASTS * FPS)
+SMALL, PRODUCT = Picture(SIZE), Picture((240, 136), "product", renderer="classic")
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +92,7 @@ def film_of(path: Path) -> np.ndarray:
 def test_size_rate_and_frames_are_exact(taken) -> None:
     folder, run, film, _ = taken
     frames = film_of(folder / "run.mp4")
-    wanted = int(run.sim_time_s * FPS + 1e-6) + 1 + HELD
+    wanted = int(run.sim_time_s * FPS + 1e-6) + 1 + HELD + TURNED
     assert film.frames == wanted and frames.shape == (wanted, SIZE[1], SIZE[0], 3)
     about = iio.immeta(folder / "run.mp4", plugin="pyav")
     assert about["fps"] == pytest.approx(FPS) and about["codec"] == "h264"
@@ -111,17 +113,29 @@ def test_a_film_ends_with_all_units_for_a_second(
         return draw(caption, pixels, product, made, *rest)
 
     assert HELD == FPS
-    assert all(np.array_equal(pictures[-1], one) for one in pictures[-HELD:])
+    held = pictures[-HELD - TURNED : -TURNED]
+    assert all(np.array_equal(held[-1], one) for one in held)
     monkeypatch.setattr(Caption, "draw", drawn)
-    render_log(read_log(taken[0] / "run.log"), tmp_path / "again.mp4", SMALL, FPS)
+    render_log(read_log(taken[0] / "run.log"), Shot(tmp_path / "again.mp4", SMALL, FPS))
     assert said[0] == 0 and said[-1] == 1
+
+
+@needs_gl
+def test_then_it_shows_the_product_alone_and_from_more_than_one_side(taken) -> None:
+    before, one, *_, other = taken[3][-TURNED - 1 :]
+
+    def coloured(picture: np.ndarray) -> float:
+        return float((np.ptp(picture.astype(int), axis=2) > 60).mean())
+
+    assert min(coloured(one), coloured(other)) > 3 * coloured(before)
+    assert (np.abs(one.astype(int) - other).max(axis=2) > 40).mean() > 0.1
 
 
 @needs_gl
 def test_the_picture_is_not_blank_and_changes(taken) -> None:
     frames = film_of(taken[0] / "run.mp4").astype(int)
     assert all(frame.std() > 10 for frame in frames)
-    factory_only = frames[:-HELD, : int(0.8 * SIZE[1])]
+    factory_only = frames[: -HELD - TURNED, : int(0.8 * SIZE[1])]
     changed = [np.abs(a - b).max() for a, b in pairwise(factory_only)]
     assert np.mean(np.array(changed) > 30) > 0.6
 
@@ -143,7 +157,7 @@ def test_the_same_pictures_are_encoded_the_same_every_time(taken, tmp_path: Path
     log = read_log(taken[0] / "run.log")
     films = set()
     for _ in range(3):
-        render_log(log, tmp_path / "again.mp4", SMALL, 5.0)
+        render_log(log, Shot(tmp_path / "again.mp4", SMALL, 5.0))
         films.add((tmp_path / "again.mp4").read_bytes())
     assert len(films) == 1
 
@@ -153,15 +167,15 @@ def test_a_log_gives_the_same_pictures_as_its_run(taken, tmp_path: Path) -> None
     folder = taken[0]
     log = read_log(folder / "run.log")
     with drawn() as pictures:
-        count = render_log(log, tmp_path / "log.mp4", SMALL, FPS)
+        count = render_log(log, Shot(tmp_path / "log.mp4", SMALL, FPS))
     one, other = np.array(taken[3]), np.array(pictures)
     assert one.shape == other.shape == (count, SIZE[1], SIZE[0], 3)
     assert np.abs(one.astype(int) - other).max() <= 2
     assert len(film_of(tmp_path / "log.mp4")) == count
-    assert render_log(log, tmp_path / "log.png", PRODUCT) == 1
+    assert render_log(log, Shot(tmp_path / "log.png", PRODUCT)) == 1
     pictures = [iio.imread(p).astype(int) for p in (folder / "end.png", tmp_path / "log.png")]
     assert np.abs(pictures[0] - pictures[1]).max() <= 2
-    assert render_log(log, tmp_path / "then.png", SMALL, at=1.0) == 1
+    assert render_log(log, Shot(tmp_path / "then.png", SMALL, at=1.0)) == 1
     assert iio.imread(tmp_path / "then.png").shape == (SIZE[1], SIZE[0], 3)
 
 
@@ -361,10 +375,11 @@ def test_no_more_facets_are_drawn_than_are_seen(layout, tmp_path: Path) -> None:
     """Faces are whole, cylinders have two rings, the sky behind the floor is left out; a picture
     with all of that shows the same."""
     simulation = Simulation(layout, RunRequest("mujoco", units=1))
-    subject = subject_of_run(simulation)
+    subject = MonitorSubject.of_run(simulation)
     seen = simulation.state().observation
     shown = Snapshot.of(seen.qpos, seen.welds)
-    with Painter(simulation.world.m, (320, 180), "overview", subject) as painter:
+    look = Framing(16 / 9)
+    with Painter(simulation.world.m, (320, 180), "overview", subject, look) as painter:
         few, quality = painter.paint(shown), painter.replica.m.vis.quality
         assert (quality.numquads, quality.numstacks) == (1, 2)
         assert not painter.renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SKYBOX]
@@ -446,7 +461,7 @@ def test_the_ideal_world_has_no_picture(layout, tmp_path: Path) -> None:
     with LogWriter(tmp_path / "log", simulation) as log:
         simulation.run([log.observe])
     with pytest.raises(InputError, match="ideal world"):
-        render_log(read_log(tmp_path / "log"), tmp_path / "a.mp4")
+        render_log(read_log(tmp_path / "log"), Shot(tmp_path / "a.mp4"))
     assert not (tmp_path / "a.mp4").exists()
 
 

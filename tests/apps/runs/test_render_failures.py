@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from factory.apps.log import Log
 from factory.apps.log.model import model_of
 from factory.apps.monitor.record import recorded_subject
-from factory.apps.runs.pictures import moment_of
+from factory.apps.recovery.undo import marking_after, undo
 from factory.engine.mjcf.replica import Replica
 from factory.engine.record.failures import Death, Failing, deaths
-from factory.engine.record.subject import subject_of
+from factory.engine.record.subject import MonitorSubject
 from factory.film.caption import TOLD, Caption, draw_notices
 from factory.film.gantt_panel import GanttPanel
 from factory.film.history import History
@@ -23,8 +23,8 @@ from factory.film.ink import AMBER, DEAD, FLASH, Ink
 from factory.film.marks import Mark, Marks
 from factory.film.net_panel import NetPanel
 from factory.film.sheet import Rows
+from factory.film.shot import moment_of
 from factory.support.settings import Settings
-from factory.theory.nets.undo import marking_after, undo
 from factory.theory.nets.undone import Undone
 from tests.failing_runs import failing, paper_layout
 from tests.token_game import enabled, follower
@@ -83,7 +83,7 @@ def test_an_undo_left_out_would_be_noticed(log: Log) -> None:
 
 @pytest.fixture(scope="module")
 def subject():
-    return subject_of(paper_layout(), Settings())
+    return MonitorSubject.of(paper_layout(), Settings())
 
 
 @settings(max_examples=60, deadline=None)

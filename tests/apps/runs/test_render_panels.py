@@ -11,10 +11,11 @@ import pytest
 
 import factory
 from factory.apps.log import Log, LogWriter, read_log
+from factory.apps.log.model import model_of
 from factory.apps.monitor.record import recorded_subject
-from factory.apps.runs.pictures import moment_of, render_log, take_of
+from factory.apps.runs.pictures import render_log
 from factory.engine.record.state import State
-from factory.engine.record.subject import subject_of_run
+from factory.engine.record.subject import MonitorSubject
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.film import Film, Picture, Still, camera_named, panels_named
@@ -27,7 +28,7 @@ from factory.film.history import History, OperationProgress, depths, followed
 from factory.film.ink import GROUND, Ink, fitted, operation_colours, robot_colours, width
 from factory.film.net_panel import NetPanel
 from factory.film.picture import PANELS, shared
-from factory.film.reel import Poster
+from factory.film.reel import Completions, Poster
 from factory.film.sheet import (
     BOTTOM,
     CLOSE,
@@ -39,6 +40,7 @@ from factory.film.sheet import (
     Rows,
     neighbourhood,
 )
+from factory.film.shot import Shot, moment_of, recorded_take
 from factory.pipeline import all_templates
 from factory.support.errors import InputError
 from factory.theory.lang import read_pag
@@ -268,7 +270,7 @@ def test_the_product_followed_is_the_same_when_parts_become_one_body(tmp_path: P
     found = []
     for fuse in (False, True):
         simulation = Simulation(layout, RunRequest("mujoco", units=2, fuse=fuse))
-        followed = Followed(simulation.world.m, subject_of_run(simulation))
+        followed = Followed(simulation.world.m, MonitorSubject.of_run(simulation))
         track: list[np.ndarray] = []
 
         def look(state: State, d=simulation.world.d, followed=followed, track=track) -> None:
@@ -289,7 +291,7 @@ def test_the_product_followed_is_the_same_when_parts_become_one_body(tmp_path: P
 @pytest.mark.parametrize("fuse", [False, True])
 def test_a_part_is_followed_from_its_feeder_to_the_dropoff(fuse: bool) -> None:
     simulation = Simulation(laid_out("paper"), RunRequest("mujoco", units=2, fuse=fuse))
-    followed = Followed(simulation.world.m, subject_of_run(simulation), "part1")
+    followed = Followed(simulation.world.m, MonitorSubject.of_run(simulation), "part1")
     ranks, labels = [], []
 
     def look(state: State) -> None:
@@ -344,7 +346,7 @@ def test_areas_cover_the_picture_once(size, panels) -> None:
     for area in (scene, *areas.values()):
         covered[area.top : area.top + area.height, area.left : area.left + area.width] += 1
     assert (covered == 1).all() and list(areas) == list(panels)
-    assert 0.4 < scene.width * scene.height / (size[0] * size[1]) < 0.7
+    assert 0.4 < scene.width * scene.height / (size[0] * size[1]) <= 0.7
 
 
 def test_pictures_too_small_for_panels_are_refused() -> None:
@@ -367,6 +369,11 @@ def test_a_title_fades_and_then_leaves_the_picture_alone() -> None:
 def test_words_are_cut_to_fit() -> None:
     assert fitted("gearbox", 12, 1000) == "gearbox"
     assert fitted("gearbox/12", 12, 0.8 * width("gearbox/12", 12)).endswith("…/12")
+    one, other = (
+        fitted(f"axle_{end}", 12, 0.9 * width("axle_right", 12)) for end in ("left", "right")
+    )
+    assert one != other
+    assert fitted("subassembly12", 12, 60).endswith("…12")
     assert fitted("gearbox", 12, 5) == ""
     assert fitted("mount/2", 12, 0.65 * width("mount/2", 12)) == ""
     for label in ("mount", "mount/2", "front_axle", "cab"):
@@ -392,12 +399,13 @@ def test_ink_is_where_it_is_put_to_a_fraction_of_a_pixel() -> None:
 
 
 def test_the_poster_is_when_the_product_has_become_whole_and_most_is_there(paper: Log) -> None:
-    take = take_of(paper, Picture(SIZE))
-    poster = Poster(take, Path("poster.png"))
+    scene = model_of(paper), recorded_subject(paper.header)
+    take = recorded_take(paper, lambda: scene, Picture(SIZE))
+    poster, completions = Poster(take, Path("poster.png")), Completions(take)
     firings = list(zip(paper.fired_t.tolist(), paper.fired.tolist(), strict=True))
     for row in range(len(paper)):
         take.history.catch_up(paper.timed_entries, float(paper.time[row]))
-        poster.see(moment_of(paper, row))
+        poster.see(moment_of(paper, row), completions.since_last())
     root = take.subject.factory.by_label["sub3"]
     ends = [t for t, event in firings if event == root.end]
     assert isinstance(poster.moment, Moment)
@@ -419,10 +427,10 @@ def test_a_film_with_everything(tmp_path: Path) -> None:
     ):
         run = simulation.run([writer.observe, filming.observe])
     frames = iio.imread(film, plugin="pyav").astype(int)
-    assert frames.shape == (int(run.sim_time_s * 2 + 1e-6) + 3, 490, 560, 3)
+    assert frames.shape == (int(run.sim_time_s * 2 + 1e-6) + 7, 490, 560, 3)
     assert iio.imread(tmp_path / "p.png").shape == (490, 560, 3)
     again = tmp_path / "again.mp4"
-    render_log(read_log(log), again, picture, 2)
+    render_log(read_log(log), Shot(again, picture, 2))
     assert np.abs(frames - iio.imread(again, plugin="pyav")).max() <= 2
     panels = shared(size, PANELS)[1]
     for area in panels.values():

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from factory.apps.log import Log, LogWriter, read_log
-from factory.apps.runs.pictures import moment_of, take_of
+from factory.apps.log.model import model_of
+from factory.apps.monitor.record import recorded_subject
 from factory.engine.mjcf import names
 from factory.engine.mjcf.replica import Replica
 from factory.engine.simulation.request import RunRequest
@@ -16,6 +17,7 @@ from factory.film.camerawork import Take
 from factory.film.following import Viewpoint
 from factory.film.junction import handover_view
 from factory.film.picture import Picture, orbit, overview
+from factory.film.shot import moment_of, recorded_take
 from factory.floor.geometry.sight import Framing, View, fit, towards
 from factory.support.engine import mujoco
 from factory.theory.problem.pag import NOPART
@@ -38,7 +40,7 @@ def log(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 
 @pytest.fixture(scope="module")
 def take(log: Log) -> Take:
-    return take_of(log, Picture())
+    return recorded_take(log, lambda: (model_of(log), recorded_subject(log.header)), Picture())
 
 
 @pytest.fixture(scope="module")

@@ -12,14 +12,20 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
+from factory.api import (
+    Diagnostic,
+    GearNet,
+    InputError,
+    MarkedNet,
+    Position,
+    RunError,
+    Verdict,
+    read_bytes,
+)
 from factory.apps.exports.certificate.check import check_certificate
 from factory.apps.exports.certificate.listing import CLAIMS
 from factory.apps.exports.certificate.writer import certificate
-from factory.support.errors import Diagnostic, InputError, Position, RunError
-from factory.support.files import NET, read_bytes
-from factory.theory.nets.gears import GearNet
-from factory.theory.nets.marked import MarkedNet
-from factory.theory.nets.verdict import Verdict
+from factory.support.files import NET
 
 Json = dict[str, Any]
 

@@ -26,11 +26,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from factory.api import NONE, GearNet, MarkedNet, Verdict, marked, token_free
 from factory.apps.exports.certificate.listing import CLAIMS, SCHEMA, TRAIN, digest
-from factory.theory.nets.composition import Composition, compose, cover
-from factory.theory.nets.gears import GearNet
-from factory.theory.nets.marked import NONE, MarkedNet, marked, token_free
-from factory.theory.nets.verdict import Verdict
+from factory.apps.foreign_nets.behaviour import cover
+from factory.theory.nets.composition import Composition, compose
 
 Json = dict[str, Any]
 

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from factory.api import Diagnostic, InputError, MarkedNet, marked, mujoco, read_bytes, read_text
 from factory.apps.foreign_nets.pnml_reader import read_pnml
-from factory.support.engine import mujoco, unwarned
-from factory.support.errors import Diagnostic, InputError
-from factory.support.files import LARGE, NET, read_bytes
-from factory.theory.lang.source import read_text
-from factory.theory.nets.marked import MarkedNet, marked
+from factory.apps.log.content import LARGE
+from factory.support.engine import unwarned
+from factory.support.files import NET
 
 ENDINGS = ("xml", "coordinated.pnml", "ways.json", "clearance.json")
 """The ends of the names of the four files; the first is that of the model."""

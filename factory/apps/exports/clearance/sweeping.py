@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from factory.api import mujoco
 from factory.apps.exports.clearance.documents import MachineWay
 from factory.apps.exports.clearance.machines import Machines
-from factory.support.engine import mujoco
 
 Boxes = NDArray[np.float64]
 

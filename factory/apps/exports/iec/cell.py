@@ -9,16 +9,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from factory.api import Diagnostic, Factory, InputError, Layout, Settings
 from factory.apps.exports.iec import declarations as iec
 from factory.apps.exports.iec.robots import COMPLETED, RobotBlocks
 from factory.apps.exports.subject import Subject
 from factory.floor.layout.exclusions import coordinated
-from factory.floor.layout.layout import Layout
 from factory.floor.modes.modes import operation_modes
 from factory.floor.modes.staging import stages_of
-from factory.support.errors import Diagnostic, InputError
-from factory.support.settings import Settings
-from factory.theory.plant.factory import Factory
 
 SCAN = 10
 """Default period of the task [ms]."""

@@ -13,14 +13,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import ceil
 
+from factory.api import NOPART, Layout, Mode
 from factory.apps.exports.iec.declarations import OrganizationUnit, Variable, comment
-from factory.floor.layout.layout import Layout
 from factory.floor.modes.staging import HeadStart
-from factory.theory.control.mode import STILL, Mode
+from factory.theory.control.mode import STILL
 from factory.theory.nets.coordinated import Order
 from factory.theory.plant.programs import Program, ProgramStep, program_of
-from factory.theory.problem.ids import AxisId, TransitionId
-from factory.theory.problem.pag import NOPART
 
 WAIT, RUN, GRIP, LEAVE = range(4)
 """Phases of a step: it waits for the others; moves to the goal; opens or closes the grip and waits
@@ -158,7 +156,7 @@ class RobotBlocks:
         there = f"{over} OR Axes[{past.axis + 1}].Position {side}"
         return f"({count} > Unit + 1 OR {count} = Unit + 1 AND ({there}))"
 
-    def _completed(self, transition: TransitionId) -> str:
+    def _completed(self, transition: int) -> str:
         """How often a transition of the compiled net has fired."""
         operation = self.layout.factory.operation_of(transition)
         gear = self.layout.factory.robots[operation.carrier].operations
@@ -192,7 +190,7 @@ class RobotBlocks:
         factory, number = self.layout.factory, step.operation.index
         mode, axes = self.modes[number], factory.axes[number]
         for slot, axis in enumerate(axes):
-            if factory.robot_of(AxisId(axis)) != robot:
+            if factory.robot_of(axis) != robot:
                 continue
             target, goal = f"Axes[{axis + 1}].Target", float(mode.goals[slot])
             gate = int(mode.gate[slot]) if len(mode.gate) else -1

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
+from factory.api import Position
 from factory.apps.importing.draft import ImportFaults
-from factory.support.errors import Position
 from factory.theory.lang.source import Source, quoted
 from factory.theory.lang.words import number
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from factory.api import Array, Diagnostic
 from factory.apps.importing.draft import MATE, MOST_NODES, PART, DraftNode, ImportFaults, too_many
 from factory.apps.importing.ldraw.lines import (
     INHERITED,
@@ -30,8 +31,6 @@ from factory.apps.importing.ldraw.shapes import (
 )
 from factory.apps.importing.mesh_files import MeshStore
 from factory.apps.importing.part_maker import Placement
-from factory.floor.geometry.meshes import Array
-from factory.support.errors import Diagnostic
 from factory.theory.lang.source import quoted
 from factory.theory.problem.pag import Parameter
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from factory.api import Array, Diagnostic, read_text
 from factory.apps.importing.draft import ImportFaults
 from factory.apps.importing.ldraw.lines import (
     LDrawFile,
@@ -16,11 +17,8 @@ from factory.apps.importing.ldraw.lines import (
     key_of,
     read_lines,
 )
-from factory.apps.importing.mesh_files import first_file, path_inside
-from factory.floor.geometry.mesh_file import obj_of
-from factory.floor.geometry.meshes import Array
-from factory.support.errors import Diagnostic
-from factory.theory.lang.source import quoted, read_text, source_of
+from factory.apps.importing.mesh_files import first_file, obj_of, path_inside
+from factory.theory.lang.source import quoted, source_of
 
 ROOMS = ("parts", "p", "models", "unofficial/parts", "unofficial/p")
 """The folders of a library, in the order of the search."""

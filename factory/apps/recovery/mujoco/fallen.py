@@ -8,11 +8,11 @@ from math import ceil, sqrt
 
 import numpy as np
 
+from factory.api import MujocoWorld
+from factory.apps.recovery.sweeping import SweptFloor
 from factory.engine.mjcf.driving import GRAVITY
 from factory.engine.mjcf.masks import robot_code
-from factory.engine.simulation.mujoco.world import MujocoWorld
 from factory.floor.layout.bins import TOP, Bin
-from factory.floor.layout.sweeping import SweptFloor
 
 SETTLES = 0.5
 """So long after the last thing has been cleared away nothing shakes any more [s]."""

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from factory.api import MujocoWorld, Operation, mujoco
 from factory.apps.deviations.deviation import Deviation
 from factory.apps.recovery.mujoco.fallen import Fallen
 from factory.engine.mjcf.masks import robot_code
 from factory.engine.simulation.mujoco.pressing import PRESSED
-from factory.engine.simulation.mujoco.world import MujocoWorld
-from factory.support.engine import mujoco
-from factory.theory.plant.factory import Operation
 
 FAR = 1.0
 """Contact of what lies askew is counted to this depth, and presses on nothing [m]."""

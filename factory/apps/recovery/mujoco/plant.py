@@ -7,6 +7,7 @@ from math import radians
 
 import numpy as np
 
+from factory.api import NOPART, Array, Factory, Index, MujocoWorld, Operation
 from factory.apps.deviations.campaign import Campaign
 from factory.apps.deviations.deviation import Deviation
 from factory.apps.recovery.mujoco.fallen import Fallen
@@ -16,11 +17,7 @@ from factory.engine.mjcf.masks import robot_code
 from factory.engine.mjcf.weld_frames import WeldFrames
 from factory.engine.record.verdict import MOST
 from factory.engine.simulation.mujoco.holdings import Holdings
-from factory.engine.simulation.mujoco.world import MujocoWorld
 from factory.floor.layout.bins import Bin
-from factory.theory.control.mode import Array, Index
-from factory.theory.plant.factory import Factory, Operation
-from factory.theory.problem.pag import NOPART
 
 SCRAP = 1 << 20
 """Bodies that are scrap count for units from this one on."""

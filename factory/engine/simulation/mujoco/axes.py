@@ -11,8 +11,8 @@ from factory.engine.mjcf import names
 from factory.engine.mjcf.tools import gyration
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.way import Ways
+from factory.support.arrays import Array, Index, Truth
 from factory.support.engine import mujoco
-from factory.theory.control.mode import Array, Index, Truth
 from factory.theory.problem.robot_bodies import LIFT_JOINT
 
 

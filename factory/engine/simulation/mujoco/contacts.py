@@ -17,7 +17,7 @@ from factory.engine.mjcf.masks import loose_code, masks_of
 from factory.engine.mjcf.pads import trunks
 from factory.engine.simulation.mujoco.model_arrays import ModelArrays
 from factory.floor.geometry.fused_bodies import Inside
-from factory.theory.control.mode import Index, Truth
+from factory.support.arrays import Index, Truth
 
 SOFT = 0.02
 """Time constant of contacts of parts, the engine's own [s]."""

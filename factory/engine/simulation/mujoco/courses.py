@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from factory.engine.simulation.mujoco.drives import Drives
+from factory.support.arrays import Array, Index
 from factory.theory.control.governor import follow
-from factory.theory.control.mode import REST, ROUNDING, Array, Index
+from factory.theory.control.mode import REST, ROUNDING
 from factory.theory.control.navigation import Bundle
 from factory.theory.nets.coordinated import Past
 

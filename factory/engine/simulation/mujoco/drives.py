@@ -19,8 +19,8 @@ import numpy as np
 
 from factory.engine.simulation.mujoco.axes import Across
 from factory.engine.simulation.mujoco.model_arrays import ModelArrays
+from factory.support.arrays import Array, Index
 from factory.support.engine import mujoco
-from factory.theory.control.mode import Array, Index
 
 NO_AXES = np.empty(0, np.intp)
 

@@ -23,7 +23,7 @@ from factory.engine.simulation.mujoco.supply import Supply, TakenBack
 from factory.engine.simulation.mujoco.welds import Place, Welds
 from factory.floor.layout.exclusions import coordinated
 from factory.floor.layout.feeding import Outlet, lines_of, outlets_of
-from factory.theory.control.mode import Index
+from factory.support.arrays import Index
 from factory.theory.plant.factory import Operation
 
 

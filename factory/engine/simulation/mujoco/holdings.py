@@ -17,8 +17,8 @@ from factory.engine.mjcf.model import Model
 from factory.engine.mjcf.parts import parked_at
 from factory.engine.simulation.mujoco.welds import Welds
 from factory.floor.layout.feeding import outlets_of
+from factory.support.arrays import Index
 from factory.support.engine import mujoco
-from factory.theory.control.mode import Index
 
 NOTHING: Mapping[str, int] = MappingProxyType({})
 

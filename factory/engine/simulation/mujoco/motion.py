@@ -17,8 +17,8 @@ from factory.engine.simulation.mujoco.outfeed import Outfeed
 from factory.engine.simulation.mujoco.sleep import Sleep
 from factory.engine.simulation.mujoco.sliders import Sliders
 from factory.engine.simulation.mujoco.stepping import Stepping
+from factory.support.arrays import Array, Index
 from factory.support.engine import mujoco
-from factory.theory.control.mode import Array, Index
 from factory.theory.control.navigation import Bundle
 
 

@@ -13,9 +13,9 @@ from factory.engine.simulation.mujoco.courses import AHEAD, Course, Follower, Mo
 from factory.engine.simulation.mujoco.drives import Drives
 from factory.floor.layout.dimensions import BEHIND, PLAY
 from factory.floor.layout.outfeed import NEAR, tray_profile
+from factory.support.arrays import Array
 from factory.support.engine import mujoco
 from factory.theory.control.governor import towards
-from factory.theory.control.mode import Array
 
 WEIGHT = np.array([0.0, SHUTTER_MASS * GRAVITY])
 """What the drives of tray and shutter carry [N]."""

@@ -13,8 +13,9 @@ from factory.engine.simulation.mujoco.axes import Axes
 from factory.engine.simulation.request import RunRequest
 from factory.floor.layout.coordinating import HOME
 from factory.floor.layout.feeding import Outlet, outlets_of, passing
+from factory.support.arrays import Array, Index, Truth
 from factory.support.engine import mujoco
-from factory.theory.control.mode import STILL, Array, Index, Truth
+from factory.theory.control.mode import STILL
 from factory.theory.control.profile import SpeedProfile
 from factory.theory.plant.factory import Factory, Operation
 from factory.theory.problem.pag import NOPART

@@ -11,8 +11,8 @@ import numpy as np
 from factory.engine.mjcf.masks import NOBODY, masks_of
 from factory.engine.mjcf.pads import trunks
 from factory.engine.mjcf.replica import Replica
+from factory.support.arrays import Array, Index
 from factory.support.engine import mujoco
-from factory.theory.control.mode import Array, Index
 
 PROBE = 1 << 28
 """The code of a holder that no factory has."""

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from factory.engine.simulation.mujoco.model_arrays import ModelArrays
+from factory.support.arrays import Index
 from factory.support.engine import mujoco
-from factory.theory.control.mode import Index
 
 MAY_SLEEP, STAYS_AWAKE = (
     int(getattr(mujoco.mjtSleepPolicy, f"mjSLEEP_{name}")) for name in ("ALLOWED", "NEVER")

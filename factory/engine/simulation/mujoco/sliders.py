@@ -20,10 +20,10 @@ from factory.engine.simulation.mujoco.model_arrays import ModelArrays
 from factory.engine.simulation.mujoco.sleep import Sleep
 from factory.engine.timing.timing import CALM
 from factory.floor.layout.feeding import outlets_of
+from factory.support.arrays import Array, Index
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
 from factory.theory.control.governor import towards
-from factory.theory.control.mode import Array, Index
 
 ROUNDED = 0.01
 """What is due so much of a tick later is due."""

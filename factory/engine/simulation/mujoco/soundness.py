@@ -25,9 +25,9 @@ from factory.engine.simulation.mujoco.model_arrays import ModelArrays
 from factory.engine.simulation.mujoco.probing import untouched
 from factory.floor.layout.feeding import lines_of
 from factory.floor.layout.hands.limbs import limbs
+from factory.support.arrays import Array, Index
 from factory.support.engine import mujoco
 from factory.support.errors import Diagnostic
-from factory.theory.control.mode import Array, Index
 
 NAMED = 3
 """So many are named of those that share a fault."""

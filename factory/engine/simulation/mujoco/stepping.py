@@ -9,9 +9,9 @@ from typing import Protocol
 from factory.engine.simulation.mujoco.courses import Course
 from factory.engine.simulation.mujoco.inspection import Inspection
 from factory.engine.simulation.world import Hooks
+from factory.support.arrays import Index
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
-from factory.theory.control.mode import Index
 
 
 class Stepping(Protocol):

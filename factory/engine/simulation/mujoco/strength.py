@@ -19,9 +19,9 @@ from factory.engine.simulation.world import Drop
 from factory.floor.layout.hands.gauges import gauge, middle
 from factory.floor.layout.hands.hand import Hand
 from factory.floor.layout.hands.tips import TERMS, shares
+from factory.support.arrays import Array, Index
 from factory.support.engine import mujoco
 from factory.support.errors import Diagnostic
-from factory.theory.control.mode import Array, Index
 
 OFTEN = 0.09
 """Hands are not measured more often than once in this time [s]: a robot gains and loses its speed

@@ -14,8 +14,8 @@ from factory.engine.simulation.mujoco.contacts import ContactMasks
 from factory.engine.simulation.mujoco.fusing import rotations
 from factory.engine.simulation.mujoco.model_arrays import ModelArrays
 from factory.engine.simulation.mujoco.sleep import Sleep
+from factory.support.arrays import Array, Index
 from factory.support.engine import mujoco
-from factory.theory.control.mode import Array, Index
 
 Place = tuple[float, float, float]
 

@@ -28,8 +28,8 @@ from factory.engine.simulation.mujoco.soundness import Soundness
 from factory.engine.simulation.mujoco.stepping import SingleSteps
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.world import Drop, Hooks, Job
+from factory.support.arrays import Array, Index
 from factory.support.engine import by_name, mujoco
-from factory.theory.control.mode import Array, Index
 from factory.theory.control.navigation import Bundle
 from factory.theory.nets.coordinated import Past
 from factory.theory.plant.demand import Word

@@ -6,14 +6,13 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array
 from factory.floor.layout.dimensions import FINGER, FINGER_TOP, PAYLOAD
 from factory.floor.layout.hands.hand import BEAM, Hand, Kind
 from factory.floor.layout.hands.holding import Holding
 from factory.floor.layout.hands.places import Places
 from factory.floor.layout.hands.reach import back, halves, reach
 from factory.floor.layout.hands.surfaces import Way, swept
-from factory.theory.control.mode import Truth
+from factory.support.arrays import Array, Truth
 from factory.theory.problem.pag import NOPART
 from factory.theory.problem.robot_bodies import MAST
 

@@ -10,11 +10,10 @@ from itertools import product as pairs
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array
 from factory.floor.layout.hands.hand import Point3
 from factory.floor.layout.hands.places import Places
 from factory.floor.layout.hands.tips import STRONG, TipName
-from factory.theory.control.mode import Index, Truth
+from factory.support.arrays import Array, Index, Truth
 
 ENOUGH = 0.85
 """A hand holds well if no more than this share of its strength is used."""

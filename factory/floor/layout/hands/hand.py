@@ -13,9 +13,9 @@ from typing import Literal
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array
 from factory.floor.layout.dimensions import FINGER
 from factory.floor.layout.hands.tips import TipName
+from factory.support.arrays import Array
 
 Point3 = tuple[float, float, float]
 

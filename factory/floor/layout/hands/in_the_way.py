@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array
 from factory.floor.layout.dimensions import SLOT
 from factory.floor.layout.hands.apart import BESIDE, HandsApart, Swept
 from factory.floor.layout.hands.hand import Hand, Kind
@@ -20,7 +19,7 @@ from factory.floor.layout.hands.reach import back, halves, reach, under_beam
 from factory.floor.layout.hands.surfaces import TOUCH, Way, hit, retreat, swept
 from factory.floor.layout.hands.tips import STRONG
 from factory.floor.layout.presence import ACROSS, ALONG
-from factory.theory.control.mode import Truth
+from factory.support.arrays import Array, Truth
 from factory.theory.plant.factory import Operation
 from factory.theory.problem.pag import NOPART
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array
 from factory.floor.layout.hands.hand import Kind, Point3
 from factory.floor.layout.hands.surfaces import Way
+from factory.support.arrays import Array
 from factory.support.errors import Diagnostic, Position
 
 THERE = {

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array
 from factory.floor.layout.hands.apart import Swept
 from factory.floor.layout.hands.choosing import Hands
 from factory.floor.layout.hands.hand import Kind
@@ -18,7 +17,7 @@ from factory.floor.layout.hands.misses import Miss, NoGrip, Obstacle
 from factory.floor.layout.hands.places import Places
 from factory.floor.layout.hands.surfaces import Way, hit, near
 from factory.floor.layout.hands.tips import STRONG
-from factory.theory.control.mode import Index, Truth
+from factory.support.arrays import Array, Index, Truth
 
 Frames = tuple[tuple[Way, Way], ...]
 """How a robot may lie: along u, to a carrier that lies along t."""

@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array
 from factory.floor.layout.dimensions import FINGER
 from factory.floor.layout.hands.apart import BESIDE
 from factory.floor.layout.hands.groups import (
@@ -36,7 +35,7 @@ from factory.floor.layout.hands.places import Places, centre_of, strain_of_two
 from factory.floor.layout.hands.reach import halves
 from factory.floor.layout.hands.surfaces import Way
 from factory.floor.layout.hands.tips import TipName, tip
-from factory.theory.control.mode import Truth
+from factory.support.arrays import Array, Truth
 from factory.theory.problem.pag import NOPART
 
 LEVEL = 5e-5

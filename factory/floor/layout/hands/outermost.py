@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array
 from factory.floor.layout.hands.surfaces import FLAT, Body, blocks
+from factory.support.arrays import Array
 
 SAME = 1e-6
 """What reaches no further out by this is not looked at [m]."""

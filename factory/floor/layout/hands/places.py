@@ -8,13 +8,12 @@ from math import floor, log10, pi
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.solids import Product
 from factory.floor.layout.hands.hand import Kind, Point3
 from factory.floor.layout.hands.outermost import outermost
 from factory.floor.layout.hands.surfaces import Surfaces
 from factory.floor.layout.hands.tips import Tip, shares, tip
-from factory.theory.control.mode import Index, Truth
+from factory.support.arrays import Array, Index, Truth
 
 RADII = (0.02, 0.014, 0.01, 0.007, 0.005, 0.0035, 0.0025, 0.0016, 0.001)
 """Radii of pads [m]."""

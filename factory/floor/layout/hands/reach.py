@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array
 from factory.floor.geometry.solids import Product
 from factory.floor.layout.dimensions import FINGER
 from factory.floor.layout.hands.hand import AIR, BEAM, Kind, widths
 from factory.floor.layout.hands.surfaces import Way
+from factory.support.arrays import Array
 
 APART = 2e-4
 """A hand is so far from all parts beside it [m]: they come and go with that play."""

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from factory.floor.geometry.meshes import Array
+from factory.support.arrays import Array
 from factory.support.errors import Diagnostic, InputError, Position
 from factory.support.resources import mjcf_folder
 

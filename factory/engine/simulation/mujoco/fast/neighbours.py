@@ -17,8 +17,8 @@ from factory.engine.mjcf.weld_frames import held_at
 from factory.engine.simulation.mujoco.axes import Axes
 from factory.engine.simulation.mujoco.contacts import ContactMasks
 from factory.engine.simulation.mujoco.parts import Parts
+from factory.support.arrays import Array, Index, Truth
 from factory.support.engine import mujoco
-from factory.theory.control.mode import Array, Index, Truth
 
 MARGIN = 5e-3
 """Nothing is further from its way than this, or from its place in the hand, unless it is touched

@@ -16,9 +16,9 @@ from factory.engine.simulation.mujoco.fast.neighbours import Neighbours
 from factory.engine.simulation.mujoco.inspection import Inspection
 from factory.engine.simulation.mujoco.stepping import SingleSteps
 from factory.engine.simulation.world import Hooks
+from factory.support.arrays import Index
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
-from factory.theory.control.mode import Index
 
 ROOM = 15_000_000
 """So many numbers of courses are kept, of 8 bytes each: twice those of the cycles of 1,000

@@ -1,0 +1,195 @@
+"""The interface of the core: the names that apps, exporters and other packages import.
+
+Each is documented where it is defined. A name loads its module when it is imported from here, and
+nothing else: `import factory.api` loads neither numpy nor the engine.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from factory.engine.mjcf import names as names
+    from factory.engine.mjcf.model import Model as Model
+    from factory.engine.mjcf.parts import HIDDEN as HIDDEN
+    from factory.engine.mjcf.replica import Geoms as Geoms
+    from factory.engine.mjcf.replica import Replica as Replica
+    from factory.engine.record.ending import CutOff as CutOff
+    from factory.engine.record.failures import Failing as Failing
+    from factory.engine.record.failures import Failures as Failures
+    from factory.engine.record.findings import Report as Report
+    from factory.engine.record.state import Event as Event
+    from factory.engine.record.state import Observation as Observation
+    from factory.engine.record.state import Observer as Observer
+    from factory.engine.record.state import Recordable as Recordable
+    from factory.engine.record.state import Recorder as Recorder
+    from factory.engine.record.state import State as State
+    from factory.engine.record.subject import MonitorSubject as MonitorSubject
+    from factory.engine.record.verdict import RunVerdict as RunVerdict
+    from factory.engine.simulation.modelling import physical_model as physical_model
+    from factory.engine.simulation.mujoco.world import MujocoWorld as MujocoWorld
+    from factory.engine.simulation.request import RunRequest as RunRequest
+    from factory.engine.simulation.run import Run as Run
+    from factory.engine.simulation.run import steady_from as steady_from
+    from factory.engine.simulation.simulation import Simulation as Simulation
+    from factory.engine.simulation.world import World as World
+    from factory.engine.timing.timed import pace as pace
+    from factory.engine.timing.timing import Timing as Timing
+    from factory.film.film import Film as Film
+    from factory.film.picture import Picture as Picture
+    from factory.film.shot import Shot as Shot
+    from factory.floor.geometry.meshes import Mesh as Mesh
+    from factory.floor.geometry.solids import Product as Product
+    from factory.floor.geometry.solids import Solid as Solid
+    from factory.floor.geometry.solids import rotation as rotation
+    from factory.floor.layout.certificate import Certificate as Certificate
+    from factory.floor.layout.clearance import certify as certify
+    from factory.floor.layout.dimensions import Clearance as Clearance
+    from factory.floor.layout.durations import Pace as Pace
+    from factory.floor.layout.embedding import certified as certified
+    from factory.floor.layout.guidepath import Guidepath as Guidepath
+    from factory.floor.layout.guidepath import Point2 as Point2
+    from factory.floor.layout.hands.choosing import Hands as Hands
+    from factory.floor.layout.hands.hand import Hand as Hand
+    from factory.floor.layout.layout import Layout as Layout
+    from factory.floor.layout.request import Ground as Ground
+    from factory.floor.layout.shapes import payload_boxes as payload_boxes
+    from factory.pipeline import Project as Project
+    from factory.support.apps import App as App
+    from factory.support.arrays import Array as Array
+    from factory.support.arrays import Index as Index
+    from factory.support.arrays import Indices as Indices
+    from factory.support.bounds import Allowance as Allowance
+    from factory.support.collector import collector_paused as collector_paused
+    from factory.support.engine import mujoco as mujoco
+    from factory.support.errors import Diagnostic as Diagnostic
+    from factory.support.errors import FactoryError as FactoryError
+    from factory.support.errors import InputError as InputError
+    from factory.support.errors import MissingError as MissingError
+    from factory.support.errors import Position as Position
+    from factory.support.errors import RunError as RunError
+    from factory.support.errors import did_you_mean as did_you_mean
+    from factory.support.errors import usage_error as usage_error
+    from factory.support.files import read_bytes as read_bytes
+    from factory.support.files import write_all as write_all
+    from factory.support.settings import Settings as Settings
+    from factory.support.tables import misfit as misfit
+    from factory.support.tables import table_of as table_of
+    from factory.support.tables import value_of as value_of
+    from factory.support.version import optional as optional
+    from factory.theory.control.mode import Limits as Limits
+    from factory.theory.control.mode import Mode as Mode
+    from factory.theory.lang.pag_reader import load_pag as load_pag
+    from factory.theory.lang.source import read_text as read_text
+    from factory.theory.lang.writer import write_pag as write_pag
+    from factory.theory.nets.gears import GearNet as GearNet
+    from factory.theory.nets.marked import NONE as NONE
+    from factory.theory.nets.marked import MarkedNet as MarkedNet
+    from factory.theory.nets.marked import marked as marked
+    from factory.theory.nets.marked import token_free as token_free
+    from factory.theory.nets.petri import Marking as Marking
+    from factory.theory.nets.petri import PetriNet as PetriNet
+    from factory.theory.nets.petri import Place as Place
+    from factory.theory.nets.petri import Transition as Transition
+    from factory.theory.nets.undone import Entry as Entry
+    from factory.theory.nets.undone import Undone as Undone
+    from factory.theory.nets.verdict import Verdict as Verdict
+    from factory.theory.nets.verdict import listing as listing
+    from factory.theory.nets.verify import verify as verify
+    from factory.theory.plant.demand import Demand as Demand
+    from factory.theory.plant.factory import Factory as Factory
+    from factory.theory.plant.factory import Operation as Operation
+    from factory.theory.plant.robot import Robot as Robot
+    from factory.theory.problem.ids import PlaceId as PlaceId
+    from factory.theory.problem.ids import TransitionId as TransitionId
+    from factory.theory.problem.pag import NOPART as NOPART
+    from factory.theory.problem.pag import PAG as PAG
+    from factory.theory.problem.pag import Assembly as Assembly
+    from factory.theory.problem.plan import Plan as Plan
+    from factory.theory.problem.robot_types import Catalogue as Catalogue
+    from factory.theory.problem.robot_types import load_catalogue as load_catalogue
+    from factory.theory.problem.template import Template as Template
+
+HOMES = {
+    "support.errors": "Diagnostic FactoryError InputError MissingError Position RunError "
+    "did_you_mean usage_error",
+    "support.settings": "Settings",
+    "support.arrays": "Array Index Indices",
+    "support.bounds": "Allowance",
+    "support.collector": "collector_paused",
+    "support.engine": "mujoco",
+    "support.files": "read_bytes write_all",
+    "support.tables": "misfit table_of value_of",
+    "support.version": "optional",
+    "support.apps": "App",
+    "theory.problem.ids": "PlaceId TransitionId",
+    "theory.problem.pag": "NOPART PAG Assembly",
+    "theory.problem.plan": "Plan",
+    "theory.problem.robot_types": "Catalogue load_catalogue",
+    "theory.problem.template": "Template",
+    "theory.lang.pag_reader": "load_pag",
+    "theory.lang.source": "read_text",
+    "theory.lang.writer": "write_pag",
+    "theory.nets.gears": "GearNet",
+    "theory.nets.marked": "NONE MarkedNet marked token_free",
+    "theory.nets.petri": "Marking PetriNet Place Transition",
+    "theory.nets.undone": "Entry Undone",
+    "theory.nets.verdict": "Verdict listing",
+    "theory.nets.verify": "verify",
+    "theory.control.mode": "Limits Mode",
+    "theory.plant.demand": "Demand",
+    "theory.plant.factory": "Factory Operation",
+    "theory.plant.robot": "Robot",
+    "floor.geometry.meshes": "Mesh",
+    "floor.geometry.solids": "Product Solid rotation",
+    "floor.layout.certificate": "Certificate",
+    "floor.layout.clearance": "certify",
+    "floor.layout.dimensions": "Clearance",
+    "floor.layout.durations": "Pace",
+    "floor.layout.embedding": "certified",
+    "floor.layout.guidepath": "Guidepath Point2",
+    "floor.layout.hands.choosing": "Hands",
+    "floor.layout.hands.hand": "Hand",
+    "floor.layout.layout": "Layout",
+    "floor.layout.request": "Ground",
+    "floor.layout.shapes": "payload_boxes",
+    "engine.mjcf": "names",
+    "engine.mjcf.model": "Model",
+    "engine.mjcf.parts": "HIDDEN",
+    "engine.mjcf.replica": "Geoms Replica",
+    "engine.timing.timed": "pace",
+    "engine.timing.timing": "Timing",
+    "engine.record.ending": "CutOff",
+    "engine.record.failures": "Failing Failures",
+    "engine.record.findings": "Report",
+    "engine.record.state": "Event Observation Observer Recordable Recorder State",
+    "engine.record.subject": "MonitorSubject",
+    "engine.record.verdict": "RunVerdict",
+    "engine.simulation.modelling": "physical_model",
+    "engine.simulation.mujoco.world": "MujocoWorld",
+    "engine.simulation.request": "RunRequest",
+    "engine.simulation.run": "Run steady_from",
+    "engine.simulation.simulation": "Simulation",
+    "engine.simulation.world": "World",
+    "film.film": "Film",
+    "film.picture": "Picture",
+    "film.shot": "Shot",
+    "pipeline": "Project",
+}
+"""The names by the modules that define them, in the order of the house."""
+
+_HOME = {name: home for home, names in HOMES.items() for name in names.split()}
+
+__all__ = sorted(_HOME)
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> object:
+        """The object of a name, from its home; a module where the home has one of this name."""
+        if name not in _HOME:
+            raise AttributeError(f"module 'factory.api' has no attribute '{name}'")
+        home = import_module(f"factory.{_HOME[name]}")
+        if not hasattr(home, name):
+            return import_module(f"{home.__name__}.{name}")
+        return getattr(home, name)

@@ -1,0 +1,1 @@
+"""Drawings and pages that other apps make: SVG and its paper."""

@@ -1,0 +1,177 @@
+"""Folds"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
+
+from factory.api import (
+    NOPART,
+    Catalogue,
+    Diagnostic,
+    Factory,
+    InputError,
+    Plan,
+    Position,
+    did_you_mean,
+)
+from factory.theory.compiler.assigning import with_crew
+from factory.theory.compiler.folding import Line, begun_by, kind_of, line_of, sides_at, sides_of
+from factory.theory.problem.plan import NOBODY
+
+
+def fold(factory: Factory, lines: Iterable[Line], catalogue: Catalogue) -> Plan:
+    """The plan with one robot for each of the `lines`, and for each robot on no line. Raises
+    InputError (BadLine) with every reason why the lines are not a fold."""
+    shared = [line for line in lines if len(line) > 1]
+    faults = [fault for line in shared for fault in line_faults(factory, line, shared, catalogue)]
+    if faults:
+        raise InputError(faults)
+    if shared:
+        shared += _tool_lines(factory, shared)
+    return factory.plan.then([_turn(factory, shared)])
+
+
+def folded(factory: Factory, lines: Iterable[Line], catalogue: Catalogue) -> Factory:
+    """The factory with one robot for each of the `lines` of a fold, which is not checked, and for
+    each robot on no line."""
+    return with_crew(factory, [_turn(factory, lines)], catalogue)
+
+
+def _turn(factory: Factory, lines: Iterable[Line]) -> list[int]:
+    """For each robot of the factory the one robot of its line."""
+    on = line_of(len(factory.robots), lines)
+    number = {head: n for n, head in enumerate(sorted({*on}))}
+    return [number[head] for head in on]
+
+
+def _tool_lines(factory: Factory, lines: Sequence[Line]) -> list[Line]:
+    """The tools that share a robot: those of one kind that come to one line, opposite to robots
+    that come from the same sides."""
+    on = line_of(len(factory.robots), lines)
+    groups: dict[tuple[object, ...], list[int]] = {}
+    for robot in factory.robots[1:]:
+        kind = kind_of(factory, robot.index)
+        if kind[0] == "tool":
+            last = factory.last(robot.index)
+            sides = [frozenset(sides_at(last, r)) for r in last.robots if r != last.carrier]
+            key = on[last.carrier], kind, *sides
+            groups.setdefault(key, []).append(robot.index)
+    return [tuple(tools) for tools in groups.values() if len(tools) > 1]
+
+
+def count_of(factory: Factory, lines: Sequence[Line]) -> int:
+    """Number of robots of a factory that is folded by these lines."""
+    shared = [line for line in lines if len(line) > 1]
+    shared += _tool_lines(factory, shared) if shared else []
+    return len(factory.robots) - sum(len(line) - 1 for line in shared)
+
+
+def lines_of(plan: Plan) -> tuple[Line, ...]:
+    """The lines of a plan: the tours of each robot that has several, by the first turn in which
+    they are done."""
+    on: dict[int, list[int]] = {}
+    for tour, robots in enumerate(zip(*plan.turns, strict=True)):
+        on.setdefault(next(r for r in robots if r != NOBODY), []).append(tour)
+    return tuple(tuple(tours) for tours in on.values() if len(tours) > 1)
+
+
+def lines_of_labels(factory: Factory, sides: Iterable[Sequence[str]]) -> tuple[Line, ...]:
+    """Lines given by the labels that their robots bring. Raises InputError (BadLine) for a label
+    that no robot brings, or that is on two lines."""
+    brings = {
+        factory.by_label[label].written: robot
+        for o in factory.making
+        for robot, label in zip(o.robots, o.before, strict=True)
+        if label != NOPART and robot != o.carrier
+    }
+    faults, lines, seen = list[Diagnostic](), list[Line](), set[str]()
+    for labels in sides:
+        for label in labels:
+            if label not in brings:
+                message = f"no robot brings '{label}' to another"
+                faults.append(_fault(message, hint=did_you_mean(label, list(brings), "labels")))
+            elif label in seen:
+                message = f"'{label}' is on two lines"
+                faults.append(_fault(message, hint="name each label once"))
+            seen.add(label)
+        lines.append(tuple(sorted({brings[label] for label in labels if label in brings})))
+    if faults:
+        raise InputError(faults)
+    return tuple(lines)
+
+
+def line_faults(
+    factory: Factory, line: Line, lines: Sequence[Line], catalogue: Catalogue
+) -> Iterator[Diagnostic]:
+    """The reasons why tours cannot be on one line, pair by pair with its first tour."""
+    on = line_of(len(factory.robots), lines)
+    first, *others = line
+    for other in others:
+        message = mismatch(factory, first, other, on, catalogue)
+        if message:
+            names = f"{_named(factory, first)} and {_named(factory, other)} cannot share a robot"
+            position = factory.robots[other].position
+            yield _fault(f"{names}: {message}", position=position)
+    deliveries = [tour[-1] for robot in line for tour in factory.tours[robot]]
+    if not set.intersection(*(sides_of(factory, robot) for robot in line)):
+        message = f"{_named(factory, first)} and others cannot all come from one side"
+        yield _fault(message, position=factory.robots[first].position)
+    begun = {frozenset(on[guest] for guest in begun_by(factory, robot)) for robot in line}
+    if len(begun) > 1:
+        message = f"what {_named(factory, first)} and others begin with comes on different lines"
+        yield _fault(message, position=factory.robots[first].position)
+    if len(set(deliveries)) < len(deliveries):
+        both = next(n for n in deliveries if deliveries.count(n) > 1)
+        message = f"'{factory.operations[both].written}' needs two inputs of one robot at once"
+        yield _fault(message, position=factory.operations[both].position)
+
+
+def kept_apart(factory: Factory, lines: Sequence[Line], catalogue: Catalogue) -> Iterator[str]:
+    """The reasons why lines that deliver to one robot cannot become one, for each two consecutive
+    ones that are not needed at once. Lines are named by the labels of their first tours."""
+    on = line_of(len(factory.robots), lines)
+    heads: dict[int, list[int]] = {}
+    for robot in dict.fromkeys(line for line in on if line):
+        if kind_of(factory, robot)[0] != "tool":
+            heads.setdefault(on[factory.last(robot).carrier], []).append(robot)
+    for one, other in (pair for group in heads.values() for pair in pairwise(group)):
+        tours = [robot for robot in range(len(on)) if on[robot] in (one, other)]
+        if len({factory.last(robot).index for robot in tours}) < len(tours):
+            continue
+        message = mismatch(factory, one, other, on, catalogue)
+        if not message and not set.intersection(*(sides_of(factory, r) for r in tours)):
+            message = "they cannot come from one side"
+        if message:
+            both = f"{_named(factory, one)} and {_named(factory, other)}"
+            yield f"{both} cannot share a robot: {message}"
+
+
+def mismatch(
+    factory: Factory, one: int, other: int, on: Sequence[int], catalogue: Catalogue
+) -> str:
+    """The reason why two tours, given by their robots, cannot be on one line, "" if they can; `on`:
+    the lines of all tours."""
+    ends = factory.last(one), factory.last(other)
+    if 0 in (one, other):
+        return "the output robot has a line of its own"
+    if on[ends[0].carrier] != on[ends[1].carrier]:
+        return "they deliver to different robots"
+    if catalogue.meet(factory.robots[one].type, factory.robots[other].type) is None:
+        return "no robot type fits both"
+    if kind_of(factory, one) != kind_of(factory, other):
+        return "they begin or end in different ways"
+    return ""
+
+
+def _named(factory: Factory, robot: int) -> str:
+    last = factory.last(robot)
+    label = last.before[last.robots.index(robot)]
+    if label == NOPART:
+        return f"the tool of '{last.written}'"
+    return f"'{factory.by_label[label].written}'"
+
+
+def _fault(message: str, position: Position | None = None, hint: str = "") -> Diagnostic:
+    hint = hint or "a line has labels that come to one carrier, from one side, by one kind of robot"
+    return Diagnostic("BadLine", message, position, hint)

@@ -1,0 +1,167 @@
+"""Addresses in the engine's model of robots, copies of parts, welds and their frames, from the
+names in the model and its kinematic tree."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from factory.api import Array, Factory, Index, names
+from factory.engine.mjcf.weld_frames import HINGE, SLIDE, WeldFrames
+from factory.floor.layout.way import Ways
+
+if TYPE_CHECKING:
+    from factory.api import mujoco
+
+PARK, FEED, GRIP, HOLD = range(4)
+
+
+KINDS = {"park": PARK, "feed": FEED, "grip": GRIP, "hold": HOLD}
+"""What holds a part, by the first word of a weld's name: its parking place, its feeder, a robot,
+the outfeed's tray."""
+
+Bent = tuple[tuple[int, ...], Ways]
+"""The robots (index) whose guidepaths have bends, and the ways that these are."""
+
+Holder = tuple[int, int]
+"""Kind and, for a grip, the robot's index; -1 for others."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class BentWays:
+    """The `ways` of the `robots` (b,) whose guidepaths have bends, and the addresses (b, 2) of the
+    positions, speeds and setpoints of their two slides."""
+
+    robots: Index
+    ways: Ways
+    slides: Index
+    dofs: Index
+    drives: Index
+
+    @classmethod
+    def of(cls, m: Any, called: list[str], bent: Bent) -> BentWays:
+        """Those of robots `called` in a model. Raises KeyError where it lacks them."""
+        robots, ways = bent
+        named = [called[robot] for robot in robots]
+        pairs = [
+            [m.joint(name).id for name in (names.slide(r), names.slide_across(r))] for r in named
+        ]
+        joints = np.array(pairs, np.intp).reshape(-1, 2)
+        acts = [
+            [m.actuator(name).id for name in (names.drive(r), names.drive_across(r))] for r in named
+        ]
+        drives = np.array(acts, np.intp).reshape(-1, 2)
+        return cls(
+            np.array(robots, np.intp),
+            ways,
+            np.asarray(m.jnt_qposadr[joints], np.intp),
+            np.asarray(m.jnt_dofadr[joints], np.intp),
+            np.asarray(m.actuator_ctrladr[drives], np.intp),
+        )
+
+    def along(self, qpos: Array, qvel: Array) -> tuple[Array, Array]:
+        """Their arc lengths [m] and speeds [m/s]."""
+        x, first = self.ways.nearest(qpos[self.slides])
+        return x, (qvel[self.dofs] * first).sum(axis=-1) / (first**2).sum(axis=-1)
+
+    def reached(self, ctrl: Array) -> Array:
+        """The arc lengths [m] of their setpoints."""
+        return self.ways.nearest(ctrl[self.drives])[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Anatomy:
+    """Addresses in the engine's arrays.
+
+    Robots (R,): `slide`, `dof` and `drive`, of their position, speed and setpoint. Actuators (A,):
+    `joint`, `setpoint`, and `owner`, a robot's index or -1 for the outfeed. Copies of parts (C,):
+    `copies`, their names, `label`, and `body` in qpos; `copy_of` (nbody,): the copy that a body is,
+    or -1. Constraints (E,): `holder`, None for one that holds no part, `part`, its label, and
+    `frames`, the place of the part. `bent`: the guidepaths with bends.
+    """
+
+    slide: Index = field(repr=False)
+    dof: Index = field(repr=False)
+    drive: Index = field(repr=False)
+    joint: Index = field(repr=False)
+    setpoint: Index = field(repr=False)
+    owner: tuple[int, ...] = field(repr=False)
+    copies: tuple[str, ...] = field(repr=False)
+    label: tuple[str, ...] = field(repr=False)
+    body: Index = field(repr=False)
+    copy_of: Index = field(repr=False)
+    holder: tuple[Holder | None, ...] = field(repr=False)
+    part: tuple[str, ...] = field(repr=False)
+    frames: WeldFrames = field(repr=False)
+    bent: BentWays = field(repr=False)
+
+    @classmethod
+    def of(cls, m: Any, factory: Factory, bent: Bent) -> Anatomy:
+        """The anatomy of a model of a factory, some of whose guidepaths are `bent`. Raises
+        ValueError where the model is not of that factory."""
+        from factory.api import mujoco
+
+        robots = {r.name: r.index for r in factory.robots}
+        try:
+            slide = [m.joint(names.first_axis(r)).id for r in factory.robots]
+            drive = [m.actuator(names.drive(r)).id for r in robots]
+            ways = BentWays.of(m, [*robots], bent)
+        except KeyError as error:
+            raise ValueError(f"the model is not of this factory: {error}") from error
+        actuators = range(len(m.actuator_ctrladr))
+        driven = np.array([m.actuator_trnid[a, 0] for a in actuators], np.intp)
+        owners = (m.actuator(a).name.partition("/")[0] for a in actuators)
+        bodies = [b for b in range(m.nbody) if names.kind(m.body(b).name) == "part"]
+        copy_of = np.full(m.nbody, -1, np.intp)
+        copy_of[bodies] = np.arange(len(bodies))
+        called = [m.body(b).name for b in bodies]
+        welds = [m.equality(e).name.split("/", 2) for e in range(m.neq)]
+        check_holders(m, np.flatnonzero([words[0] in KINDS for words in welds]))
+        d = mujoco.MjData(m)
+        mujoco.mj_kinematics(m, d)
+        return cls(
+            np.asarray(m.jnt_qposadr[slide], np.intp),
+            np.asarray(m.jnt_dofadr[slide], np.intp),
+            np.asarray(m.actuator_ctrladr[drive], np.intp),
+            np.asarray(m.jnt_qposadr[driven], np.intp),
+            np.asarray(m.actuator_ctrladr, np.intp),
+            tuple(robots.get(name, -1) for name in owners),
+            tuple(name.partition("/")[2] for name in called),
+            tuple(names.label_of(name) for name in called),
+            np.asarray(m.jnt_qposadr[m.body_jntadr[bodies]], np.intp),
+            copy_of,
+            tuple(_holder(words, robots) for words in welds),
+            tuple(_part(words) for words in welds),
+            WeldFrames.of(m, d),
+            ways,
+        )
+
+
+def _holder(words: list[str], robots: Mapping[str, int]) -> Holder | None:
+    kind = KINDS.get(words[0])
+    if kind != GRIP:
+        return None if kind is None else (kind, -1)
+    return (kind, robots[words[1]]) if words[1] in robots else None
+
+
+def _part(words: list[str]) -> str:
+    """The label in a weld's name: `grip/r3/part1`, `park/part1#2`, `feed/part1`."""
+    label = words[-1] if words[0] == "grip" else "/".join(words[1:])
+    return label.rpartition("#")[0] if words[0] == "park" else label
+
+
+def check_holders(m: mujoco.MjModel, welds: Index) -> None:
+    """Raises ValueError where the first body of a weld does more than slide, or turn about the
+    vertical on what slides."""
+    joints, up = m.body_jntnum, m.body_parentid
+    first = np.minimum(m.body_jntadr, m.njnt - 1)
+    last = m.jnt_type[np.minimum(m.body_jntadr + np.maximum(joints, 1), m.njnt) - 1]
+    slides = (joints == 0) | (joints <= 2) & (m.jnt_type[first] == SLIDE) & (last == SLIDE)
+    upright = abs(m.jnt_axis[first, 2]) == 1.0
+    turns = (joints == 1) & (m.jnt_type[first] == HINGE) & upright
+    for body in np.unique(m.eq_obj1id[welds]):
+        if not ((slides | turns)[body] and slides[up[body]] and m.body_weldid[up[up[body]]] == 0):
+            raise ValueError(f"{m.body(int(body)).name} holds parts and does more than slide")
