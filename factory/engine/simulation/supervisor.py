@@ -252,7 +252,7 @@ class Supervisor:
         seem to leave then."""
         active = self.active
         asked = there if bundle.clocked is None else there & ~bundle.clocked
-        clocks = self.tick * asked
+        clocks = self.tick * asked.astype(float)
         if active.clocks is not None:
             clocks += active.clocks
         active.clocks, finished = clocks, bundle.finished(there, clocks)
