@@ -180,20 +180,22 @@ def test_a_call_lasts_until_something_asks_for_the_supervisor(name: str) -> None
         for_a_reason |= world.supplied or supervisor.enabled or any(may_be_past)
 
 
-@pytest.mark.parametrize("sensors", [[], [lambda x, v: (x, v)]], ids=["exact", "sensors"])
-def test_a_clock_that_runs_asks_for_nobody(sensors: list[Any]) -> None:
-    """A call lasts until the clock has run out; where sensors may err robots are asked in every
-    tick whether they are still there."""
+@pytest.mark.parametrize("asked", ["", "sensors", "before_step"])
+def test_a_clock_that_runs_asks_for_nobody(asked: str) -> None:
+    """A call lasts until the clock has run out; where sensors may err, or something may push them,
+    robots are asked in every tick whether they are still there."""
     simulation = ready("paper", settings=Settings(), jitter=0.0)
-    supervisor, world, ticks = simulation.supervisor, simulation.world, list[int]()
-    world.hooks.sensors.extend(sensors)
-    while world.delivered() < 2:
-        begun, fired = world.time, len(supervisor.events)
+    supervisor, hooks, ticks = simulation.supervisor, simulation.world.hooks, list[int]()
+    hooks.sensors.extend([lambda x, v: (x, v)] * (asked == "sensors"))
+    hooks.before_step.extend([lambda: None] * (asked == "before_step"))
+    while simulation.world.delivered() < 2:
+        begun, fired = simulation.world.time, len(supervisor.events)
         supervisor.step(MOST)
         clocks = supervisor.active.clocks
         if clocks is not None and clocks.any() and len(supervisor.events) == fired:
-            ticks.append(round((world.time - begun) / supervisor.tick))
-    assert len(ticks) > 5 and (np.mean(ticks) > 3) == (not sensors), ticks
+            ticks.append(round((simulation.world.time - begun) / supervisor.tick))
+            assert not (asked and supervisor.active.clocked)
+    assert len(ticks) > 5 and (np.mean(ticks) > 3) == (not asked), ticks
 
 
 @pytest.mark.parametrize("timestep", [1e-5, 1e-3, 2e-3, 4e-3, 2e-2])

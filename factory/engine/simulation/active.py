@@ -44,8 +44,8 @@ class Active:
         """Ticks [s] until the first clock that runs with time has run out, at most MOST."""
         if self.bundle is None or self.clocks is None or not self.clocked:
             return MOST
-        left = (self.bundle.dwell - self.clocks)[self.bundle.clocked].min() / tick
-        return min(MOST, ceil(left - ROUNDED))
+        left = float((self.bundle.dwell - self.clocks)[self.bundle.clocked].min())
+        return min(MOST, ceil(left / tick - ROUNDED))
 
     def go_on(self, seconds: float) -> None:
         """Advance the clocks that run with time."""

@@ -251,15 +251,16 @@ class Supervisor:
 
     def _run_out(self, bundle: Bundle, there: Truth, still: Truth) -> Truth:
         """Whether each mode is in its goal: it is `there` and its clock has run out. The clocks of
-        those that are `still` run with time from now on; not where sensors err, since a robot may
-        seem to leave then."""
+        those that are `still` run with time from now on; not where sensors err or something acts
+        on bodies, since a robot may leave then, or seem to."""
         active = self.active
         asked = there if bundle.clocked is None else there & ~bundle.clocked
-        clocks = self.tick * asked
+        clocks = self.tick * asked.astype(float)
         if active.clocks is not None:
             clocks += active.clocks
         active.clocks, finished = clocks, bundle.finished(there, clocks)
-        stays = there & still & ~finished & (not self.world.hooks.sensors)
+        hooks = self.world.hooks
+        stays = there & still & ~finished & (not (hooks.sensors or hooks.each_step))
         active.clocked = frozenset(compress(active.numbers, stays.tolist()))
         active.bundle, _ = self.bundles.of(active.numbers, active.clocked)
         return finished

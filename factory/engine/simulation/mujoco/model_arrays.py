@@ -157,7 +157,8 @@ class ModelArrays:
         for span in spans:
             begin, last = span[0][0], self._arrays[span[-1][1]]
             size = last.ctypes.data + last.nbytes - begin
-            memory = np.frombuffer((ctypes.c_uint8 * size).from_address(begin), np.uint8)
+            there = (ctypes.c_uint8 * size).from_address(begin)
+            memory = np.frombuffer(memoryview(there), np.uint8)
             flat = memory.copy()
             for address, name in span:
                 array = self._arrays[name]
