@@ -71,9 +71,9 @@ def _edges(bright: NDArray[np.uint8]) -> Places:
         np.minimum(least[here], bright[beside], out=least[here])
         np.maximum(most[here], bright[beside], out=most[here])
     step = most - least
-    found = (step > most // SHARE) & (step >= LEAST)
-    found[[0, -1]] = found[:, [0, -1]] = False
-    return np.flatnonzero(found)
+    stepped = (step > most // SHARE) & (step >= LEAST)
+    stepped[[0, -1]] = stepped[:, [0, -1]] = False
+    return np.flatnonzero(stepped)
 
 
 def _range(*rows: Brightness) -> Brightness:

@@ -15,6 +15,7 @@ from pathlib import Path
 import click
 import pytest
 
+from benches import drawing
 from factory.apps.exports import exporters
 from factory.commands import commands
 from factory.pipeline import all_templates
@@ -340,3 +341,18 @@ def test_the_site_is_built_without_a_warning_and_needs_no_network(tmp_path: Path
             r'<(?:script|img|link)[^>]+(?:src|href)="(https?:[^"]+)"', page.read_text("utf-8")
         )
         assert not loaded, f"{page.name} loads {loaded}"
+
+
+def test_no_picture_of_the_gallery_is_older_than_the_code_that_draws_it(tmp_path: Path) -> None:
+    """`make gallery` draws them anew."""
+    pictures = {path.name for path in drawing.GALLERY.iterdir() if path.suffix != ".json"}
+    now = drawing.digest()
+    kept = drawing.digests()
+    drawn = pictures - {*drawing.BY_A_BROWSER}
+    assert {name for name in drawn if kept.get(name) != now} == set()
+    shutil.copytree(drawing.ROOT / "factory" / "film", tmp_path / "film")
+    changed = tmp_path / "film" / "look.py"
+    changed.write_text(changed.read_text("utf-8") + "# a comment\n", "utf-8")
+    assert drawing.digest(tmp_path / "film") == now
+    changed.write_text(changed.read_text("utf-8").replace("0.855", "0.955"), "utf-8")
+    assert drawing.digest(tmp_path / "film") != now

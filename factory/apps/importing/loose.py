@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from factory.api import PAG, Array, Assembly, Diagnostic, Indices, InputError, Position, read_bytes
+from factory.api import PAG, Array, Diagnostic, Indices, InputError, Position, read_bytes
 from factory.apps.importing.alike import alike
 from factory.apps.importing.bodies import Bodies, FileBody, apart, check_count, unit_of
+from factory.apps.importing.colours import colours_by_size, kinds_of
 from factory.apps.importing.draft import (
     PART,
     DraftNode,
@@ -22,9 +24,8 @@ from factory.apps.importing.importer import Imported
 from factory.apps.importing.mesh_files import MeshStore, natural, obj_of
 from factory.apps.importing.part_maker import Placement
 from factory.apps.importing.scene_file import MESHES, SCENES, read_one, read_scene
-from factory.floor.geometry.alike import shape_of
+from factory.floor.geometry.alike import PartShape, shape_of
 from factory.floor.geometry.mesh_file import ANEW, UnreadableMesh
-from factory.floor.geometry.solids import colour
 from factory.support.files import MESH
 from factory.theory.lang.source import quoted
 from factory.theory.problem.pag import Parameter
@@ -98,12 +99,13 @@ def _assembled(
     name: str, path: Path, bodies: tuple[FileBody, ...], unit: float
 ) -> tuple[PAG, dict[str, bytes]]:
     """The PAG that mates all bodies at once, and its mesh files. Parts of one kind that have no
-    colour get the same one."""
+    colour get the same one, by their size."""
     here, store = Position(str(path), 1, 1), MeshStore("meshes")
     drafts = [DraftNode(name, here, inputs=list(range(1, len(bodies) + 1)))]
     shapes = [shape_of(*_scaled(body.mesh.merged(), unit)) for body in bodies]
     kinds, origins, meshes = alike(shapes), dict[int, Array](), dict[int, str]()
-    numbers = {kind: number for number, kind in enumerate(dict.fromkeys(kinds.kinds))}
+    names = [_name(body, index) for index, body in enumerate(bodies)]
+    paints = colours_by_size(kinds_of(kinds.kinds, names, *_sizes(shapes)))
     for index, body in enumerate(bodies):
         kind, motion = kinds.kinds[index], kinds.motions[index]
         if kind == index:
@@ -114,10 +116,18 @@ def _assembled(
             meshes[kind] = store.add(_name(body, index), ".obj", content)
         at = motion.turn @ origins[kind] + motion.shift
         stands = Placement(motion.turn, at, moved=True).parameters({})
-        rgba = body.colour or colour(Assembly("", PART), numbers[kind])
+        rgba = body.colour or paints[kind]
         parameters = (Parameter("mesh", meshes[kind]), *stands, Parameter("rgba", rgba))
         drafts.append(DraftNode(_name(body, index), here, PART, [], parameters))
     return assemble(drafts, ImportFaults()), store.files
+
+
+def _sizes(shapes: Sequence[PartShape]) -> tuple[list[float], float]:
+    """The diagonal of the box round each shape, and of that round all [m]."""
+    boxes = np.array([(s.vertices.min(axis=0), s.vertices.max(axis=0)) for s in shapes])
+    whole = boxes[:, 1].max(axis=0) - boxes[:, 0].min(axis=0)
+    each = np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1)
+    return each.tolist(), max(float(np.linalg.norm(whole)), 1e-12)
 
 
 def _scaled(mesh: tuple[Array, Indices], unit: float) -> tuple[Array, Indices]:
