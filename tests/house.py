@@ -246,7 +246,8 @@ def upward_imports(house: House) -> Iterator[str]:
 
 def reach_ins(house: House) -> Iterator[str]:
     """Imports of an app from the core past `factory.api` that `reach_ins.toml` does not list, and
-    lines of that list that nothing needs."""
+    lines of that list that nothing needs. Its command line stands with `commands`, which use all
+    that they print and call."""
     listed = {
         (app, f"{module}.{name}")
         for app, modules in house.reach_ins.items()

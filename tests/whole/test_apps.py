@@ -108,7 +108,7 @@ def test_an_app_from_outside_gives_a_command(tmp_path: Path) -> None:
     (package / "__init__.py").write_text("")
     (package / "words.py").write_text(HELLO)
     (package / "app.py").write_text(
-        "from factory.support.apps import App\n"
+        "from factory.api import App\n"
         "APP = App('greeting', commands={'hello': 'greeting.words:hello'})\n"
     )
     install(tmp_path, "greeting")
