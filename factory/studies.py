@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from factory.apps.runs.pictures import Rendered
     from factory.apps.sweep.summary import Summary
     from factory.engine.simulation.run import Run
-    from factory.film.picture import PanelName
+    from factory.film.picture import PanelName, RendererName
     from factory.support.bounds import WorldName
     from factory.theory.problem.pag import PAG
 
@@ -44,6 +44,7 @@ def render(
     fps: float = 30,
     at: float | Literal["end"] = "end",
     poster: AnyPath | None = None,
+    renderer: RendererName = "auto",
     units: int = 1,
     seed: int = 0,
     jitter: float = 0.0,
@@ -56,7 +57,8 @@ def render(
     run that is in it.
 
     `size` (width, height) [px]; `camera`: overview, orbit, top, product, part:LABEL or
-    handover:LABEL; `panels` beside the 3-D: net, gantt; `poster`: a still of a film's best moment.
+    handover:LABEL; `panels` beside the 3-D: net, gantt; `poster`: a still of a film's best moment;
+    `renderer`: classic, filament, or auto, which takes filament for stills where it works.
     The others are those of `run`. Raises InputError, MissingError without GL, RunError.
     """
     from factory.apps.log import read_log
@@ -66,7 +68,7 @@ def render(
     from factory.film.shot import Shot
 
     asked = RunOptions("mujoco", units, seed, jitter, wip, max_time=max_time)
-    picture = Picture(size, camera, panels=tuple(panels), title=title)
+    picture = Picture(size, camera, panels=tuple(panels), title=title, renderer=renderer)
     shot = Shot(path_of(output), picture, fps, at, maybe(poster))
     will_write(shot.output, shot.poster)
     log = _logged(product)

@@ -39,6 +39,7 @@ def doctor(out: OutputOptions) -> int:
     findings = examine()
     good = all(f.ok for f in findings)
     extras = [_extra(name) for name in EXTRAS]
+    filament = _filament() if good else Finding("filament", False, "", "repair the rest first")
     if out.as_json:
         emit(
             {
@@ -50,6 +51,7 @@ def doctor(out: OutputOptions) -> int:
                     {"name": f.name, "for": EXTRAS[f.name][1], "installed": f.ok, "mend": f.mend}
                     for f in extras
                 ],
+                "filament": {"ok": filament.ok, "mend": filament.mend},
             }
         )
     else:
@@ -61,6 +63,7 @@ def doctor(out: OutputOptions) -> int:
         for extra in extras:
             here = extra.found if extra.ok else f"not installed: {extra.mend}"
             say(f"  {extra.name:10} {EXTRAS[extra.name][1]}: {here}")
+        say(f"renderer filament: {filament.found if filament.ok else filament.mend}")
     return 0 if good else 3
 
 
@@ -127,6 +130,16 @@ def _engine() -> Finding:
         return Finding("engine", False, error.diagnostics[0].message, error.diagnostics[0].hint)
     except Exception as error:  # whatever a broken installation raises
         return Finding("engine", False, str(error), "pip install --force-reinstall mujoco")
+
+
+def _filament() -> Finding:
+    """Whether the physically based renderer draws; nothing needs it."""
+    from factory.film.filament import fault
+
+    missing = fault()
+    if missing is None:
+        return Finding("filament", True, "draws stills (--renderer)")
+    return Finding("filament", False, missing.message, missing.hint)
 
 
 def _rendering() -> Finding:

@@ -302,6 +302,13 @@ PICTURE = options(
     ),
     click.option("--title", default="", help="Title at the start of a film."),
     click.option("--poster", type=OUT, help="Write a still of a film's best moment (.png)."),
+    click.option(
+        "--renderer",
+        type=click.Choice(["auto", "classic", "filament"]),
+        default="auto",
+        help="classic, or filament: physically based, needs Vulkan; auto: that for stills where it"
+        " works.",
+    ),
     gathered(PictureOptions, "shown"),
 )
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from factory.apps.few_robots.candidate import Candidate
     from factory.apps.log.plan_file import PlanFile
     from factory.film import Picture
+    from factory.film.picture import RendererName
     from factory.floor.layout.request import Ground
     from factory.pipeline import Project
     from factory.support.settings import Settings
@@ -197,6 +198,7 @@ class PictureOptions:
     panels: str | None
     title: str
     poster: Path | None
+    renderer: RendererName
 
     def area(self) -> tuple[int, int]:
         """Width and height [px]. Raises InputError (BadValue)."""
@@ -209,7 +211,9 @@ class PictureOptions:
         from factory.film import Picture, camera_named, check_output, panels_named
 
         camera, panels = camera_named(self.camera, pag), panels_named(self.panels)
-        picture = Picture(self.area(), camera, panels=panels, title=self.title)
+        picture = Picture(
+            self.area(), camera, panels=panels, title=self.title, renderer=self.renderer
+        )
         if self.poster is not None:
             check_output(self.poster, picture.size, still=True)
         return picture

@@ -20,9 +20,9 @@ from factory.commands.requests import (
     ProjectOptions,
 )
 from factory.commands.resuming import resumed
-from factory.commands.verdicts import found_by, say_failures, say_verdict, tell_failures
+from factory.commands.summaries import summarise, tell_failures
 from factory.commands.warnings import announced, say_allowed
-from factory.support.console import emit, say, table
+from factory.support.console import emit, say
 from factory.support.errors import usage_error
 from factory.support.guard import reading
 from factory.support.progress import Waiting
@@ -162,27 +162,6 @@ def _film(
     picture = shown.picture(project.pag)
     probe()
     return lambda made: Film(made, video, picture, shown.fps, shown.poster)
-
-
-def summarise(record: Run, factory: Factory, verbose: bool) -> None:
-    """Print a run in a few lines; the first line of a failed run says why."""
-    from factory.engine.simulation.figures import figures
-
-    if not record.succeeded:
-        say_verdict(record.verdict, verbose)
-    for line in figures(record, verbose):
-        say(line)
-    if record.failures is not None:
-        say_failures(record.failures, verbose)
-    if record.monitor is not None:
-        say(found_by(record.monitor, record.cut_off))
-    if record.succeeded:
-        say_verdict(record.verdict, verbose)
-    busy = sorted(zip(factory.robots, record.utilisation, strict=True), key=lambda p: -p[1])
-    rows = [(r.name, r.type, f"{100 * u:.0f} %") for r, u in (busy if verbose else busy[:6])]
-    table("Utilisation", ("robot", "type", "busy"), rows)
-    if more := len(busy) - len(rows):
-        say(f"... and {more} more robot{'s' if more > 1 else ''} (-v shows all)")
 
 
 def say_files(**files: Path | None) -> None:

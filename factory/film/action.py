@@ -48,7 +48,7 @@ class Fading:
         for body in range(1, self.m.nbody):
             if names.kind(name := self.m.body(body).name) == "feeder":
                 geoms = Geoms(self.m).shown(body)
-                stands += [(g, name) for g in geoms if self.m.geom(g).name.endswith(STANDS)]
+                stands += [(g, name) for g in geoms if is_stand(self.m.geom(g).name)]
         self.geoms = np.array([g for g, _ in stands], np.intp)
         self.groups = np.unique([group for _, group in stands], return_inverse=True)[1]
         self.paint = np.array([Geoms(self.m).colour(g) for g in self.geoms]).reshape(-1, 4)
@@ -80,6 +80,11 @@ class Fading:
         greatest = np.zeros(int(self.groups.max()) + 1)
         np.maximum.at(greatest, pairs // count, together)
         return greatest
+
+
+def is_stand(geom: str) -> bool:
+    """Whether a geom of a feeder is its post or its boom, or a skin of one."""
+    return not set(STANDS).isdisjoint(geom.split("/")[2:])
 
 
 def outlines(view: View, boxes: Array) -> tuple[Array, Array]:

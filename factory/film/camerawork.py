@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import floor
 from typing import Literal
@@ -12,14 +13,17 @@ from factory.engine.mjcf import names
 from factory.engine.record.subject import MonitorSubject
 from factory.film.action import Snapshot
 from factory.film.caption import Caption, draw_notices, draw_title
+from factory.film.drawn import drawn
+from factory.film.filament import Filament, draws
 from factory.film.gantt_panel import GanttPanel
 from factory.film.history import History
 from factory.film.ink import Pixels
 from factory.film.marks import Marks
 from factory.film.net_panel import NetPanel
-from factory.film.painter import Painter
+from factory.film.painter import Painter, Renderer
 from factory.film.picture import Area, PanelName, Picture, Size, shared
 from factory.film.sheet import OUTSIDE, Rows
+from factory.floor.geometry.sight import Framing
 from factory.support.arrays import Array
 from factory.support.engine import mujoco
 from factory.support.errors import Diagnostic, InputError
@@ -52,10 +56,13 @@ class Moment:
 
 @dataclass(frozen=True, slots=True)
 class Take:
-    """The subject of pictures and how they are taken: the engine's model, the factory, the
-    product's name, the units to make; `history` holds the firings up to the moment of a picture."""
+    """The subject of pictures and how they are taken: the run's model with its MJCF and mesh files,
+    the factory, the product's name, the units to make; `history` holds the firings up to the moment
+    of a picture."""
 
     m: mujoco.MjModel
+    xml: str
+    files: Mapping[str, bytes]
     subject: MonitorSubject
     product: str
     units: int
@@ -81,7 +88,11 @@ class Camerawork(Closing):
         self.caption = Caption(size) if picture.caption else None
         self.panels = Panels(take.m, picture.size, areas, take.history) if areas else None
         share = self.caption.share if self.caption else 0.0
-        self.painter = Painter(take.m, size, picture.camera, take.subject, share, samples)
+        filament = draws(picture.renderer, self.still)
+        model = drawn(take.m, take.xml, take.files, picture.camera, filament)
+        renderer = Filament if filament else Renderer
+        look = Framing(size[0] / size[1], below=0.03 + share)
+        self.painter = Painter(model, size, picture.camera, take.subject, look, samples, renderer)
         self.marks = Marks(self.painter.replica, take.history)
 
     def picture(self, moment: Moment, elapsed: float = 0.0) -> Pixels:

@@ -5,9 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-from PIL import Image, ImageDraw, ImageFont
-
 from factory.film.history import History
 from factory.film.ink import (
     AMBER,
@@ -22,9 +19,11 @@ from factory.film.ink import (
     fitted,
     width,
 )
+from factory.theory.lang.source import counted
 from factory.theory.nets.verdict import listing
 
-HALO = (250, 250, 251)
+BAR = 0.82
+"""Opacity of the bars that words stand on."""
 
 SMALLEST = 100
 """Pictures lower than this many pixels have no caption."""
@@ -42,29 +41,35 @@ class Caption:
         self.points = max(11, round(0.030 * min(height, self.width * 9 / 16)))
         self.strip = round(2.4 * self.points) if height >= SMALLEST else 0
         self.share = self.strip / height
-        self.font = ImageFont.load_default(self.points)
 
     def draw(self, pixels: Pixels, product: str, made: int, units: int, time: float) -> Pixels:
         """The picture with its caption; `made` of the `units` by a time [s]."""
         if not self.strip:
             return pixels
-        below = Image.fromarray(pixels[-self.strip :])
-        draw, halo = ImageDraw.Draw(below), max(1, self.points // 9)
-        count = f"{made} of {units} unit{'' if units == 1 else 's'}"
-        edge, middle = round(1.2 * self.points), self.strip // 2
-        right = self.width - edge
-        left = right - round(draw.textlength("0000.0 s", self.font)) - self.points
-        room = self.width - 2 * edge - draw.textlength(f"{count}   000.0 s", self.font)
-        name = fitted(product, self.points, room)
-        for x, words, anchor in (
-            (edge, name, "lm"),
-            (right, f"{time:.1f} s", "rm"),
-            (left, count, "rm"),
+        captioned, points = pixels.copy(), self.points
+        ink, middle = Ink(captioned), len(pixels) - self.strip / 2
+        count, edge = f"{made} of {counted(units, 'unit')}", 0.7 * points
+        digit, unit = width("0", points), width(". s", points)
+        figures = 5 * digit + unit
+        right = self.width - 2 * edge
+        between = right - figures - 1.2 * points
+        name = fitted(product, points, between - width(count, points) - 3.2 * points)
+        for start, end in (
+            (edge, 3 * edge + width(name, points)),
+            (between - width(count, points) - edge, right + edge),
         ):
-            at = x, middle
-            draw.text(at, words, INK, self.font, anchor, stroke_width=halo, stroke_fill=HALO)
-        captioned = pixels.copy()
-        captioned[-self.strip :] = np.asarray(below)
+            top, bottom = middle - 0.85 * points, middle + 0.85 * points
+            ink.box(start, top, end, bottom, WHITE, BAR, 0.35 * points)
+        ink.words(2 * edge, middle, name, points, INK)
+        ink.words(between, middle, count, points, INK, "r")
+        ink.words(right, middle, "s", points, INK, "r")
+        whole, tenth = f"{time:.1f}".split(".")
+        at = right - width(" s", points) - digit / 2
+        ink.words(at, middle, tenth, points, INK, "m")
+        at -= digit / 2 + width(".", points)
+        ink.words(at, middle, ".", points, INK)
+        for place, figure in enumerate(reversed(whole)):
+            ink.words(at - (place + 0.5) * digit, middle, figure, points, INK, "m")
         return captioned
 
 

@@ -29,9 +29,9 @@ class _Observer(Recorder):
         factory = simulation.layout.factory
         picture.check(factory.pag)
         subject = MonitorSubject.of_run(simulation)
-        m, self.history = simulation.physical.m, History(subject)
+        m, made, self.history = simulation.physical.m, simulation.model, History(subject)
         name, units = product_name(factory), simulation.request.units
-        self.take = Take(m, subject, name, units, picture, self.history)
+        self.take = Take(m, made.xml, made.files, subject, name, units, picture, self.history)
         self.last = self._moment(simulation.state())
 
     def _moment(self, state: State) -> Moment:
@@ -81,6 +81,9 @@ class Film(_Observer):
     def close(self) -> None:
         """Finish the file, and write the poster."""
         self.reel.close()
+
+    def __exit__(self, *raised: object) -> None:
+        self.reel.__exit__(*raised)
 
 
 class Still(_Observer):

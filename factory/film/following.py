@@ -16,6 +16,7 @@ from factory.engine.mjcf import names
 from factory.engine.mjcf.replica import Replica
 from factory.engine.record.subject import MonitorSubject
 from factory.film.action import SIGNS, Snapshot, action_of, corners
+from factory.film.hero import clear_the_way, free_side
 from factory.film.junction import handover_view
 from factory.film.picture import HANDOVER, PART, Camera, from_above, orbit, overview
 from factory.floor.geometry.sight import Framing, View, fit, towards
@@ -31,13 +32,19 @@ NEAR = 0.02
 
 class Viewpoint:
     """The camera in consecutive pictures of a replica. Cameras that follow a product need the
-    factory. `watched` (n, 8, 3): boxes around the subject of the last view, by their corners
-    [m]."""
+    factory. A `still` of a product has nothing in its way. `watched` (n, 8, 3): boxes around the
+    subject of the last view, by their corners [m]."""
 
     def __init__(
-        self, replica: Replica, camera: Camera, framing: Framing, subject: MonitorSubject
+        self,
+        replica: Replica,
+        camera: Camera,
+        framing: Framing,
+        subject: MonitorSubject,
+        still: bool = False,
     ) -> None:
-        self.d, self.framing = replica.d, framing
+        self.replica, self.d, self.framing = replica, replica.d, framing
+        self.is_hero = still and camera == "product"
         action = action_of(replica.m, replica.d)
         self.watched, self.points = action.robots, action.points
         if camera.startswith(HANDOVER):
@@ -77,6 +84,9 @@ class Viewpoint:
         about = middle + 1.45 * (followed.box - middle)
         box = wanted + self.away + followed.box
         self.watched = (box[:, None] + box) / 2  # each eighth: the least of it is to be seen
+        if self.is_hero:
+            clear_the_way(self.replica, shown)
+            return free_side(self.replica, wanted + about, box, self.framing)
         return fit(wanted + self.away + about, towards(-122.0, 44.0), self.framing)
 
     def _wanted(self, followed: Followed, shown: Snapshot) -> tuple[Array, int]:

@@ -79,7 +79,7 @@ class GanttPanel:
         colours |= {"dead": DEAD} if self.history.deaths() else {}
         colours |= {"undone": FLASH} if self.history.undone else {}
         for name, colour in reversed(colours.items()):
-            if x - width(name, small) < self.sheet.size[0] / 3:
+            if x - width(name, small) < 0.52 * self.sheet.size[0]:
                 break
             ink.words(x, y, name, small, FAINT, "r")
             x -= width(name, small) + 0.5 * small

@@ -7,7 +7,7 @@ disc or a capsule, very thin it is a line.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
 from functools import cache, lru_cache
 
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from factory.engine.mjcf.robot_bodies import role_of
-from factory.engine.mjcf.robots import ROLES
+from factory.film.look import ROLES, Colour3
 from factory.theory.plant.factory import Factory
 
 GROUND, INK, FAINT, LINE = (243, 243, 245), (38, 44, 54), (112, 121, 134), (205, 209, 215)
@@ -61,12 +61,12 @@ def operation_colours(factory: Factory) -> tuple[Colour, ...]:
 
 def robot_colours(factory: Factory) -> tuple[Colour, ...]:
     """The colour of each robot: the paint of its role."""
-    paint = {role: _colour(rgba.split()) for role, rgba in ROLES.items()}
+    paint = {role: _colour(shade) for role, shade in ROLES.items()}
     return tuple(paint[role_of(factory, robot.index)] for robot in factory.robots)
 
 
-def _colour(rgba: Sequence[str]) -> Colour:
-    red, green, blue = (round(255 * float(word)) for word in rgba[:3])
+def _colour(shade: Colour3) -> Colour:
+    red, green, blue = (round(255 * part) for part in shade)
     return red, green, blue
 
 
@@ -174,13 +174,17 @@ def width(text: str, points: int) -> int:
     return _mask(text, points).shape[1] - 1 if text else 0
 
 
+ENDING = re.compile(r"(?<=\w\w\w)([/_.-]\w{1,5}|\d{1,3})$")
+"""The end of a label that has others beside it."""
+
+
 def fitted(text: str, points: int, room: float) -> str:
-    """A text, shortened to fit; "" if less than three letters or two fifths of it fit. The number
-    of a label such as `box/3` is kept."""
+    """A text, shortened to fit; "" if less than three letters or two fifths of it fit. What tells
+    a label from its like is kept: the number of `box/3` and `log12`, the end of `axle_left`."""
     if width(text, points) <= room:
         return text
-    head, slash, number = text.rpartition("/")
-    head, tail = (head, slash + number) if slash else (text, "")
+    match = ENDING.search(text)
+    head, tail = (text[: match.start()], match[0]) if match else (text, "")
     for length in range(len(head) - 1, max(2, int(0.4 * len(head))), -1):
         shorter = f"{head[:length].rstrip()}…{tail}"
         if width(shorter, points) <= room:

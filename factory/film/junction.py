@@ -17,7 +17,7 @@ from factory.engine.mjcf.pads import Pads
 from factory.engine.mjcf.replica import Geoms, Replica
 from factory.engine.mjcf.weld_frames import held_at
 from factory.engine.record.subject import MonitorSubject
-from factory.film.action import STANDS, box_of, outlines, placed, shape_of
+from factory.film.action import box_of, is_stand, outlines, placed, shape_of
 from factory.floor.geometry.sight import Framing, View, fit, towards
 from factory.support.arrays import Array
 from factory.theory.plant.factory import Operation
@@ -115,7 +115,7 @@ def _stands(replica: Replica) -> Array:
     m, d = replica.m, replica.d
     bodies = [b for b in range(1, m.nbody) if names.kind(m.body(b).name) in ("feeder", "outfeed")]
     geoms = (g for b in bodies if m.body_weldid[b] == 0 for g in Geoms(m).shown(b))
-    boxes = [placed(m, d, g) for g in geoms if not m.geom(g).name.endswith(STANDS)]
+    boxes = [placed(m, d, g) for g in geoms if not is_stand(m.geom(g).name)]
     return np.array(boxes).reshape(-1, 8, 3)
 
 
@@ -131,8 +131,8 @@ def _others(
         if label in factory.by_label and label != made.label
     ]
     feet = {m.body(names.carriage(factory.robots[r].name)).id for r in operation.robots}
-    bodies = (b for b in range(m.nbody) if m.body_rootid[b] in feet)
-    limbs = [placed(m, d, g) for b in bodies for g in Geoms(m).shown(b) if m.geom_contype[g]]
+    solid = np.isin(m.body_rootid[m.geom_bodyid], [*feet]) & (m.geom_contype > 0)
+    limbs = [placed(m, d, g) for g in np.flatnonzero(solid).tolist()]
     return np.array([*loads, *limbs]).reshape(-1, 8, 3)
 
 

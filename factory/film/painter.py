@@ -10,10 +10,13 @@ from factory.engine.mjcf import names
 from factory.engine.mjcf.replica import SHOWN, Replica
 from factory.engine.record.subject import MonitorSubject
 from factory.film.action import Fading, Snapshot
+from factory.film.filament import Filament
 from factory.film.following import Viewpoint
 from factory.film.ink import Pixels
 from factory.film.marks import Mark, Marks
 from factory.film.picture import Camera, Size
+from factory.film.smoothing import smooth
+from factory.film.studio import GOLDEN, moved, sun
 from factory.floor.geometry.sight import Framing, View
 from factory.support import gl
 from factory.support.arrays import Array
@@ -23,7 +26,10 @@ from factory.support.resource import Closing
 MANY = 110
 """Robots above which a film has no shadows: they cost a second pass over all geometry."""
 
-SOFT = 0.11
+STILL_SHADOWS, FILM_SHADOWS = 4096, 2048
+"""Texels along an edge of the shadow map."""
+
+SOFT = 0.04
 """Radius of the sun as a still sees it [rad]: the softness of shadows."""
 
 
@@ -35,10 +41,10 @@ class Painter(Closing):
     """Draws one model from one camera; it has a model and data of its own, so a run is not
     disturbed.
 
-    `caption`: height of the strip below that is kept free, as a fraction of the picture's.
-    `samples`: above 1 a picture is the mean of so many, each with the key light and the pixels'
-    grid moved a little: soft shadows and smooth edges, for stills. Raises MissingError where there
-    is no GL."""
+    `framing`: the margins that are kept free, that of the caption too. `samples`: above 1 a picture
+    is the mean of so many, each with the key light and the pixels' grid moved a little: soft
+    shadows and smooth edges, for stills; edges of a film's are smoothed afterwards. Raises
+    MissingError where there is no GL."""
 
     def __init__(
         self,
@@ -46,22 +52,22 @@ class Painter(Closing):
         size: Size,
         camera: Camera,
         subject: MonitorSubject,
-        caption: float = 0.0,
+        framing: Framing,
         samples: int = 1,
+        renderer: type[Renderer | Filament] | None = None,
     ) -> None:
         gl.probe()
         self.replica, self.samples = Replica(m), samples
         _facet(self.replica.m)
         quality = self.replica.m.vis
         quality.global_.offwidth, quality.global_.offheight = size
-        if samples > 1:
-            quality.quality.offsamples = 1
-        framing = Framing(size[0] / size[1], below=0.03 + caption)
-        self.viewpoint = Viewpoint(self.replica, camera, framing, subject)
+        quality.quality.offsamples = 0
+        quality.quality.shadowsize = STILL_SHADOWS if samples > 1 else FILM_SHADOWS
+        self.viewpoint = Viewpoint(self.replica, camera, framing, subject, samples > 1)
         self.fading = Fading(self.replica)
         joints = (names.kind(m.joint(n).name) for n in range(m.njnt))
         self.shadows = sum(kind == "robot" for kind in joints) <= MANY
-        self.renderer = Renderer(self.replica, size)
+        self.renderer = (renderer or Renderer)(self.replica, size)
 
     def close(self) -> None:
         """Gives the GL context back."""
@@ -82,7 +88,7 @@ class Painter(Closing):
         view = self.viewpoint.view(shown, elapsed, time)
         self.fading.fade(view, self.viewpoint.watched)
         if self.samples == 1:
-            return np.ascontiguousarray(self.renderer.draw(view, self.shadows)[::-1])
+            return smooth(np.ascontiguousarray(self.renderer.draw(view, self.shadows)[::-1]))
         return self.renderer.mean(view, self.samples)
 
 
@@ -100,6 +106,7 @@ class Renderer(Closing):
         self.rectangle = mujoco.MjrRect(0, 0, *size)
         self.pixels = np.empty((size[1], size[0], 3), np.uint8)
         self.marks: list[Mark] = []
+        self.sun: Array | None = None
 
     def close(self) -> None:
         """Gives the GL context back."""
@@ -148,16 +155,17 @@ class Renderer(Closing):
             camera.frustum_top = near * (dy + view.tall)
 
     def _light(self, view: View, sample: Sample | None) -> None:
-        """The headlight shines from the camera, the key light over what is seen; a still moves
-        it."""
+        """The headlight shines from the camera, the key light, beside where the first camera
+        stands, over what is seen; a still moves it."""
+        if self.sun is None:
+            self.sun = sun(view.axes)
         middle = view.position + view.distance * view.axes[2]
         self.drawing.shadowClip = 1.25 * view.distance * max(view.wide, view.tall) + view.depth
         for light in self.scene.lights[: self.scene.nlight]:
             if light.headlight:
                 light.pos, light.dir = view.position, view.axes[2]
             elif light.castshadow:
-                if sample is not None:
-                    light.dir = _moved(np.asarray(light.dir, float), sample)
+                light.dir = -self.sun if sample is None else _spread_sun(self.sun, sample)
                 light.pos = middle - sum(view.range) / 2 * np.asarray(light.dir, float)
 
 
@@ -177,15 +185,10 @@ def _facet(m: mujoco.MjModel) -> None:
         m.vis.quality.numstacks = 2
 
 
-def _moved(direction: Array, sample: Sample) -> Array:
-    """A direction moved inside a disc of radius SOFT, the samples evenly spread over it."""
+def _spread_sun(towards: Array, sample: Sample) -> Array:
+    """The way of the light from one place of a sun of radius SOFT, evenly spread over it."""
     n, count = sample
-    radius, angle = SOFT * ((n + 0.5) / count) ** 0.5, n * 2.399963
-    side = np.cross(direction, (0.0, 0.0, 1.0))
-    side /= np.linalg.norm(side)
-    other = np.cross(direction, side)
-    moved = direction + radius * (np.cos(angle) * side + np.sin(angle) * other)
-    return np.asarray(moved / np.linalg.norm(moved))
+    return moved(-towards, SOFT * ((n + 0.5) / count) ** 0.5, n * GOLDEN)
 
 
 @cache

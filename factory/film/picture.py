@@ -77,9 +77,9 @@ def overview(points: Array, framing: Framing) -> View:
     return best if size(best) > 1.05 * size(usual) else usual
 
 
-def orbit(points: Array, framing: Framing) -> Callable[[float], View]:
-    """The view at each time [s] from a camera that goes round at an even height. It comes nearer
-    and goes away calmly, and has everything in the frame all the way."""
+def orbit(points: Array, framing: Framing, turn: float = TURN) -> Callable[[float], View]:
+    """The view at each time [s] from a camera that goes round at an even height, `turn` degrees a
+    second. It comes nearer and goes away calmly, and has everything in the frame all the way."""
     elevation = 36.0 if framing.aspect >= 1 else 50.0
     azimuths = np.arange(0.0, 360.0, 3.0)
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
@@ -91,7 +91,7 @@ def orbit(points: Array, framing: Framing) -> Callable[[float], View]:
     depth = float(np.linalg.norm(about, axis=1).max())
 
     def view(time: float) -> View:
-        azimuth = -62.0 + TURN * time
+        azimuth = -62.0 + turn * time
         axes = towards(azimuth, elevation)
         right, up, back = (
             np.interp(azimuth, azimuths, values, period=360.0) for values in (*aside.T, away)
@@ -140,8 +140,14 @@ PanelName = Literal["net", "gantt"]
 
 PANELS: tuple[PanelName, ...] = get_args(PanelName)
 
-SHARE = 0.44
-"""Of the longer side of a picture that panels take."""
+RendererName = Literal["auto", "classic", "filament"]
+"""`classic`: the same to the bit each time; `filament`: physically based, needs Vulkan; `auto`:
+that for stills where it works, else the classic one."""
+
+RENDERERS: tuple[RendererName, ...] = get_args(RendererName)
+
+SHARE = 0.30
+"""Of the longer side of a picture that panels take, or more where they need it."""
 
 LEAST = 240
 """Pixels that a panel is wide and high at least."""
@@ -157,9 +163,10 @@ class Picture:
         caption: whether it has a caption.
         panels: names of the panels beside the 3-D.
         title: shown at the beginning.
+        renderer: what draws it.
 
-    Raises InputError (BadValue) for an unknown camera or panel, and where there is no room for the
-    panels.
+    Raises InputError (BadValue) for an unknown camera, panel or renderer, and where there is no
+    room for the panels.
     """
 
     size: Size = (1280, 720)
@@ -167,8 +174,11 @@ class Picture:
     caption: bool = True
     panels: tuple[PanelName, ...] = ()
     title: str = ""
+    renderer: RendererName = "auto"
 
     def __post_init__(self) -> None:
+        if self.renderer not in RENDERERS:
+            raise _none_of("renderer", self.renderer, RENDERERS)
         camera_named(self.camera)
         shared(self.size, panels_named(",".join(self.panels)))
 
@@ -205,9 +215,10 @@ def shared(size: Size, panels: Sequence[PanelName]) -> tuple[Area, dict[PanelNam
     if not panels:
         return Area(0, 0, width, height), {}
     beside = width >= height
-    wide = 2 * round(SHARE * width / 2) if beside else width
-    tall = height if beside else 2 * round(SHARE * height / 2)
-    if wide < LEAST or tall < LEAST * len(panels):
+    least = LEAST if beside else LEAST * len(panels)
+    taken = max(2 * round(SHARE * max(size) / 2), least)
+    wide, tall = (taken, height) if beside else (width, taken)
+    if wide < LEAST or tall < LEAST * len(panels) or 2 * taken > max(size):
         hint = "take 1280x720, or leave panels out"
         message = f"{width}x{height} has no room for {' and '.join(panels)}"
         raise InputError(Diagnostic("BadValue", message, None, hint))

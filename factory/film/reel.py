@@ -7,6 +7,7 @@ from pathlib import Path
 import imageio.v3 as iio
 
 from factory.film.camerawork import Camerawork, Moment, Take
+from factory.film.finale import finale
 from factory.film.ink import Pixels
 from factory.film.video import VideoFile, check_output
 from factory.support.files import unwritten, write_bytes
@@ -21,8 +22,9 @@ HOLD = 1.0
 
 
 class Reel(Closing):
-    """Frames of a growing row of moments, at even times, into a video file, and of the last one for
-    HOLD; with a still of the best of them where there is to be a `poster`."""
+    """Frames of a growing row of moments, at even times, into a video file, of the last one for
+    HOLD, and of a product that was finished (`finale.py`); with a still of the best moment where
+    there is to be a `poster`."""
 
     def __init__(self, take: Take, path: Path, fps: float, poster: Path | None = None) -> None:
         check_output(path, take.picture.size, fps)
@@ -30,6 +32,9 @@ class Reel(Closing):
             check_output(poster, take.picture.size, still=True)
         self.fps, self.last = fps, None  # type: float, Moment | None
         self.poster = None if poster is None else Poster(take, poster)
+        self.take = take
+        self.whole: Moment | None = None
+        self.products = Completions(take)
         self.work = Camerawork(take)
         try:
             self.file = VideoFile(path, take.picture.size, fps)
@@ -44,8 +49,11 @@ class Reel(Closing):
 
     def until(self, now: Moment) -> None:
         """Write the frames due by now."""
+        completed = self.products.since_last()
+        if completed:
+            self.whole = now
         if self.poster is not None:
-            self.poster.see(now)
+            self.poster.see(now, completed)
         while self.frames / self.fps <= now.time + 1e-9:
             due = self.frames / self.fps
             moment = self.last.towards(now, due) if self.last is not None else now
@@ -53,10 +61,22 @@ class Reel(Closing):
         self.last = now
 
     def close(self) -> None:
-        """Finish the file, give the GL back and write the poster."""
-        self.give_up()
+        """Finish the file with the product, give the GL back and write the poster."""
+        with self.file:
+            try:
+                self._hold()
+            finally:
+                self.work.close()
+            if self.whole is not None and self.last is not None:
+                for pixels in finale(self.take, self.whole, self.last, self.fps):
+                    self.file.write(pixels)
         if self.poster is not None:
             self.poster.save()
+
+    def __exit__(self, *raised: object) -> None:
+        if raised[0] is not None:  # an interruption does not wait for more pictures
+            self.whole = None
+        self.close()
 
     def give_up(self) -> None:
         """Finish the file and give the GL back."""
@@ -69,9 +89,23 @@ class Reel(Closing):
     def _hold(self) -> None:
         """Write the frames of the last moment, in which the last unit is out."""
         if self.last is not None:
-            pixels, self.last = self.work.picture(self.last, 1 / self.fps), None
+            pixels = self.work.picture(self.last, 1 / self.fps)
             for _ in range(round(HOLD * self.fps)):
                 self.file.write(pixels)
+
+
+class Completions:
+    """Says when products become whole: the last operation before the dropoff has ended."""
+
+    def __init__(self, take: Take) -> None:
+        factory, self.history, self.seen = take.subject.factory, take.history, 0
+        self.ends = {factory.by_label[product].end for product in factory.products}
+
+    def since_last(self) -> bool:
+        """Whether one has become whole since it was asked last."""
+        fired = self.history.events[self.seen :]
+        self.seen += len(fired)
+        return not self.ends.isdisjoint(fired)
 
 
 class Poster:
@@ -82,16 +116,12 @@ class Poster:
     def __init__(self, take: Take, path: Path) -> None:
         self.take, self.path = take, path
         self.moment: Moment | None = None
-        factory, m = take.subject.factory, take.m
-        self.ends = {factory.by_label[product].end for product in factory.products}
-        self.seen, self.whole, self.most = 0, False, -1
+        self.whole, self.most, m = False, -1, take.m
         self.parked = {e for e in range(m.neq) if m.equality(e).name.startswith("park/")}
 
-    def see(self, moment: Moment) -> None:
-        """A moment of the film; the history is as far."""
-        fired = self.take.history.events[self.seen :]
-        self.seen += len(fired)
-        if not self.ends.isdisjoint(fired):
+    def see(self, moment: Moment, completed: bool) -> None:
+        """A moment of the film, at which a product was `completed` or not."""
+        if completed:
             shown = len(self.parked.difference(moment.shown.active.tolist()))
             if shown >= self.most:
                 self.most, self.moment = shown, moment

@@ -37,6 +37,10 @@ class RecordedStates(Protocol):
     @property
     def header(self) -> Mapping[str, Any]: ...
     @property
+    def xml(self) -> str: ...
+    @property
+    def files(self) -> Mapping[str, bytes]: ...
+    @property
     def time(self) -> Array: ...
     @property
     def delivered(self) -> KeptRows: ...
@@ -134,7 +138,8 @@ def recorded_take(states: RecordedStates, scene: Scene, picture: Picture) -> Tak
     if states.failures is not None:
         history.failings += states.failures.found
         history.stand(states.failures.stood)
-    return Take(m, subject, states.header["product"], states.header["units"], picture, history)
+    product, units = states.header["product"], states.header["units"]
+    return Take(m, states.xml, states.files, subject, product, units, picture, history)
 
 
 def moment_of(states: RecordedStates, row: int) -> Moment:

@@ -11,8 +11,12 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
+from itertools import zip_longest
 from math import isfinite
+from shutil import get_terminal_size
+from textwrap import wrap
 from typing import Any
+from unicodedata import combining, east_asian_width
 
 from factory.support.errors import SHOWN, Diagnostic, FactoryError, one_line, printed
 
@@ -23,6 +27,12 @@ POOL_BOUND = "a larger pool of parts has too many bodies for the engine; --wip o
 
 CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 """Control characters of terminals and of text direction."""
+
+WIDTH = 160
+"""The width of tables that are not printed to a terminal, in columns."""
+
+FILLER = "\0"
+"""Stands for the second column of a wide character."""
 
 STDOUT = "what is printed"
 """The name of stdout in messages."""
@@ -92,20 +102,34 @@ def fail(error: FactoryError, as_json: bool, details: Mapping[str, Any] | None =
 
 def table(title: str, columns: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> None:
     """Print a table to stdout, as wide as the terminal, or 160 columns elsewhere."""
-    from rich import box
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
-    from rich.text import Text
+    lines = [columns, *(tuple(map(one_line, row)) for row in rows)]
+    widths = [max(1, *map(_cells, column)) for column in zip(*lines, strict=True)]
+    edges = 3 * len(widths) - 1
+    room = (get_terminal_size().columns if sys.stdout.isatty() else WIDTH) - edges
+    while sum(widths) > max(room, len(widths)):
+        widths[widths.index(max(widths))] -= 1
+    blank = " " * (sum(widths) + edges)
+    head, *body = (line for cells in lines for line in _folded(cells, widths))
+    above = [title.ljust(len(blank))] if title else []
+    say("\n".join([*above, blank, head, f" {'─' * (len(blank) - 2)} ", *body, blank]))
 
-    title = escape(title)
-    made = Table(title=title or None, box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
-    for column in columns:
-        made.add_column(escape(column), overflow="fold")
-    for row in rows:
-        made.add_row(*(Text(one_line(cell)) for cell in row))
-    console = Console(width=None if sys.stdout.isatty() else 160, highlight=False)
-    with _named():
-        with console.capture() as printed:
-            console.print(made)
-        print(printed.get(), end="")
+
+def _folded(cells: tuple[str, ...], widths: list[int]) -> Iterator[str]:
+    """The lines of a row whose cells are folded at widths."""
+    folded = [_wrapped(cell, width) for cell, width in zip(cells, widths, strict=True)]
+    for parts in zip_longest(*folded, fillvalue=""):
+        padded = (p + " " * (w - _cells(p)) for p, w in zip(parts, widths, strict=True))
+        yield f" {'   '.join(padded)} "
+
+
+def _wrapped(cell: str, width: int) -> list[str]:
+    if _cells(cell) <= width:
+        return [cell]
+    spaced = "".join(c + FILLER * (_cells(c) - 1) for c in cell)
+    width = max(1, width - (FILLER in spaced))  # a wide character may be cut from its filler
+    return [part.replace(FILLER, "") for part in wrap(spaced, width, break_on_hyphens=False)]
+
+
+def _cells(text: str) -> int:
+    """How many columns of a terminal a text takes."""
+    return sum(0 if combining(c) else 1 + (east_asian_width(c) in ("W", "F")) for c in text)

@@ -1,12 +1,14 @@
 """The engine, `mujoco`, imported so that it loads whatever MUJOCO_GL says, with or without GL.
 
-MuJoCo binds a window system when it is imported, and fails where MUJOCO_GL names none or its
-library is missing. Only rendering needs one, so a failed import is repeated without it. Every
-module that needs the engine imports it from here: `from factory.support.engine import mujoco`.
+MuJoCo binds a window system when it is imported, which takes time, and fails where MUJOCO_GL names
+none or its library is missing. Pictures have contexts of their own (`factory.support.gl`), so it is
+bound only where MUJOCO_GL names one, and a failed import is repeated without it. Every module that
+needs the engine imports it from here: `from factory.support.engine import mujoco`.
 """
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 import warnings
@@ -19,7 +21,8 @@ from factory.support.interruption import put_off
 
 with put_off():
     try:
-        import mujoco
+        with environment("MUJOCO_GL", os.environ.get("MUJOCO_GL") or "disable"):
+            import mujoco
     except Exception:  # a wrong MUJOCO_GL is a RuntimeError, a missing library anything
         try:
             with environment("MUJOCO_GL", "disable"):

@@ -108,12 +108,13 @@ def _way_out(named: str, variables: dict[str, str | None]) -> str:
     if named == "osmesa":
         return "apt-get install -y libosmesa6, or set MUJOCO_GL=egl"
     detours = [name for name in _DETOURS if variables.get(name)]
-    if detours and _loads("libEGL.so.1") and _loads("libGL.so.1"):
+    if detours and loads("libEGL.so.1") and loads("libGL.so.1"):
         return f"unset {' '.join(detours)}; or {APT}"
     return APT
 
 
-def _loads(library: str) -> bool:
+def loads(library: str) -> bool:
+    """Whether a shared library can be loaded."""
     try:
         ctypes.CDLL(library)
     except OSError:

@@ -259,6 +259,10 @@ def test_a_mode_is_near_before_it_is_there(count: int, within: float, seed: int)
     away = np.maximum.reduceat(np.abs(x - bundle.goal), bundle.starts)
     assert any(way < mode.eps + within for way, mode in zip(away, bundle.modes, strict=True))
     assert bundle.near_goal(x, 0.0) == bundle.at_goal(x).any()
+    near = np.logical_and.reduceat(np.abs(x - bundle.goal) < EPS + within, bundle.starts)
+    for clocked in (near, near & (np.arange(count) != near.argmax())):
+        others = replace(bundle, clocked=clocked)
+        assert others.near_goal(x, within) == (near & ~clocked).any()
 
 
 @settings(max_examples=50, deadline=None)

@@ -14,6 +14,7 @@ from factory.engine.mjcf.parts import HIDDEN
 from factory.engine.mjcf.replica import SHOWN, Replica
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
+from factory.film.drawn import drawn
 from factory.floor.layout.dimensions import RISE
 from factory.floor.layout.feeding import feeder_of
 from factory.floor.layout.layout import Layout
@@ -189,6 +190,17 @@ def test_no_jump_changes_a_pixel(eye: Eye, found: list[Jump]) -> None:
     """Into every housing, and of a whole unit out of the shed."""
     for jump in (*fed(found), *gone(found)[: len(fed(found))]):
         assert not any(eye.sees(jump)), jump.body
+
+
+@needs_gl
+def test_no_jump_is_seen_in_the_drawn_model(paper: Layout, found: list[Jump]) -> None:
+    simulation = Simulation(paper, RunRequest(units=2))
+    made, m = simulation.model, simulation.physical.m
+    seen = [*fed(found), *gone(found)[: len(fed(found))]]
+    with Eye(paper, drawn(m, made.xml, made.files, "overview")) as eye:
+        assert not any(any(eye.sees(jump)) for jump in seen)
+        eye.replica.m.geom_group[eye.geom("outfeed/housing/skin")] = SHOWN
+        assert any(any(eye.sees(jump)) for jump in gone(found))
 
 
 @needs_gl

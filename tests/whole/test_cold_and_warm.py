@@ -7,20 +7,41 @@ import os
 import shutil
 import subprocess
 import sys
+from collections import Counter
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Any
+from xml.sax import saxutils
 
+import numpy as np
 import pytest
+import rich.table
 import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rich.box import SIMPLE_HEAD
+from rich.cells import cell_len
+from rich.console import Console
+from rich.text import Text
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
 
 from factory.commands import places
 from factory.floor.geometry import meshes
+from factory.floor.geometry.pieces import BOX_FACES, box_piece, is_box
 from factory.floor.geometry.product import product_geometry
 from factory.floor.mating.overlaps import Finder
 from factory.pipeline import all_templates
+from factory.support import console as console_module
+from factory.support import markup
 from factory.support.cache import load, store
+from factory.support.errors import one_line
 from factory.support.files import user_cache
 from factory.theory.lang import load_pag
+from factory.theory.nets.components import strong_components
 from tests.command_line import Terminal
 
 TWO = """root = s; s = mate ( a, b );
@@ -30,6 +51,9 @@ BOXES = """root = s; s = mate ( a, b );
 a = atomic ( box = (0.1, 0.1, 0.1) ); b = atomic ( box = (0.1, 0.1, 0.1), pos = (0, 0, 0.1) )"""
 
 ENGINES = ("trimesh", "scipy", "mujoco", "networkx", "PIL")
+
+UNUSED = ("trimesh", "scipy", "networkx", "PIL", "glfw", "rich", "http", "unittest")
+"""What a run of boxes that is not filmed does without."""
 
 
 @pytest.fixture(autouse=True)
@@ -73,8 +97,8 @@ def work(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
 def imported(*words: object, cache: Path) -> set[str]:
     """The packages that a command loads, in a process of its own, and the modules of this one."""
     code = "import sys; from factory.commands import run_command; run_command(sys.argv[1:]);"
-    names = "{n for name in sys.modules for n in (name, name.partition('.')[0])}"
-    code += f"print(*{names}, file=sys.stderr)"
+    code += "found = {n for name in sys.modules for n in (name, name.partition('.')[0])};"
+    code += "print(*found, file=sys.stderr)"
     environment = {**os.environ, "XDG_CACHE_HOME": str(cache.parent)}
     command = [sys.executable, "-c", code, *map(str, words)]
     done = subprocess.run(command, capture_output=True, text=True, env=environment, check=True)
@@ -205,13 +229,16 @@ def test_the_oldest_entries_go_where_they_are_too_many(
     [
         (["--version"], ("numpy", "lark", *ENGINES)),
         (["--help"], ("numpy", "lark", *ENGINES)),
-        (["check", "examples/paper.pag"], ("numpy", *ENGINES)),
+        (["check", "examples/paper.pag"], ("numpy", "rich", *ENGINES)),
+        (["build", "examples/paper.pag", "-o", "out"], UNUSED),
+        (["run", "examples/paper.pag", "--units", "1"], UNUSED),
     ],
-    ids=["version", "help", "paper"],
+    ids=["version", "help", "check", "build", "run"],
 )
 def test_a_command_loads_what_it_needs(
-    words: list[str], without: tuple[str, ...], cache: Path
+    words: list[str], without: tuple[str, ...], cache: Path, tmp_path: Path
 ) -> None:
+    words = [str(tmp_path / word) if word == "out" else word for word in words]
     found = imported(*words, cache=cache)
     assert "click" in found and not found & set(without)
 
@@ -243,3 +270,72 @@ def test_meshes_that_are_known_are_checked_without_libraries(file: Path, cache: 
     """But for the edges of their bodies, which hands touch: SciPy finds those."""
     assert {"trimesh", "scipy"} <= imported("check", file, cache=cache)
     assert imported("check", file, cache=cache) & set(ENGINES) <= {"scipy"}
+
+
+# --- what is done without a library does what the library does -----------------------------------
+
+CELLS = st.text("ab cé漢[\t\x1b-", min_size=1, max_size=12).map(lambda t: f"x{t}y")
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(1, 5).flatmap(lambda n: st.lists(st.tuples(*[CELLS] * n), min_size=1)))
+def test_a_table_that_is_no_wider_than_its_room_is_that_of_rich(rows: list[Any]) -> None:
+    columns = tuple(f"column {n}" for n in range(len(rows[0])))
+    made = rich.table.Table(title="T", box=SIMPLE_HEAD, title_justify="left", pad_edge=False)
+    for column in columns:
+        made.add_column(column)
+    for row in rows:
+        made.add_row(*(Text(one_line(cell)) for cell in row))
+    console = Console(width=console_module.WIDTH, highlight=False)
+    with console.capture() as expected:
+        console.print(made)
+    assert printed_table("T", columns, rows) == expected.get()
+
+
+def printed_table(*table: Any) -> str:
+    with redirect_stdout(StringIO()) as out:
+        console_module.table(*table)
+    return out.getvalue()
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.integers(0, 150), min_size=1, max_size=6), st.sampled_from("a漢"))
+def test_a_wide_table_is_folded_and_loses_nothing(sizes: list[int], letter: str) -> None:
+    cells = tuple("b" + letter * size for size in sizes)
+    lines = printed_table("", ("c",) * len(cells), [cells]).splitlines()
+    assert all(cell_len(line) <= console_module.WIDTH for line in lines)
+    assert Counter("".join(lines[3:]).replace(" ", "")) == Counter("".join(cells))
+
+
+@given(st.text(st.sampled_from("<>&\"'\n\r\tab"), max_size=8))
+def test_markup_is_that_of_the_standard_library(text: str) -> None:
+    assert markup.escape(text) == saxutils.escape(text)
+    assert markup.quoteattr(text) == saxutils.quoteattr(text)
+
+
+@given(st.integers(1, 12), st.data())
+def test_strong_components_are_those_of_scipy(size: int, data: st.DataObject) -> None:
+    node = st.integers(0, size - 1)
+    edges = data.draw(st.lists(st.tuples(node, node), max_size=24))
+    before, after = np.array(edges, np.intp).reshape(-1, 2).T
+    links = csr_array((np.ones(len(edges)), (before, after)), (size, size))
+    expected = connected_components(links, connection="strong")[1]
+    found = strong_components(size, before, after)
+    assert ((found[:, None] == found) == (expected[:, None] == expected)).all()
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_the_faces_of_a_box_are_those_of_its_hull(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    half, turn = rng.uniform(1e-4, 1.0, 3), Rotation.random(rng=rng).as_matrix()
+    corners = box_piece(half) @ turn.T + rng.uniform(-9, 9, 3)
+    assert is_box(corners)
+    a, b, c = corners[BOX_FACES].transpose(1, 0, 2)
+    normals = np.cross(b - a, c - a)
+    heights = ((corners[:, None] - a) * normals).sum(axis=2)
+    assert (np.minimum(heights.max(axis=0), -heights.min(axis=0)) < 1e-9).all()
+    area = np.linalg.norm(normals, axis=1).sum() / 2
+    assert area == pytest.approx(ConvexHull(corners).area)
+    moved = corners + 1e-6 * np.eye(8)[rng.integers(8)][:, None]
+    assert not is_box(moved) and not is_box(corners[[1, 0, *range(2, 8)]])
+    assert not is_box(corners[:7]) and not is_box(corners * [1, 1, 0])

@@ -253,6 +253,18 @@ def test_files_that_the_map_and_the_decisions_name_are_there() -> None:
             assert (package / name).exists() or (ROOT / name).exists(), f"{page.name}: {name}"
 
 
+def test_the_glossary_names_what_is_there() -> None:
+    """Each term with the file of its definition, and the class or function there; and no two are
+    one term."""
+    page = (DOCS / "glossary.md").read_text("utf-8")
+    rows = re.findall(r"^\| ([^|]+) \| .+ \| `([^`]+)`(?: `(\w+)`)? \|$", page, re.M)
+    assert len(rows) >= 60
+    assert len({term for term, *_ in rows}) == len(rows)
+    for term, path, name in rows:
+        text = (ROOT / "factory" / path).read_text("utf-8")
+        assert re.search(rf"^(class|def) {name}\b" if name else "^", text, re.M), term
+
+
 def test_every_decision_is_in_the_index() -> None:
     index = (DOCS / "decisions" / "index.md").read_text("utf-8")
     pages = {page.stem for page in (DOCS / "decisions").glob("*.md")} - {"index"}

@@ -180,6 +180,22 @@ def test_a_call_lasts_until_something_asks_for_the_supervisor(name: str) -> None
         for_a_reason |= world.supplied or supervisor.enabled or any(may_be_past)
 
 
+@pytest.mark.parametrize("sensors", [[], [lambda x, v: (x, v)]], ids=["exact", "sensors"])
+def test_a_clock_that_runs_asks_for_nobody(sensors: list[Any]) -> None:
+    """A call lasts until the clock has run out; where sensors may err robots are asked in every
+    tick whether they are still there."""
+    simulation = ready("paper", settings=Settings(), jitter=0.0)
+    supervisor, world, ticks = simulation.supervisor, simulation.world, list[int]()
+    world.hooks.sensors.extend(sensors)
+    while world.delivered() < 2:
+        begun, fired = world.time, len(supervisor.events)
+        supervisor.step(MOST)
+        clocks = supervisor.active.clocks
+        if clocks is not None and clocks.any() and len(supervisor.events) == fired:
+            ticks.append(round((world.time - begun) / supervisor.tick))
+    assert len(ticks) > 5 and (np.mean(ticks) > 3) == (not sensors), ticks
+
+
 @pytest.mark.parametrize("timestep", [1e-5, 1e-3, 2e-3, 4e-3, 2e-2])
 @pytest.mark.parametrize("substeps", [1, 5, 100])
 def test_a_stride_is_no_longer_than_a_look(timestep: float, substeps: int) -> None:

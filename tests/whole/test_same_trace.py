@@ -20,6 +20,7 @@ from factory.engine.mjcf import loading
 from factory.engine.record.figures import PhysicsFigures
 from factory.engine.record.state import Event, State
 from factory.engine.simulation import bundles
+from factory.engine.simulation.active import Active
 from factory.engine.simulation.mujoco import outfeed
 from factory.engine.simulation.mujoco.courses import Follower
 from factory.engine.simulation.mujoco.fast import neighbours, strides
@@ -290,6 +291,7 @@ def _setpoints(d: mujoco.MjData) -> None:
 FAULTS: dict[str, tuple[str, Any, str, Any]] = {
     "a pass that comes unseen": ("chest", Follower, "until", lambda self, past: self.left),
     "a tray that comes unseen": ("chest", outfeed, "CLOSE", 0.0),
+    "a clock's end that comes unseen": ("paper", Active, "ticks_left", lambda *_: 1),
     "a goal that comes unseen": ("paper", Bundle, "near_goal", lambda *_: False),
     **{
         f"going back forgets {forget.__name__[1:]}": ("paper", strides, "mujoco", Forgetful(forget))

@@ -1,5 +1,5 @@
 """What the app `analyze` gives."""
 
-from factory.support.apps import App
+from factory.api import App
 
 APP = App("analyze", commands={"analyze": "factory.apps.analyze.command_line.analyze:analyze"})

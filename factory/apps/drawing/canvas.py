@@ -10,7 +10,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from math import floor, hypot, log10
 from typing import TYPE_CHECKING, Any
-from xml.sax.saxutils import escape, quoteattr
+
+from factory.support.markup import escape, quoteattr
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

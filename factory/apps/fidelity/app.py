@@ -1,5 +1,5 @@
 """What the app `fidelity` gives."""
 
-from factory.support.apps import App
+from factory.api import App
 
 APP = App("fidelity", commands={"fidelity": "factory.apps.fidelity.command_line.fidelity:fidelity"})

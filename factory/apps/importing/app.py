@@ -1,5 +1,5 @@
 """What the app `importing` gives."""
 
-from factory.support.apps import App
+from factory.api import App
 
 APP = App("importing", commands={"import": "factory.apps.importing.command_line.import_:import_"})

@@ -1,5 +1,5 @@
 """What the app `monitor` gives."""
 
-from factory.support.apps import App
+from factory.api import App
 
 APP = App("monitor", commands={"monitor": "factory.apps.monitor.command_line.monitor:monitor"})

@@ -1,5 +1,5 @@
 """What the app `pareto` gives."""
 
-from factory.support.apps import App
+from factory.api import App
 
 APP = App("pareto", commands={"pareto": "factory.apps.pareto.command_line.pareto:pareto"})

@@ -1,5 +1,5 @@
 """What the app `plc` gives."""
 
-from factory.support.apps import App
+from factory.api import App
 
 APP = App("plc", commands={"plant": "factory.apps.plc.command_line.plant:plant"})

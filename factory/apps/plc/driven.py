@@ -13,8 +13,8 @@ from factory.api import Array, Event, Factory, Limits, Operation, Settings
 from factory.apps.plc.corridors import SLACK
 from factory.apps.plc.interlock import PlantInterlock
 from factory.apps.plc.signals import NOBODY, AxisDrives, Commands, Controller, Refusal, Sensed
+from factory.engine.simulation.active import Active
 from factory.engine.simulation.ordering import Ordering
-from factory.engine.simulation.supervisor import Active
 from factory.engine.timing.distributed import Scan
 
 if TYPE_CHECKING:

@@ -1,5 +1,5 @@
 """What the app `report` gives."""
 
-from factory.support.apps import App
+from factory.api import App
 
 APP = App("report", commands={"report": "factory.apps.report.command_line.report:report"})

@@ -1,6 +1,6 @@
 """What the app `revise` gives."""
 
-from factory.support.apps import App
+from factory.api import App
 
 APP = App(
     "revise",

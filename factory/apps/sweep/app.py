@@ -1,5 +1,5 @@
 """What the app `sweep` gives."""
 
-from factory.support.apps import App
+from factory.api import App
 
 APP = App("sweep", commands={"sweep": "factory.apps.sweep.command_line.sweep:sweep"})

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,7 +24,7 @@ class Bundles:
     ) -> None:
         self.modes, self.axes_of = tuple(modes), tuple(axes_of)
         self._axes = np.array([axis for axes in axes_of for axis in axes], np.intp)
-        self._kept: dict[tuple[int, ...], tuple[Bundle, Index]] = {}
+        self._kept: dict[tuple[tuple[int, ...], frozenset[int]], tuple[Bundle, Index]] = {}
         self.limit(limits)
 
     def with_more(self, modes: Sequence[Mode], axes_of: Sequence[tuple[int, ...]]) -> Bundles:
@@ -36,12 +37,21 @@ class Bundles:
         self._all = Bundle.of(self.modes, [limits.of(axes) for axes in self.axes_of])
         self._kept.clear()
 
-    def of(self, numbers: tuple[int, ...]) -> tuple[Bundle, Index]:
-        """The bundle of modes, by number, and their axes, mode by mode."""
-        if numbers not in self._kept:
-            if len(self._kept) == KEPT:
+    def of(
+        self, numbers: tuple[int, ...], clocked: frozenset[int] = frozenset()
+    ) -> tuple[Bundle, Index]:
+        """The bundle of modes, by number, some of them clocked, and their axes, mode by mode."""
+        key = numbers, clocked
+        if key not in self._kept:
+            if len(self._kept) >= KEPT:
                 self._kept.clear()
-            chosen = np.array(numbers, np.intp)
-            slots = ranges(self._all.starts[chosen], self._all.sizes[chosen])
-            self._kept[numbers] = self._all.select(numbers), self._axes[slots]
-        return self._kept[numbers]
+            self._kept[key] = self._selected(numbers, clocked)
+        return self._kept[key]
+
+    def _selected(self, numbers: tuple[int, ...], clocked: Collection[int]) -> tuple[Bundle, Index]:
+        if clocked:
+            bundle, axes = self.of(numbers)
+            return replace(bundle, clocked=np.array([n in clocked for n in numbers])), axes
+        chosen = np.array(numbers, np.intp)
+        slots = ranges(self._all.starts[chosen], self._all.sizes[chosen])
+        return self._all.select(numbers), self._axes[slots]

@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from factory.engine.record.state import Event
+from factory.engine.simulation.active import Active
 from factory.engine.simulation.bundles import Bundles
 from factory.engine.simulation.cells import Cells, Link
 from factory.engine.simulation.ordering import Ordering
-from factory.engine.simulation.supervisor import Active
 from factory.engine.simulation.world import Job, World
 from factory.engine.timing.distributed import Scan, drawn_scans
 from factory.floor.modes.staging import HeadStart

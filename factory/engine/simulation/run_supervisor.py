@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from factory.engine.record.state import Event
+from factory.engine.simulation.active import Active
 from factory.engine.simulation.ordering import Ordering
-from factory.engine.simulation.supervisor import Active
 from factory.engine.timing.distributed import Scan
 from factory.theory.control.mode import Limits
 from factory.theory.nets.undone import Undone

@@ -8,18 +8,19 @@ robot costs nothing.
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from itertools import compress
 
 import numpy as np
 
 from factory.engine.record.state import Event
+from factory.engine.simulation.active import Active
 from factory.engine.simulation.ahead import Ahead
 from factory.engine.simulation.bundles import Bundles
 from factory.engine.simulation.ordering import Ordering
 from factory.engine.simulation.world import World
 from factory.engine.timing.distributed import Scan
 from factory.floor.modes.staging import HeadStart
-from factory.support.arrays import Array, Index
+from factory.support.arrays import Array, Truth
 from factory.theory.control.mode import STILL, Limits, Mode
 from factory.theory.control.navigation import Bundle
 from factory.theory.nets.petri import Marking
@@ -27,18 +28,6 @@ from factory.theory.nets.threaded import Threads
 from factory.theory.nets.undone import Undone
 from factory.theory.plant.demand import Word
 from factory.theory.plant.factory import Factory, Operation
-
-
-@dataclass(slots=True)
-class Active:
-    """The active modes by number: of operations, then stages of waiting robots; their bundle, the
-    axes of each slot, and the clocks, if any."""
-
-    operations: tuple[int, ...] = ()
-    ahead: tuple[int, ...] = ()
-    bundle: Bundle | None = None
-    axes: Index = field(default_factory=lambda: np.empty(0, np.intp))
-    clocks: Array | None = None
 
 
 class Supervisor:
@@ -119,9 +108,17 @@ class Supervisor:
             ticks = 1
         if self.word.is_late:
             self.enabled, self.world.hooks.busy = True, self.world.time
-        self.near = self.world.step(self.active.bundle, self.active.axes, ticks, self.ordering.held)
+        self._advance(ticks)
         if self.ordering.held:
             self.enabled |= self.ordering.goes_on(self._sensed())
+
+    def _advance(self, ticks: int) -> None:
+        """Advance the world by up to `ticks`, but not past the end of a running clock."""
+        world, active, before = self.world, self.active, self.world.time
+        ticks = max(1, min(ticks, active.ticks_left(self.tick)))
+        near = world.step(active.bundle, active.axes, ticks, self.ordering.held)
+        active.go_on(world.time - before)
+        self.near = near or active.ticks_left(self.tick) <= 0
 
     def undo(
         self, undone: Undone, fired: Sequence[int], marking: Marking, free: Container[int]
@@ -243,19 +240,27 @@ class Supervisor:
             return []
         x, v = self.world.sense()
         there = active.bundle.at_goal(x[active.axes])
-        if not np.count_nonzero(there):
-            return []
-        if active.bundle.dwells:
-            clocks = self.tick * there.astype(float)
-            if active.clocks is not None:
-                clocks += active.clocks
-            active.clocks, there = clocks, active.bundle.finished(there, clocks)
-            if not np.count_nonzero(there):
-                return []
         still = np.logical_and.reduceat(np.abs(v[active.axes]) < STILL, active.bundle.starts)
-        numbers = (*active.operations, *active.ahead)
+        if active.bundle.dwells:
+            there = self._run_out(active.bundle, there, still)
+        numbers = active.numbers
         over = [numbers[number] for number in (there & still).nonzero()[0].tolist()]
         return [n for n in over if self._passes(n)] if self.world.hooks.judges else over
+
+    def _run_out(self, bundle: Bundle, there: Truth, still: Truth) -> Truth:
+        """Whether each mode is in its goal: it is `there` and its clock has run out. The clocks of
+        those that are `still` run with time from now on; not where sensors err, since a robot may
+        seem to leave then."""
+        active = self.active
+        asked = there if bundle.clocked is None else there & ~bundle.clocked
+        clocks = self.tick * asked
+        if active.clocks is not None:
+            clocks += active.clocks
+        active.clocks, finished = clocks, bundle.finished(there, clocks)
+        stays = there & still & ~finished & (not self.world.hooks.sensors)
+        active.clocked = frozenset(compress(active.numbers, stays.tolist()))
+        active.bundle, _ = self.bundles.of(active.numbers, active.clocked)
+        return finished
 
     def _passes(self, number: int) -> bool:
         """Whether a mode at its goal may end; a stage always may."""
@@ -296,10 +301,10 @@ class Supervisor:
         """Rebuild the bundle of active modes; clocks of continuing modes are kept."""
         active = self.active
         operations, ahead = tuple(operations), tuple(ahead)
-        numbers = (*operations, *ahead)
-        bundle, axes = self.bundles.of(numbers)
-        kept = None
+        numbers, kept = (*operations, *ahead), None
         if active.clocks is not None and np.count_nonzero(active.clocks):
-            clocks = dict(zip((*active.operations, *active.ahead), active.clocks, strict=True))
+            clocks = dict(zip(active.numbers, active.clocks, strict=True))
             kept = np.array([clocks.get(o, 0.0) for o in numbers])
-        self.active = Active(operations, ahead, bundle if numbers else None, axes, kept)
+        clocked = active.clocked.intersection(numbers)
+        bundle, axes = self.bundles.of(numbers, clocked)
+        self.active = Active(operations, ahead, bundle if numbers else None, axes, kept, clocked)

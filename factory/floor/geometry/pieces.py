@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
@@ -21,6 +21,21 @@ from factory.support.arrays import Array, Indices
 
 ROUND = 5e-6
 """The tolerated protrusion of the polytope round a round body [m]."""
+
+CORNERS = np.array([*product((0.0, 1.0), repeat=3)])
+"""The corners of a unit box."""
+
+BOX_FACES = np.array(
+    [
+        *([0, 1, 2], [1, 2, 3], [4, 5, 6], [5, 6, 7], [0, 1, 4], [1, 4, 5]),
+        *([2, 3, 6], [3, 6, 7], [0, 2, 4], [2, 4, 6], [1, 3, 5], [3, 5, 7]),
+    ]
+)
+"""The triangles (12, 3) of its faces, by corner. SciPy finds those of any hull; to import it takes
+longer than all else that is done before a run of boxes."""
+
+EXACT = 1e-12
+"""The rounding of corners [m]."""
 
 SIDES = (16, 256)
 """Fewest and most sides of the prism round a cylinder."""
@@ -37,8 +52,17 @@ FLATNESS = 1e-4
 
 def box_piece(half: Array) -> Array:
     """The corners (8, 3) of a box about the origin."""
-    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
-    return np.asarray(signs * half)
+    return np.asarray((2 * CORNERS - 1) * half)
+
+
+def is_box(points: Array) -> bool:
+    """Whether points (n, 3) are the corners of a box of any attitude, or of a sheared one, in the
+    order of `box_piece`."""
+    if len(points) != len(CORNERS):
+        return False
+    edges = points[[4, 2, 1]] - points[0]
+    off = np.abs(points - points[0] - CORNERS @ edges).max()
+    return bool(off < EXACT and abs(np.linalg.det(edges)) > EXACT**2)
 
 
 def cylinder_piece(radius: float, half: float) -> Array:

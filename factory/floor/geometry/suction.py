@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from factory.floor.geometry.pieces import BOX_FACES, is_box
 from factory.floor.geometry.solids import Solid, rotation
 from factory.support.arrays import Array
 
@@ -147,6 +148,8 @@ def _pieces(solid: Solid) -> Array:
 def _hull(points: Array) -> Array:
     """The triangles (n, 3, 3) of the convex hull of points (k, 3); if they are coplanar, the two
     triangles of the top of their box."""
+    if is_box(points):
+        return np.asarray(points[BOX_FACES])
     from scipy.spatial import ConvexHull, QhullError
 
     try:

@@ -64,7 +64,9 @@ class _Terms:
 class Bundle:
     """All active modes, concatenated: a configuration x (n,) has the robots of the first mode
     first, in the mode's order. `starts` (modes,): the number of each mode's first robot; `sizes`
-    (modes,): how many it has. `dwells`: a clock has to run out in some mode.
+    (modes,): how many it has. `dwells`: a clock has to run out in some mode. `clocked` (modes,):
+    modes that rest in their goal balls until their clocks have run out, so that their ends are
+    known; None for none.
 
     No call loops over robots or modes; arrays are made once, by `of`.
     """
@@ -85,6 +87,7 @@ class Bundle:
     gates: Gates
     pairs: Pairs
     moving: Array | None
+    clocked: Truth | None = None
     dwells: bool = field(init=False)
 
     def __post_init__(self) -> None:
@@ -177,11 +180,12 @@ class Bundle:
 
     def near_goal(self, x: Array, within: float, slow: Truth | None = None) -> bool:
         """Whether any mode's robots are all that near to its goal ball [m]; and all of those that
-        are `slow` (n,), but where time in the ball counts."""
+        are `slow` (n,), but where time in the ball counts. Modes that are clocked are left out."""
         near = np.abs(x - self.goal) < self.eps + within
         if slow is not None:
             near &= slow | (self.dwell > 0.0)[self.owner]
-        return bool(np.logical_and.reduceat(near, self.starts).any())
+        modes = np.logical_and.reduceat(near, self.starts)
+        return bool((modes if self.clocked is None else modes & ~self.clocked).any())
 
     def finished(self, there: Truth, clock: Array) -> Truth:
         """Whether each mode's (x, clock) is in its goal G_p (modes,): x is `there`, in the goal

@@ -20,6 +20,7 @@ from functools import cached_property
 import numpy as np
 
 from factory.support.arrays import Array, Index
+from factory.theory.nets.components import strong_components
 from factory.theory.nets.marked import NONE, MarkedNet, token_free
 
 ROUNDING = 1e-12
@@ -76,14 +77,10 @@ class _Graph:
     """The places on circuits as edges between transitions, and the state of the iteration."""
 
     def __init__(self, net: MarkedNet, seconds: Sequence[float]) -> None:
-        from scipy.sparse import csr_array
-        from scipy.sparse.csgraph import connected_components
-
         before, after = np.array(net.left, np.intp), np.array(net.right, np.intp)
         size = len(net.net.transitions)
         joined = (before != NONE) & (after != NONE)
-        links = (np.ones(int(joined.sum())), (before[joined], after[joined]))
-        _, self.part = connected_components(csr_array(links, (size, size)), connection="strong")
+        self.part = strong_components(size, before[joined], after[joined])
         inside = np.flatnonzero(joined)
         self.places: Index = inside[self.part[before[inside]] == self.part[after[inside]]]
         self.before, self.after = before[self.places], after[self.places]

@@ -8,7 +8,7 @@ import pytest
 
 import factory.engine.simulation.modelling as modelling
 from factory.apps.recovery import WorldFault
-from factory.commands.verdicts import say_failures
+from factory.commands.summaries import say_failures
 from factory.engine.record.failures import Failures
 from factory.engine.simulation.request import RunRequest
 from factory.floor.layout import bins

@@ -31,6 +31,7 @@ from factory.engine.simulation.simulation import Simulation
 from factory.film import Film, Picture, Still, check_output
 from factory.film.action import Snapshot
 from factory.film.caption import Caption
+from factory.film.finale import LASTS
 from factory.film.painter import Painter, Renderer
 from factory.film.picture import from_above, overview
 from factory.film.reel import HOLD
@@ -46,8 +47,8 @@ from tests.paths import ROOT
 
 PAPER = ROOT / "examples" / "paper.pag"
 SIZE, FPS = (160, 96), 10.0
-HELD = round(HOLD * FPS)
-SMALL, PRODUCT = Picture(SIZE), Picture((240, 136), "product")
+HELD, TURNED = round(HOLD * FPS), round(LASTS * FPS)
+SMALL, PRODUCT = Picture(SIZE), Picture((240, 136), "product", renderer="classic")
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +92,7 @@ def film_of(path: Path) -> np.ndarray:
 def test_size_rate_and_frames_are_exact(taken) -> None:
     folder, run, film, _ = taken
     frames = film_of(folder / "run.mp4")
-    wanted = int(run.sim_time_s * FPS + 1e-6) + 1 + HELD
+    wanted = int(run.sim_time_s * FPS + 1e-6) + 1 + HELD + TURNED
     assert film.frames == wanted and frames.shape == (wanted, SIZE[1], SIZE[0], 3)
     about = iio.immeta(folder / "run.mp4", plugin="pyav")
     assert about["fps"] == pytest.approx(FPS) and about["codec"] == "h264"
@@ -112,17 +113,29 @@ def test_a_film_ends_with_all_units_for_a_second(
         return draw(caption, pixels, product, made, *rest)
 
     assert HELD == FPS
-    assert all(np.array_equal(pictures[-1], one) for one in pictures[-HELD:])
+    held = pictures[-HELD - TURNED : -TURNED]
+    assert all(np.array_equal(held[-1], one) for one in held)
     monkeypatch.setattr(Caption, "draw", drawn)
     render_log(read_log(taken[0] / "run.log"), Shot(tmp_path / "again.mp4", SMALL, FPS))
     assert said[0] == 0 and said[-1] == 1
 
 
 @needs_gl
+def test_then_it_shows_the_product_alone_and_from_more_than_one_side(taken) -> None:
+    before, one, *_, other = taken[3][-TURNED - 1 :]
+
+    def coloured(picture: np.ndarray) -> float:
+        return float((np.ptp(picture.astype(int), axis=2) > 60).mean())
+
+    assert min(coloured(one), coloured(other)) > 3 * coloured(before)
+    assert (np.abs(one.astype(int) - other).max(axis=2) > 40).mean() > 0.1
+
+
+@needs_gl
 def test_the_picture_is_not_blank_and_changes(taken) -> None:
     frames = film_of(taken[0] / "run.mp4").astype(int)
     assert all(frame.std() > 10 for frame in frames)
-    factory_only = frames[:-HELD, : int(0.8 * SIZE[1])]
+    factory_only = frames[: -HELD - TURNED, : int(0.8 * SIZE[1])]
     changed = [np.abs(a - b).max() for a, b in pairwise(factory_only)]
     assert np.mean(np.array(changed) > 30) > 0.6
 
@@ -365,7 +378,8 @@ def test_no_more_facets_are_drawn_than_are_seen(layout, tmp_path: Path) -> None:
     subject = MonitorSubject.of_run(simulation)
     seen = simulation.state().observation
     shown = Snapshot.of(seen.qpos, seen.welds)
-    with Painter(simulation.world.m, (320, 180), "overview", subject) as painter:
+    look = Framing(16 / 9)
+    with Painter(simulation.world.m, (320, 180), "overview", subject, look) as painter:
         few, quality = painter.paint(shown), painter.replica.m.vis.quality
         assert (quality.numquads, quality.numstacks) == (1, 2)
         assert not painter.renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SKYBOX]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from factory.api import Diagnostic, InputError, usage_error
 from factory.apps.runs.options import RunOptions
 from factory.commands import options as shared
 from factory.commands.defaults import with_defaults
@@ -17,14 +18,12 @@ from factory.commands.grouped import Grouped
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced, cut_off, read_partly
 from factory.support.console import emit, say, table
-from factory.support.errors import Diagnostic, InputError, usage_error
 
 if TYPE_CHECKING:
-    from factory.apps.analyze import Analysis, Change, Timing
+    from factory.api import Factory, Project, Timing
+    from factory.apps.analyze import Analysis, Change
     from factory.apps.analyze.measured import RunRecord
     from factory.apps.log import Log
-    from factory.pipeline import Project
-    from factory.theory.plant.factory import Factory
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +85,8 @@ def analyze(
     out: OutputOptions,
 ) -> int:
     """Find the bottleneck of FILE.pag, and what would relieve it."""
-    from factory.apps.analyze import Timing, analyse
+    from factory.api import Timing
+    from factory.apps.analyze import analyse
     from factory.apps.analyze.document import document
     from factory.apps.analyze.measured import Conditions, conditions, logged_record
     from factory.theory.nets.verify import proved
@@ -149,10 +149,10 @@ def _run(
     project: Project, timing: Timing, asked: RunOptions, silent: bool
 ) -> tuple[RunRecord, int]:
     """A run without fused parts, and its exit status."""
+    from factory.api import Simulation
     from factory.apps.analyze.measured import record_of
     from factory.apps.runs.executing import carry_out
     from factory.apps.runs.watched import watched
-    from factory.engine.simulation.simulation import Simulation
 
     request = replace(asked, fuse=False).request(project, shown=False)
     run = carry_out(Simulation(timing.layout, request), silent, go=watched)

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, cast
 
 import click
 
+from factory.api import Diagnostic, InputError, usage_error
 from factory.commands.options import LIBRARY, OUT, OUTPUT, PATH, TEMPLATES
 from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions
 from factory.commands.warnings import announced
 from factory.support.console import emit, say
-from factory.support.errors import Diagnostic, InputError, usage_error
 from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
-    from factory.theory.problem.template import Template
+    from factory.api import Template
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 
@@ -63,10 +63,11 @@ def import_(
 ) -> int:
     """Convert SOURCE to a PAG: an LDraw model (.ldr, .mpd), a tree of meshes (.json, .yaml), a bill
     of materials with levels (.csv), or a folder with one of these."""
+    from factory.api import write_all
     from factory.apps.importing import Options, import_product
     from factory.apps.importing.draft import Mates
     from factory.pipeline import all_templates
-    from factory.support.files import own_names, write_all
+    from factory.support.files import own_names
 
     for folder, option in ((library, "--library"), (meshes, "--meshes")):
         _require_folder(folder, option)
@@ -126,9 +127,9 @@ def _chosen(columns: Sequence[str]) -> dict[str, str]:
 
 def _shape_warnings(pag: Path, templates: Mapping[str, Template]) -> tuple[Diagnostic, ...]:
     """The warnings that `build` will give about the shapes of a written PAG."""
+    from factory.api import load_pag
     from factory.floor.geometry.overlapping import overlaps_of
     from factory.floor.geometry.product import product_geometry
-    from factory.theory.lang.pag_reader import load_pag
 
     try:
         made = load_pag(pag, templates)

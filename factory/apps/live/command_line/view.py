@@ -49,11 +49,11 @@ def view(
     """Run FILE.pag endlessly in a browser, where you can pause it, push robots and block feeders.
 
     With --spares or --faults the run recovers from failures: you can pause or kill robots."""
+    from factory.api import Simulation
     from factory.apps.live import Server, Session
     from factory.apps.live.page import page
     from factory.apps.live.server import check_server
     from factory.apps.runs.running import campaign_of
-    from factory.engine.simulation.simulation import Simulation
     from factory.support.interruption import Interruption
     from factory.theory.nets.verify import proved
 

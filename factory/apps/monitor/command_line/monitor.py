@@ -10,7 +10,7 @@ import click
 
 from factory.commands.options import LENIENT, OUTPUT, PATH, STRICT
 from factory.commands.requests import OutputOptions
-from factory.commands.verdicts import found_by, say_failures, say_verdict, tell_failures
+from factory.commands.summaries import found_by, say_failures, say_verdict, tell_failures
 from factory.support.console import emit, say
 
 

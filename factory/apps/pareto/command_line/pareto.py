@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from factory.api import Diagnostic, usage_error
 from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
 from factory.commands.options import FLOOR, MOTION, OUT, OUTPUT, SECONDS, SOURCE
@@ -17,12 +18,12 @@ from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced
 from factory.support.console import emit, say, table
-from factory.support.errors import Diagnostic, StoppedError, usage_error
+from factory.support.errors import StoppedError
 
 if TYPE_CHECKING:
+    from factory.api import Project
     from factory.apps.pareto import Effort, FrontPoint, ParetoFront
     from factory.apps.pareto.sweeping import Step
-    from factory.pipeline import Project
 
 PAGE_NAME = "pareto.html"
 
@@ -135,9 +136,10 @@ def _written(
 ) -> tuple[Sequence[str | None], list[Path]]:
     """Write the page and the files of the points into a folder, if there is one. Returns the
     commands that build the points, and the files."""
+    from factory.api import write_all
     from factory.apps.pareto.front import commands_of, point_files
     from factory.apps.pareto.page import floor_plans, front_page
-    from factory.support.files import own_names, write_all
+    from factory.support.files import own_names
 
     if folder is None:
         return [None] * len(front.points), []

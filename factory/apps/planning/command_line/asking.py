@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from factory.api import InputError
 from factory.support.bounds import LENGTHS
-from factory.support.errors import InputError
 
 if TYPE_CHECKING:
     from factory.apps.planning.parts import InPlace

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from factory.api import InputError, MissingError
 from factory.commands.requests import OutputOptions
 from factory.commands.warnings import announced
-from factory.support.errors import InputError, MissingError
 from factory.support.progress import Waiting
 
 if TYPE_CHECKING:

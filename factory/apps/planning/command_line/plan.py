@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from factory.api import MissingError
 from factory.apps.planning.command_line.asking import asked
 from factory.apps.planning.command_line.interlocking import refuse
 from factory.commands.options import LIBRARY, OUT, OUTPUT, PATH, SECONDS, TEMPLATES
@@ -18,16 +19,14 @@ from factory.commands.requests import OutputOptions
 from factory.commands.warnings import announced, say_allowed
 from factory.support.bounds import AIMS, LENGTHS, UPS
 from factory.support.console import emit, say
-from factory.support.errors import MissingError
 from factory.support.progress import StepBar, Waiting
 
 if TYPE_CHECKING:
+    from factory.api import Array, Project
     from factory.apps.planning.parts import InPlace
     from factory.apps.planning.plan import CannotAssemble, Planned, PlannedJoin, PlanOptions
     from factory.apps.planning.searching import Aim
     from factory.floor.geometry.overlapping import Overlapping
-    from factory.pipeline import Project
-    from factory.support.arrays import Array
     from factory.theory.plant.approaches import Approach, Kind
 
 LOOKS = ("exploded.png", "assembly.mp4")

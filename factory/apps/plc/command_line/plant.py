@@ -6,16 +6,15 @@ import sys
 
 import click
 
+from factory.api import usage_error
 from factory.apps.runs.options import RunOptions
 from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
 from factory.commands.options import FLOOR, LENIENT, MOTION, OUTPUT, RUN, SOURCE, address
 from factory.commands.requests import OutputOptions, ProjectOptions
-from factory.commands.run import summarise
-from factory.commands.verdicts import tell_failures
+from factory.commands.summaries import summarise, tell_failures
 from factory.commands.warnings import announced
 from factory.support.console import emit, say
-from factory.support.errors import usage_error
 
 SCAN = 10
 """Default period at which the plant reads its commands [ms]."""
@@ -57,9 +56,9 @@ def plant(
     The controller writes targets, grips, jobs and a heartbeat, without which all axes stand. What
     the net or the reach of a grip does not allow is refused by name. `export --format st` writes
     a controller."""
+    from factory.api import Simulation
     from factory.apps.plc.opcua import OpcuaPlant, check_plant
     from factory.apps.runs.running import carry_on
-    from factory.engine.simulation.simulation import Simulation
     from factory.theory.nets.verify import proved
 
     check_plant(host, expose)

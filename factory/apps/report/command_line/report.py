@@ -14,7 +14,7 @@ from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
 from factory.commands.outputs import for_a_pag, writable
 from factory.commands.requests import OutputOptions, ProjectOptions
-from factory.commands.run import summarise
+from factory.commands.summaries import summarise
 from factory.commands.warnings import announced
 from factory.support.console import emit, say
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import click
 
+from factory.api import Diagnostic, InputError
 from factory.commands.options import OUT, OUTPUT, PATH, TEMPLATES, pag_files
 from factory.commands.outputs import writable
 from factory.commands.requests import OutputOptions
 from factory.support.console import emit, say
-from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import MOST_UNITS
 
 
@@ -30,10 +30,9 @@ def mix(
     out: OutputOptions,
 ) -> int:
     """Write ONE.pag and OTHER.pag as one product family, in which what is equal is written once."""
+    from factory.api import load_pag, write_all, write_pag
     from factory.apps.revise.family import family
     from factory.pipeline import all_templates
-    from factory.support.files import write_all
-    from factory.theory.lang import load_pag, write_pag
 
     writable(output)
     templates, counts = all_templates(folders), _counts(count)

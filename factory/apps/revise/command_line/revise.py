@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import click
 
+from factory.api import RunError
 from factory.commands.options import OUT, OUTPUT, PATH, TEMPLATES, pag_files
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.support.console import emit, say, warn
-from factory.support.errors import RunError
 from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
@@ -50,11 +50,11 @@ def revise(
 
     With --live, -o DIR also writes DIR/family.pag, the mix of both, and DIR/live.csv, orders for a
     change: factory run DIR/family.pag --demand DIR/live.csv --units 18 --wip 4"""
+    from factory.api import pace, write_all
     from factory.apps.exports.build import BuildRequest, build
     from factory.apps.revise.live import FAMILY_NAME, ORDERS_NAME, LiveChange
     from factory.apps.revise.revision import revised
-    from factory.engine.timing.timed import pace
-    from factory.support.files import own_names, write_all
+    from factory.support.files import own_names
     from factory.theory.nets.verify import proved
 
     writable(picture)

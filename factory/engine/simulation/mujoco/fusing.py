@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from factory.support.arrays import Array
 from factory.support.engine import mujoco
@@ -82,8 +81,15 @@ class Fusion:
 
 
 def rotations(quaternions: Array) -> Array:
-    """Rotation matrices (n, 3, 3) of unit quaternions (n, 4)."""
-    return np.asarray(Rotation.from_quat(quaternions, scalar_first=True).as_matrix())
+    """Rotation matrices (n, 3, 3) of quaternions (n, 4), which are unit ones but for rounding."""
+    w, x, y, z = quaternions.T
+    w, x, y, z = quaternions.T / np.sqrt(((x * x + y * y) + z * z) + w * w)
+    rows = (
+        (x * x - y * y - z * z + w * w, 2 * (x * y - z * w), 2 * (x * z + y * w)),
+        (2 * (x * y + z * w), -x * x + y * y - z * z + w * w, 2 * (y * z - x * w)),
+        (2 * (x * z - y * w), 2 * (y * z + x * w), -x * x - y * y + z * z + w * w),
+    )
+    return np.array(rows).transpose(2, 0, 1)
 
 
 def angles(turns: Array) -> Array:

@@ -68,8 +68,10 @@ class ModelArrays:
         self.m = m
         self._arrays, self._kept = arrays_of(m), dict[str, Values]()
         self._spans = [*self._copied()]
-        self._hot = [(self._arrays[name], self._kept[name]) for name in HOT if name in self._arrays]
+        hot = (name for name in HOT if name in self._arrays)
+        self._hot = [(self._arrays[name], self._kept[name]) for name in hot]
         self._options, self._right = OptionReader(m), compiled.options
+        self._raw = self._options.raw() if self._options.read() == self._right else None
         self._next = -np.inf
         self.first = tuple(self._before(compiled, recompiled))
 
@@ -82,17 +84,17 @@ class ModelArrays:
         """Take the whole model as it is now, as a disturbance has made it."""
         for name, array in self._arrays.items():
             self._kept[name][:] = array
-        self._right = self._options.read()
+        self._right, self._raw = self._options.read(), self._options.raw()
 
     def same(self, now: float) -> bool:
         """Whether the options and the arrays that are compared most often are as they should be
         and, where the others are due at a time [s], these too."""
-        if self._options.read() != self._right:
+        if self._options.raw() != self._raw:
             return False
         if now < self._next:
             return all(array.tobytes() == kept.tobytes() for array, kept in self._hot)
         self._next = now + OFTEN
-        return all(ctypes.string_at(at, size) == kept for at, size, kept in self._spans)
+        return all((memory == kept).all() for memory, kept in self._spans)
 
     def changes(self) -> Iterator[Diagnostic]:
         """All that differs from what it should be."""
@@ -140,9 +142,10 @@ class ModelArrays:
         more = len(wrong) - 1
         return Diagnostic(code, words + (f" (and {more} more)" if more else ""))
 
-    def _copied(self) -> Iterator[tuple[int, int, bytearray]]:
-        """The spans of memory that the arrays fill: where, how many bytes, and a copy, of which
-        that of each array is a view. The engine has its arrays side by side."""
+    def _copied(self) -> Iterator[tuple[Values, Values]]:
+        """The spans of memory that the arrays fill, and a copy of each, of which that of an array
+        is a view; both in words of four bytes where they have whole ones, which takes a seventh of
+        the time. The engine has its arrays side by side."""
         at = sorted((array.ctypes.data, name) for name, array in self._arrays.items())
         spans: list[list[tuple[int, str]]] = []
         end = -1
@@ -154,13 +157,14 @@ class ModelArrays:
         for span in spans:
             begin, last = span[0][0], self._arrays[span[-1][1]]
             size = last.ctypes.data + last.nbytes - begin
-            kept = bytearray(ctypes.string_at(begin, size))
-            flat = np.frombuffer(kept, np.uint8)
+            memory = np.frombuffer((ctypes.c_uint8 * size).from_address(begin), np.uint8)
+            flat = memory.copy()
             for address, name in span:
                 array = self._arrays[name]
                 inside = flat[address - begin : address - begin + array.nbytes]
                 self._kept[name] = inside.view(array.dtype).reshape(array.shape)
-            yield begin, size, kept
+            words = np.uint8 if size % 4 else np.uint32
+            yield memory.view(words), flat.view(words)
 
 
 _APART = 64

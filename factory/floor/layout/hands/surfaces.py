@@ -14,6 +14,7 @@ from itertools import product as pairs
 
 import numpy as np
 
+from factory.floor.geometry.pieces import BOX_FACES, is_box
 from factory.floor.geometry.solids import Product, Solid
 from factory.floor.mating.depth import polytope
 from factory.support.arrays import Array, Index, Truth
@@ -88,13 +89,15 @@ class Body:
     def edges(self) -> Array:
         """The ends (e, 2, 3) of its edges, and of lines across faces [m]; of what is too thin for
         faces those of its box."""
-        from scipy.spatial import ConvexHull, QhullError
+        corners, faces = self.vertices, BOX_FACES
+        if not is_box(corners):
+            from scipy.spatial import ConvexHull, QhullError
 
-        try:
-            corners, faces = self.vertices, ConvexHull(self.vertices).simplices
-        except QhullError:
-            corners = np.array([[*p] for p in pairs(*zip(self.low, self.high, strict=True))])
-            return np.asarray(corners[list(combinations(range(8), 2))])
+            try:
+                faces = ConvexHull(corners).simplices
+            except QhullError:
+                corners = np.array([[*p] for p in pairs(*zip(self.low, self.high, strict=True))])
+                return np.asarray(corners[list(combinations(range(8), 2))])
         sorted_ends = np.sort(
             np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [0, 2]]])
         )

@@ -1,17 +1,40 @@
-"""What is printed of a run's verdict, of what failed in it, and of what a monitor found."""
+"""What is printed of a run: its figures and verdict, what failed in it, what a monitor found."""
 
 from __future__ import annotations
 
 import sys
 from typing import TYPE_CHECKING
 
-from factory.support.console import say
+from factory.support.console import say, table
 
 if TYPE_CHECKING:
     from factory.apps.monitor import Report
     from factory.engine.record.ending import CutOff
     from factory.engine.record.failures import Failures
     from factory.engine.record.verdict import RunVerdict
+    from factory.engine.simulation.run import Run
+    from factory.theory.plant.factory import Factory
+
+
+def summarise(record: Run, factory: Factory, verbose: bool) -> None:
+    """Print a run in a few lines; the first line of a failed run says why."""
+    from factory.engine.simulation.figures import figures
+
+    if not record.succeeded:
+        say_verdict(record.verdict, verbose)
+    for line in figures(record, verbose):
+        say(line)
+    if record.failures is not None:
+        say_failures(record.failures, verbose)
+    if record.monitor is not None:
+        say(found_by(record.monitor, record.cut_off))
+    if record.succeeded:
+        say_verdict(record.verdict, verbose)
+    busy = sorted(zip(factory.robots, record.utilisation, strict=True), key=lambda p: -p[1])
+    rows = [(r.name, r.type, f"{100 * u:.0f} %") for r, u in (busy if verbose else busy[:6])]
+    table("Utilisation", ("robot", "type", "busy"), rows)
+    if more := len(busy) - len(rows):
+        say(f"... and {more} more robot{'s' if more > 1 else ''} (-v shows all)")
 
 
 def say_verdict(verdict: RunVerdict, verbose: bool = False) -> None:
