@@ -43,10 +43,20 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class Project:
     """A PAG with all that follows from it: its geometry, factory and layout, each computed when it
-    is first used. `templates`, `catalogue` and `plan` are what it is compiled with, `settings` and
-    `ground` what it is laid out for; `laid`: the table of its layout, None where one is looked
-    for. `lowered`: by operations the input to be lowered there, if it can be. Raises InputError
-    (BadValue) where relays are asked for of robots with several tours."""
+    is first used.
+
+    Attributes:
+        pag: the product assembly graph.
+        templates: the operations it is compiled with, by name.
+        catalogue: the robot types it is compiled with.
+        settings: those that it is laid out for.
+        ground: the floor and the variant that it is laid out for.
+        plan: the variant of the factory.
+        laid: the table of its layout; None where one is searched.
+        lowered: by operation, the input that is to be lowered there, if it can be.
+
+    Raises InputError (BadValue) where relays are asked for of robots with several tours.
+    """
 
     pag: PAG
     templates: Mapping[str, Template] = field(repr=False)

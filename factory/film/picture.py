@@ -155,9 +155,19 @@ LEAST = 240
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """How a still or a film is taken: its `size`, the `camera`, whether it has a `caption`, the
-    `panels` beside the 3-D, a `title` shown at the beginning, and the `renderer`. Raises InputError
-    (BadValue) for an unknown camera, panel or renderer, and without room for the panels."""
+    """How a still or a film is taken.
+
+    Attributes:
+        size: width and height [pixels].
+        camera: name of the camera.
+        caption: whether it has a caption.
+        panels: names of the panels beside the 3-D.
+        title: shown at the beginning.
+        renderer: what draws it.
+
+    Raises InputError (BadValue) for an unknown camera, panel or renderer, and where there is no
+    room for the panels.
+    """
 
     size: Size = (1280, 720)
     camera: Camera = "overview"

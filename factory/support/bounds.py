@@ -17,9 +17,17 @@ from factory.support.settings import LONGEST
 
 @dataclass(slots=True)
 class Allowance:
-    """At most `effort` candidates are examined, and none is begun after `seconds`, or once it is
-    `stopped`. `spent`: their number so far; `cut_off`: whether time ended the search first, so that
-    a faster machine would have examined more."""
+    """The bounds of a search, and what it has used of them.
+
+    Attributes:
+        effort: number of candidates that may be examined.
+        seconds: time after which no candidate is begun [s].
+        stopped: whether the search was stopped; no candidate is begun then.
+        spent: number of candidates examined.
+        cut_off: whether time ended the search first, so that a faster machine would have examined
+            more.
+        begun: the time of its beginning [s].
+    """
 
     effort: float
     seconds: float = inf

@@ -23,7 +23,14 @@ WORD = 200
 
 @dataclass(frozen=True, slots=True)
 class Position:
-    """A place in a text: file name, line and column, both counted from 1, and the line itself."""
+    """A place in a text.
+
+    Attributes:
+        file: the name of the file.
+        line: counted from 1.
+        column: counted from 1.
+        text: the line itself.
+    """
 
     file: str
     line: int
@@ -36,9 +43,17 @@ class Position:
 
 @dataclass(frozen=True, slots=True)
 class Diagnostic:
-    """One error or warning: a documented code, what was found, its position, and a remedy as hint.
-    `many`: the words for several of the same cause, as in "4 meshes are open: ..."; "" if each is
-    listed. `about`: the label by which it is named in such a line."""
+    """An error or a warning.
+
+    Attributes:
+        code: its documented code, such as Syntax; `factory --explain CODE` prints the text.
+        message: what was found.
+        position: where in the user's text; None for no place.
+        hint: what would have been valid, or what to do; "" for nothing.
+        many: the words for several diagnostics of one cause, as in "4 meshes are open: ..."; ""
+            where each is listed.
+        about: the label by which it is named in such a line.
+    """
 
     code: str
     message: str
@@ -112,7 +127,12 @@ class InputError(FactoryError):
 
 
 def usage_error(message: str, hint: str) -> InputError:
-    """A wrong use of the command line (code Usage)."""
+    """The error of a wrong use of the command line (code Usage).
+
+    Args:
+        message: what was found.
+        hint: what would have been valid.
+    """
     return InputError(Diagnostic("Usage", message, None, hint))
 
 
@@ -142,7 +162,13 @@ def printed(diagnostics: Sequence[Diagnostic], noun: str) -> list[str]:
 
 
 def did_you_mean(word: str, valid: Sequence[str], noun: str = "") -> str:
-    """A hint that suggests the nearest valid name, or lists what there is (at most twelve)."""
+    """A hint: the nearest valid name, or a list of the valid ones, at most twelve.
+
+    Args:
+        word: the name that is not valid.
+        valid: the valid names.
+        noun: what they are, in the plural, for the list.
+    """
     near = get_close_matches(word, valid, n=1, cutoff=0.6) if len(word) <= WORD else []
     if near:
         return f"did you mean '{near[0]}'?"

@@ -31,11 +31,17 @@ PATIENCE = 2.0
 
 
 def read_bytes(path: Path, most: int) -> bytes:
-    """The content of a file, or what comes through a pipe: at most so many bytes.
+    """The content of a file or a pipe.
 
-    Raises OSError where it cannot be read. Refused before anything is read are folders, devices and
-    larger files; pipes as soon as more has come, or that nothing writes to. It is an input then,
-    which is not written over: raises InputError where it will be.
+    Args:
+        path: the file or pipe.
+        most: upper bound on its size [bytes].
+
+    A folder, a device or a larger file is refused before anything is read; a pipe when more has
+    come, or when nothing writes to it. What was read is an input, which is not written over: raises
+    InputError where it will be.
+
+    Raises OSError where it cannot be read.
     """
     reading(path)
     status = os.stat(path)
@@ -95,8 +101,13 @@ def write_text(path: Path, text: str) -> None:
 def write_all(contents: Mapping[Path, bytes]) -> None:
     """Write files, and the folders they need: all of them or, where one cannot be written, none.
 
+    Args:
+        contents: the bytes of each file.
+
     A link is followed; a pipe or a device is written in place. The permissions of a file stay as
-    they are. Raises OSError, and InputError (BadFile) where one is an input.
+    they are.
+
+    Raises OSError, and InputError (BadFile) where one is an input.
     """
     for path in contents:
         about_to_write(path)

@@ -63,18 +63,28 @@ EXAMPLES: Mapping[str, str] = MappingProxyType({"timestep": '0.002, or "auto"', 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Speed [m/s] and acceleration [m/s²] of a robot; `eps`, radius of a goal ball [m]; `timestep`
-    of the engine [s], or AUTO, and `substeps` of it in one tick of the supervisor (None: as many as
-    TICK has room for; with AUTO at least so many); least `clearance` [m]; `overlap`:
-    the most [m] by which parts may overlap and are still tested against each other, by shapes that
-    are smaller where they collide; `force`: the actuators'
-    limit as a multiple of what the payload needs; `settle`: time to come to rest within eps [s],
-    used only to predict; `outfeed` speed [m/s]; `stage`: 1 where robots that wait empty-handed go
-    ahead to where their next operation needs them.
+    """The numbers that a layout and a run depend on, beside the product.
 
-    With AUTO a tick is TICK, whatever is chosen for a layout (`factory.engine.mjcf.timestep`): so
-    layouts and predictions need not know. Raises InputError (BadValue) with every value out of its
-    range.
+    Attributes:
+        speed: of a robot [m/s].
+        acceleration: of a robot [m/s²].
+        eps: radius of a goal ball [m].
+        timestep: of the engine [s], or AUTO.
+        substeps: timesteps in one tick of the supervisor; None for as many as TICK has room for.
+            With AUTO at least so many.
+        clearance: least distance between machines that share no mode [m].
+        overlap: the most by which parts may overlap and still be tested against each other, by
+            shapes that are smaller where they collide [m].
+        force: limit of the actuators, as a multiple of what the payload needs.
+        settle: time to come to rest within eps [s], used for predictions only.
+        outfeed: speed of the outfeed [m/s].
+        stage: 1 where robots that wait with empty hands go ahead to where their next operation
+            needs them, else 0.
+
+    With AUTO a tick is TICK, whatever timestep is chosen for a layout
+    (`factory.engine.mjcf.timestep`), so layouts and predictions do not depend on it.
+
+    Raises InputError (BadValue) with every value out of its range.
     """
 
     speed: float = 0.5

@@ -25,8 +25,11 @@ MISFITS = (
 
 
 def misfit(error: BaseException) -> str:
-    """What is wrong with values that do not fit each other, without the words of Python's own
-    errors."""
+    """The reason why values do not fit each other, without the words of Python's own errors.
+
+    Args:
+        error: what was raised when they were put together.
+    """
     if type(error) is KeyError:
         return f"it has no {error}"
     return str(error) if type(error) is ValueError else "its values do not fit each other"
@@ -44,7 +47,11 @@ WORDS = {bool: "true or false", str: "a text", NoneType: "null"} | {
 
 def table_of(value: Any) -> Any:
     """The JSON value of a value: a table for a dataclass, with the fields that differ from their
-    defaults, or for a mapping; a list for a tuple or a set."""
+    defaults, or for a mapping; a list for a tuple or a set.
+
+    Args:
+        value: a dataclass, mapping, tuple, set, text or number.
+    """
     if is_dataclass(value):
         held = ((field, getattr(value, field.name)) for field in fields(value))
         return {f.name: table_of(v) for f, v in held if not _is_default(f, v)}
@@ -56,8 +63,16 @@ def table_of(value: Any) -> Any:
 
 
 def value_of(kind: type[T], table: Any, place: str = "") -> T:
-    """The value of a type that a table holds: the inverse of `table_of`. Raises ValueError, which
-    names the place within the table, says what is there and what would have been valid."""
+    """The value of a type that a table holds: the inverse of `table_of`.
+
+    Args:
+        kind: the type.
+        table: the JSON value.
+        place: its place within a document, for messages.
+
+    Raises ValueError, which names the place, and says what was found and what would have been
+    valid.
+    """
     made: T = _value(kind, table, place)
     return made
 

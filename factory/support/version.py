@@ -33,8 +33,17 @@ def installs(extra: str) -> str:
 
 
 def optional(module: str, package: str, what: str, extra: str, otherwise: str = "") -> Any:
-    """A module of an optional package, which `what` needs. Raises MissingError with the command
-    that installs it, or with an alternative."""
+    """A module of an optional package.
+
+    Args:
+        module: its dotted name.
+        package: the name of the package, for the message.
+        what: the feature that needs it.
+        extra: the extra of this distribution that installs it.
+        otherwise: an alternative, instead of the command that installs it.
+
+    Raises MissingError where it is not installed.
+    """
     try:
         with put_off():
             return import_module(module)

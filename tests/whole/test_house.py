@@ -46,6 +46,7 @@ LAWS: tuple[Law, ...] = (
     vague,
     reach_ins,
     interface,
+    undocumented,
 )
 BREACHES: tuple[tuple[Law, dict[str, str], str], ...] = (
     (strangers, {"factory/loose.py": ""}, "loose: on no floor"),
@@ -296,7 +297,7 @@ def test_a_planted_breach_is_found(
 
 
 def test_every_law_has_a_planted_breach() -> None:
-    assert {law for law, *_ in BREACHES} == {*LAWS, undocumented}
+    assert {law for law, *_ in BREACHES} == {*LAWS}
 
 
 @pytest.mark.parametrize(

@@ -64,13 +64,25 @@ ARENA = 64
 
 @dataclass(frozen=True)
 class Model:
-    """A factory as MJCF: the XML, its mesh files by name, and the numbers the run needs.
+    """A factory as MJCF: the XML, its files, and the numbers that a run needs.
 
-    `carried`: what bodies there are, `copies`: how many of each; `masses`: of each label carried
-    [kg]; `drives`: of each robot; `insets`: what is taken from the shapes that collide; `wip`: the
-    most units inside at once that they are enough for, None where more never are; `apart`: the
-    pairs of parts that are `excluded`, each part with a body that may bring it to the other;
-    `bins`: those for scrap; `overlaps`: what is said of parts that overlap in the finished product.
+    Attributes:
+        layout: the layout.
+        settings: the settings.
+        carried: the bodies that robots carry.
+        copies: number of copies of each.
+        masses: of each label carried [kg].
+        drives: of each robot.
+        insets: what is taken off the shapes that collide, and the pairs of parts without contact.
+        xml: the text.
+        files: meshes by name.
+        joints: number of joints.
+        welds: number of welds that a run can switch.
+        wip: the most units inside at once that the copies are enough for; None where more never
+            are.
+        apart: pairs of parts without contact, each part with a body that may bring it to the other.
+        bins: bins for scrap.
+        overlaps: diagnostics of parts that overlap in the finished product.
     """
 
     layout: Layout

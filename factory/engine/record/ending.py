@@ -9,9 +9,16 @@ from factory.support.errors import Diagnostic
 
 @dataclass(frozen=True, slots=True)
 class CutOff:
-    """The end of a run, or of its record, before all units were made: at `t` [s], with `products`
-    of `units`. `code` and `message`: those of the diagnostic that ended it, such as Timeout,
-    Stalled or Interrupted, or BadLog where only the record ended; "" where unknown."""
+    """The end of a run, or of its record, before all units were made.
+
+    Attributes:
+        t: time [s].
+        products: number of units made.
+        units: number of units asked for.
+        code: of the diagnostic that ended it, such as Timeout, Stalled or Interrupted; BadLog where
+            only the record ended; "" where unknown.
+        message: of that diagnostic.
+    """
 
     t: float
     products: int

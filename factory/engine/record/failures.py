@@ -10,9 +10,17 @@ from typing import Protocol
 
 @dataclass(frozen=True, slots=True)
 class Failing:
-    """A failure detected at `t` [s]: the failed `test`, the `operation` (its label), the `robot`,
-    "" for none; the `response`, and the labels that were `scrapped`. `until`: when a dead robot is
-    replaced [s], None where it is not."""
+    """A failure that was detected in a run.
+
+    Attributes:
+        t: when it was detected [s].
+        test: the test that failed.
+        operation: label of the operation.
+        robot: name of the robot; "" for none.
+        response: what was done.
+        scrapped: labels that were scrapped.
+        until: when a dead robot is replaced [s]; None where it is not.
+    """
 
     t: float
     test: str
@@ -81,12 +89,21 @@ Stood = tuple[float, tuple[str, ...]]
 
 @dataclass(frozen=True)
 class Failures:
-    """All failures of a run. `struck`: number of faults of each kind; `missed`: of those that no
-    sensor detected; `false_alarms`: of failures without a fault; `undone`: of transitions fired
-    backwards; `spares`: of spares used; `contacts`: of contacts with fallen parts, which do not
-    count as unintended; `stood`: the robots that stood still over time; `binned`: number of times
-    that scrap fell into a bin; `spilled`: names of robots that dropped scrap elsewhere, where there
-    is no space for a bin; `unseen`: the missed faults, in words."""
+    """All failures of a run.
+
+    Attributes:
+        found: the failures that were detected.
+        struck: number of faults of each kind.
+        missed: number of faults that no sensor detected.
+        false_alarms: number of failures without a fault.
+        undone: number of transitions fired backwards.
+        spares: number of spares used.
+        contacts: number of contacts with fallen parts, which do not count as unintended.
+        stood: robots that stood still, over time.
+        binned: number of times that scrap fell into a bin.
+        spilled: names of robots that dropped scrap elsewhere, where there is no space for a bin.
+        unseen: the missed faults, in words.
+    """
 
     found: tuple[Failing, ...] = ()
     struck: Mapping[str, int] = field(default_factory=dict)

@@ -62,9 +62,17 @@ class Firing:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """The verdict of a monitor. `time_s`: time taken by the monitor [s]; `calm_s`: total duration
-    of the judged spells of the run [s], None where all of it is judged; `figures` of the bodies,
-    recomputed from the states in a log, None where they were not."""
+    """The findings of a monitor.
+
+    Attributes:
+        seen: firings that it observed.
+        inferred: firings that it concluded from others.
+        violations: what the net does not allow.
+        time_s: time that the monitor took [s].
+        calm_s: total duration of the judged spells of the run [s]; None where all of it is judged.
+        figures: figures of the bodies, computed again from the states in a log; None where they
+            were not.
+    """
 
     seen: tuple[Firing, ...] = field(repr=False)
     inferred: tuple[Firing, ...] = field(repr=False)

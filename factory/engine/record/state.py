@@ -39,15 +39,20 @@ class Contacts(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """What can be measured of a world at a time [s].
+    """What can be measured of a world at a time. In the ideal world, positions [m] and speeds [m/s]
+    of all axes, and nothing else.
 
-    In MuJoCo: the engine's `qpos`, `qvel` and setpoints `ctrl`; `welds` (k, 3): the active
-    constraints by number, and the two bodies that each joins; `contacts`, None for none. In the
-    ideal world: positions [m] and speeds [m/s] of all axes, and nothing else. `at_end`: made as
-    operations ended and parts changed hands, before the engine continued; others are made after a
-    tick.
-
-    Until a constraint is switched or reassigned, `welds` is the same array."""
+    Attributes:
+        time: [s].
+        qpos: the engine's positions (nq,).
+        qvel: the engine's speeds (nv,).
+        ctrl: the setpoints of the drives (nu,).
+        welds: the active constraints by number, and the two bodies that each joins (k, 3); the same
+            array until one is switched or reassigned.
+        at_end: whether it was made as operations ended and parts changed hands, before the engine
+            continued; others are made after a tick.
+        contacts: the contacts; None for none.
+    """
 
     time: float
     qpos: Array = field(repr=False)
@@ -90,7 +95,12 @@ class EngineView:
 
 
 class Event(NamedTuple):
-    """A transition that fired at time t [s]."""
+    """A transition that fired.
+
+    Attributes:
+        t: time [s].
+        transition: its name.
+    """
 
     t: float
     transition: str
@@ -102,10 +112,16 @@ class Event(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """The state of a run at an instant: the `observation` of its world, the marking of its net as a
-    byte for each place (`marked`), the number of products `made` since it began, all `events` so
-    far, and the `account` of its failures, None for a run that does not recover from any. It holds
-    until the next step: arrays and events are those of the run."""
+    """The state of a run at an instant. It holds until the next step: arrays and events are those
+    of the run.
+
+    Attributes:
+        observation: what can be measured of its world.
+        marked: the marking of its net, a byte for each place.
+        made: number of products made since it began.
+        events: all events so far.
+        account: failures so far; None for a run that does not recover from any.
+    """
 
     observation: Observation
     marked: bytearray

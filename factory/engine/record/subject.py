@@ -29,15 +29,22 @@ Bent = tuple[tuple[Bend, ...], float]
 
 @dataclass(frozen=True)
 class MonitorSubject:
-    """The observed factory.
+    """The factory that a monitor observes: what it has before the run.
 
-    `goals[i]`: arc length [m] of the goal of each robot of operation i; `radii[i]`: its goal ball
-    [m]; `places[label]`: the centre of mass of a part, or a sub-assembly that is one body, in the
-    frame of the product [m]; `start`: the marking in which the run begins; `wip`: the bound on
-    units inside; `patience` [s]: time without an event until a run counts as stalled; `early`:
-    (operation, robot) where a robot goes ahead regardless of the settings, so that its hand is out
-    of the way; `bends`: those of guidepaths, and their rounding [m], by robot (index); `word`:
-    which units are made, None for all.
+    Attributes:
+        factory: the factory, with its net.
+        goals: arc length of the goal of each robot, for each operation [m].
+        radii: radius of the goal ball of each operation [m].
+        places: by label, the centre of mass of a part, or of a sub-assembly that is one body, in
+            the frame of the product [m].
+        settings: the settings of the run.
+        start: the marking in which the run begins.
+        patience: time without an event until a run counts as stalled [s].
+        wip: most units inside at once; None for any number.
+        early: (operation, robot) where a robot goes ahead regardless of the settings, so that its
+            hand is out of the way.
+        bends: by robot (index), the bends of its guidepath and their rounding [m].
+        word: the units that are made; None for all.
     """
 
     factory: Factory

@@ -117,12 +117,19 @@ UNSEEN = "what follows may be its doing; a template says what is tested: failure
 
 @dataclass(frozen=True, slots=True)
 class RunVerdict:
-    """The verdict on a run: the `trouble` that ended it early, whether its record refines the net,
-    and the failures of its `bodies`, in the order of time, of which `before` is the number that
-    precede the trouble. `lenient`: the bodies do not count. `blocked`: operations in which parts
-    passed through each other, a failure of the order of assembly and not of the run;
-    `reservations`: what else qualifies its success, in words. `strict`: a qualified success is a
-    failure."""
+    """The verdict on a run.
+
+    Attributes:
+        trouble: what ended it early; None for nothing.
+        refines: whether its record refines the net.
+        bodies: failures of the bodies, in the order of time.
+        lenient: whether failures of the bodies do not count.
+        before: number of failures of the bodies that precede the trouble.
+        blocked: operations in which parts passed through each other: a failure of the order of
+            assembly, and not of the run.
+        reservations: what else qualifies its success, in words.
+        strict: whether a qualified success is a failure.
+    """
 
     trouble: Diagnostic | None = None
     refines: bool = True

@@ -68,10 +68,19 @@ def physical_model(
     fuse: bool = False,
     shown: bool = True,
 ) -> Model:
-    """The MJCF model of a layout with the bodies it needs for `units` (None: for ever): the pool of
-    parts, or with `fuse` bodies of sub-assemblies too, and then few parts. Where the pool is too
-    large, at most so many units are inside as `fitting_wip` says, unless `wip` is given. `shown`:
-    with what is only shown, too."""
+    """The MJCF model of a layout with the bodies that a number of units needs.
+
+    Args:
+        layout: the layout.
+        units: number of units; None for any number.
+        settings: those of the run; None for the defaults.
+        catalogue: the robot types; None for those that are shipped.
+        wip: most units inside at once; None for as many as the pool of parts has room for
+            (`fitting_wip`).
+        under_way: labels that are under way where the run begins, with their number.
+        fuse: whether sub-assemblies are bodies, too; then few parts are enough.
+        shown: whether it has what is only shown, too.
+    """
     from factory.engine.mjcf.model import build_model
 
     bodies = bodies_of(layout.factory, layout.product, fuse)

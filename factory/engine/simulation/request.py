@@ -13,16 +13,26 @@ from factory.theory.problem.robot_types import Catalogue
 
 @dataclass(frozen=True, slots=True)
 class RunRequest:
-    """A run of a laid-out factory in a `world`, until `units` products are dropped off.
+    """A run of a laid-out factory, as it is asked for.
 
-    `seed` and `jitter` draw each robot's speed and gain within ± jitter. `start`: the marking it
-    begins from, m_0 where None. `wip`: most units inside at once. `distributed`: robots run their
-    own programs. `fuse`: parts joined for good become one rigid body. `shown`: it is filmed, logged
-    or watched; if not, the model has nothing that is only shown, and the run is the same and
-    faster. `recovers`: with some bodies more, for parts that are scrapped. `fast`: with what only
-    makes it faster. `catalogue`: robot types, the shipped ones where None. `demand`: the
-    order in which the products of a mix are made, as its sequence says where None. Raises
-    InputError (Usage) with every value out of its bounds.
+    Attributes:
+        world: ideal or mujoco.
+        units: number of units to drop off.
+        seed: with `jitter` it gives the speed and gain of each robot.
+        jitter: the most by which these differ from the settings, as a share.
+        settings: the settings.
+        start: the marking it begins from; None for m_0.
+        wip: most units inside at once; None for the default.
+        distributed: whether robots run their own programs (section 6).
+        fuse: whether parts joined for good become one rigid body.
+        shown: whether it is filmed, logged or watched. If not, the model has nothing that is only
+            shown; the run is the same and faster.
+        recovers: whether there are some bodies more, for parts that are scrapped.
+        fast: whether it uses what only makes it faster.
+        catalogue: the robot types; None for those that are shipped.
+        demand: the order in which the products of a mix are made; None for its sequence.
+
+    Raises InputError (Usage) with every value out of its bounds.
     """
 
     world: WorldName = "mujoco"

@@ -30,8 +30,12 @@ STEADY = 4
 
 
 def steady_from(period: int = 1) -> int:
-    """The number of products from which on a cycle time is measured where `period` units come in a
-    cycle of the net: the last half has a whole period."""
+    """The number of products from which on a cycle time is measured, so that the last half of them
+    has a whole period.
+
+    Args:
+        period: number of units in a cycle of the net.
+    """
     return max(STEADY, 2 * period if period > 1 else 0)
 
 
@@ -64,13 +68,36 @@ def busy_times(factory: Factory, events: Iterable[Event | Undone]) -> tuple[floa
 
 @dataclass(frozen=True)
 class Run:
-    """The record of a run: figures and events. `replays`: an independent replay of the events is a
-    run of the net; `trouble` is None for a run that reached its end; `monitor` is what a monitor
-    reports that watched it, if one did. `lenient`: what is wrong with the bodies does not count;
-    `strict`: a qualified success is a failure; `period`: how many units come in a cycle of the net;
-    `by_product`: how many units of each product were made; `word`: on demand, the products in the
-    order in which they left; `failures`: what went wrong, in a run that goes on then; `log`: its
-    log."""
+    """The record of a run.
+
+    Attributes:
+        world: ideal or mujoco.
+        units: number of units asked for.
+        products: number of units made.
+        robots: number of robots.
+        sim_time_s: simulated time [s].
+        wall_time_s: time that the run loop took [s].
+        physics_time_s: share of that in the engine [s].
+        supervisor_time_s: share of that in the supervisor [s].
+        predicted_cycle_time_s: cycle time of the timed net [s]; None where there is none.
+        bottleneck: what bounds it, in words.
+        replays: whether an independent replay of the events is a run of the net.
+        events: all firings, and transitions that were undone.
+        dropoffs: time at which each product left [s].
+        busy: time that each robot spent in operations [s].
+        physics: figures of the bodies; None in the ideal world.
+        seed: of its request.
+        jitter: of its request.
+        trouble: what ended it early; None for a run that reached its end.
+        monitor: the report of the monitor that watched it; None for none.
+        lenient: whether failures of the bodies do not count.
+        strict: whether a qualified success is a failure.
+        period: number of units in a cycle of the net.
+        by_product: number of units of each product.
+        word: on demand, the products in the order in which they left.
+        failures: what went wrong, in a run that recovers.
+        log: the file of its log.
+    """
 
     world: str
     units: int

@@ -87,10 +87,12 @@ class Drop:
 class World(Protocol):
     """The surroundings of a run: the ideal world or MuJoCo.
 
+    Attributes:
+        supplied: whether an operation may have become prepared; reset by the reader.
+        instant: whether robots have any speed at once, so that none is governed (ẋ = F_p(x)).
+
     A supervisor calls `step`; robots with programs of their own are driven by `move`, `advance` and
-    `settle`. `supplied`: an operation may have become prepared; reset by the reader. `instant`:
-    whether robots have any speed at once, so that none is governed (ẋ = F_p(x)). `dropoffs`: time
-    at which each product left the factory [s].
+    `settle`.
     """
 
     supplied: bool

@@ -136,7 +136,12 @@ def _copied(timing: Timing, change: Change) -> MarkedNet:
 
 
 def pace(layout: Layout, settings: Settings) -> tuple[CycleTime, tuple[float, ...]]:
-    """The cycle time of a layout in MuJoCo, and how long each operation takes [s]."""
+    """The predicted cycle time of a layout in MuJoCo, and the time that each operation takes [s].
+
+    Args:
+        layout: the layout.
+        settings: the settings of the run.
+    """
     timing = Timing(layout, settings)
     return timed(timing).cycle, timing.delays
 

@@ -48,10 +48,18 @@ AS_IT_IS = Change()
 
 @dataclass(frozen=True)
 class Timing:
-    """The delays of a layout, by its modes, where each starts, and the robots' limits.
+    """The delays of a layout in whole ticks: its modes, where each starts, and the robots' limits.
 
-    Speeds are those of `seed` and `jitter`, as in a run; `shaped`: the modes,
-    where they have been made already. Raises InputError where a mode cannot reach its goal.
+    Attributes:
+        layout: the layout.
+        settings: the settings of the run.
+        world: ideal or mujoco.
+        seed: of the run; with `jitter` it gives the robots' speeds.
+        jitter: of the run.
+        wip: most units inside at once; None for any number.
+        shaped: the modes, where they have been made already.
+
+    Raises InputError where a mode cannot reach its goal.
     """
 
     layout: Layout

@@ -38,8 +38,15 @@ the MJCF does not turn the inertia of a sheet or a rod into an impossible one.""
 
 @dataclass(frozen=True)
 class Mesh:
-    """A triangle mesh in metres, in its own frame: vertices (n, 3), faces (m, 3). `pieces`: the
-    vertices (k, 3) of the convex bodies that collide in its place; empty if its hull does."""
+    """A triangle mesh in its own frame.
+
+    Attributes:
+        name: of its file.
+        vertices: [m] (n, 3).
+        faces: vertices of each triangle (m, 3).
+        pieces: vertices of the convex bodies that collide in its place [m] (k, 3) each; empty if
+            its hull does.
+    """
 
     name: str
     vertices: Array = field(repr=False)

@@ -39,12 +39,23 @@ PALETTE = (
 class Solid:
     """A part as a solid. Arrays are in the frame of the finished product unless stated otherwise.
 
-    `kind` is box, cylinder, sphere or mesh; `size` its half lengths as in MJCF [m]; `position` (3,)
-    and `quaternion` (4,) place it; `mass` [kg], `centre` (3,) of mass, `inertia` (3, 3) about it
-    [kg m²]; `low`, `high` (3,) its bounding box; `corners` (n, 3): surface points whose
-    displacements bound that of the whole; `pieces`: the vertices (n, 3) of the convex bodies that
-    represent it in collisions (`factory.floor.geometry.pieces` states how exactly): one for most;
-    `fed`: the angle about the vertical by which it is turned where it is presented [rad].
+    Attributes:
+        label: of the part.
+        kind: box, cylinder, sphere or mesh.
+        size: half lengths, as in MJCF [m].
+        position: where it is [m] (3,).
+        quaternion: how it is turned (4,), w first.
+        mass: [kg].
+        centre: of mass [m] (3,).
+        inertia: about the centre of mass [kg m²] (3, 3).
+        low: lower corner of its bounding box [m] (3,).
+        high: upper corner [m] (3,).
+        rgba: colour, from 0 to 1.
+        mesh: its mesh, for the kind mesh.
+        corners: points of the surface whose displacements bound that of the whole [m] (n, 3).
+        pieces: vertices of the convex bodies that represent it in collisions [m] (n, 3) each; one
+            body for most. `factory.floor.geometry.pieces` states how exactly.
+        fed: angle about the vertical by which it is turned where it is presented [rad].
     """
 
     label: str
@@ -66,7 +77,14 @@ class Solid:
 
 @dataclass(frozen=True)
 class Product(Keeping):
-    """The solids of a product's parts by label, its bounding box, and warnings."""
+    """The solids of a product, in the frame of the finished product.
+
+    Attributes:
+        solids: by the label of each part.
+        low: lower corner of its bounding box [m] (3,).
+        high: upper corner [m] (3,).
+        warnings: what was found in its shapes.
+    """
 
     solids: Mapping[str, Solid]
     low: Array
@@ -184,7 +202,11 @@ def colour(node: Assembly, number: int) -> tuple[float, ...]:
 
 
 def rotation(quaternion: Array) -> Array:
-    """The rotation matrix (3, 3) of a unit quaternion (w, x, y, z)."""
+    """A rotation matrix (3, 3).
+
+    Args:
+        quaternion: a unit quaternion (4,), w first.
+    """
     w, x, y, z = quaternion
     return np.array(
         [

@@ -175,14 +175,23 @@ class Exclusions:
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """That no two robots which are not coupled by a mode can touch, nor their payloads.
+    """The certificate that robots which no mode couples cannot touch, nor their payloads.
 
-    Uncoupled regions of different robots in one layer are at least `clearance` [m] apart in plan;
-    end stops are beyond the regions by less than half of that. `layers` gives each layer's z range
-    and `gaps` the vertical distance to the one below [m]; where a coupled region is nearer to
-    another robot's, `shared` names the junction. `apart`: what keeps machines apart
-    that come near; `crossing`: the robots that share floor without a common operation, as faults
-    but for that. It holds if there is no fault; at most `clearance.MOST` faults are listed.
+    Attributes:
+        clearance: least distance in plan between uncoupled regions of different robots in one layer
+            [m]. End stops are beyond the regions by less than half of that.
+        layers: name and z range of each layer [m].
+        gaps: vertical distance of each layer to the one below [m].
+        robots: their names.
+        operations: their labels.
+        regions: floor that each body covers in each operation.
+        shared: coupled regions that are nearer to another robot's, each with its junction.
+        faults: regions and pairs for which it fails; at most `clearance.MOST`.
+        pairs: number of pairs that were compared.
+        apart: what keeps machines apart that come near each other.
+        crossing: robots that share floor without a common operation, as faults but for `apart`.
+
+    It holds if there is no fault.
     """
 
     clearance: float

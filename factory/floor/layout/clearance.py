@@ -61,7 +61,12 @@ MOST = 100
 
 
 def certify(layout: Layout) -> Certificate:
-    """The clearance certificate of a layout. Never raises; see `Certificate.holds`."""
+    """The clearance certificate of a layout, computed without anything of the search. Never raises;
+    see `Certificate.holds`.
+
+    Args:
+        layout: the layout.
+    """
     factory, (search, faults) = layout.factory, searched(layout)
     swept = search.swept
     faults = [fault for fault in faults if fault not in search.crossing]

@@ -74,8 +74,12 @@ def up(length: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Clearance:
-    """c: least distance between things that are not meant to touch [m]; W: width and length of the
-    largest `carriage` [m]."""
+    """The distances that a layout keeps.
+
+    Attributes:
+        c: least distance between things that are not meant to touch [m].
+        carriage: W, width and length of the largest carriage [m].
+    """
 
     c: float = 0.02
     carriage: float = CARRIAGE

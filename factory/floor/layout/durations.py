@@ -20,9 +20,14 @@ from factory.theory.problem.pag import NOPART
 
 @dataclass(frozen=True, slots=True)
 class Pace(SpeedProfile):
-    """Speed [m/s] and acceleration [m/s²] of the robots, radius eps of a goal ball [m], and the
-    time [s] lost between two operations; `ahead`: that lost on the way of a robot that goes ahead
-    while it waits (`modes/staging.py`), None where none does."""
+    """The times that a layout is judged by, beside the robots' speeds.
+
+    Attributes:
+        eps: radius of a goal ball [m].
+        lost: time between two operations [s].
+        ahead: time lost on the way of a robot that goes ahead while it waits
+            (`floor/modes/staging.py`) [s]; None where none does.
+    """
 
     eps: float = 2e-4
     lost: float = 0.01

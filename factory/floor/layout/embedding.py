@@ -113,8 +113,15 @@ def _parted(layout: Layout, certificate: Certificate) -> dict[int, float]:
 def certified(
     layout: Layout, floor: Point2 | None = None, certificate: Certificate | None = None
 ) -> Layout:
-    """A layout with its certificate, computed unless given, and the floor it takes. Raises RunError
-    (Layout) as `lay_out` does."""
+    """A layout with its certificate and the floor it takes.
+
+    Args:
+        layout: the layout.
+        floor: width and depth that it may take [m]; None for any.
+        certificate: its certificate; None to compute it.
+
+    Raises RunError (Layout) where the certificate does not hold or the floor is too small.
+    """
     certificate = certificate or certify(layout)
     if not certificate.holds:
         raise RunError(dict.fromkeys(_reason(layout, fault) for fault in certificate.faults))

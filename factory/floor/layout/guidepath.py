@@ -24,6 +24,7 @@ Extent = tuple[float, float, float, float]
 """(ulo, uhi, tlo, thi): a box in a robot's frame, about the product's middle [m]."""
 
 Point2 = tuple[float, float]
+"""A point or a vector in the plane of the floor [m]."""
 
 LEVER = 0.1
 """At the end of an arm of this length [m] what turns is as fast as other robots are."""
@@ -49,23 +50,27 @@ def moved(box: Box, by: Point2) -> Box:
 
 @dataclass(frozen=True, slots=True)
 class Guidepath:
-    """The guidepath of one robot and how the robot is stretched to its payload.
+    """The guidepath of a robot, and how the robot reaches from its carriage to its payload. The arc
+    length x of the carriage runs from A = 0; it delivers at x = reach, and receives at B = reach +
+    travel.
 
-    `heading` u, a unit vector towards A, and `side` t, to the left or right of it; `a`: the
-    product's middle when the robot delivers (x, y); `travel`: how far before that it receives (the
-    station at its B end); `reach` = 2r: how far the carriage stays behind the product's middle;
-    `offset`: how far the carriage's line is to the side t; `arm`: how far behind the middle the arm
-    ends; `nest`: where ahead of the middle the payload's own middle is, reached by the finger;
-    `aside`: how far to the side t of the carriage's line that is, in a lane beside another's. All
-    lengths in [m].
-
-    A robot that is fixed goes nowhere: `turn` is the angle [rad] by which it turns what it holds
-    about the vertical, from where it receives to where it delivers, None for all others. Its x is
-    an angle too, and `travel` how far it turns; carriage and middle stay where they are.
-
-    Arc length x of the carriage runs from A = 0; delivering at x = reach, receiving at B = reach +
-    travel. `bends`: where the guidepath goes on beside its line, to the side t, its corners of a
-    `rounding`; then x is the coordinate of `factory.floor.layout.way`.
+    Attributes:
+        heading: u, a unit vector towards A (2,).
+        side: t, a unit vector to the left or right of it (2,).
+        a: the product's middle where the robot delivers [m] (2,).
+        travel: distance from where it receives to where it delivers [m]; an angle for a robot that
+            is fixed [rad].
+        reach: 2r, distance of the carriage behind the product's middle [m].
+        offset: distance of the carriage's line to the side t [m].
+        arm: distance of the end of the arm behind the middle [m].
+        nest: distance of the payload's own middle ahead of the middle, which a finger bridges [m].
+        aside: distance of that to the side t of the carriage's line, in a lane beside another's
+            [m].
+        bends: where the guidepath goes on beside its line, to the side t; then x is the coordinate
+            of `factory.floor.layout.way`.
+        rounding: radius of the corners of bends [m].
+        turn: angle by which a robot that is fixed turns what it holds about the vertical, from
+            where it receives to where it delivers [rad]; None for all others.
     """
 
     heading: Point2

@@ -30,10 +30,19 @@ BESIDE = 0.001
 class Layout(Keeping, Pictured):
     """A factory laid out: a guidepath for each robot, and its visit for each of its operations.
 
-    `payloads[label]`: the box of a sub-assembly about the product's middle; `outfeed`: the box of
-    the conveyor in the world; `hands`: those of the robots, None for tools, nothing where they are
-    not chosen; `plain`: the layout without relays, None where this is one; `tile`: the size of the
-    tiles of the platen over which robots go [m], 0 where they go on rails.
+    Attributes:
+        factory: the factory.
+        product: its solids.
+        clearance: least distance between machines that share no mode [m].
+        guidepaths: of each robot.
+        visits: by operation and robot, where the robot is.
+        payloads: by label, the box of a sub-assembly about the product's middle [m].
+        outfeed: the box of the conveyor in the world [m].
+        hands: of each robot; None for tools, empty where they are not chosen.
+        floor: the box of the floor that it takes [m].
+        certificate: its clearance certificate.
+        plain: the layout without relays; None where this is one.
+        tile: size of the tiles of the platen over which robots go [m]; 0 where they go on rails.
     """
 
     factory: Factory

@@ -32,11 +32,16 @@ def is_side(length: object) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """What a layout is made for, beside settings: width and depth of the floor [m], None for as
-    much as it takes; whether guidepaths are shared among `relay` robots, or the `cycle` time [s]
-    that those are to reach, None for the shortest; `tile`: the size of the tiles of a platen [m],
-    None for rails. Raises InputError: BadValue for a wrong floor, Usage for a wrong time or
-    tile."""
+    """The floor that a layout is asked for, and its variant.
+
+    Attributes:
+        floor: width and depth [m]; None for as much as it takes.
+        relay: whether robots relay each other on shared guidepaths.
+        cycle: the cycle time that relays are to reach [s]; None for the shortest.
+        tile: size of the tiles of a platen [m]; None for rails.
+
+    Raises InputError: BadValue for a wrong floor, Usage for a wrong time or tile.
+    """
 
     floor: tuple[float, float] | None = None
     relay: bool = False

@@ -84,7 +84,13 @@ def headings(factory: Factory, sides: Sides) -> list[Frame]:
 
 
 def payload_boxes(factory: Factory, product: Product) -> dict[str, Box]:
-    """The box of every sub-assembly about the product's middle, from its parts' real geometry."""
+    """The box of every sub-assembly about the product's middle [m], by label, from the geometry of
+    its parts.
+
+    Args:
+        factory: the factory.
+        product: its solids.
+    """
     return {label: pile.box for label, pile in piles(factory, product).items()}
 
 

@@ -44,7 +44,11 @@ def _floats() -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Limits:
-    """Speed v [m/s] and acceleration a [m/s²] of each robot, both (k,) and positive.
+    """The limits of k robots.
+
+    Attributes:
+        speed: v [m/s] (k,).
+        acceleration: a [m/s²] (k,).
 
     Raises ValueError where a limit is missing, not finite or not positive.
     """
@@ -69,20 +73,30 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mode:
-    """F_p with its domain D_p = W - Δ and its goal G_p, the open ball of radius eps about `goals`
-    in the maximum norm: every robot nearer than eps to its own goal.
+    """Controlled dynamics F_p with domain D_p = W - Δ and goal G_p (Definition 3.2), for k robots
+    on intervals. G_p is the open ball of radius eps about the goals in the maximum norm.
 
-    `lower`, `upper` (k,): the interval [A, B] of each robot [m]. `pairs` (m, 2): robots i, j whose
-    guidepaths meet, at the coordinates `meet` (m, 2) on i's and on j's; they touch, and the
-    configuration is in Δ, where |x_i - meet_i| + |x_j - meet_j| <= `touch` (m,), the distance in
-    the tree that ~ makes of the guidepaths. `gate` (k,): the robot that must stand at its goal (be
-    in its eps ball) before this one comes nearer to its own than `standoff` (k,) [m] on the B side;
-    -1 for none. So W is L-shaped: x_gate not at its goal implies x >= goal + standoff.
-    `dwell` [s]: one more continuous state, a clock of rate 1 while x is in the ball and else 0;
-    it belongs to G_p from `dwell` on. `pairs`, `gate` and what goes with them may be left out.
+    Attributes:
+        goals: goal of each robot [m] (k,).
+        lower: A, the lower end of the interval of each robot [m] (k,).
+        upper: B, the upper end [m] (k,).
+        eps: radius of the goal ball [m].
+        pairs: robots i, j whose guidepaths meet (m, 2).
+        meet: the coordinates at which they meet, on i's and on j's [m] (m, 2).
+        touch: distance in the tree that ~ makes of the guidepaths at which they touch [m] (m,).
+        gate: the robot that must be in its goal ball before this one comes nearer to its own goal
+            than `standoff` on the side of B (k,); -1 for none.
+        standoff: that distance [m] (k,).
+        dwell: time in the ball after which the goal is reached [s]: a clock of rate 1 inside, 0
+            elsewhere.
+        reach: derived: distance up to which a pair repels [m] (m,).
+        order: derived: the robots, each after its gate.
 
-    Derived: `reach` (m,), the distance up to which a pair repels; `order`, the robots, each after
-    its gate. Raises ValueError where the values describe no mode, or its goal lies in Δ.
+    The configuration is in Δ where |x_i - meet_i| + |x_j - meet_j| <= touch. W is L-shaped: x_gate
+    not at its goal implies x >= goal + standoff. Pairs, gates and what goes with them may be left
+    out.
+
+    Raises ValueError where the values describe no mode, or its goal lies in Δ.
     """
 
     goals: Array

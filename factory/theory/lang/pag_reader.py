@@ -104,8 +104,15 @@ def unit_of(statements: Statements, findings: Findings) -> str:
 
 
 def load_pag(path: str | os.PathLike[str], templates: Mapping[str, Template]) -> PAG:
-    """The PAG in a file, or on stdin for `-`. Raises InputError, also if the file cannot be read
-    (BadFile) or is of another kind (Usage)."""
+    """The PAG in a file.
+
+    Args:
+        path: the file; `-` for stdin.
+        templates: the operations that it may use, by name.
+
+    Raises InputError with all errors of the text; BadFile where it cannot be read, Usage for a file
+    of another kind.
+    """
     name = os.fspath(path)
     _check_kind(name)
     shown = "<stdin>" if name == STDIN else name

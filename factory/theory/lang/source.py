@@ -78,8 +78,14 @@ def where(first: Position, second: Position) -> str:
 
 
 def read_text(path: str | os.PathLike[str], most: int = TEXT) -> str:
-    """The text of a UTF-8 file of at most so many bytes. Raises InputError (BadFile, Syntax where
-    it is not UTF-8, or Usage for a log). `-` is stdin."""
+    """The text of a UTF-8 file.
+
+    Args:
+        path: the file; `-` for stdin.
+        most: upper bound on its size [bytes].
+
+    Raises InputError: BadFile, Syntax where it is not UTF-8, Usage for a log.
+    """
     name = os.fspath(path)
     try:
         data = head_of(Path(name), len(LOG))

@@ -7,7 +7,12 @@ from factory.theory.problem.template import LOST, Failure, Law, Template
 
 
 def write_pag(pag: PAG) -> str:
-    """The canonical text of a PAG: one statement a line, numbers at full precision."""
+    """The canonical text of a PAG: one statement a line, numbers at full precision. `read_pag` of
+    it gives the same PAG.
+
+    Args:
+        pag: the PAG.
+    """
     count = [] if pag.count is None else [f"{pag.count} parts;"]
     allowed = map(write_allowance, pag.allowed)
     products = f"root = {pag.root};" if pag.mix is None else write_mix(pag.mix)

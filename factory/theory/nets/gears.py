@@ -45,10 +45,16 @@ class Gear:
 
 @dataclass(frozen=True)
 class GearNet(Pictured):
-    """A threaded net that is claimed to be composed of gears, one for each robot (Definition 3.6).
+    """A threaded net with the claim that it is composed of gears, one for each robot (Definition
+    3.6).
 
-    `initial` is the marked place of each gear, in the gears' order; slot i of an operation's place
-    belongs to robot `slots[place][i]` (an index into `gears`). A claim only: `verify` proves it.
+    Attributes:
+        threaded: the threaded net (Definition 3.5).
+        gears: the gears.
+        initial: the marked place of each gear, in the gears' order.
+        slots: for each place, the robot (an index into `gears`) of each slot of its operation.
+
+    A claim only: `verify` proves it.
     """
 
     threaded: ThreadedNet

@@ -26,10 +26,16 @@ MANY = TransitionId(-2)
 
 @dataclass(frozen=True)
 class MarkedNet(Pictured):
-    """(T, P) with m_0, for each place the number of its tokens; it may have choice.
+    """A Petri net (T, P) with an initial marking m_0, which may have choice (Definitions 3.1 and
+    3.2).
 
-    `gears` are those that are claimed, or () where none are known; `slots` as in `GearNet`, or ().
-    Raises ValueError where tokens and places differ in number or some number is negative.
+    Attributes:
+        net: the net.
+        tokens: number of tokens of each place.
+        gears: gears that are claimed; () where none are known.
+        slots: as in `GearNet`, or ().
+
+    Raises ValueError where tokens and places differ in number, or a number is negative.
     """
 
     net: PetriNet
@@ -104,8 +110,12 @@ class MarkedNet(Pictured):
 
 
 def marked(net: GearNet | MarkedNet) -> MarkedNet:
-    """The net with its initial tokens. A place that `initial` names for each robot in its slots
-    has one token; for each further time that it is named, a further one."""
+    """A net with its initial tokens. A place that `initial` names for each robot in its slots has
+    one token; for each further time that it is named, one more.
+
+    Args:
+        net: a gear net, or a net that is marked already.
+    """
     if isinstance(net, MarkedNet):
         return net
     tokens = [0] * len(net.threaded.places)
@@ -134,7 +144,11 @@ class TokenFree:
 
 
 def token_free(net: MarkedNet) -> TokenFree:
-    """The topological order of a marked graph along its places without tokens. Linear."""
+    """The topological order of a marked graph along its places without tokens. Linear.
+
+    Args:
+        net: the marked graph.
+    """
     waits = [0] * len(net.net.transitions)
     free = [not tokens for tokens in net.tokens]
     for event in net.blocked:

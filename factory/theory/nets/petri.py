@@ -20,7 +20,12 @@ Marking = frozenset[int]
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """An element of T: a discrete change of the dynamics. `position` is the user's line."""
+    """An element of T: a discrete change of the dynamics (Definition 3.1).
+
+    Attributes:
+        name: unique in its net.
+        position: the user's line; not compared.
+    """
 
     name: str
     position: Position | None = field(default=None, compare=False)
@@ -28,10 +33,16 @@ class Transition:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """p = [left; right]: the transitions that mark it and those that unmark it.
+    """p = [left; right]: the transitions that mark it and those that unmark it (Definition 3.1).
 
-    `mode` names the controlled dynamics: an operation, `wait` or `hold`; `label` the sub-assembly
-    it is about; `size` is l_p, the number of robots the mode acts on.
+    Attributes:
+        name: unique in its net.
+        left: transitions (index) that mark it.
+        right: transitions (index) that unmark it.
+        mode: the controlled dynamics: an operation, `wait` or `hold`.
+        label: the sub-assembly that it is about.
+        size: l_p, the number of robots that the mode acts on.
+        position: the user's line; not compared.
     """
 
     name: str
@@ -45,8 +56,12 @@ class Place:
 
 @dataclass(frozen=True)
 class PetriNet:
-    """A Petri net (T, P) (Definition 3.1). It may have choice: nothing here assumes a marked
-    graph."""
+    """A Petri net (T, P) (Definition 3.1). It may have choice: nothing here assumes a marked graph.
+
+    Attributes:
+        transitions: T.
+        places: P, by indices into T.
+    """
 
     transitions: tuple[Transition, ...]
     places: tuple[Place, ...]

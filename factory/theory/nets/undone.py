@@ -16,11 +16,16 @@ that made what it joined (`Factory.joins`)."""
 
 @dataclass(frozen=True, slots=True)
 class Undone:
-    """Transitions that were undone at time t [s].
+    """Transitions that were undone.
 
-    `operation`: label of the operation that failed; `reason`: cause, in words; `asked`: the
-    transitions that had to be undone; `transitions`: all that were undone, by number. Names are
-    repeated for each time that they are undone. `factory.apps.recovery.undo` has the definition.
+    Attributes:
+        t: time [s].
+        operation: label of the operation that failed.
+        reason: the cause, in words.
+        asked: transitions that had to be undone.
+        transitions: all that were undone, in their order.
+
+    A name is repeated for each time that it is undone. Defined by `factory.apps.recovery.undo`.
     """
 
     t: float

@@ -65,11 +65,21 @@ class Witness:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Which properties a net has: True, False, or None where that is undecided.
+    """The properties of a net, each True, False, or None where it is undecided.
 
-    Each that is not True has a witness; a defect of a gear train may be listed with property
-    `gear_net`. `gears`: the gears, claimed or discovered; `method`: how the behaviour was decided,
-    `structure` or `exploration`. A gear net is also a `gear_train`.
+    Attributes:
+        gear_net: whether it is composed of its gears (Definition 3.6).
+        live: whether each transition can fire again, whatever has fired.
+        safe: whether no place ever has two tokens.
+        reversible: whether it can return to the initial marking, whatever has fired.
+        legal: whether the initial marking is legal: one token in each gear.
+        witness: a counterexample for each property that is not True; a defect of a gear train may
+            be listed with `gear_net`.
+        gears: the gears, claimed or discovered.
+        method: how the behaviour was decided: `structure` or `exploration`.
+        gear_train: whether gears are glued along places of several robots; a gear net is one, too.
+
+    For a gear net under a legal marking, live, safe and reversible are Theorems 3.1 and 3.2.
     """
 
     gear_net: bool | None
@@ -165,7 +175,12 @@ def _labels(net: MarkedNet, places: Iterable[int]) -> tuple[str, ...]:
 
 
 def listing(names: Iterable[str], most: int = 6) -> str:
-    """Names in a sentence: the first few, then how many more."""
+    """Names in a sentence: the first few, then how many more.
+
+    Args:
+        names: the names.
+        most: number of names that are written.
+    """
     every = list(names)
     shown = ", ".join(every[:most])
     return shown + (f" and {len(every) - most} more" if len(every) > most else "")

@@ -38,10 +38,14 @@ def proved(net: GearNet) -> Verdict:
 
 @collector_paused()
 def verify(net: GearNet | MarkedNet, sources: Mapping[str, Position] | None = None) -> Verdict:
-    """Prove the claim that `net` is composed of its gears, and everything that follows.
+    """Prove that a net is composed of its gears, and all that follows (Theorems 3.1, 3.2 and 5.1).
+    Linear in the net.
 
-    Linear in the net. `sources` gives source positions of robots by name, for the witnesses. Live,
-    safe and reversible are undecided (None) where the claim or the marking fails.
+    Args:
+        net: a gear net, or a marked net with gears that are claimed.
+        sources: source positions of robots by name, for the witnesses.
+
+    Live, safe and reversible are undecided (None) where the claim or the marking fails.
     """
     subject = marked(net)
     against, train = shape_defects(net, subject, compose(subject))

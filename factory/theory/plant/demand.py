@@ -16,9 +16,12 @@ from dataclasses import dataclass, field, replace
 
 @dataclass(frozen=True, slots=True)
 class Demand:
-    """What is asked for: `orders`, each a product and when it is placed [s]; or, instead, standing
-    `changes`, each a product and how many units have been made before from then on it is asked
-    for."""
+    """The units that are asked for: either orders, or standing changes.
+
+    Attributes:
+        orders: products, each with the time at which it is ordered [s].
+        changes: products, each with the number of units made before it is the one asked for.
+    """
 
     orders: tuple[tuple[str, float], ...] = ()
     changes: tuple[tuple[str, int], ...] = ()

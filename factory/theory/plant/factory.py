@@ -36,10 +36,17 @@ from factory.theory.problem.template import Template
 class Operation:
     """A template instantiated: O(r_1, ..., r_k) (section 4.3).
 
-    `label` is that of the result, `dropoff` for the last. `robots` are indices into
-    `Factory.robots`, in the template's order; `before` and `after` the labels each carries when it
-    starts and ends (NOPART for none); `dwell` [s]; `approach`: how its inputs come together, None
-    where that is free; `turn`: for which unit of a period it is, from 0.
+    Attributes:
+        index: its number in `Factory.operations`.
+        label: label of its result; `dropoff` for the last.
+        template: its template.
+        robots: indices into `Factory.robots`, in the template's order.
+        before: label that each robot carries when it starts; NOPART for none.
+        after: label that each robot carries when it ends.
+        dwell: time that it takes at its goal [s].
+        position: the user's line; not compared.
+        approach: how its inputs come together; None where that is free.
+        turn: the unit of a period that it is for, from 0.
     """
 
     index: OperationId
@@ -112,13 +119,20 @@ NO_PARENT = OperationId(-1)
 
 @dataclass(frozen=True)
 class Factory(Pictured):
-    """F = (R, ~, N) with the operations it is made of; the last operation is dropoff.
+    """F = (R, ~, N), with its operations (section 4.4). The last operation is dropoff; ~ is the
+    union of the templates' identifications over the operations.
 
-    ~ is the union of the templates' identifications over `operations`. `parents[i]` is the
-    operation that takes the result of operation i (dropoff has none, -1). `plan`: the variant that
-    it is. `adjusted`: robots with a lift that is set for each of their tours, to where the one hand
-    holds what they bring. `period`: how many units are made in one cycle of the net, with
-    operations of their own; the last so many operations are their dropoffs, in that order.
+    Attributes:
+        pag: the product.
+        robots: R.
+        operations: the operations; operation i has the transitions 2i and 2i + 1, and the place i.
+        net: N, a gear net (Theorem 5.1).
+        parents: for each operation the one that takes its result; -1 for dropoff.
+        plan: the variant that it is.
+        adjusted: robots (index) with a lift that is set for each of their tours, to where the one
+            hand holds what they bring.
+        period: number of units in one cycle of the net, with operations of their own; the last so
+            many operations are their dropoffs, in that order.
     """
 
     pag: PAG

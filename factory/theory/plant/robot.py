@@ -12,9 +12,15 @@ from factory.theory.problem.robot_types import RobotType
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """A robot identifier: name r1, r2, ..., of which type (`kind`), and its operations in the
-    gear's order. `position` is that of the operation that made it necessary (for diagnostics: the
-    user's line)."""
+    """A robot of a factory.
+
+    Attributes:
+        index: its number in `Factory.robots`.
+        name: r1, r2 and so on.
+        kind: its robot type.
+        operations: its operations (index), in the order of its gear.
+        position: the operation that made it necessary: the user's line; not compared.
+    """
 
     index: RobotId
     name: str

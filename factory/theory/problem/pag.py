@@ -13,6 +13,8 @@ from factory.support.settings import MOST_UNITS
 from factory.support.showing import Pictured
 
 NOPART = "nopart"
+"""The label of a robot that carries nothing."""
+
 RESERVED = frozenset({NOPART, "root", "mix", "parts", "dropoff"})
 
 SHAPES = ("mesh", "box", "cylinder", "sphere")
@@ -32,9 +34,15 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class Assembly:
-    """One node of a PAG: `label = operation(inputs, parameters)`. A part has no inputs.
+    """A node of a PAG: `label = operation(inputs, parameters)`. A part has no inputs.
 
-    Positions are those of the label and of each input; they do not count in comparisons.
+    Attributes:
+        label: its name.
+        operation: name of its template.
+        inputs: labels that it joins.
+        parameters: names and values.
+        position: place of the label in the text; not compared.
+        input_positions: places of the inputs; not compared.
     """
 
     label: str
@@ -87,10 +95,20 @@ class Mix:
 
 @dataclass(frozen=True)
 class PAG(Pictured):
-    """A product assembly graph: one tree over its labels, in the order of the text, which
-    `factory.theory.lang.read_pag` checks; with a `mix`, a tree for each product, which share
-    labels, and `root` is the first product. `count` is the number in `N parts`, None without it;
-    `folder` is where mesh paths start; `allowed`: overlaps that are meant."""
+    """A product assembly graph (section 4.1): one tree over its labels, in the order of the text.
+    With a mix, a tree for each product; trees may share labels.
+
+    Attributes:
+        root: label of the product; of the first product of a mix.
+        nodes: all nodes.
+        count: the number in `N parts`; None without it.
+        folder: where paths of meshes start.
+        file: name of its file.
+        allowed: overlaps that are meant.
+        mix: the products and their sequence; None for one product.
+
+    `factory.theory.lang.read_pag` checks that it is a tree.
+    """
 
     root: str
     nodes: tuple[Assembly, ...]

@@ -37,16 +37,21 @@ def out_of_turn(label: str, turn: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Which variant of its factory makes a product. `Plan()` is the factory of the paper, with one
-    robot for each tour and the forms as they are written.
+    """The variant of a factory. `Plan()` is the factory of the paper: one robot for each tour, and
+    the forms as they are written.
 
-    `forms`: the form of each join (by label) that has another than it is written in. `relays`: how
-    many robots hand over what each label names, on its way to the operation that takes it. `turns`:
-    who does which tour (`Turns`), empty for one robot for each tour. `lifts`: the robots (index)
-    whose lift is set for each of their tours, None where the hands have not been chosen yet.
-    `names`: those of the robots, as `r9`, where they are not r1, r2 and so on: a robot that stays
-    in the next revision of a product keeps its name. `tees`: pairs of robots (index) that share the
-    last stretch of their guidepaths, though they bring different labels.
+    Attributes:
+        forms: the form of each join, by label, that differs from the written one.
+        relays: number of robots that hand over what a label names, on its way to the operation that
+            takes it.
+        turns: the robot (index) that does each tour, for each turn; empty for one robot for each
+            tour.
+        lifts: robots (index) whose lift is set for each of their tours; None where the hands have
+            not been chosen.
+        names: names of the robots, as `r9`; empty for r1, r2 and so on. A robot that stays in the
+            next revision of a product keeps its name.
+        tees: pairs of robots (index) that share the last stretch of their guidepaths, though they
+            bring different labels.
     """
 
     forms: Mapping[str, int] = field(default_factory=dict)

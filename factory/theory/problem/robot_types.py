@@ -50,7 +50,11 @@ class RobotType:
 
 @dataclass(frozen=True)
 class Catalogue:
-    """Robot types by name."""
+    """Robot types by name.
+
+    Attributes:
+        types: each type with what was read of its MJCF.
+    """
 
     types: Mapping[str, RobotType]
 

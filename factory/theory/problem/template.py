@@ -97,14 +97,27 @@ LOST = (Failure("lost", None, (Response("scrap"),)),)
 class Template:
     """An operation template (Definition 4.1).
 
-    `robots` R: the type of each robot; `carrier` j, from 1; `identifications` ~: classes of points
-    that are one; `before` a and `after` b: the label each robot carries, NOPART or a variable such
-    as LAB1; `law` F; `further`: the template that takes inputs beyond those in a, "" if none does;
-    `instead`: the one that does the same with one robot fewer, where the robot of one input keeps
-    what is joined, "" if none does; `brought`: the template by which a robot hands over first what
-    one that is not the carrier brings, "" if none does;
-    `parameters`: keyword arguments and their defaults; `geometry`: True where the operation makes a
-    part and takes mesh, pos, box and so on; `failures`: what is tested, and what is done about it.
+    Attributes:
+        name: as a PAG uses it.
+        robots: R, the type of each robot.
+        carrier: j, the robot that carries the result, from 1.
+        identifications: ~, classes of points that are one.
+        before: a, the label that each robot carries before: NOPART, or a variable such as LAB1.
+        after: b, the label that each robot carries after.
+        law: F, the control law.
+        further: template that takes inputs beyond those in a; "" for none.
+        instead: template that does the same with one robot fewer, where the robot of one input
+            keeps what is joined; "" for none.
+        parameters: keyword arguments and their defaults.
+        geometry: whether the operation makes a part, and takes mesh, pos, box and so on.
+        failures: what is tested, and the response to each failure.
+        position: its place in the text; not compared.
+        further_position: place of `further`.
+        instead_position: place of `instead`.
+        robot_positions: places of the robots.
+        brought: template by which a robot first hands over what one that is not the carrier brings;
+            "" for none.
+        brought_position: place of `brought`.
     """
 
     name: str

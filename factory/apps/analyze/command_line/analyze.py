@@ -20,8 +20,8 @@ from factory.commands.warnings import announced, cut_off, read_partly
 from factory.support.console import emit, say, table
 
 if TYPE_CHECKING:
-    from factory.api import Factory, Project
-    from factory.apps.analyze import Analysis, Change, Timing
+    from factory.api import Factory, Project, Timing
+    from factory.apps.analyze import Analysis, Change
     from factory.apps.analyze.measured import RunRecord
     from factory.apps.log import Log
 
@@ -85,7 +85,8 @@ def analyze(
     out: OutputOptions,
 ) -> int:
     """Find the bottleneck of FILE.pag, and what would relieve it."""
-    from factory.apps.analyze import Timing, analyse
+    from factory.api import Timing
+    from factory.apps.analyze import analyse
     from factory.apps.analyze.document import document
     from factory.apps.analyze.measured import Conditions, conditions, logged_record
     from factory.theory.nets.verify import proved

@@ -30,10 +30,9 @@ def mix(
     out: OutputOptions,
 ) -> int:
     """Write ONE.pag and OTHER.pag as one product family, in which what is equal is written once."""
-    from factory.api import write_all
+    from factory.api import load_pag, write_all, write_pag
     from factory.apps.revise.family import family
     from factory.pipeline import all_templates
-    from factory.theory.lang import load_pag, write_pag
 
     writable(output)
     templates, counts = all_templates(folders), _counts(count)

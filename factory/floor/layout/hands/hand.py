@@ -42,16 +42,19 @@ PAD = 0.0015
 
 @dataclass(frozen=True, slots=True)
 class Hand:
-    """How a robot holds its payload.
+    """The gripper of a robot: how it holds its payload. Of the kind `none` if nothing can hold.
 
-    `places`: points of the payload's surface at the middles of its tips, in the frame of the
-    finished product [m]: one, or, from below, two on one line along its heading; `radius` of a tip
-    [m]; `beam`: height of the lower edge of the beam of a hand above, in that frame [m]; `covered`:
-    share of a tip's face that the surface covers, for each tour, with suction; `share`: predicted
-    share of the tips' strength used by weight and acceleration; `tip`: kind of tip; `first`:
-    whether it has to be in place before its payload comes; `wait`: predicted distance that it has
-    to go back until its carrier's next operation may start [m]. Of the kind `none` if nothing can
-    hold.
+    Attributes:
+        kind: below, behind, above or none.
+        places: points of the payload's surface at the middles of the tips, in the frame of the
+            finished product [m]: one or, from below, two on one line along the heading.
+        radius: of a tip [m].
+        beam: height of the lower edge of the beam of a gripper above, in that frame [m].
+        share: predicted share of the tips' strength that weight and acceleration use.
+        tip: kind of tip.
+        first: whether it is in place before its payload comes.
+        wait: predicted distance that it goes back until its carrier's next operation may start [m].
+        covered: share of a tip's face that the surface covers, for each tour, with suction.
     """
 
     kind: Kind
