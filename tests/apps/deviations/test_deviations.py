@@ -331,7 +331,8 @@ def test_a_run_with_every_disturbance_recovers_and_resumes(run: Terminal, tmp_pa
 def test_a_blackout_hides_what_noise_measures() -> None:
     """Sensors that report nothing report no noise either."""
     made = Simulation(layout(PAPER), RunRequest(units=1, settings=FINE, recovers=True))
-    recovery = recover(made, Campaign((Deviation("noise", metres=1e-4),)))
+    recovery = recover(made)
+    recovery.strike(Deviation("noise", metres=1e-4))
     made.physical.advance(1)
     assert not np.isnan(made.world.sense()[0]).any()
     recovery.strike(Deviation("blackout", at=0.0, seconds=1.0))
