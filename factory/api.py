@@ -99,7 +99,7 @@ if TYPE_CHECKING:
     from factory.theory.nets.verify import verify as verify
     from factory.theory.plant.demand import Demand as Demand
     from factory.theory.plant.factory import Factory as Factory
-    from factory.theory.plant.factory import Operation as Operation
+    from factory.theory.plant.operation import Operation as Operation
     from factory.theory.plant.robot import Robot as Robot
     from factory.theory.problem.ids import PlaceId as PlaceId
     from factory.theory.problem.ids import TransitionId as TransitionId
@@ -139,7 +139,8 @@ HOMES = {
     "theory.nets.verify": "verify",
     "theory.control.mode": "Limits Mode",
     "theory.plant.demand": "Demand",
-    "theory.plant.factory": "Factory Operation",
+    "theory.plant.factory": "Factory",
+    "theory.plant.operation": "Operation",
     "theory.plant.robot": "Robot",
     "floor.geometry.meshes": "Mesh",
     "floor.geometry.solids": "Product Solid rotation",

@@ -34,7 +34,7 @@ from factory.floor.layout.layout import Layout
 from factory.support.engine import mujoco
 from factory.support.errors import InputError
 from factory.support.settings import Settings
-from factory.theory.plant.factory import Operation
+from factory.theory.plant.operation import Operation
 from tests.examples import with_hands
 from tests.pag_texts import laid_out
 from tests.paths import ROOT

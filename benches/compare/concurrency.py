@@ -12,7 +12,7 @@ from factory.engine.record.state import Event, State
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.layout import Layout
-from factory.theory.plant.factory import Operation
+from factory.theory.plant.operation import Operation
 
 NAMES = (
     *("paper", "lamp", "stool", "truck", "chair", "gearbox"),

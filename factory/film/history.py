@@ -14,7 +14,8 @@ from factory.engine.record.subject import MonitorSubject
 from factory.floor.layout.durations import Pace
 from factory.support.arrays import Array
 from factory.theory.nets.undone import Entry, Undone
-from factory.theory.plant.factory import Factory, Operation
+from factory.theory.plant.factory import Factory
+from factory.theory.plant.operation import Operation
 
 TIE = 1e-9
 """Times that are no further apart are the same [s]."""

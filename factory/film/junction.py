@@ -20,7 +20,7 @@ from factory.engine.record.subject import MonitorSubject
 from factory.film.action import box_of, is_stand, outlines, placed, shape_of
 from factory.floor.geometry.sight import Framing, View, fit, towards
 from factory.support.arrays import Array
-from factory.theory.plant.factory import Operation
+from factory.theory.plant.operation import Operation
 from factory.theory.problem.pag import NOPART
 
 ROOM = 1.3

@@ -32,7 +32,7 @@ from factory.film.ink import (
 from factory.film.sheet import PanelRow, PanelSheet, Rows, robots_shown
 from factory.floor.layout.layout import Point2
 from factory.support.arrays import Array
-from factory.theory.plant.factory import Operation
+from factory.theory.plant.operation import Operation
 
 WORK = 0.66
 """Share of a column that an operation takes; the rest is for the place before it."""

@@ -16,7 +16,8 @@ import numpy as np
 
 from factory.film.history import History, depths, followed
 from factory.film.ink import AMBER, EDGE, FAINT, GROUND, INK, Ink, robot_colours, width
-from factory.theory.plant.factory import Factory, Operation
+from factory.theory.plant.factory import Factory
+from factory.theory.plant.operation import Operation
 
 CLOSE, EASY = 12.0, 26.0
 """Least distances of rows at 1280x720 where all robots are shown, and where not [px]."""

@@ -109,15 +109,15 @@ def table(title: str, columns: tuple[str, ...], rows: Iterable[tuple[str, ...]])
     while sum(widths) > max(room, len(widths)):
         widths[widths.index(max(widths))] -= 1
     blank = " " * (sum(widths) + edges)
-    head, *body = (line for cells in lines for line in _folded(cells, widths))
+    head, *body = (line for cells in lines for line in _row_lines(cells, widths))
     above = [title.ljust(len(blank))] if title else []
     say("\n".join([*above, blank, head, f" {'─' * (len(blank) - 2)} ", *body, blank]))
 
 
-def _folded(cells: tuple[str, ...], widths: list[int]) -> Iterator[str]:
-    """The lines of a row whose cells are folded at widths."""
-    folded = [_wrapped(cell, width) for cell, width in zip(cells, widths, strict=True)]
-    for parts in zip_longest(*folded, fillvalue=""):
+def _row_lines(cells: tuple[str, ...], widths: list[int]) -> Iterator[str]:
+    """The lines of a row whose cells are wrapped at widths."""
+    wrapped = [_wrapped(cell, width) for cell, width in zip(cells, widths, strict=True)]
+    for parts in zip_longest(*wrapped, fillvalue=""):
         padded = (p + " " * (w - _cells(p)) for p, w in zip(parts, widths, strict=True))
         yield f" {'   '.join(padded)} "
 

@@ -33,7 +33,8 @@ from factory.theory.compiler.mixing import even
 from factory.theory.lang.pag_reader import read_pag
 from factory.theory.nets.threaded import Threads
 from factory.theory.plant.demand import Demand, Word
-from factory.theory.plant.factory import Factory, Operation
+from factory.theory.plant.factory import Factory
+from factory.theory.plant.operation import Operation
 from tests.command_line import Terminal
 from tests.mix_values import LITTLE, mixed_factory, random_family
 from tests.pag_values import TEMPLATES

@@ -30,7 +30,7 @@ from factory.floor.layout.layout import Layout
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
 from factory.theory.control.navigation import Bundle
-from factory.theory.plant.factory import Operation
+from factory.theory.plant.operation import Operation
 from tests.examples import with_hands
 from tests.good_runs import random_marking
 from tests.layout_values import random_layout

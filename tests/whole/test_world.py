@@ -18,7 +18,7 @@ from factory.engine.simulation.simulation import Simulation
 from factory.engine.simulation.world import Hooks, World
 from factory.support.arrays import Array
 from factory.support.errors import InputError
-from factory.theory.plant.factory import Operation
+from factory.theory.plant.operation import Operation
 from tests.simulation_values import FINE, layout_of, ready
 
 Name = Literal["mujoco", "ideal"]

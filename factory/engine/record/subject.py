@@ -18,7 +18,8 @@ from factory.support.tables import table_of
 from factory.theory.nets.history import firings
 from factory.theory.nets.petri import Marking
 from factory.theory.plant.demand import Word
-from factory.theory.plant.factory import Factory, Operation
+from factory.theory.plant.factory import Factory
+from factory.theory.plant.operation import Operation
 
 PATIENCE = 4.0
 """A run stalls when nothing happens for this many times the longest time of an operation."""

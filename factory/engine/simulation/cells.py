@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 from factory.engine.simulation.world import World
 from factory.support.arrays import Array
-from factory.theory.plant.factory import Factory, Operation
+from factory.theory.plant.factory import Factory
+from factory.theory.plant.operation import Operation
 from factory.theory.problem.ids import operation_of
 
 

@@ -27,7 +27,8 @@ from factory.support.arrays import Array, Index
 from factory.theory.control.governor import govern
 from factory.theory.control.mode import ROUNDING, STILL, Limits, Mode
 from factory.theory.control.navigation import Bundle
-from factory.theory.plant.factory import Factory, Operation
+from factory.theory.plant.factory import Factory
+from factory.theory.plant.operation import Operation
 from factory.theory.plant.programs import Program, ProgramStep, program_of
 
 

@@ -16,7 +16,7 @@ from factory.support.arrays import Array, Index
 from factory.theory.control.navigation import Bundle
 from factory.theory.nets.coordinated import Past
 from factory.theory.plant.demand import Word
-from factory.theory.plant.factory import Operation
+from factory.theory.plant.operation import Operation
 
 
 class IdealWorld:

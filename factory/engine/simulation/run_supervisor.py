@@ -11,7 +11,8 @@ from factory.engine.simulation.ordering import Ordering
 from factory.engine.timing.distributed import Scan
 from factory.theory.control.mode import Limits
 from factory.theory.nets.undone import Undone
-from factory.theory.plant.factory import Factory, Operation
+from factory.theory.plant.factory import Factory
+from factory.theory.plant.operation import Operation
 
 
 class RunSupervisor(Protocol):

@@ -27,7 +27,8 @@ from factory.theory.nets.petri import Marking
 from factory.theory.nets.threaded import Threads
 from factory.theory.nets.undone import Undone
 from factory.theory.plant.demand import Word
-from factory.theory.plant.factory import Factory, Operation
+from factory.theory.plant.factory import Factory
+from factory.theory.plant.operation import Operation
 from factory.theory.problem.ids import TransitionId
 
 

@@ -15,7 +15,7 @@ from factory.support.errors import Diagnostic
 from factory.theory.control.navigation import Bundle
 from factory.theory.nets.coordinated import Past
 from factory.theory.plant.demand import Word
-from factory.theory.plant.factory import Operation
+from factory.theory.plant.operation import Operation
 
 Job = tuple[Operation, int]
 """An operation with the number of the unit that it works on."""

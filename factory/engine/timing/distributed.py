@@ -19,7 +19,7 @@ from factory.theory.control.governed import Trajectory
 from factory.theory.control.mode import STILL
 from factory.theory.nets.coordinated import Past
 from factory.theory.nets.marked import token_free
-from factory.theory.plant.factory import Operation
+from factory.theory.plant.operation import Operation
 from factory.theory.problem.ids import is_end, operation_of
 
 PERIODS = (0.006, 0.02)

@@ -25,7 +25,8 @@ from factory.floor.layout.footprint import ahead_of
 from factory.floor.layout.layout import BESIDE, carriers
 from factory.floor.layout.shapes import payload_boxes
 from factory.floor.layout.stops import carried
-from factory.theory.plant.factory import Factory, Operation
+from factory.theory.plant.factory import Factory
+from factory.theory.plant.operation import Operation
 from factory.theory.problem.pag import NOPART
 
 ROUNDED = 1e-3

@@ -44,7 +44,7 @@ from factory.floor.layout.layout import Layout, delivery
 from factory.floor.layout.outfeed import dip_of, slot_of
 from factory.floor.layout.sweeps import Pile, piles, regions
 from factory.theory.plant.approaches import MARGIN
-from factory.theory.plant.factory import Operation
+from factory.theory.plant.operation import Operation
 from factory.theory.problem.ids import OperationId
 from factory.theory.problem.pag import NOPART
 from factory.theory.problem.robot_bodies import ARM_LOW, ARM_TOP, CARRIAGE_TOP

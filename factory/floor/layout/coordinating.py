@@ -20,7 +20,7 @@ from factory.floor.layout.hands.limbs import rises_first
 from factory.floor.layout.layout import Layout
 from factory.theory.nets.coordinated import CoordinatedNet, Coordination, Past
 from factory.theory.nets.gears import GearNet
-from factory.theory.plant.factory import Operation
+from factory.theory.plant.operation import Operation
 from factory.theory.problem.ids import RobotId, TransitionId, carriage_axis, start_of
 
 HOME = 1e-3

@@ -20,7 +20,7 @@ from factory.floor.layout.certificate import Fault, fault
 from factory.floor.layout.guidepath import Guidepath, Point2
 from factory.floor.layout.layout import Layout, carriers, delivery
 from factory.support.arrays import Index
-from factory.theory.plant.factory import Operation
+from factory.theory.plant.operation import Operation
 from factory.theory.problem.pag import NOPART
 
 CHUNK = 512

@@ -14,7 +14,7 @@ from factory.floor.layout.layout import Layout
 from factory.support.settings import Settings
 from factory.theory.control.profile import SpeedProfile
 from factory.theory.nets.ways import train_ratio
-from factory.theory.plant.factory import Operation
+from factory.theory.plant.operation import Operation
 from factory.theory.problem.pag import NOPART
 
 

@@ -20,7 +20,7 @@ from factory.floor.layout.dimensions import (
 from factory.floor.layout.guidepath import Extent, Feeder, hull
 from factory.floor.layout.hands.hand import BEAM
 from factory.floor.layout.layout import Layout
-from factory.theory.plant.factory import Operation
+from factory.theory.plant.operation import Operation
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -17,7 +17,8 @@ from factory.floor.layout.dimensions import PAYLOADS, POST, SIDE, Clearance, up
 from factory.floor.layout.guidepath import Extent, hull
 from factory.floor.layout.shapes import Shape
 from factory.floor.layout.stops import Stop, stops_of
-from factory.theory.plant.factory import Factory, Operation
+from factory.theory.plant.factory import Factory
+from factory.theory.plant.operation import Operation
 from factory.theory.problem.robot_bodies import MAST
 
 Block = tuple[float, float, float, float]

@@ -19,7 +19,8 @@ from factory.floor.layout.way import Ways
 from factory.support.keeping import Keeping
 from factory.support.showing import Pictured
 from factory.theory.plant.approaches import Overlap
-from factory.theory.plant.factory import Factory, Operation
+from factory.theory.plant.factory import Factory
+from factory.theory.plant.operation import Operation
 from factory.theory.problem.pag import NOPART
 
 BESIDE = 0.001

@@ -41,7 +41,8 @@ from factory.floor.layout.shapes import (
 from factory.floor.layout.sides import admissible, admitted
 from factory.floor.layout.stretching import Stretched, outgoing, stretch
 from factory.floor.layout.sweeps import piles, regions
-from factory.theory.plant.factory import Factory, Operation
+from factory.theory.plant.factory import Factory
+from factory.theory.plant.operation import Operation
 
 EFFORT = 800
 """Robots times layouts that are looked at, four layouts at most."""

@@ -23,7 +23,8 @@ from factory.floor.layout.outline import Choice, Guest, Outline, outlined
 from factory.floor.layout.shapes import Shape, Sides
 from factory.floor.layout.skyline import Skyline
 from factory.floor.layout.stops import Stop
-from factory.theory.plant.factory import Factory, Operation
+from factory.theory.plant.factory import Factory
+from factory.theory.plant.operation import Operation
 
 SPAN = 0.15
 """A station is not looked at that costs as much more than the best as so long a way [m]."""

@@ -11,7 +11,8 @@ from __future__ import annotations
 from factory.floor.layout.guidepath import Point2
 from factory.floor.layout.layout import carriers
 from factory.floor.layout.shapes import OUTPUT, Frame, Sides, turned
-from factory.theory.plant.factory import Factory, Operation
+from factory.theory.plant.factory import Factory
+from factory.theory.plant.operation import Operation
 from factory.theory.problem.pag import NOPART
 
 

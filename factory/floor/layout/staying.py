@@ -25,7 +25,7 @@ from factory.floor.layout.layout import Layout
 from factory.floor.layout.presence import ROUNDING, MachineBodies, Presence, Span, corners_of
 from factory.support.arrays import Array
 from factory.theory.nets.coordinated import Past
-from factory.theory.plant.factory import Operation
+from factory.theory.plant.operation import Operation
 from factory.theory.problem.ids import end_of, is_end, start_of
 from factory.theory.problem.pag import NOPART
 from factory.theory.problem.robot_bodies import ARM_LOW, ARM_TOP, ARM_WIDTH, CARRIAGE_TOP, MAST

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from heapq import heappop, heappush
 
 from factory.support.errors import Diagnostic, InputError
-from factory.theory.plant.factory import Factory, Operation
+from factory.theory.plant.factory import Factory
+from factory.theory.plant.operation import Operation
 
 
 @dataclass(frozen=True, slots=True)

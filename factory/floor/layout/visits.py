@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 from factory.floor.layout.guidepath import Guidepath, Point2
 from factory.floor.layout.hands.hand import Point3
-from factory.theory.plant.factory import Factory, Operation
+from factory.theory.plant.factory import Factory
+from factory.theory.plant.operation import Operation
 
 LEAST = 0.001
 """The least stroke of a lift [m]."""

@@ -23,7 +23,8 @@ from factory.theory.compiler.domains import EXAMPLE
 from factory.theory.control.laws import Setting, hold, law_of
 from factory.theory.control.mode import Limits, Mode
 from factory.theory.control.navigation import Bundle
-from factory.theory.plant.factory import Factory, Operation
+from factory.theory.plant.factory import Factory
+from factory.theory.plant.operation import Operation
 from factory.theory.problem.pag import NOPART
 from factory.theory.problem.robot_bodies import CARRIAGE
 from factory.theory.problem.template import Point, Template

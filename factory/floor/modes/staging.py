@@ -22,7 +22,8 @@ from factory.support.arrays import Array
 from factory.support.settings import Settings
 from factory.theory.control.mode import ROUNDING, Mode
 from factory.theory.control.profile import World
-from factory.theory.plant.factory import Factory, Operation
+from factory.theory.plant.factory import Factory
+from factory.theory.plant.operation import Operation
 from factory.theory.problem.ids import AxisId, carriage_axis
 
 

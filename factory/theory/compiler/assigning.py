@@ -20,7 +20,8 @@ from factory.support.errors import Diagnostic, InputError
 from factory.theory.nets.gears import Gear, GearNet
 from factory.theory.nets.petri import PetriNet, Place, Transition
 from factory.theory.nets.threaded import Redistribution, Slot, ThreadedNet
-from factory.theory.plant.factory import NO_PARENT, Factory, Operation
+from factory.theory.plant.factory import NO_PARENT, Factory
+from factory.theory.plant.operation import Operation
 from factory.theory.plant.robot import Robot
 from factory.theory.problem.ids import OperationId, PlaceId, RobotId
 from factory.theory.problem.pag import NOPART, PAG

@@ -18,7 +18,8 @@ from factory.theory.compiler.domains import check_prepared
 from factory.theory.compiler.expanding import Node, expand
 from factory.theory.compiler.turning import check_turned
 from factory.theory.plant.approaches import Approach
-from factory.theory.plant.factory import NO_PARENT, Factory, Operation
+from factory.theory.plant.factory import NO_PARENT, Factory
+from factory.theory.plant.operation import Operation
 from factory.theory.plant.robot import Robot
 from factory.theory.problem.ids import OperationId, RobotId
 from factory.theory.problem.pag import NOPART, PAG

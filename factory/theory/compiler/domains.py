@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 
 from factory.support.errors import Diagnostic
-from factory.theory.plant.factory import Operation
+from factory.theory.plant.operation import Operation
 from factory.theory.plant.robot import Robot
 from factory.theory.problem.template import Point, Template
 

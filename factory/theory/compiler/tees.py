@@ -17,7 +17,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from factory.theory.compiler.assigning import assigned
-from factory.theory.plant.factory import Factory, Operation
+from factory.theory.plant.factory import Factory
+from factory.theory.plant.operation import Operation
 from factory.theory.problem.ids import RobotId
 from factory.theory.problem.pag import NOPART
 

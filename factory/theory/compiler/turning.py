@@ -11,7 +11,8 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from factory.support.errors import Diagnostic, InputError
 from factory.theory.compiler.expanding import Node
-from factory.theory.plant.factory import Factory, Operation
+from factory.theory.plant.factory import Factory
+from factory.theory.plant.operation import Operation
 from factory.theory.plant.robot import Robot
 from factory.theory.problem.pag import NOPART, PAG
 from factory.theory.problem.robot_types import Catalogue

@@ -28,10 +28,10 @@ def strong_components(size: int, before: Index, after: Index) -> Index:
 
 
 def _neighbours(size: int, before: Index, after: Index) -> list[list[int]]:
-    found: list[list[int]] = [[] for _ in range(size)]
+    neighbours: list[list[int]] = [[] for _ in range(size)]
     for one, other in zip(before.tolist(), after.tolist(), strict=True):
-        found[one].append(other)
-    return found
+        neighbours[one].append(other)
+    return neighbours
 
 
 def _finished(forward: list[list[int]]) -> list[int]:

@@ -29,7 +29,7 @@ from factory.floor.layout.layout import Layout
 from factory.pipeline import read
 from factory.support.settings import Settings
 from factory.theory.nets.verify import verify
-from factory.theory.plant.factory import Operation
+from factory.theory.plant.operation import Operation
 from factory.theory.problem.robot_bodies import ARM_WIDTH
 from factory.theory.problem.robot_types import load_catalogue
 from tests.apps.relay.test_relay import templates_of

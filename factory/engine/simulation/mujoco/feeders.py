@@ -24,7 +24,7 @@ from factory.engine.simulation.mujoco.welds import Place, Welds
 from factory.floor.layout.exclusions import coordinated
 from factory.floor.layout.feeding import Outlet, lines_of, outlets_of
 from factory.support.arrays import Index
-from factory.theory.plant.factory import Operation
+from factory.theory.plant.operation import Operation
 
 
 @dataclass(frozen=True, slots=True)

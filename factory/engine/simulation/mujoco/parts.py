@@ -23,7 +23,7 @@ from factory.engine.simulation.mujoco.supply import Supply
 from factory.engine.simulation.mujoco.welds import Welds
 from factory.engine.simulation.request import RunRequest
 from factory.support.engine import mujoco
-from factory.theory.plant.factory import Operation
+from factory.theory.plant.operation import Operation
 
 TICKS = 0.99
 """A tick, less what times are rounded by."""

@@ -17,7 +17,8 @@ from factory.support.arrays import Array, Index, Truth
 from factory.support.engine import mujoco
 from factory.theory.control.mode import STILL
 from factory.theory.control.profile import SpeedProfile
-from factory.theory.plant.factory import Factory, Operation
+from factory.theory.plant.factory import Factory
+from factory.theory.plant.operation import Operation
 from factory.theory.problem.pag import NOPART
 
 LEVEL = 5e-4

@@ -33,7 +33,7 @@ from factory.support.engine import by_name, mujoco
 from factory.theory.control.navigation import Bundle
 from factory.theory.nets.coordinated import Past
 from factory.theory.plant.demand import Word
-from factory.theory.plant.factory import Operation
+from factory.theory.plant.operation import Operation
 
 GIVEN_UP = tuple(
     int(getattr(mujoco.mjtWarning, f"mjWARN_{name}"))

@@ -15,7 +15,8 @@ from factory.floor.layout.hands.places import ASKED, PUSH, Loads, Places, places
 from factory.floor.layout.hands.surfaces import Surfaces, Way
 from factory.floor.layout.layout import carriers
 from factory.support.arrays import Array
-from factory.theory.plant.factory import Factory, Operation
+from factory.theory.plant.factory import Factory
+from factory.theory.plant.operation import Operation
 
 
 class Holding:

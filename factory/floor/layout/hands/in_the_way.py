@@ -20,7 +20,7 @@ from factory.floor.layout.hands.surfaces import TOUCH, Way, hit, retreat, swept
 from factory.floor.layout.hands.tips import STRONG
 from factory.floor.layout.presence import ACROSS, ALONG
 from factory.support.arrays import Array, Truth
-from factory.theory.plant.factory import Operation
+from factory.theory.plant.operation import Operation
 from factory.theory.problem.pag import NOPART
 
 IN_THE_WAY = {
