@@ -21,7 +21,8 @@ from factory.apps.few_robots.sharing import with_branches, with_lines
 from factory.apps.log.plan_file import plan_files, read_plan
 from factory.apps.report import page, recording_of
 from factory.engine.simulation.modelling import physical_model
-from factory.floor.layout import request
+from factory.floor.layout import exclusions, request
+from factory.floor.layout.clearance import certify
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.request import Ground
 from factory.floor.layout.saved import LayoutTable
@@ -36,7 +37,7 @@ from tests.layout_values import (
     drawn_layouts,
     random_layout,
 )
-from tests.paths import PAPER, ROOT
+from tests.paths import PAPER, ROOT, TESTS
 
 EXAMPLES = ROOT / "examples"
 COMPARED = ("factory", "guidepaths", "visits", "hands", "floor", "outfeed")
@@ -429,3 +430,17 @@ def test_a_plan_that_is_not_utf_8_is_told_as_a_pag_is(run: Terminal, tmp_path: P
     (tmp_path / "plan.json").write_bytes(b'{"schema": "\xff"}')
     (error,) = run("check", tmp_path / "plan.json", "--json").json["errors"]
     assert error["message"] == "byte 0xff is not UTF-8 text" and error["col"] == 13
+
+
+def test_robots_without_a_common_operation_share_floor_where_the_net_keeps_them_apart(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Two carriages of this layout of a family are nearer than the clearance, in places that one
+    circuit with one token goes through; without their circuits it is refused."""
+    plan = read_plan(TESTS / "data" / "crossing" / "plan.json")
+    layout = plan.project(plan.settings, plan.ground, print).layout
+    assert layout.certificate is not None and layout.certificate.holds
+    (near,) = layout.certificate.crossing
+    assert near.robots == ("r10", "r12")
+    monkeypatch.setattr(exclusions, "_circuits", lambda net, pairs: {})
+    assert near in certify(layout).faults

@@ -6,6 +6,7 @@ import random
 import re
 import tracemalloc
 from dataclasses import replace
+from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
@@ -21,12 +22,14 @@ from factory.theory.nets.gears import GearNet
 from factory.theory.nets.marked import MarkedNet, marked
 from factory.theory.nets.petri import Transition
 from factory.theory.plant.factory import Factory
+from tests.command_line import Terminal
 from tests.net_values import (
     net_from,
     planted,
     random_marked_net,
 )
 from tests.pag_values import factories, factory_of, paper
+from tests.paths import ROOT
 
 NS = "http://www.pnml.org/version-2009/grammar/pnml"
 
@@ -281,3 +284,14 @@ def test_dot_escapes() -> None:
     assert r'xlabel="x\ny"' in text
     assert "● 7" in text
     assert marked(net) is net
+
+
+def test_check_and_export_tell_of_it(run: Terminal, tmp_path: Path) -> None:
+    file, out = ROOT / "examples" / "stool.pag", tmp_path / "stool.pnml"
+    told = run("check", file, "-v").out
+    assert "live: yes" in told.split("coordinated")[1].splitlines()[0]
+    assert "order place" in told
+    assert not run("export", file, "--format", "pnml", "--of", "coordinated", "-o", out).status
+    again = run("check", out).out
+    assert "live: yes, safe: yes, reversible: yes" in again
+    assert "tray" in out.read_text()

@@ -10,8 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.apps.log.plan_file import read_plan
-from factory.floor.layout import exclusions
 from factory.floor.layout.certificate import (
     ALWAYS,
     KINDS,
@@ -39,7 +37,6 @@ from tests.layout_values import (
     with_visits,
 )
 from tests.pag_values import SHAPES
-from tests.paths import TESTS
 
 
 def broken(layout: Layout, *words: str) -> Certificate:
@@ -319,17 +316,3 @@ def test_only_who_is_coupled_may_share_room() -> None:
     assert faults((1, "part3", mate), (2, "sub2", ALWAYS)) == 0
     assert faults((1, "part3", mate), (4, "part1", ALWAYS)) == 1
     assert faults((1, "part3", mate), (4, "part1", alone)) == 1
-
-
-def test_robots_without_a_common_operation_share_floor_where_the_net_keeps_them_apart(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Two carriages of this layout of a family are nearer than the clearance, in places that one
-    circuit with one token goes through; without their circuits it is refused."""
-    plan = read_plan(TESTS / "data" / "crossing" / "plan.json")
-    layout = plan.project(plan.settings, plan.ground, print).layout
-    assert layout.certificate is not None and layout.certificate.holds
-    (near,) = layout.certificate.crossing
-    assert near.robots == ("r10", "r12")
-    monkeypatch.setattr(exclusions, "_circuits", lambda net, pairs: {})
-    assert near in certify(layout).faults

@@ -13,10 +13,10 @@ from factory.theory.nets.history import firings
 from factory.theory.nets.replay import ReplayVerdict, replay
 from factory.theory.nets.undone import Entry, Joins, Undone, lasting
 from factory.theory.plant.factory import Factory
+from tests.apps.recovery.test_undo import failures
 from tests.fold_values import inserted, plain, random_fold, three_robots
 from tests.net_values import random_legal_marking
 from tests.pag_values import SHAPES, factory_of, paper, random_pag
-from tests.whole.test_undo import failures
 
 seeds = st.integers(0, 10**6)
 randoms = st.randoms(use_true_random=False)

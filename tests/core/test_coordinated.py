@@ -22,7 +22,6 @@ from factory.pipeline import read
 from factory.theory.nets.coordinated import CoordinatedNet, Coordination
 from factory.theory.nets.marked import MarkedNet, marked
 from factory.theory.problem.plan import Plan
-from tests.command_line import Terminal
 from tests.examples import with_hands
 from tests.fold_values import dates
 from tests.paths import ROOT
@@ -166,14 +165,3 @@ def test_machines_without_a_program_are_in_it() -> None:
     assert modes >= {"hand", "way", "order", "magazine", "tray"}
     assert made.served.keys() == {leaf.index for leaf in layout.factory.leaves}
     assert made.away.keys() == {dropoff.index for dropoff in layout.factory.dropoffs}
-
-
-def test_check_and_export_tell_of_it(run: Terminal, tmp_path: Path) -> None:
-    file, out = ROOT / "examples" / "stool.pag", tmp_path / "stool.pnml"
-    told = run("check", file, "-v").out
-    assert "live: yes" in told.split("coordinated")[1].splitlines()[0]
-    assert "order place" in told
-    assert not run("export", file, "--format", "pnml", "--of", "coordinated", "-o", out).status
-    again = run("check", out).out
-    assert "live: yes, safe: yes, reversible: yes" in again
-    assert "tray" in out.read_text()
