@@ -20,13 +20,14 @@ from factory.theory.compiler.assigning import gear_net, shared
 from factory.theory.compiler.compiler import compile_pag
 from factory.theory.compiler.folding import Line, line_of, sides_of
 from factory.theory.nets.gears import GearNet
-from factory.theory.nets.marked import MarkedNet, marked
+from factory.theory.nets.marked import marked
 from factory.theory.plant.approaches import Approach
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.pag import PAG
 from factory.theory.problem.plan import Plan
 from factory.theory.problem.robot_types import Catalogue, load_catalogue
 from tests.pag_values import SHAPES, TEMPLATES, catalogue, paper, random_pag
+from tests.token_game import dates
 
 INSERTING = {**TEMPLATES, "insert": replace(TEMPLATES["insert"], further="insert")}
 """Templates by which all inputs but the first are inserted."""
@@ -190,24 +191,6 @@ def pairs_of_tours(factory: Factory) -> Iterator[tuple[int, int, int]]:
     for robot, tours in enumerate(factory.tours):
         for one, other in combinations(range(len(tours)), 2):
             yield robot, one, other
-
-
-def dates(net: MarkedNet, seconds: list[float], rounds: int) -> list[list[float]]:
-    """When each transition of a marked graph fires, for so many times, all as soon as they can: a
-    token game in which each token says when it is ready, which begins with what is enabled."""
-    here: list[list[float]] = [[0.0] * count for count in net.tokens]
-    fired: list[list[float]] = [[] for _ in net.net.transitions]
-    ready = list(range(len(fired)))
-    while ready:
-        event = ready.pop()
-        needs = net.net.preset[event]
-        while len(fired[event]) < rounds and all(here[p] for p in needs):
-            now = max(here[p].pop(0) for p in needs)
-            fired[event].append(now)
-            for place in net.net.postset[event]:
-                here[place].append(now + seconds[place])
-                ready += net.net.places[place].right
-    return fired
 
 
 def simulated_cycle(net: GearNet, seconds: list[float], rounds: int = 60) -> float:

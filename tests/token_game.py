@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.petri import Marking, PetriNet
 from factory.theory.nets.threaded import Slot, ThreadedNet
 
@@ -60,3 +61,21 @@ class ThreadedMarking:
         carried = [(after, threads.pop(before)) for before, after in moves]
         threads.update(carried)
         return ThreadedMarking(threads)
+
+
+def dates(net: MarkedNet, seconds: list[float], rounds: int) -> list[list[float]]:
+    """When each transition of a marked graph fires, for so many times, all as soon as they can: a
+    token game in which each token says when it is ready, which begins with what is enabled."""
+    here: list[list[float]] = [[0.0] * count for count in net.tokens]
+    fired: list[list[float]] = [[] for _ in net.net.transitions]
+    ready = list(range(len(fired)))
+    while ready:
+        event = ready.pop()
+        needs = net.net.preset[event]
+        while len(fired[event]) < rounds and all(here[p] for p in needs):
+            now = max(here[p].pop(0) for p in needs)
+            fired[event].append(now)
+            for place in net.net.postset[event]:
+                here[place].append(now + seconds[place])
+                ready += net.net.places[place].right
+    return fired

@@ -23,9 +23,9 @@ from factory.theory.nets.coordinated import CoordinatedNet, Coordination
 from factory.theory.nets.marked import MarkedNet, marked
 from factory.theory.problem.plan import Plan
 from tests.examples import with_hands
-from tests.fold_values import dates
 from tests.paths import ROOT
 from tests.random_products import random_product
+from tests.token_game import dates
 
 HANDS = ("lamp", "stool", "truck", "chair")
 

@@ -17,6 +17,7 @@ from factory.film.reel import Reel
 from factory.support.errors import MissingError
 from factory.support.gl import probe
 from tests.command_line import Terminal, spawn_each, started
+from tests.core.test_progress import STOPPED, stopped
 from tests.paths import PAPER, ROOT, files_in
 from tests.waiting import grown
 
@@ -221,3 +222,14 @@ except KeyboardInterrupt:
         [sys.executable, "-c", code], env=environment, capture_output=True, text=True, cwd=tmp_path
     )
     assert done.stdout == "heard\n", done.stderr
+
+
+COMMAND = (
+    f"{STOPPED}from factory import commands\n"
+    "commands.cli.main = lambda *_, **__: __import__('stops') and 5\ncommands.main(['run'])"
+)
+
+
+def test_a_signal_while_something_is_imported(tmp_path: Path) -> None:
+    done = stopped(tmp_path, COMMAND, "missing")
+    assert done.returncode == 130, done.stderr
