@@ -8,7 +8,6 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from factory.apps.importing.mesh_files import natural
 from factory.commands.requests import OutputOptions
 from factory.support.console import say, warn
 from factory.support.errors import Diagnostic
@@ -45,6 +44,8 @@ def condensed(warnings: Sequence[Diagnostic], verbose: bool) -> list[Diagnostic]
 
 
 def _as_one(alike: list[Diagnostic]) -> Diagnostic:
+    from factory.apps.importing.mesh_files import natural
+
     first, names = alike[0], sorted((one.about for one in alike if one.about), key=natural)
     if not names:
         message = f"{len(alike)} {first.many}; list: -v"

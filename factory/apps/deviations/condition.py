@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from functools import cached_property
 from heapq import heappop, heappush
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -17,14 +17,15 @@ from factory.api import (
     Index,
     InputError,
     Limits,
-    MujocoWorld,
     Operation,
-    Simulation,
     did_you_mean,
 )
 from factory.apps.deviations.deviation import Deviation, Vector
-from factory.apps.deviations.interference import Interference, Measure
-from factory.apps.deviations.pushes import Push, Pushes
+
+if TYPE_CHECKING:
+    from factory.api import MujocoWorld, Simulation
+    from factory.apps.deviations.interference import Interference, Measure
+    from factory.apps.deviations.pushes import Pushes
 
 
 class Breakable(Protocol):
@@ -85,11 +86,15 @@ class PlantCondition:
     @cached_property
     def interference(self) -> Interference:
         """The means to disturb the engine."""
+        from factory.apps.deviations.interference import Interference
+
         return Interference(self.world)
 
     @cached_property
     def pushes(self) -> Pushes:
         """The pushes that act and will act."""
+        from factory.apps.deviations.pushes import Pushes
+
         return Pushes(self.world, self.interference)
 
     @property
@@ -160,7 +165,7 @@ class PlantCondition:
             message = f"'push' names '{name}', which is none of the bodies"
             hint = did_you_mean(name, sorted(names), "bodies")
             raise InputError(Diagnostic("BadFault", message, None, hint))
-        self.pushes.add(Push(int(m.body(name).id), force, start, end))
+        self.pushes.add(int(m.body(name).id), force, start, end)
 
     def slow(self, start: float, robot: int, factor: float) -> None:
         """Let a robot (index) move at `factor` times its speed limit from a time [s]; 1 gives it

@@ -35,12 +35,12 @@ class Pushes:
         self._world, self._interference = world, interference
         self._pushes: list[Push] = []
 
-    def add(self, push: Push) -> None:
-        """Let a push act when its time comes, which may be now."""
+    def add(self, body: int, force: Vector, start: float, end: float) -> None:
+        """Let a force [N] act on a body from a time to another [s], which may be now."""
         before_step = self._world.hooks.before_step
         if not self._pushes:
             before_step.insert(0, self._act)
-        self._pushes.append(push)
+        self._pushes.append(Push(body, force, start, end))
         self._act()
 
     def _act(self) -> None:

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
-from xml.sax.saxutils import quoteattr
 
 from factory.api import Layout, Model, names
 from factory.engine.mjcf.driving import GRAVITY
@@ -23,6 +22,7 @@ from factory.engine.mjcf.feeders import SLIDER_MASS
 from factory.engine.mjcf.outfeed import SHUTTER_MASS
 from factory.floor.layout.feeding import outlets_of
 from factory.floor.layout.starting import start_positions
+from factory.support.markup import quoteattr
 from factory.theory.problem.robot_bodies import LIFT_JOINT
 
 LAW = ("kp", "kv", "forcerange")

@@ -8,7 +8,7 @@ Theorem 21: a marking is reachable where it keeps the tokens of every circuit).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
@@ -25,6 +25,7 @@ from factory.api import (
     marked,
     token_free,
 )
+from factory.apps.foreign_nets.covering import cover
 from factory.apps.foreign_nets.discover import discover
 from factory.apps.foreign_nets.explore import LIMIT, Exploration, explore
 from factory.theory.nets.composition import compose
@@ -280,16 +281,6 @@ def _explored(net: MarkedNet, exploration: Exploration) -> Iterator[Defect]:
         yield Defect("reversible", "no way back", reason, transitions=one_way)
     elif not exploration.complete:
         yield Defect("reversible", "undecided", text)
-
-
-def cover(net: MarkedNet, closed: Iterable[bool]) -> list[int]:
-    """For each place a gear through it that has at most one token and keeps it, or NONE."""
-    covered: list[int] = [NONE] * len(net.tokens)
-    for number, (gear, good) in enumerate(zip(net.gears, closed, strict=False)):
-        if good and sum(net.tokens[p] for p in gear.places) <= 1:
-            for place in gear.places:
-                covered[place] = number
-    return covered
 
 
 def dead_ends(net: MarkedNet) -> tuple[int, ...]:

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from factory.api import Diagnostic, Factory, InputError, Product, usage_error
+from factory.api import Diagnostic, InputError, usage_error
 from factory.support.bounds import WORLDS, WorldName, check_choice, check_values
 
 if TYPE_CHECKING:
-    from factory.api import Marking, Project, RunRequest
+    from factory.api import Factory, Marking, Product, Project, RunRequest
 
 APART = (
     (

@@ -28,7 +28,7 @@ from typing import Any
 
 from factory.api import NONE, GearNet, MarkedNet, Verdict, marked, token_free
 from factory.apps.exports.certificate.listing import CLAIMS, SCHEMA, TRAIN, digest
-from factory.apps.foreign_nets.behaviour import cover
+from factory.apps.foreign_nets.covering import cover
 from factory.theory.nets.composition import Composition, compose
 
 Json = dict[str, Any]
