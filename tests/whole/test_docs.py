@@ -15,6 +15,7 @@ from pathlib import Path
 import click
 import pytest
 
+from factory.api import HOMES
 from factory.apps.exports import exporters
 from factory.commands import commands
 from factory.pipeline import all_templates
@@ -175,6 +176,8 @@ def test_the_reference_has_everything_there_is(reference: dict[str, str]) -> Non
     assert headings(reference["diagnostics"]) == list(codes())
     assert headings(reference["operations"]) == sorted(all_templates())
     assert headings(reference["robots"]) == [*load_catalogue().types, "The catalogue"]
+    names = [name for row in HOMES.values() for name in row.split()]
+    assert headings(reference["interface"]) == names and len(names) == len(set(names))
     for page, names in (("settings", RANGES), ("language", GEOMETRY), ("formats", exporters())):
         rows = re.findall(r"^\| `([\w-]+)` \|", reference[page], re.M)
         assert set(names) <= set(rows), page
