@@ -12,7 +12,7 @@ author = "the factory authors"
 copyright = author
 version = release = __version__
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "factory_reference"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "factory_reference"]
 source_suffix = {".md": "markdown"}
 exclude_patterns = ["_build", "_extensions", "fidelity", "benchmarks"]
 nitpicky = False
@@ -25,6 +25,7 @@ highlight_language = "text"
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
 autoclass_content = "class"
+napoleon_use_ivar = True
 
 html_theme = "furo"
 html_title = "factory"

@@ -45,7 +45,6 @@ if TYPE_CHECKING:
     from factory.floor.geometry.solids import rotation as rotation
     from factory.floor.layout.certificate import Certificate as Certificate
     from factory.floor.layout.clearance import certify as certify
-    from factory.floor.layout.dimensions import Clearance as Clearance
     from factory.floor.layout.durations import Pace as Pace
     from factory.floor.layout.embedding import certified as certified
     from factory.floor.layout.guidepath import Guidepath as Guidepath
@@ -60,6 +59,7 @@ if TYPE_CHECKING:
     from factory.support.arrays import Array as Array
     from factory.support.arrays import Index as Index
     from factory.support.arrays import Indices as Indices
+    from factory.support.arrays import Truth as Truth
     from factory.support.bounds import Allowance as Allowance
     from factory.support.collector import collector_paused as collector_paused
     from factory.support.engine import mujoco as mujoco
@@ -78,6 +78,8 @@ if TYPE_CHECKING:
     from factory.support.tables import table_of as table_of
     from factory.support.tables import value_of as value_of
     from factory.support.version import optional as optional
+    from factory.theory.control.laws import Setting as Setting
+    from factory.theory.control.laws import navigation as navigation
     from factory.theory.control.mode import Limits as Limits
     from factory.theory.control.mode import Mode as Mode
     from factory.theory.lang.pag_reader import load_pag as load_pag
@@ -115,7 +117,7 @@ HOMES = {
     "support.errors": "Diagnostic FactoryError InputError MissingError Position RunError "
     "did_you_mean usage_error",
     "support.settings": "Settings",
-    "support.arrays": "Array Index Indices",
+    "support.arrays": "Array Index Indices Truth",
     "support.bounds": "Allowance",
     "support.collector": "collector_paused",
     "support.engine": "mujoco",
@@ -137,6 +139,7 @@ HOMES = {
     "theory.nets.undone": "Entry Undone",
     "theory.nets.verdict": "Verdict listing",
     "theory.nets.verify": "verify",
+    "theory.control.laws": "Setting navigation",
     "theory.control.mode": "Limits Mode",
     "theory.plant.demand": "Demand",
     "theory.plant.factory": "Factory",
@@ -146,7 +149,6 @@ HOMES = {
     "floor.geometry.solids": "Product Solid rotation",
     "floor.layout.certificate": "Certificate",
     "floor.layout.clearance": "certify",
-    "floor.layout.dimensions": "Clearance",
     "floor.layout.durations": "Pace",
     "floor.layout.embedding": "certified",
     "floor.layout.guidepath": "Guidepath Point2",

@@ -27,9 +27,7 @@ dab = (R, j, ~, <a; b>, F) where
 """,
     "gluing/robots/__init__.py": "",
     "gluing/laws.py": """\
-from factory.theory.control.laws import Setting, navigation
-from factory.theory.control.mode import Mode
-from factory.theory.problem.template import Template
+from factory.api import Mode, Setting, Template, navigation
 
 
 def near(template: Template, setting: Setting) -> Mode:

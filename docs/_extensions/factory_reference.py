@@ -6,14 +6,18 @@ docs/reference/NAME.md only where it has changed; git ignores them, so none can 
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Callable, Mapping
+from inspect import isclass, isfunction, ismodule, signature
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 from reference_text import code, definition, heading, prose, table
 
+from factory import api
 from factory.apps.exports import exporters
 from factory.commands import cli
 from factory.commands import commands as every_command
@@ -36,12 +40,14 @@ CALLS = (
     *("export", "sweep", "plan", "to_networkx"),
 )
 VALUES = (
-    *("support.settings.Settings", "problem.pag.PAG", "problem.pag.Assembly"),
-    *("problem.template.Template", "plant.factory.Factory", "plant.factory.Operation"),
-    *("plant.factory.Robot", "nets.verdict.Verdict", "layout.layout.Layout"),
-    *("simulation.run.Run", "record.figures.PhysicsFigures", "exporting.build.Built"),
-    *("rendering.film.Rendered", "show.report.page.RunReport"),
-    *("study.analysis.Analysis", "study.sweep.summary.Summary", "studies.PlannedAssembly"),
+    *("support.settings.Settings", "theory.problem.pag.PAG", "theory.problem.pag.Assembly"),
+    *("theory.problem.template.Template", "theory.plant.factory.Factory"),
+    *("theory.plant.factory.Operation", "theory.plant.robot.Robot"),
+    *("theory.nets.verdict.Verdict", "floor.layout.layout.Layout", "engine.simulation.run.Run"),
+    *("engine.record.figures.PhysicsFigures", "apps.exports.build.Built"),
+    *("apps.runs.pictures.Rendered", "apps.report.page.RunReport"),
+    *("apps.analyze.analysing.Analysis", "apps.sweep.summary.Summary"),
+    *("studies.PlannedAssembly",),
 )
 """What the calls take and give."""
 
@@ -228,6 +234,32 @@ def python() -> str:
     )
 
 
+def interface() -> str:
+    """The names of `factory.api`, each with the docstring at its definition."""
+    lines = [heading(1, "Interface"), prose(docstring(api))]
+    for home, names in api.HOMES.items():
+        for name in names.split():
+            subject = getattr(api, name)
+            lines.append(heading(2, name))
+            if isfunction(subject):
+                lines.append(code(f"{name}{signature(subject)}", "python"))
+            plain = isclass(subject) or isfunction(subject) or ismodule(subject)
+            lines.append(definition(docstring(subject) if plain else remark(home, name)))
+            lines.append(f"*`factory/{home.replace('.', '/')}.py`*")
+    return "\n\n".join(lines)
+
+
+def remark(home: str, name: str) -> str:
+    """The text below the definition of a constant or of the name of a type."""
+    body = ast.parse((PACKAGE / f"{home.replace('.', '/')}.py").read_text("utf-8")).body
+    for node, after in pairwise(body):
+        targets = node.targets if isinstance(node, ast.Assign) else []
+        if any(isinstance(target, ast.Name) and target.id == name for target in targets):
+            assert isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
+            return str(after.value.value)
+    raise LookupError(f"{home} does not define {name}")
+
+
 def directive(*texts: str) -> str:
     """A block of directives in Sphinx's own language."""
     return "\n".join(["```{eval-rst}", "\n\n".join(texts), "```"])
@@ -250,6 +282,7 @@ PAGES: Mapping[str, Callable[[], str]] = {
     "log": log_format,
     "robots": robots,
     "python": python,
+    "interface": interface,
 }
 
 

@@ -16,6 +16,7 @@ import click
 import pytest
 
 from benches import drawing
+from factory.api import HOMES
 from factory.apps.exports import exporters
 from factory.commands import commands
 from factory.pipeline import all_templates
@@ -176,6 +177,8 @@ def test_the_reference_has_everything_there_is(reference: dict[str, str]) -> Non
     assert headings(reference["diagnostics"]) == list(codes())
     assert headings(reference["operations"]) == sorted(all_templates())
     assert headings(reference["robots"]) == [*load_catalogue().types, "The catalogue"]
+    names = [name for row in HOMES.values() for name in row.split()]
+    assert headings(reference["interface"]) == names and len(names) == len(set(names))
     for page, names in (("settings", RANGES), ("language", GEOMETRY), ("formats", exporters())):
         rows = re.findall(r"^\| `([\w-]+)` \|", reference[page], re.M)
         assert set(names) <= set(rows), page

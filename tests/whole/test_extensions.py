@@ -31,6 +31,30 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+def listings() -> list[str]:
+    """The modules that the page about extensions shows."""
+    page = (ROOT / "docs" / "guide" / "extending.md").read_text("utf-8")
+    return re.findall(r"^```python\n(.*?)^```$", page, re.M | re.S)
+
+
+def test_what_the_page_shows_runs_with_the_interface_alone() -> None:
+    exporter, law, app = listings()
+    lines = "\n".join((exporter, law, app)).splitlines()
+    loaded = {line for line in lines if "import" in line and "factory" in line}
+    assert loaded and all(line.startswith("from factory.api import ") for line in loaded)
+    spaces: list[dict[str, Any]] = [{}, {}, {}]
+    for listing, space in zip((exporter, law, app), spaces, strict=True):
+        exec(compile(listing, "extending.md", "exec", dont_inherit=True), space)
+    made = project(load(PAPER))
+    labels = spaces[0]["export"](SimpleNamespace(project=made)).split()
+    assert labels == [node.label for node in made.pag.nodes]
+    template, setting = made.templates["mate"], stretched("mate")
+    plain, near = navigation(template, setting), spaces[1]["near"](template, setting)
+    assert near.eps == plain.eps / 2 and (near.goals == plain.goals).all()
+    ticks = spaces[2]["busy"](made, units=1)
+    assert len(ticks) == len(made.factory.net.threaded.places) and min(ticks) > 0
+
+
 def test_a_folder_brings_a_format(run: Terminal, folder: Path) -> None:
     done = run("export", PAPER, "--format", "labels", "--exporters", folder)
     assert done.status == 0, done.err
@@ -169,8 +193,8 @@ def test_a_package_brings_an_operation_a_law_a_robot_type_and_a_format(
 
 
 PACKAGE_MISTAKES = [
-    ("laws.py", "navigation(template", "navigation(templates", 7, "NameError: name 'templates'"),
-    ("laws.py", "return navigation", "return 3 or navigation", 6, "gave int, not a Mode"),
+    ("laws.py", "navigation(template", "navigation(templates", 5, "NameError: name 'templates'"),
+    ("laws.py", "return navigation", "return 3 or navigation", 4, "gave int, not a Mode"),
     ("laws.py", "def near", "def far", None, "has no attribute 'near'"),
     ("robots/catalogue.toml", "[dabber]", "[dot]", 1, "there is a robot type 'dot' already"),
     ("robots/catalogue.toml", '"tool"', '"toool"', 1, "did you mean 'tool'?"),

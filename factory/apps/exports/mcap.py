@@ -12,12 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from factory.api import Array, optional
+from factory.api import Array, Truth, optional
 from factory.apps.exports.csv import EventRow, rows
 from factory.apps.exports.motion import BodyMotion, motion_of
 from factory.apps.exports.subject import Subject
 from factory.apps.log import Log
-from factory.support.arrays import Truth
 
 FORMAT, TAKES, BINARY = "mcap", "log", True
 

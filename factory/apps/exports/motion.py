@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from factory.api import HIDDEN, Array, Indices
+from factory.api import HIDDEN, Array, Indices, Truth
 from factory.apps.log import Log
-from factory.support.arrays import Truth
 
 if TYPE_CHECKING:
     from factory.api import mujoco

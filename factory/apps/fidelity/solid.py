@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import HIDDEN, Array, Index, Replica, mujoco, names
+from factory.api import HIDDEN, Array, Index, Replica, Truth, mujoco, names
 from factory.engine.mjcf.replica import SHOWN
-from factory.support.arrays import Truth
 
 
 class SolidReplica(Replica):

@@ -12,13 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from factory.api import Array, Index, Layout, Point2
+from factory.api import Array, Index, Layout, Point2, Truth
 from factory.floor.layout.bending import Detour, bent
 from factory.floor.layout.certificate import STATIONS, Region
 from factory.floor.layout.clearance import TOLERANCE, ClearanceSearch
 from factory.floor.layout.layout import carriers
 from factory.floor.layout.sweeps import piles, regions_of
-from factory.support.arrays import Truth
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -7,15 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.api import Array, Clearance, Factory, Hand, Layout, Operation
-from factory.floor.layout.dimensions import FINGER
+from factory.api import Array, Factory, Hand, Layout, Operation, Truth
+from factory.floor.layout.dimensions import FINGER, Clearance
 from factory.floor.layout.hands.apart import BESIDE, HandsApart, Swept
 from factory.floor.layout.hands.hand import Kind, widths
 from factory.floor.layout.hands.holding import Holding, held
 from factory.floor.layout.hands.in_the_way import InTheWay, Passed
 from factory.floor.layout.hands.places import Places
 from factory.floor.layout.hands.surfaces import Way, swept
-from factory.support.arrays import Truth
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,12 +25,18 @@ from factory.theory.problem.template import Point, Template
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Setting:
-    """Where one operation takes place: the guidepaths of its robots, in the template's order.
+    """The place of an operation: the guidepaths of its k robots, in the template's order.
 
-    `lower`, `upper` (k,): A and B of each [m]; `station` (k,): S, its interior station, NaN where
-    it has none; `r` (k,): the length [m] that multiples in the template's points count. Two robots
-    touch at the mean of their `width` (k,) [m]. `eps` [m]: the factory's own, used where the
-    template says so; `dwell` [s]; `gate`, `standoff` (k,) as in `Mode`.
+    Attributes:
+        lower: A, the lower end of each guidepath [m] (k,).
+        upper: B, the upper end [m] (k,).
+        r: the length that multiples in the template's points count [m] (k,).
+        eps: the factory's own radius of a goal ball, used where the template says so [m].
+        station: S, the interior station of each guidepath [m] (k,); NaN for none.
+        width: width of each robot [m] (k,). Two robots touch at the mean of theirs.
+        dwell: as in `Mode` [s].
+        gate: as in `Mode` (k,).
+        standoff: as in `Mode` [m] (k,).
     """
 
     lower: Array
@@ -66,10 +72,15 @@ Law = Callable[[Template, Setting], Mode]
 
 
 def navigation(template: Template, setting: Setting) -> Mode:
-    """Derived from a navigation function on W - Δ: each robot to its goal point, none touching.
+    """The mode derived from a navigation function on W - Δ: each robot moves to its goal point, and
+    no two touch. Guidepaths meet where ~ says so.
 
-    Guidepaths meet where ~ says so. Raises InputError (NotPrepared) where that is no mode: a goal
-    off its guidepath, or robots that touch at their goals.
+    Args:
+        template: the operation.
+        setting: the guidepaths of its robots.
+
+    Raises InputError (NotPrepared) where that is no mode: a goal off its guidepath, or robots that
+    touch at their goals.
     """
     law = template.law
     meetings = list(_meetings(template, setting))
