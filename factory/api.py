@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from factory.engine.simulation.world import World as World
     from factory.engine.timing.timed import pace as pace
     from factory.engine.timing.timing import Timing as Timing
-    from factory.film.film import Film as Film
     from factory.film.picture import Picture as Picture
     from factory.film.shot import Shot as Shot
     from factory.floor.geometry.meshes import Mesh as Mesh
@@ -66,7 +65,6 @@ if TYPE_CHECKING:
     from factory.support.errors import Diagnostic as Diagnostic
     from factory.support.errors import FactoryError as FactoryError
     from factory.support.errors import InputError as InputError
-    from factory.support.errors import MissingError as MissingError
     from factory.support.errors import Position as Position
     from factory.support.errors import RunError as RunError
     from factory.support.errors import did_you_mean as did_you_mean
@@ -114,7 +112,7 @@ if TYPE_CHECKING:
     from factory.theory.problem.template import Template as Template
 
 HOMES = {
-    "support.errors": "Diagnostic FactoryError InputError MissingError Position RunError "
+    "support.errors": "Diagnostic FactoryError InputError Position RunError "
     "did_you_mean usage_error",
     "support.settings": "Settings",
     "support.arrays": "Array Index Indices Truth",
@@ -175,7 +173,6 @@ HOMES = {
     "engine.simulation.run": "Run steady_from",
     "engine.simulation.simulation": "Simulation",
     "engine.simulation.world": "World",
-    "film.film": "Film",
     "film.picture": "Picture",
     "film.shot": "Shot",
     "pipeline": "Project",

@@ -3,16 +3,22 @@ the line of the user's file."""
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 import factory
+from factory.api import navigation
+from factory.pipeline import read
 from factory.support.extensions import extensions
 from tests.command_line import Terminal
-from tests.paths import PAPER
+from tests.core.test_control_laws import SETTING
+from tests.paths import PAPER, ROOT
 from tests.plug_in import FILES, write_package
 
 GOOD = '''"""The labels, one a line."""
@@ -45,10 +51,10 @@ def test_what_the_page_shows_runs_with_the_interface_alone() -> None:
     spaces: list[dict[str, Any]] = [{}, {}, {}]
     for listing, space in zip((exporter, law, app), spaces, strict=True):
         exec(compile(listing, "extending.md", "exec", dont_inherit=True), space)
-    made = project(load(PAPER))
+    made = read(PAPER)
     labels = spaces[0]["export"](SimpleNamespace(project=made)).split()
     assert labels == [node.label for node in made.pag.nodes]
-    template, setting = made.templates["mate"], stretched("mate")
+    template, setting = made.templates["mate"], SETTING
     plain, near = navigation(template, setting), spaces[1]["near"](template, setting)
     assert near.eps == plain.eps / 2 and (near.goals == plain.goals).all()
     ticks = spaces[2]["busy"](made, units=1)

@@ -16,8 +16,9 @@ from tests.paths import PAPER, ROOT
 ASIDE = ("factory.apps.foreign_nets", "networkx")
 """What the main road does without."""
 
-OFF_THE_ROAD = {"apps.foreign_nets", "apps.exports", "commands"}
-"""Rooms that may import `foreign_nets`: commands when they are given a net in PNML."""
+OFF_THE_ROAD = {"apps.foreign_nets", "apps.exports", "apps.analyze", "commands"}
+"""Rooms that may import `foreign_nets`: commands when they are given a net in PNML, and studies of
+nets."""
 
 PLANTED = "import factory.apps.foreign_nets.behaviour"
 

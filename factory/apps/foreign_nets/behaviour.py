@@ -25,7 +25,6 @@ from factory.api import (
     marked,
     token_free,
 )
-from factory.apps.foreign_nets.covering import cover
 from factory.apps.foreign_nets.discover import discover
 from factory.apps.foreign_nets.explore import LIMIT, Exploration, explore
 from factory.theory.nets.composition import compose
@@ -111,7 +110,7 @@ def _dying(net: MarkedNet, stuck: tuple[int, ...]) -> Iterator[Defect]:
 
 def _unsafe(net: MarkedNet, closed: Sequence[bool], stuck: frozenset[int]) -> Iterator[Defect]:
     """A place of a marked graph that can hold two tokens, with the firings that put them there."""
-    covered = cover(net, closed)
+    covered = net.cover(closed)
     work = 0
     for place, gear in enumerate(covered):
         if gear != NONE:

@@ -5,13 +5,14 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from factory.api import Film, Project, Recorder, Run, Shot, Simulation
+from factory.api import Project, Recorder, Run, Shot, Simulation
 from factory.apps.log import Log
 from factory.apps.log.model import model_of
 from factory.apps.monitor.record import recorded_subject
 from factory.apps.runs.executing import Tell, carry_out
 from factory.apps.runs.options import RunOptions
 from factory.apps.runs.watched import watched
+from factory.film.film import Film
 from factory.support.gl import probe
 
 

@@ -108,6 +108,16 @@ class MarkedNet(Pictured):
         places = tuple(replace(place, size=len(on)) for place, on in pairs)
         return MarkedNet(replace(self.net, places=places), self.tokens, gears, slots)
 
+    def cover(self, closed: Iterable[bool]) -> list[int]:
+        """For each place a gear through it that has at most one token and keeps it, or NONE;
+        `closed`: whether each gear is a cycle of the net."""
+        covered: list[int] = [NONE] * len(self.tokens)
+        for number, (gear, good) in enumerate(zip(self.gears, closed, strict=False)):
+            if good and sum(self.tokens[p] for p in gear.places) <= 1:
+                for place in gear.places:
+                    covered[place] = number
+        return covered
+
 
 def marked(net: GearNet | MarkedNet) -> MarkedNet:
     """A net with its initial tokens. A place that `initial` names for each robot in its slots has

@@ -28,7 +28,6 @@ from typing import Any
 
 from factory.api import NONE, GearNet, MarkedNet, Verdict, marked, token_free
 from factory.apps.exports.certificate.listing import CLAIMS, SCHEMA, TRAIN, digest
-from factory.apps.foreign_nets.covering import cover
 from factory.theory.nets.composition import Composition, compose
 
 Json = dict[str, Any]
@@ -141,7 +140,7 @@ def _gear_train(net: MarkedNet, verdict: Verdict) -> Json:
 
 
 def _safe(net: MarkedNet, composition: Composition) -> Json | None:
-    covered = cover(net, composition.closed)
+    covered = net.cover(composition.closed)
     return None if NONE in covered else {"cover": covered}
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from factory.api import InputError, MissingError
+from factory.api import InputError
 from factory.commands.requests import OutputOptions
 from factory.commands.warnings import announced
+from factory.support.errors import MissingError
 from factory.support.progress import Waiting
 
 if TYPE_CHECKING:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from factory.api import MissingError
 from factory.apps.planning.command_line.asking import asked
 from factory.apps.planning.command_line.interlocking import refuse
 from factory.commands.options import LIBRARY, OUT, OUTPUT, PATH, SECONDS, TEMPLATES
@@ -19,6 +18,7 @@ from factory.commands.requests import OutputOptions
 from factory.commands.warnings import announced, say_allowed
 from factory.support.bounds import AIMS, LENGTHS, UPS
 from factory.support.console import emit, say
+from factory.support.errors import MissingError
 from factory.support.progress import StepBar, Waiting
 
 if TYPE_CHECKING:
