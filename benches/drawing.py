@@ -1,5 +1,5 @@
-"""The digest of the code that draws pictures, kept beside those of the gallery, so that a test finds
-a picture that is older than the code.
+"""The digest of the code that draws pictures, kept beside those of the gallery: so a test finds a
+picture that is older than the code.
 
 What cannot change a picture is left out: docstrings, comments and imports.
 """
