@@ -1,0 +1,83 @@
+"""Filament draws stills where Vulkan works; elsewhere everything is as without it."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from factory.engine.mjcf.replica import Replica
+from factory.film import filament, studio
+from factory.film.picture import Picture
+from factory.floor.geometry.sight import View
+from factory.support.engine import mujoco
+from factory.support.errors import InputError, MissingError
+
+
+@pytest.fixture
+def untried() -> Iterator[None]:
+    filament.fault.cache_clear()
+    yield
+    filament.fault.cache_clear()
+
+
+@pytest.mark.usefixtures("untried")
+@pytest.mark.parametrize("loads", [True, False])
+def test_without_vulkan_stills_are_classic_and_filament_is_refused(
+    loads: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whether its loader is missing, or the trial ends as the renderer does without a driver."""
+    reason = "libc++abi: terminating\nin createVkInstance:985\nreason: Unable to create an instance"
+    ended = subprocess.CompletedProcess([], -6, "", reason)
+    monkeypatch.setattr(filament, "loads", lambda library: loads)
+    monkeypatch.setattr(subprocess, "run", lambda *_, **__: ended)
+    assert not filament.draws("auto", still=True)
+    with pytest.raises(MissingError, match="NoVulkan") as caught:
+        filament.draws("filament", still=True)
+    (said,) = caught.value.diagnostics
+    assert ("Unable to create" if loads else filament.LOADER) in said.message
+    assert filament.APT in said.hint and "--renderer classic" in said.hint
+
+
+@pytest.mark.usefixtures("untried")
+def test_what_is_classic_tries_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(filament, "fault", None)
+    assert not filament.draws("classic", still=True)
+    assert not filament.draws("auto", still=False)
+
+
+def test_a_second_thread_does_not_draw(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(filament, "fault", lambda: None)
+    monkeypatch.setattr(filament, "_threads", {-1})
+    assert not filament.draws("auto", still=True)
+    with pytest.raises(InputError, match="another thread"):
+        filament.draws("filament", still=True)
+
+
+def test_an_unknown_renderer_is_refused() -> None:
+    with pytest.raises(InputError, match="there is no renderer 'filamnt'"):
+        Picture(renderer="filamnt")  # type: ignore[arg-type]
+
+
+def test_the_environment_is_a_cube_map_of_the_studio() -> None:
+    content = studio.environment()
+    assert content.startswith(b"\xabKTX 11\xbb\r\n\x1a\n")
+    texels = sum(6 * (studio.SIZE >> level) ** 2 for level in range(4))
+    assert 4 * texels < len(content) < 4 * texels + 2000
+    up, down, side = studio.light(np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]))
+    assert up.min() > down.min() > side.min() > 0.4
+
+
+def test_filament_draws_and_keeps_the_output_clean(capfd: pytest.CaptureFixture[str]) -> None:
+    if filament.fault() is not None:
+        pytest.skip("Vulkan does not work here")
+    ball = "<mujoco><worldbody><geom size='1' rgba='1 0 0 1'/></worldbody></mujoco>"
+    axes = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
+    view = View(np.array([0.0, -6.0, 0.0]), axes, 0.3, 0.3, 6.0, 1.0)
+    model = mujoco.MjModel.from_xml_string(ball)
+    with filament.Filament(Replica(model), (64, 48)) as renderer:
+        red, green, _ = renderer.mean(view, 4)[24, 32]
+    assert red > 2 * green
+    assert capfd.readouterr() == ("", "")
