@@ -120,7 +120,7 @@ def _strokes(letter: str) -> tuple[tuple[Array, bool], ...]:
     first."""
     lines = list[tuple[Array, bool]]()
     for stroke in (GLYPHS.get(letter) or GLYPHS.get(letter.upper(), "")).split():
-        corners = [(NARROW * int(x), float(y)) for x, y in stroke.split(",")]
+        corners = [(NARROW * int(at[0]), float(at[1])) for at in stroke.split(",")]
         closed = corners[0] == corners[-1]
         line = np.array(corners[:-1] if closed else corners)
         lines.append((_smooth(_smooth(line, closed), closed), closed))

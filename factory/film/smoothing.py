@@ -7,6 +7,8 @@ stair is sought, and a pixel takes as much of the colour beyond the step as the 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,7 +25,7 @@ SINGLE = 0.45
 """How much of what is a pixel wide is spread to its neighbours."""
 
 Places = NDArray[np.intp]
-Brightness = NDArray[np.float32]
+Brightness = NDArray[np.floating[Any]]
 
 
 def smooth(pixels: Pixels) -> Pixels:
@@ -50,13 +52,13 @@ def smooth(pixels: Pixels) -> Pixels:
     share = np.maximum(share, SINGLE * (spread * spread * (3 - 2 * spread)) ** 2)[:, None]
     mixed = flat.copy()
     mixed[at] = (1 - share) * flat[at] + share * flat[at + across] + np.float32(0.5)
-    return mixed.reshape(pixels.shape)
+    return np.asarray(mixed.reshape(pixels.shape), np.uint8)
 
 
 def _bright(pixels: Pixels) -> NDArray[np.uint8]:
     """The brightness (height, width) of pixels, from 0 to 255."""
     red, green, blue = (pixels[:, :, k] >> shift for k, shift in enumerate((2, 1, 2)))
-    return red + green + blue
+    return np.asarray(red + green + blue, np.uint8)
 
 
 def _edges(bright: NDArray[np.uint8]) -> Places:

@@ -127,7 +127,7 @@ def _blurred(size: int, rough: float, samples: int = 160) -> Array:
     other, total = np.cross(ways, side), np.zeros_like(ways)
     for x, y, z in to:
         total += z * _env(x * side + y * other + z * ways)
-    return total / to[:, 2].sum()
+    return np.asarray(total / to[:, 2].sum(), float)
 
 
 def _harmonics() -> Array:
