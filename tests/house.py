@@ -170,10 +170,11 @@ CLOCKED = ("tests.waiting",)
 
 
 class House:
-    """All modules of a package `factory` below `root`, by name. `beside`: those of its tests and
-    benches, by their names below `root`."""
+    """All modules of a package `factory` below the folder `root`, by name. `beside`: those of its
+    tests and benches, by their names below `root`."""
 
     def __init__(self, root: Path) -> None:
+        self.root = root
         self.beside: dict[str, Module] = {}
         for path in sorted(chain.from_iterable((root / n).rglob("*.py") for n in BESIDE)):
             name = ".".join(path.relative_to(root).with_suffix("").parts)

@@ -28,6 +28,7 @@ from tests.house import (
     variants,
 )
 from tests.interface import interface, undocumented
+from tests.naming import named_apps
 from tests.paths import ROOT
 
 Law = Callable[[House], Iterator[str]]
@@ -47,6 +48,7 @@ LAWS: tuple[Law, ...] = (
     reach_ins,
     interface,
     undocumented,
+    named_apps,
 )
 BREACHES: tuple[tuple[Law, dict[str, str], str], ...] = (
     (strangers, {"factory/loose.py": ""}, "loose: on no floor"),
@@ -268,6 +270,24 @@ BREACHES: tuple[tuple[Law, dict[str, str], str], ...] = (
             "factory/pipeline.py": "class Project:\n    'A project of a PAG.'\n    pag: PAG",
         },
         "api.Project: 'pag' is not under Attributes",
+    ),
+    (
+        named_apps,
+        {"factory/theory/nets/a.py": "def with_tees(net): ..."},
+        "theory.nets.a names few robots",
+    ),
+    (
+        named_apps,
+        {"factory/theory/nets/a.py": "'A net, for the monitor.'"},
+        "theory.nets.a names monitor",
+    ),
+    (
+        named_apps,
+        {
+            "factory/theory/nets/a.py": "",
+            "tests/named_in_core.toml": "relay = ['theory.nets.a']",
+        },
+        "theory.nets.a no longer names relay",
     ),
 )
 

@@ -14,7 +14,6 @@ from math import ceil
 
 from factory.api import (
     Certificate,
-    Clearance,
     Factory,
     Hands,
     Layout,
@@ -26,7 +25,7 @@ from factory.api import (
 from factory.apps.revise.pins import Pins
 from factory.floor.layout.certificate import Fault
 from factory.floor.layout.clearance import searched
-from factory.floor.layout.dimensions import TOOL_TRAVEL, up
+from factory.floor.layout.dimensions import TOOL_TRAVEL, Clearance, up
 from factory.floor.layout.drafting import LayoutDraft
 from factory.floor.layout.durations import cycle_of
 from factory.floor.layout.layout import branch_of, carriers

@@ -15,7 +15,6 @@ from typing import Any, Literal, get_args
 
 from factory.api import (
     NOPART,
-    Clearance,
     Factory,
     Ground,
     Hands,
@@ -32,6 +31,7 @@ from factory.apps.revise.matching import matching, shifted
 from factory.apps.revise.pairing import Pairing
 from factory.apps.revise.pinning import Pinning
 from factory.apps.revise.pins import Pins, StayingRobot, framed, same_module
+from factory.floor.layout.dimensions import Clearance
 from factory.floor.mating.mating import judged
 
 Pin = Literal["all", "hands", "none"]
