@@ -48,7 +48,8 @@ def view(
 ) -> int:
     """Run FILE.pag endlessly, and show it in a browser.
 
-    There you can pause it, push robots and block feeders. With --spares or --faults the run recovers from failures: you can pause or kill robots."""
+    There you can pause it, push robots and block feeders. With --spares or --faults the run
+    recovers from failures: you can pause or kill robots."""
     from factory.api import Simulation
     from factory.apps.live import Server, Session
     from factory.apps.live.page import page

@@ -53,9 +53,9 @@ def plant(
 ) -> int:
     """Serve the plant of FILE.pag to a PLC, by OPC UA.
 
-    It ends when its products are made. The controller writes targets, grips, jobs and a heartbeat, without which all axes stand. What
-    the net or the reach of a grip does not allow is refused by name. `export --format st` writes
-    a controller."""
+    It ends when its products are made. The controller writes targets, grips, jobs and a heartbeat,
+    without which all axes stand. What the net or the reach of a grip does not allow is refused by
+    name. `export --format st` writes a controller."""
     from factory.api import Simulation
     from factory.apps.plc.opcua import OpcuaPlant, check_plant
     from factory.apps.runs.running import carry_on

@@ -77,8 +77,8 @@ def sweep(
 ) -> int:
     """Run FILE.pag for all combinations of varied values.
 
-    The results are kept in SQLite. Called again, the sweep continues where it stopped. `factory sweep RESULTS --summary`
-    summarises the results so far, also during a sweep.
+    The results are kept in SQLite. Called again, the sweep continues where it stopped. `factory
+    sweep RESULTS --summary` summarises the results so far, also during a sweep.
     """
     document: dict[str, Any] = {}
     failed = False
