@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import floor
+from math import floor, inf
 from typing import Literal
 
 import numpy as np
@@ -22,7 +22,7 @@ from factory.film.marks import Marks
 from factory.film.net_panel import NetPanel
 from factory.film.painter import Painter, Renderer
 from factory.film.picture import Area, PanelName, Picture, Size, shared
-from factory.film.sheet import OUTSIDE, Rows
+from factory.film.sheet import NAMES, OUTSIDE, Rows
 from factory.film.tour import Tour
 from factory.floor.geometry.sight import Framing
 from factory.support.arrays import Array
@@ -132,7 +132,8 @@ class Panels:
     ) -> None:
         scale = min(max(size) / 1280, min(size) / 720)
         room = min(area.height for area in areas.values()) / max(scale, SMALLEST) - OUTSIDE
-        self.size, self.rows = size, Rows(history, room)
+        wide = areas["net"].width / max(scale, SMALLEST) - NAMES if "net" in areas else inf
+        self.size, self.rows = size, Rows(history, room, wide)
         self.shown = [
             (area, KINDS[name]((area.width, area.height), scale, history, self.rows))
             for name, area in areas.items()

@@ -16,7 +16,7 @@ USUAL, STEP = -62.0, 15
 BETTER = 1.05
 """How much better another side has to be."""
 
-CLUTTER = 2.0
+CLUTTER = 4.0
 """How much worse it is to see a shed in front than less of the factory, by the share of the
 picture that it takes."""
 
