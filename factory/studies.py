@@ -40,7 +40,7 @@ def render(
     output: AnyPath,
     *,
     size: tuple[int, int] = (1280, 720),
-    camera: str = "overview",
+    camera: str = "tour",
     panels: Sequence[PanelName] = (),
     title: str = "",
     fps: float = 30,
@@ -58,7 +58,7 @@ def render(
     """Film a run (.mp4), or take a still of it (.png) at a time [s] or at its end; of a log, of the
     run that is in it.
 
-    `size` (width, height) [px]; `camera`: overview, orbit, top, product, part:LABEL or
+    `size` (width, height) [px]; `camera`: tour, overview, orbit, top, product, part:LABEL or
     handover:LABEL; `panels` beside the 3-D: net, gantt; `poster`: a still of a film's best moment;
     `renderer`: classic, filament, or auto, which takes filament for stills where it works.
     The others are those of `run`. Raises InputError, MissingError without GL, RunError.

@@ -288,11 +288,12 @@ PICTURE = options(
     click.option("--fps", type=bounded("fps"), default=30, help="Frames per second."),
     click.option(
         "--camera",
-        default="overview",
+        default="tour",
         metavar="CAMERA",
         shell_complete=cameras,
-        help="overview, orbit, top, product, part:LABEL to follow a part, or handover:LABEL for a"
-        " close-up of its hand-over.",
+        help="tour (of a film: the overview, cut to two hand-overs and the product), overview,"
+        " orbit, top, product, part:LABEL to follow a part, or handover:LABEL for a close-up of its"
+        " hand-over.",
     ),
     click.option(
         "--with",

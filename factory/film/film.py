@@ -63,6 +63,7 @@ class Film(_Observer):
         poster: Path | str | None = None,
     ) -> None:
         super().__init__(simulation, picture)
+        self.figures = simulation.figures
         self.reel = Reel(self.take, Path(path), fps, None if poster is None else Path(poster))
         try:
             self.reel.until(self.last)
@@ -81,9 +82,15 @@ class Film(_Observer):
 
     def close(self) -> None:
         """Finish the file, and write the poster."""
+        self._count()
         self.reel.close()
 
+    def _count(self) -> None:
+        figures = self.figures()
+        self.reel.contacts = figures.unintended_contacts if figures else None
+
     def __exit__(self, *raised: object) -> None:
+        self._count()
         self.reel.__exit__(*raised)
 
 
