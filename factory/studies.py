@@ -83,7 +83,7 @@ def report(
     product: Stage,
     output: AnyPath | None = None,
     *,
-    units: int = 4,
+    units: int | None = None,
     seed: int = 0,
     jitter: float = 0.0,
     wip: int | None = None,
@@ -92,14 +92,22 @@ def report(
     progress: Tell | None = None,
 ) -> RunReport:
     """The page about a run of a product, or about the run in a log; a notebook shows it. Written to
-    `output` where that is given. The others are those of `run`. Raises InputError, RunError."""
+    `output` where that is given. `units`: None for as many as it takes to measure a cycle time. The
+    others are those of `run`. Raises InputError, RunError."""
     from factory.apps.report.page import report_on
     from factory.apps.runs.options import RunOptions
+    from factory.engine.simulation.run import steady_from
+    from factory.support.bounds import check_values
     from factory.support.files import write_text
 
-    asked = RunOptions("mujoco", units, seed, jitter, wip, max_time=max_time)
+    check_values({"units": units})
+    asked = RunOptions("mujoco", 1, seed, jitter, wip, max_time=max_time)
     will_write(maybe(output))
-    made = report_on(_logged(product) or project_of(product, settings), asked, progress=progress)
+    log = _logged(product)
+    source = log or project_of(product, settings)
+    if not isinstance(source, Path):
+        asked = replace(asked, units=units or steady_from(source.plain.period))
+    made = report_on(source, asked, progress=progress)
     if output is not None:
         write_text(path_of(output), made.text)
     return made

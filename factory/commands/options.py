@@ -73,10 +73,10 @@ def options(*decorators: Callable[[F], F]) -> Callable[[F], F]:
     return decorate
 
 
-def gathered(kind: type, name: str) -> Callable[[F], F]:
-    """A decorator that passes the options that are fields of a dataclass to a command as one value,
-    by this name."""
-    names = [field.name for field in fields(kind)]
+def gathered(kind: type, name: str, but: str = "") -> Callable[[F], F]:
+    """A decorator that passes the options that are fields of a dataclass, `but` for one, to a
+    command as one value, by this name."""
+    names = [field.name for field in fields(kind) if field.name != but]
 
     def decorate(command: F) -> F:
         @wraps(command)

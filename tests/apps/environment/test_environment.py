@@ -1,4 +1,4 @@
-"""A factory as a Gymnasium environment: Gymnasium's own checker, the baseline, and hostile agents."""
+"""A factory as a Gymnasium environment: its checker, the baseline, and agents by chance."""
 
 from __future__ import annotations
 
