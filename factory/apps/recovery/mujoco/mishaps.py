@@ -54,7 +54,7 @@ class Mishaps:
         """Open a robot's hand."""
         parts = self._world.parts
         held = parts.holdings.hand(robot)
-        parts.welds.loose([parts.holdings.weld[robot_code(robot), label] for label in held])
+        parts.welds.open([parts.holdings.weld[robot_code(robot), label] for label in held])
         parts.welds.write()
         self._fallen.watch(held.values())
         self.opened.add(robot)
@@ -65,7 +65,7 @@ class Mishaps:
         welds = tuple(holdings.weld[robot_code(robot), label] for label in holdings.hand(robot))
         for weld in welds:
             place = self._world.m.eq_data[weld, 3:10]
-            self._world.parts.welds.bend(weld, place + metres * UP)
+            self._world.parts.welds.offset(weld, place + metres * UP)
         bodies = tuple(body for r in operation.robots for body in holdings.hand(r).values())
         self.slips[operation.index] = Slip(robot, welds, bodies)
         self._fallen.watch(bodies)
@@ -74,7 +74,7 @@ class Mishaps:
         """Put slipped inputs of operations (index) back into place."""
         for number in {*operations} & self.slips.keys():
             slip = self.slips.pop(number)
-            self._world.parts.welds.straighten(slip.welds)
+            self._world.parts.welds.end_offset(slip.welds)
             self._settling.append((self._world.time + SETTLES, slip.bodies))
 
     def fresh(self) -> Sequence[tuple[str, int]]:
@@ -103,7 +103,7 @@ class Mishaps:
         mujoco.mju_mulQuat(pose, slider, turn)
         aside = np.zeros(3)
         mujoco.mju_rotVecQuat(aside, np.array([0, fault.way, 0]), slider)
-        parts.welds.bend(weld, np.array([place[0], place[1] + fault.way, place[2], *turn]))
+        parts.welds.offset(weld, np.array([place[0], place[1] + fault.way, place[2], *turn]))
         parts.welds.turn(body, pose, aside)
         self._fallen.watch([body])
         pad = int(m.body_geomadr[m.eq_obj1id[weld]])

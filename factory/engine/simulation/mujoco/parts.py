@@ -145,7 +145,7 @@ class Parts:
             return False
         loose = self.strength.look()
         if loose:
-            self.welds.loose(loose)
+            self.welds.open(loose)
             self.welds.write()
         return bool(loose)
 
