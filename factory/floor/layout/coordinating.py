@@ -1,5 +1,5 @@
 """The coordinated net of a layout: its compiled net with passes, hands that wait for each other,
-magazines and the tray (`nets/coordinated.py`).
+magazines and the tray (`theory/nets/coordinated.py`).
 
 Operations are ordered as when one unit is made alone. So a sequence in which each transition fires
 once stays possible, and no circuit is free of tokens.

@@ -1,4 +1,4 @@
-"""How the inputs of an operation can come together: a value, found by `compiler/mating/` from the
+"""How the inputs of an operation can come together: a value, found by `floor/mating/` from the
 geometry of a product, used by Compile (robot types), the layout (sides) and the run (contacts)."""
 
 from __future__ import annotations
