@@ -51,7 +51,10 @@ def build(
     units: int | None,
     wip: int | None,
 ) -> int:
-    """Compile, verify and lay out FILE.pag; write the MJCF model, the floor plan, the net."""
+    """Write the factory of FILE.pag: MJCF, floor plan, net.
+
+    The PAG is compiled, verified and laid out first.
+    """
     from factory.support.cache import build_name, find_build, keep_build
 
     begin = perf_counter()

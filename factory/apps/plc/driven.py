@@ -57,8 +57,8 @@ class DrivenSupervisor:
 
     @property
     def refusals(self) -> list[Refusal]:
-        """All commands that were refused."""
-        return self.interlock.refusals
+        """The last commands that were refused."""
+        return list(self.interlock.refusals.last)
 
     @property
     def marked(self) -> bytearray:
@@ -106,7 +106,7 @@ class DrivenSupervisor:
 
     def refuse(self, message: str) -> None:
         """Refuse what concerns no single robot."""
-        self.refusals.append(Refusal(self.interlock.world.time, NOBODY, message))
+        self.interlock.refusals.add(Refusal(self.interlock.world.time, NOBODY, message))
 
     @property
     def scans(self) -> Sequence[Scan]:
@@ -150,7 +150,7 @@ class DrivenSupervisor:
             name = self.factory.robots[robot].name + (" lift" if axis != robot else "")
             ends = f"between {low[axis]:.3f} m and {high[axis]:.3f} m now"
             message = f"{name} is sent to {commands.target[axis]:.6g} m: it may go {ends}"
-            self.refusals.append(Refusal(interlock.world.time, robot, message))
+            self.interlock.refusals.add(Refusal(interlock.world.time, robot, message))
         self._astray = astray
         return confined
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from factory.api import NOPART, Event, Layout, Mode, Operation, World
 from factory.apps.plc.corridors import Corridors
-from factory.apps.plc.signals import Commands, GripStates, Refusal
+from factory.apps.plc.signals import Commands, GripStates, Refusal, Refusals
 from factory.engine.simulation.ordering import Ordering
 from factory.floor.layout.coordinating import Coordinated
 from factory.theory.control.mode import REST
@@ -24,7 +24,7 @@ class PlantInterlock:
     """Carries out commands in a `world`. It fires X_s when the carrier of X takes the job up, and
     X_e when it gives it up. `net`: the coordinated net of the layout; `corridors`: where axes may
     go; `fired`: firing counts of the transitions; `held_back`: robots that stand because their last
-    command is refused; `refusals`: all refused commands."""
+    command is refused; `refusals`: the refused commands."""
 
     def __init__(
         self,
@@ -40,7 +40,7 @@ class PlantInterlock:
         self.threads = Threads(gears.threaded, gears.threads_of(gears.initial_marking), starts)
         self.fired = [0] * len(gears.threaded.transitions)
         self.events: list[Event] = []
-        self.refusals: list[Refusal] = []
+        self.refusals = Refusals()
         robots = len(layout.factory.robots)
         self.grips, self.held_back = GripStates(robots), set[int]()
         self.commands = Commands(world.sense()[0].copy(), (False,) * robots, (0,) * robots)
@@ -223,7 +223,7 @@ class PlantInterlock:
 
     def _refuse(self, robot: int, message: str) -> None:
         """Refuse a command: the robot stands until its job or grip command changes."""
-        self.refusals.append(Refusal(self.world.time, robot, message))
+        self.refusals.add(Refusal(self.world.time, robot, message))
         self.held_back.add(robot)
 
 

@@ -29,7 +29,10 @@ def mix(
     output: Path,
     out: OutputOptions,
 ) -> int:
-    """Write ONE.pag and OTHER.pag as one product family, in which what is equal is written once."""
+    """Write two products as one family.
+
+    What ONE.pag and OTHER.pag have in common is written once.
+    """
     from factory.api import load_pag, write_all, write_pag
     from factory.apps.revise.family import family
     from factory.pipeline import all_templates

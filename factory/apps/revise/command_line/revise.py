@@ -45,8 +45,10 @@ def revise(
     picture: Path | None,
     out: OutputOptions,
 ) -> int:
-    """Say what stays of the factory of OLD.pag in that of NEW.pag, and lay it out so that most
-    does. OLD may be a plan.json.
+    """Revise a factory for a new product, and keep most of it.
+
+    Reports what can stay of the factory of OLD.pag, or of a plan.json, and lays out NEW.pag to keep
+    as much as possible.
 
     With --live, -o DIR also writes DIR/family.pag, the mix of both, and DIR/live.csv, orders for a
     change: factory run DIR/family.pag --demand DIR/live.csv --units 18 --wip 4"""
