@@ -24,8 +24,14 @@ NOTHING: Mapping[str, int] = MappingProxyType({})
 
 
 class HeldPart(NamedTuple):
-    """A part in the factory: its `label`, the `unit` that it is for, and the code of its `holder`:
-    a robot, the tray or a feeder; NOBODY while it falls or lies about."""
+    """A part in the factory.
+
+    Attributes:
+        label: its label.
+        unit: the unit that it is for.
+        holder: the code of its holder: a robot, the tray or a feeder; NOBODY while it falls or
+            lies about.
+    """
 
     label: str
     unit: int
@@ -33,12 +39,16 @@ class HeldPart(NamedTuple):
 
 
 class Holdings:
-    """The parts of a factory, by body. Those in no unit are to spare, parked out of sight.
+    """The parts of a factory by body, each with its holder. Those in no unit are spares, parked out
+    of sight.
 
-    `body[label]`: all bodies of a label; `free[label]`: those to spare, the next first. `weld`:
-    what a holder, by its code, holds a label by. `changes`: how often something has changed hands;
-    `returns`: how often something has been put away. `parking`: the weld that parks a body, and
-    where [m].
+    Attributes:
+        body: by label, all bodies (copies,).
+        free: by label, the bodies to spare, the next first.
+        weld: by the code of a holder and a label, the weld that holds such a part there.
+        parking: by body, the weld that parks it, and the position of that [m].
+        changes: how often a part has changed its holder.
+        returns: how often a part has been parked.
     """
 
     def __init__(
