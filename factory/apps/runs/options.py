@@ -17,20 +17,20 @@ APART = (
     (
         "--relay",
         ("--robots", "--parallel", "[lines]"),
-        "a relay cuts the way of one tour, and a robot has several then",
+        "a relay divides the way of one tour, and such a robot has several tours",
     ),
     ("[tees]", ("--robots", "--cycle", "--relay"), "they change the robots that share a stem"),
     (
         "--demand",
         ("--distributed", "--from"),
-        "one supervisor skips what nobody has ordered, from the beginning on",
+        "only a central supervisor that starts at the beginning can skip units without orders",
     ),
     (
         "--distributed",
         ("--faults", "--spares"),
         "robots that run their own programs do not recover",
     ),
-    ("--platen", ("--relay", "--cycle"), "what they change has no room on guidepaths that bend"),
+    ("--platen", ("--relay", "--cycle"), "relays need straight guidepaths"),
 )
 """Options that exclude others, with the reason. All other pairs can be combined; of a product,
 --relay goes with none of a mix, and with no plan whose robots have several tours (`Project`)."""
