@@ -43,8 +43,12 @@ class WayBack:
     since: float = np.inf
 
 
-class Returning:
-    """The robots (index) that are returning: `ways`."""
+class ReturnMotion:
+    """Moves robots back to where they wait in the marking after an undo.
+
+    Attributes:
+        ways: by robot (index) that is returning, its way back.
+    """
 
     def __init__(self, layout: Layout, supervisor: Supervisor, eps: float) -> None:
         self._layout, self._supervisor = layout, supervisor

@@ -131,7 +131,7 @@ class Axes:
         return cls(address, dof, body, m.body_treeid[body], actuator, lift, across, inertia, heads)
 
     @property
-    def turns(self) -> Truth:
+    def is_rotary(self) -> Truth:
         """Whether each axis is a rotation about the vertical (axes,)."""
         return np.asarray(self.inertia != 1.0)
 

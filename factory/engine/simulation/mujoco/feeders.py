@@ -238,7 +238,7 @@ class Feeders:
 
     def stay_clear(self, robot: int) -> None:
         """Let the next part of a robot (index) come down only when the robot is out of the way."""
-        self._passing.come_clear(robot)
+        self._passing.require_clear(robot)
 
     def _take_back(self) -> None:
         """Move sliders with withdrawn parts up, and release these out of sight."""

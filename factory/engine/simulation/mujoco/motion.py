@@ -96,7 +96,7 @@ class Motion:
         bias[across.actuator, 1:3] = bias.now[across.actuator, 1:3] * factors[across.axes]
         body, dof = self.axes.body, self.axes.dof
         inertia = m.body_subtreemass[body] + m.dof_armature[dof]
-        turns = self.axes.turns
+        turns = self.axes.is_rotary
         inertia[turns] = m.dof_M0[dof[turns]]
         self.drives = Drives(arrays, d, self.axes.actuator, inertia.round(9), across)
         self.guides = Guides(arrays, dof, across)
@@ -124,7 +124,7 @@ class Motion:
             return
         lift, mass, carriages = self.axes.lift, np.array(loads), np.array(robots)
         self.drives.load(carriages, mass * self.axes.inertia[carriages], np.zeros(len(mass)))
-        self.guides.load(carriages, np.where(self.axes.turns[carriages], 0.0, mass))
+        self.guides.load(carriages, np.where(self.axes.is_rotary[carriages], 0.0, mass))
         lifts = [n for n, robot in enumerate(robots) if robot in lift]
         if lifts:
             axes = np.array([lift[robots[n]] for n in lifts])
