@@ -24,9 +24,17 @@ JUNCTION = 0.008
 
 @dataclass(frozen=True, slots=True)
 class Flat:
-    """A shape in plan. `style`: its kind; `points`: two opposite corners of a box, the middle of a
-    circle of `radius` [m], the ends of a line, or the corners of an area; `name`, `paint`: label
-    and colour (`#rrggbb`) of a part."""
+    """A shape in plan.
+
+    Attributes:
+        style: its kind.
+        points: two opposite corners of a box, the middle of a circle, the ends of a line, or
+            the corners of an area [m].
+        radius: of a circle [m].
+        box: whether it is a box.
+        name: label of a part.
+        paint: colour of a part, `#rrggbb`.
+    """
 
     style: str
     points: tuple[Point2, ...]

@@ -92,8 +92,11 @@ def _unseen(failures: Failures, hits: Sequence[Hit]) -> Iterator[str]:
 
 
 class Recovery:
-    """The detection of failures in a simulation and the responses; see `recover`. `pending`:
-    operations at their goals that have failed a test, with the name of the test."""
+    """The detection of failures in a simulation and the responses; see `recover`.
+
+    Attributes:
+        pending: by operation (index) at its goal that has failed a test, the name of the test.
+    """
 
     def __init__(self, simulation: Simulation, books: RunState, plant: Plant, campaign: Campaign):
         self.simulation, self.books, self.plant = simulation, books, plant

@@ -25,8 +25,13 @@ SETTLES = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Slip:
-    """The `welds` of a hand in which an input has slipped, and all `bodies` of the operation, which
-    press on each other."""
+    """A slip of an input in its hand.
+
+    Attributes:
+        robot: the robot (index).
+        welds: the welds of its hand.
+        bodies: all bodies of the operation, which press on each other.
+    """
 
     robot: int
     welds: tuple[int, ...]
@@ -34,11 +39,16 @@ class Slip:
 
 
 class Mishaps:
-    """The faults of a world. `slips`: by operation under way (index); `opened`: robots (index)
-    whose hands have opened undetected; `bad`: defective bodies, and whether the defect is hidden
-    from feeders' cameras; `unseen`: bodies not yet examined by a camera, with their fault; `askew`:
-    bodies that lie askew in a feeder, with its code and pad (a geom); `gone`: faults that no camera
-    can find any more."""
+    """The faults of a world, as deviations have caused them.
+
+    Attributes:
+        slips: by operation under way (index), the input that has slipped.
+        opened: robots (index) whose hands have opened undetected.
+        bad: by defective body, whether the defect is hidden from feeders' cameras.
+        unseen: by body that no camera has examined yet, its fault.
+        askew: by body that lies askew in a feeder, the code and the pad (a geom) of the feeder.
+        gone: faults that no camera can find any more.
+    """
 
     def __init__(self, world: MujocoWorld, fallen: Fallen) -> None:
         self._world, self._fallen = world, fallen
