@@ -263,8 +263,11 @@ def _describe_approaches(matings: Matings, allowed: Sequence[AllowedOverlap]) ->
     passing = len(matings.of_kind("blocked")) - blocked
     every = len(matings.all)
     clear = f"{left_out} of {every} operations clear"
-    if not strict == no_deeper == left_out == every:
-        clear += f" but for overlaps when finished, {no_deeper} never deeper, {strict} strictly"
+    if not strict == no_deeper == left_out:
+        clear += (
+            f" ({no_deeper} with no overlap deeper than in the finished product,"
+            f" {strict} with no overlap)"
+        )
     say(
         f"approach: {clear}; {lowered} lowered"
         f"{f', {passing} allowed to pass through each other' if passing else ''},"

@@ -227,7 +227,7 @@ RELAY = options(
         "--seconds",
         "limit",
         type=SECONDS,
-        help="Time limit of the search for few robots [s]; a search that it cuts short says so.",
+        help="Time limit of the search for few robots [s]; a message says if it was reached.",
     ),
 )
 WIP = click.option(
@@ -245,7 +245,7 @@ LIBRARY = click.option(
 LENIENT = click.option(
     "--lenient",
     is_flag=True,
-    help="Let a run that makes its units succeed, whatever its bodies do.",
+    help="Accept a run that makes its units, whatever the verdict on its bodies.",
 )
 STRICT = click.option("--strict", is_flag=True, help="Fail a run that 'succeeded, but ...'.")
 DRAW = options(

@@ -93,8 +93,14 @@ class BuildRequest:
 
 @dataclass(frozen=True)
 class Built:
-    """A build's model, its clearance certificate and its files, including those that existed
-    before; `mjcf`: the file of the model."""
+    """A build.
+
+    Attributes:
+        model: the MJCF model.
+        clearance: the clearance certificate.
+        mjcf: the file of the model; None where it was not written.
+        files: its files, including those that existed before.
+    """
 
     model: Model
     clearance: Certificate

@@ -55,8 +55,8 @@ SMALLER = "take smaller speeds, a smaller --timestep, or check that the parts ar
 
 @dataclass(frozen=True)
 class Compiled:
-    """What runs that differ in seed and jitter alone share: modes and, in MuJoCo, the model and the
-    engine's model `loaded` of it. A run writes into a copy of that one."""
+    """What runs share that differ in seed and jitter alone: the mode of each operation and, in
+    MuJoCo, the model and the engine's model `loaded` of it, of which a run takes a copy."""
 
     modes: tuple[Mode, ...]
     model: Model | None = None
@@ -64,14 +64,24 @@ class Compiled:
 
 
 class Simulation:
-    """One run, ready to go: `run()` does it; `model` is what the engine is given (mujoco only).
+    """One run, ready to go: `run()` does it.
+
+    Args:
+        layout: the laid-out factory.
+        request: the request for the run.
+        compiled: what `compiled` made for an earlier run of the layout.
+
+    Attributes:
+        asked: the request as given; `request` has a timestep, and a `wip` where one was chosen.
+        model: the MJCF that the engine is given; None in the ideal world.
+        world, supervisor: the world, and what fires the net over it.
+        modes, limits: the mode of each operation, and the limits of all axes.
+        timing: the delays of operations.
+        counts: how often each transition has fired where it starts.
+        before: number of products that had left by then.
 
     Raises InputError where the engine refuses the model, or a mode starts outside its domain. A run
-    that stalls or takes too long has its trouble, which `require` makes an error. `compiled`: what
-    it shares with earlier runs, made by `compiled` for the same layout and a request that differs
-    in seed and jitter alone. `counts`: how often each transition has fired where it starts;
-    `before`: products that had left by then. `asked`: the request as given; in `request` the
-    timestep is a number, and `wip` is one where the pool of parts is too large. `timing`: delays.
+    that stalls or takes too long has its trouble, which `require` makes an error.
     """
 
     def __init__(

@@ -128,7 +128,7 @@ class Staying:
         """Pairs of robots at the end of an operation of both, the first without its payload, the
         second with it. All robots stand at their goals; of a robot that waits for its carrier the
         last stretch counts, and of a lift that is lowered its stroke. Whether payloads collide is
-        judged in `compiler/mating`."""
+        judged in `floor/mating/`."""
         for operation in self.layout.factory.making:
             carrier = operation.robots.index(operation.carrier)
             for pair in permutations(range(len(operation.robots)), 2):

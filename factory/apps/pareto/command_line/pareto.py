@@ -48,7 +48,7 @@ PAGE_NAME = "pareto.html"
     "--seconds",
     "limit",
     type=SECONDS,
-    help="Time limit of the search [s]; a search that it cuts short says so.",
+    help="Time limit of the search [s]; a message says if it was reached.",
 )
 @click.option(
     "--layouts/--no-layouts",

@@ -35,7 +35,7 @@ SCAN = 10
     "--pace",
     type=click.FloatRange(0.01, 100.0),
     default=1.0,
-    help="Simulated seconds in a second.",
+    help="Simulated seconds per second of real time.",
 )
 @LENIENT
 @FLOOR
