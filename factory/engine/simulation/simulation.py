@@ -125,8 +125,7 @@ class Simulation:
         self.supervisor: RunSupervisor = supervisor
 
     def again(self, seed: int) -> Simulation:
-        """Another run of the same, from the start, with another seed; what both share is compiled
-        once."""
+        """Another run of the same with another seed; what both share is compiled once."""
         self._shared = self._shared or compiled(self.layout, self.asked)
         return Simulation(self.layout, replace(self.asked, seed=seed), self._shared)
 
@@ -174,16 +173,9 @@ class Simulation:
         if self.start != factory.net.initial_marking:
             message = "a distributed run starts where every robot waits with no part"
             raise InputError(Diagnostic("BadMarking", message, None, "leave out --from"))
-        return DistributedSupervisor(
-            factory,
-            self.modes,
-            self.limits,
-            self.world,
-            settings.step,
-            settings.steps,
-            self.request.seed,
-            stages,
-        )
+        ticks = settings.step, settings.steps
+        moved = self.modes, self.limits, self.world
+        return DistributedSupervisor(factory, *moved, *ticks, self.request.seed, stages)
 
     @property
     def physical(self) -> MujocoWorld:
@@ -201,7 +193,7 @@ class Simulation:
     @property
     def engine(self) -> EngineModel | None:
         """The engine's model; None in the ideal world."""
-        return None if self.model is None else self.physical.m
+        return self.physical.m if self.model else None
 
     @property
     def at_ends(self) -> list[Observer]:
