@@ -45,6 +45,9 @@ SHOWN = 16
 MODES = 8
 """The most modes of a gear that are printed, unless `-v` asks for all."""
 
+NOUNS = ("robot", "place", "transition", "token")
+"""What is counted of a net."""
+
 PICTURES = "Folder for pictures of blocked operations and of parts that no hand can hold."
 """The help of `--clashes`."""
 
@@ -190,6 +193,8 @@ def _pictures(checked: Checked, folder: Path) -> dict[Path, bytes]:
 
 def _describe(checked: Checked, verbose: bool, allowed: Sequence[AllowedOverlap]) -> None:
     """Print the gears, the counts and the verdict."""
+    from factory.theory.lang.source import counted
+
     document = checked.as_json()
     gears = document["gears"]
     shown = gears if verbose else gears[:SHOWN]
@@ -203,8 +208,7 @@ def _describe(checked: Checked, verbose: bool, allowed: Sequence[AllowedOverlap]
         say(f"... and {len(gears) - len(shown)} more robots (-v shows all)")
     made = checked.factory.pag.title if checked.factory else checked.name
     say(
-        f"{made}: {document['robots']} robots, {document['places']} places,"
-        f" {document['transitions']} transitions, {document['tokens']} tokens,"
+        f"{made}: {', '.join(counted(document[f'{noun}s'], noun) for noun in NOUNS)},"
         f" largest mode {document['largest_mode']}"
     )
     words = {True: "yes", False: "NO", None: "undecided"}
