@@ -54,7 +54,7 @@ def test_a_long_run_writes_a_line_now_and_then_without_a_terminal(monkeypatch) -
     monkeypatch.setattr(progress, "perf_counter", lambda: next(clock))
     watch(Progress(3, False, 5.0))
     first, second = stream.getvalue().splitlines()
-    assert first == "1 of 3 units, 1.0 s simulated, 0.0 x real time, at most 2:40 min left"
+    assert first == "1 of 3 units, 1.0 s simulated, 0.025 x real time, at most 2:40 min left"
     assert second.startswith("3 of 3 units, 3.0 s simulated")
 
 
