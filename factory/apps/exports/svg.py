@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from factory.api import PAG, Assembly, Diagnostic, InputError, MarkedNet, Project, marked
-from factory.apps.drawing.canvas import Canvas, Point, hexadecimal, shortened
+from factory.apps.drawing.canvas import LETTER, Canvas, Point, hexadecimal, shortened
 from factory.apps.exports.subject import Subject
 from factory.apps.exports.swimlanes import COLOURS, LEFT, SHARED, apart, swimlanes
 from factory.floor.geometry.solids import colour
@@ -166,9 +166,12 @@ def draw_net(net: MarkedNet, title: str) -> str:
     counts = f"{places} places, {transitions} transitions"
     counts = f"{robots} robots, {counts}" if robots else counts
     ends = "; the left and the right edge are one" if transitions else ""
-    drawing.canvas.text((14.0, 20.0), f"{title}: {counts}{ends}", 12.0, "grey")
+    heading = f"{title}: {counts}{ends}"
+    drawing.canvas.text((14.0, 20.0), heading, 12.0, "grey")
+    left, right, *heights = drawing.page
+    page = left, max(right, 28 + 12 * LETTER * len(heading)), *heights
     style = f"{NET_STYLE}.shared {{ color: {SHARED}; }}\n{CHOICES if drawing.choices else ''}"
-    return drawing.canvas.document(f"{title}: net", drawing.page, style)
+    return drawing.canvas.document(f"{title}: net", page, style)
 
 
 def _style(owners: Sequence[int]) -> str:
