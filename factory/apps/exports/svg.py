@@ -168,8 +168,8 @@ def draw_net(net: MarkedNet, title: str) -> str:
     ends = "; the left and the right edge are one" if transitions else ""
     heading = f"{title}: {counts}{ends}"
     drawing.canvas.text((14.0, 20.0), heading, 12.0, "grey")
-    left, right, *heights = drawing.page
-    page = left, max(right, 28 + 12 * LETTER * len(heading)), *heights
+    left, right, top, bottom = drawing.page
+    page = left, max(right, 28 + 12 * LETTER * len(heading)), top, bottom
     style = f"{NET_STYLE}.shared {{ color: {SHARED}; }}\n{CHOICES if drawing.choices else ''}"
     return drawing.canvas.document(f"{title}: net", page, style)
 
