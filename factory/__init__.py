@@ -30,7 +30,7 @@ from factory.stages import (
     to_networkx,
     verify,
 )
-from factory.studies import analyze, plan, render, report, sweep
+from factory.studies import analyze, env, plan, render, report, sweep
 from factory.support.errors import Diagnostic, FactoryError, InputError, MissingError, RunError
 from factory.support.namesake import MEND as _MEND
 from factory.support.namesake import is_mixed as _is_mixed
@@ -47,6 +47,7 @@ __all__ = [
     "analyze",
     "build",
     "compile",
+    "env",
     "export",
     "lay_out",
     "load_pag",

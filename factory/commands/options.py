@@ -73,10 +73,10 @@ def options(*decorators: Callable[[F], F]) -> Callable[[F], F]:
     return decorate
 
 
-def gathered(kind: type, name: str) -> Callable[[F], F]:
-    """A decorator that passes the options that are fields of a dataclass to a command as one value,
-    by this name."""
-    names = [field.name for field in fields(kind)]
+def gathered(kind: type, name: str, but: str = "") -> Callable[[F], F]:
+    """A decorator that passes the options that are fields of a dataclass, `but` for one, to a
+    command as one value, by this name."""
+    names = [field.name for field in fields(kind) if field.name != but]
 
     def decorate(command: F) -> F:
         @wraps(command)
@@ -288,11 +288,12 @@ PICTURE = options(
     click.option("--fps", type=bounded("fps"), default=30, help="Frames per second."),
     click.option(
         "--camera",
-        default="overview",
+        default="tour",
         metavar="CAMERA",
         shell_complete=cameras,
-        help="overview, orbit, top, product, part:LABEL to follow a part, or handover:LABEL for a"
-        " close-up of its hand-over.",
+        help="tour (of a film: the overview, cut to two hand-overs and the product), overview,"
+        " orbit, top, product, part:LABEL to follow a part, or handover:LABEL for a close-up of its"
+        " hand-over.",
     ),
     click.option(
         "--with",

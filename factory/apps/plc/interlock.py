@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from factory.api import NOPART, Event, Layout, Mode, Operation, World
+from factory.api import NOPART, Event, Layout, Mode, Operation, Truth, World
 from factory.apps.plc.corridors import Corridors
 from factory.apps.plc.signals import Commands, GripStates, Refusal, Refusals
 from factory.engine.simulation.ordering import Ordering
@@ -108,12 +108,12 @@ class PlantInterlock:
             if not self.marked[operation.place]:
                 what = f"{name} takes up {_name(operation)} before its carrier does"
                 self._refuse(robot, what)
-        elif why := self._obstacle(operation):
+        elif why := self.obstacle(operation):
             self._refuse(robot, f"{name} takes up {_name(operation)}, but {why}")
         else:
             self._fire(operation, operation.start)
 
-    def _obstacle(self, operation: Operation) -> str:
+    def obstacle(self, operation: Operation) -> str:
         """Why an operation cannot start; "" if it can."""
         if operation.start not in self.threads.possible:
             places = self.factory.net.threaded.net.preset[operation.start]
@@ -145,16 +145,49 @@ class PlantInterlock:
             self._refuse(robot, what)
         if robot != operation.carrier or not self.marked[operation.place]:
             return
-        after = operation.after[operation.robots.index(robot)]
-        held = self.held(robot)
-        if held != (after != NOPART):
-            state = "is closed" if held else "is open"
-            self._refuse(robot, f"{name} ends {_name(operation)}, but its grip {state}")
-        elif far := self._far(operation) or self._moving(operation):
-            self._refuse(robot, f"{name} ends {_name(operation)}, but {far}")
+        if why := self.unfinished(operation):
+            self._refuse(robot, f"{name} ends {_name(operation)}, but {why}")
         else:
             self._fire(operation, operation.end)
             self.grips.hand_over(operation)
+
+    def unfinished(self, operation: Operation) -> str:
+        """Why an operation cannot end; "" if it can."""
+        robot = operation.carrier
+        held = self.held(robot)
+        if held != (operation.after[operation.robots.index(robot)] != NOPART):
+            return f"its grip {'is closed' if held else 'is open'}"
+        return self._far(operation) or self._moving(operation)
+
+    def legal_jobs(self) -> Truth:
+        """Which jobs each robot may have in the next commands, 0 for none (robots, operations + 1):
+        the one that it has, and those that it may take up now. One that is at work has no other
+        before it may give its own up."""
+        factory, jobs = self.factory, self.commands.job
+        legal = np.zeros((len(factory.robots), len(factory.operations) + 1), bool)
+        for robot, job in enumerate(jobs):
+            operation = self._operation(job)
+            legal[robot, job if operation else 0] = True
+            if operation is not None:
+                works = self.marked[operation.place] and robot in operation.robots
+                leads = works and robot == operation.carrier
+                closed = robot in self.grips.closed
+                legal[robot, 0] = not closed and not (
+                    self.unfinished(operation) if leads else works
+                )
+        for operation in factory.operations:
+            if self.marked[operation.place]:
+                takers = [robot for robot in operation.robots if robot != operation.carrier]
+            else:
+                takers = (
+                    []
+                    if jobs[operation.carrier] or self.obstacle(operation)
+                    else [operation.carrier]
+                )
+            for robot in takers:
+                if not jobs[robot] and robot not in self.grips.closed:
+                    legal[robot, operation.index + 1] = True
+        return legal
 
     def _fire(self, operation: Operation, transition: int) -> None:
         job = operation, self.factory.unit(operation, self.fired[transition])

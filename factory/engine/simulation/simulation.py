@@ -92,7 +92,7 @@ class Simulation:
     ) -> None:
         if request.demand and request.world == "mujoco":
             layout = on_demand(layout)
-        self.layout, self.asked = layout, request
+        self.layout, self.asked, self._shared = layout, request, compiled
         self.request = request = replace(request, settings=_timed(layout, request, compiled))
         settings, world, net = request.settings, request.world, layout.factory.net
         self.modes = compiled.modes if compiled else operation_modes(layout, settings.eps)
@@ -123,6 +123,12 @@ class Simulation:
         if self.start != net.initial_marking:
             supervisor.ordering.keep_passes()
         self.supervisor: RunSupervisor = supervisor
+
+    def again(self, seed: int) -> Simulation:
+        """Another run of the same, from the start, with another seed; what both share is compiled
+        once."""
+        self._shared = self._shared or compiled(self.layout, self.asked)
+        return Simulation(self.layout, replace(self.asked, seed=seed), self._shared)
 
     @cached_property
     def patience(self) -> float:

@@ -76,7 +76,7 @@ class Staying:
 
     def __init__(self, layout: Layout, net: Coordinated, awaited: Mapping[int, float]) -> None:
         self.layout, self.net, self._awaited = layout, net, awaited
-        self._own = [_own(layout, robot.index) for robot in layout.factory.robots]
+        self._own = [layout.kept(_own, robot.index) for robot in layout.factory.robots]
         self.partners = _partners(layout)
 
     def presences(self) -> Iterator[Presence]:

@@ -118,7 +118,11 @@ def test_buttons_step_slow_push_and_block(watched: Watched) -> None:
 
 def test_a_page_whose_server_is_gone_says_how_to_start_it(watched: Watched) -> None:
     watched.until("f.count > 2")
-    assert watched.page.locator("#acts button:enabled").count() == 0
+    offered = watched.page.locator("#acts button").all_inner_texts()
+    assert offered == [f"r{n}" for n in range(1, 7)] + ["part3", "part1", "part2"]
+    watched.page.locator("#acts button", has_text="part3").click()
+    assert watched.page.locator("#acts h3").all_inner_texts()[-1] == "part3"
+    watched.page.keyboard.press("Escape")
     watched.page.locator("#gantt button[data-robot='1']").click()
     assert watched.page.locator("#acts button:enabled").count() > 3
     assert watched.page.locator("#gone").is_hidden()

@@ -147,7 +147,7 @@ def _written(
         return [None] * len(front.points), []
     commands = commands_of(front, folder)
     plans = floor_plans(front, folder)
-    page = front_page(front, commands, plans, folder)
+    page = front_page(front, commands)
     files = {folder / PAGE_NAME: page.encode(), **point_files(front, folder), **plans}
     own_names(folder, files)
     write_all(files)
@@ -168,8 +168,9 @@ def _print(front: ParetoFront, commands: Sequence[str | None]) -> None:
     if front.written is not None:
         say(f"as written: {front.written}")
     say(f"lower bound: {front.least.total} robots, tools included")
-    if front.unproved:
-        say(front.unproved)
+    for words in (front.unproved, front.ending):
+        if words:
+            say(words)
     for point in front.points:
         for failure in point.trial.failures if point.trial else ():
             print(f"{point.robots} robots: the run failed: {failure}", file=sys.stderr)
@@ -177,8 +178,7 @@ def _print(front: ParetoFront, commands: Sequence[str | None]) -> None:
 
 def _looked_at(front: ParetoFront) -> str:
     laid_out = f", {front.laid_out} layouts" if front.laid_out else ""
-    rest = "" if front.complete else "; the search is incomplete (--effort, --seconds)"
-    return f"{front.estimated} estimates{laid_out}{rest}"
+    return f"{front.estimated} estimates{laid_out}"
 
 
 def _row(point: FrontPoint) -> list[str]:
