@@ -67,8 +67,6 @@ class Simulation:
     """One run, ready to go: `run()` does it.
 
     Args:
-        layout: the laid-out factory.
-        request: the request for the run.
         compiled: what `compiled` made for an earlier run of the layout.
 
     Attributes:
@@ -77,11 +75,9 @@ class Simulation:
         world, supervisor: the world, and what fires the net over it.
         modes, limits: the mode of each operation, and the limits of all axes.
         timing: the delays of operations.
-        counts: how often each transition has fired where it starts.
-        before: number of products that had left by then.
+        counts, before: how often each transition had fired, and how many products had left before.
 
-    Raises InputError where the engine refuses the model, or a mode starts outside its domain. A run
-    that stalls or takes too long has its trouble, which `require` makes an error.
+    Raises InputError where the engine refuses the model, or a mode starts outside its domain.
     """
 
     def __init__(

@@ -7,6 +7,6 @@
   `hands/` chooses the grippers meanwhile.
 * The proof, which uses nothing of the search: `clearance.py` (`certify`) with `sweeps.py` and
   `crossings.py`; `exclusions.py` decides which of two machines goes first where both need one
-  place, with `presence.py`, `machines.py`, `staying.py` and `homeward.py`; `coordinating.py` makes
-  the coordinated net of it.
+  place, with `presence.py`, `nearness.py`, `machines.py`, `staying.py` and `homeward.py`;
+  `coordinating.py` makes the coordinated net of it.
 """
