@@ -168,8 +168,9 @@ class Progress(ProgressBar):
 
     def _line(self, made: int, time: float, wall: float) -> str:
         left = f", at most {_clock(wall * (self.seconds / time - 1))} left"
+        speed = f"{paced(time / wall)} x real time"
         return (
-            f"{made} of {self.units} units, {time:.1f} s simulated, {paced(time / wall)} x real time"
+            f"{made} of {self.units} units, {time:.1f} s simulated, {speed}"
             f"{left if time < self.seconds else ''}"
         )
 
