@@ -41,9 +41,9 @@ beside it. Above them are the apps, then the commands."""
 
 APPS = (
     ("drawing",),
-    ("foreign_nets", "importing", "few_robots", "relay", "platen", "revise", "log", "deviations"),
+    ("foreign_nets", "importing", "few_robots", "relay", "platen", "log", "deviations"),
     ("monitor", "recovery", "planning", "analyze", "exports"),
-    ("runs", "resume"),
+    ("runs", "resume", "revise"),
     ("sweep",),
     ("fidelity",),
     ("report",),
