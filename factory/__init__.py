@@ -30,7 +30,17 @@ from factory.stages import (
     to_networkx,
     verify,
 )
-from factory.studies import analyze, env, plan, render, report, sweep
+from factory.studies import (
+    analyze,
+    env,
+    fidelity,
+    pareto,
+    plan,
+    render,
+    report,
+    revise,
+    sweep,
+)
 from factory.support.errors import Diagnostic, FactoryError, InputError, MissingError, RunError
 from factory.support.namesake import MEND as _MEND
 from factory.support.namesake import is_mixed as _is_mixed
@@ -49,11 +59,14 @@ __all__ = [
     "compile",
     "env",
     "export",
+    "fidelity",
     "lay_out",
     "load_pag",
+    "pareto",
     "plan",
     "render",
     "report",
+    "revise",
     "run",
     "sweep",
     "to_networkx",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -15,8 +16,11 @@ if TYPE_CHECKING:
     import gymnasium
 
     from factory.apps.analyze import Analysis
+    from factory.apps.fidelity.record import Fidelity
+    from factory.apps.pareto import ParetoFront
     from factory.apps.planning.plan import Planned
     from factory.apps.report.page import RunReport
+    from factory.apps.revise.revision import Revision
     from factory.apps.runs.executing import Tell
     from factory.apps.runs.pictures import Rendered
     from factory.apps.sweep.summary import Summary
@@ -206,6 +210,76 @@ def sweep(
     recipe = recipe_of(project, axes, {**shared, "world": world}, max_time, fuse)
     swept(recipe, axes, kept, jobs or cores(), retry)
     return summarise(kept)
+
+
+def fidelity(
+    product: Stage,
+    *,
+    seeds: int = 5,
+    units: int | None = None,
+    jitter: float = 0.3,
+    jobs: int | None = None,
+    max_time: float | None = None,
+    settings: Settings | None = None,
+) -> Fidelity:
+    """How close MuJoCo is to the ideal world, from runs in both over so many `seeds`, each of so
+    many `units`, None for as many as show the cycle time. `jobs`: processes, one per core by
+    default. The others are those of `run`. Raises InputError, RunError."""
+    from factory.apps.fidelity import measure
+    from factory.apps.sweep.pool import cores
+    from factory.support.bounds import check_values
+    from factory.theory.nets.verify import proved
+
+    check_values({"units": units, "jitter": jitter, "max_time": max_time, "jobs": jobs})
+    project = project_of(product, settings)
+    proved(project.layout.factory.net)
+    runs = range(seeds), units, jitter, project.settings, jobs or cores(), None, max_time
+    return measure(project.layout, *runs)
+
+
+def pareto(
+    product: Stage,
+    *,
+    validate: int = 0,
+    effort: int | None = None,
+    seconds: float | None = None,
+    layouts: bool = True,
+    settings: Settings | None = None,
+) -> ParetoFront:
+    """The Pareto-optimal factories of a product in robots, cycle time and floor area.
+
+    `validate`: number of points that are run in both worlds; `effort`: number of factories to lay
+    out; `seconds`: time limit [s]; without `layouts` they are estimated. Raises InputError,
+    RunError where no factory has a layout."""
+    from factory.apps.pareto import Effort
+    from factory.apps.pareto import pareto as searched
+    from factory.apps.pareto.front import tried
+    from factory.support.bounds import check_values
+    from factory.support.errors import usage_error
+
+    if validate and not layouts:
+        raise usage_error("without layouts there is nothing to run", "leave out validate")
+    check_values({"seconds": seconds})
+    bounds = Effort(layouts, effort, inf if seconds is None else seconds)
+    front = searched(project_of(product, settings), bounds)
+    for number in front.spread(validate) if validate else ():
+        front = front.with_trial(number, tried(front.points[number].project))
+    return front
+
+
+def revise(old: Stage, new: Stage, *, pin: Literal["all", "hands", "none"] = "all") -> Revision:
+    """What stays of the factory of a product in that of its next revision, laid out so that most
+    does; a notebook shows it as a picture. `pin`: what of the old layout is kept, or less where no
+    layout has that. Raises InputError for shared robots, RunError where there is no layout."""
+    from factory.apps.revise.revision import revised
+    from factory.support.bounds import check_choice
+    from factory.theory.nets.verify import proved
+
+    check_choice("pin", pin, ("all", "hands", "none"))
+    before = project_of(old)
+    revision = revised(before, project_of(new, before.settings), pin)
+    proved(revision.new.layout.factory.net)
+    return revision
 
 
 class PlannedAssembly(NamedTuple):

@@ -17,6 +17,7 @@ from factory.api import (
     physical_model,
     write_all,
 )
+from factory.apps.drawing.tables import titled
 from factory.apps.exports.binary import beside, kept, key_of, packed, seal_of, sealed
 from factory.apps.exports.certificate.writer import certificate
 from factory.apps.exports.dot import write_dot
@@ -108,6 +109,14 @@ class Built:
     clearance: Certificate
     mjcf: Path | None
     files: tuple[Path, ...]
+
+    def __repr__(self) -> str:
+        counts = f"{self.model.bodies} bodies, {self.model.joints} joints"
+        return f"<Built: a model of {counts}; {len(self.files)} files>"
+
+    def _repr_html_(self) -> str:
+        sizes = ((file.name, f"{file.stat().st_size / 1e3:.1f} kB") for file in self.files)
+        return titled(repr(self), ("file", "size"), sizes)
 
 
 def build(project: Project, verdict: Verdict, request: BuildRequest) -> Built:

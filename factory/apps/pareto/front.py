@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 from factory.api import Observer, Project, RunRequest, Simulation, Timing, steady_from, write_pag
 from factory.apps.analyze.timed import steady_units
+from factory.apps.drawing.tables import titled
 from factory.apps.few_robots.aim import Least
 from factory.apps.few_robots.candidate import Candidate
 from factory.apps.few_robots.estimating import Estimate
@@ -59,9 +60,9 @@ Ended = Literal["complete", "effort", "seconds", "stopped"]
 
 ENDINGS: dict[Ended, str] = {
     "complete": "",
-    "effort": "the search ended with its effort, after {}: a greater --effort may find more",
-    "seconds": "the search ended with its time, after {}: more --seconds may find more",
-    "stopped": "the search was stopped by hand, after {}",
+    "effort": "the search used up its effort after {}; a greater --effort may find more",
+    "seconds": "the search ran out of time after {}; more --seconds may find more",
+    "stopped": "the search was stopped by hand after {}",
 }
 
 SEED, JITTER = 0, 0.3
@@ -253,6 +254,18 @@ class ParetoFront:
     estimated: int = 0
     laid_out: int = 0
     ended: Ended = "complete"
+
+    def __repr__(self) -> str:
+        ends = " to ".join(str(point) for point in (self.points[0], self.points[-1]))
+        return f"<ParetoFront of {self.name}: {len(self.points)} points, {ends}>"
+
+    def _repr_html_(self) -> str:
+        rows = (
+            (p.robots, p.tools, p.seconds, p.area, p.trial.measured if p.trial else None)
+            for p in self.points
+        )
+        columns = ("robots", "tools", "cycle [s]", "floor [m²]", "measured, with jitter [s]")
+        return titled(repr(self), columns, rows)
 
     @property
     def ending(self) -> str:

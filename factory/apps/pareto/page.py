@@ -9,11 +9,11 @@ from pathlib import Path
 
 from factory.api import Layout
 from factory.apps.drawing.canvas import Box, page_box
+from factory.apps.drawing.tables import alike, differing, table
 from factory.apps.exports.floor_sheet import draw_floor, write_svg
 from factory.apps.pareto.chart import cycle_chart, floor_chart
 from factory.apps.pareto.front import JITTER, SEED, FrontPoint, ParetoFront, point_name
 from factory.apps.report.page import filled
-from factory.apps.report.tables import alike, differing, table
 
 PLAN_NAME = "floor.svg"
 

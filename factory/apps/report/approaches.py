@@ -9,8 +9,8 @@ from html import escape
 import numpy as np
 
 from factory.api import Operation, Product
+from factory.apps.drawing.tables import alike, differing, table
 from factory.apps.report.recording import Recording
-from factory.apps.report.tables import alike, differing, table
 from factory.floor.mating.bodies import bodies
 from factory.floor.mating.mating import AMPLE, UPRIGHT
 from factory.floor.mating.meetings import Meeting, meetings

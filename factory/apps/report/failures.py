@@ -8,8 +8,8 @@ from math import isfinite
 from typing import Any
 
 from factory.api import Failing, Failures
+from factory.apps.drawing.tables import table
 from factory.apps.report.recording import Recording
-from factory.apps.report.tables import table
 from factory.engine.record.failures import Death, deaths
 from factory.theory.lang.source import counted
 

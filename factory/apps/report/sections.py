@@ -7,11 +7,11 @@ from html import escape
 from math import comb
 
 from factory.api import PAG, CutOff, Diagnostic, Factory, steady_from
+from factory.apps.drawing.tables import table
 from factory.apps.fidelity.record import QUANTITIES
 from factory.apps.report.drawings import words_of
 from factory.apps.report.pace import MeasuredPace, Predicted, excluded
 from factory.apps.report.recording import Recording
-from factory.apps.report.tables import table
 from factory.apps.report.words import Proof
 from factory.apps.resume.remade import forged
 

@@ -98,9 +98,8 @@ class _RevisionSheet(FloorSheet):
     def _figures(self) -> tuple[str, str]:
         counts = Counter(self.grades.values()) | Counter(self.ghosts.values())
         words = {"stays": "as they were", "changed": "changed", "moved": "moved", "new": "new"}
-        parts = [
-            f"{counts[k]} {word}" for k, word in {**words, "gone": "gone"}.items() if counts[k]
-        ]
+        robots_of = {**words, "gone": "gone"}.items()
+        parts = [f"{counts[grade]} {word}" for grade, word in robots_of if counts[grade]]
         robots = f"{len(self.old.guidepaths)} -> {len(self.layout.guidepaths)} robots"
         floor = f"floor {self.old.area:.2f} -> {self.layout.area:.2f} m²"
         return f"{robots}: {', '.join(parts)}", floor

@@ -212,7 +212,7 @@ def test_the_page_refers_to_nothing_outside_itself(front: ParetoFront, tmp_path:
     assert "default-src 'none'" in text
     assert text.count('class="plan"') == len(front.points) == len(plans)
     assert all(f'href="#p{n + 1:02d}"' in text for n in range(len(front.points)))
-    assert "The search ended with its effort" in text
+    assert "The search used up its effort after" in text
     assert text == front_page(evil, commands)
 
 

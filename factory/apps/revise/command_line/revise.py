@@ -91,10 +91,7 @@ def revise(
         write_all(texts)
         files += map(str, texts)
     if picture is not None:
-        from factory.apps.revise.revision_picture import draw_revision
-
-        layouts, moved = (before.layout, revision.new.layout), revision.inheritance.shift
-        write_all({picture: draw_revision(revision.title, layouts, revision.kept, moved).encode()})
+        write_all({picture: revision.drawing.encode()})
         files.append(str(picture))
     if out.as_json:
         also = {"live": change.as_json()} if change else {}
