@@ -30,22 +30,13 @@ from factory.stages import (
     to_networkx,
     verify,
 )
-from factory.studies import (
-    analyze,
-    env,
-    fidelity,
-    pareto,
-    plan,
-    render,
-    report,
-    revise,
-    sweep,
-)
+from factory.studies import analyze, fidelity, pareto, plan, revise, sweep
 from factory.support.errors import Diagnostic, FactoryError, InputError, MissingError, RunError
 from factory.support.namesake import MEND as _MEND
 from factory.support.namesake import is_mixed as _is_mixed
 from factory.support.settings import Settings
 from factory.support.version import __version__ as __version__
+from factory.views import env, render, report
 
 __all__ = [
     "Diagnostic",
