@@ -50,6 +50,7 @@ APPS = (
     ("pareto", "live"),
     ("plc",),
     ("environment",),
+    ("making",),
 )
 """The apps, from those that use no other app up. An app imports `factory.api`, itself, and the apps
 below it."""
