@@ -92,12 +92,14 @@ def sweep(
     jobs: int | None = None,
     retry: bool = False,
     settings: Settings | None = None,
+    on: str | None = None,
 ) -> Summary:
     """Run a product for every combination of the varied values ({"seed": range(100)}), keep the
     results in a database (SQLite) and summarise them. Called again, it continues where it stopped.
 
-    `jobs`: processes, one per core by default; `retry`: failed runs are repeated. The others are
-    those of `run`. Raises InputError, RunError.
+    `jobs`: processes, one per core by default; `on`: address of a Dask scheduler, whose workers are
+    taken instead; `retry`: failed runs are repeated. The others are those of `run`. Raises
+    InputError, RunError.
     """
     from factory.apps.sweep.grid import read_axes
     from factory.apps.sweep.pool import cores
@@ -115,7 +117,7 @@ def sweep(
     will_write(kept)
     project = project_of(product, settings)
     recipe = recipe_of(project, axes, {**shared, "world": world}, max_time, fuse)
-    swept(recipe, axes, kept, jobs or cores(), retry)
+    swept(recipe, axes, kept, jobs or cores(), retry, on=on)
     return summarise(kept)
 
 
