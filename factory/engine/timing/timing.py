@@ -138,8 +138,8 @@ class Timing:
         layout = self.layout
         drive = self.axis_drive(past.axis, change)
         if past.axis != carriage_axis(robot):
-            stroke = layout.strokes[robot]
-            return drive.way(stroke).passes(stroke - past.at)
+            low, top = self._rise(robot, number)
+            return drive.way(top - low).passes(top - past.at)
         visit, factor = layout.visits[number, robot], change.way.get(robot, 1.0)
         if past.direction < 0:
             slot = self.factory.operations[number].robots.index(robot)
@@ -148,11 +148,25 @@ class Timing:
         rises, length = 0, layout.guidepaths[robot].length
         if rises_first(layout, robot):
             lift = self.axis_drive(self.factory.lift_axis[robot], change)
-            rises = lift.way(layout.strokes[robot]).rests(self.settings.eps)
+            low, top = self._rise(robot, number)
+            rises = lift.way(top - low).rests(self.settings.eps)
         home = drive.way((length - visit.at) * factor)
         if past.at < length - HOME:
             return rises + home.passes(min(length - visit.at, length - past.at) * factor)
         return rises + home.rests(HOME) + self._adjusted(robot, number)
+
+    def _rise(self, robot: int, number: int) -> tuple[float, float]:
+        """From where an operation (index) leaves the lift of a robot to where the next one takes it
+        [m]: tours differ in both."""
+        lift, gear = self.factory.lift_axis[robot], self.factory.robots[robot].operations
+        after = gear[(gear.index(number) + 1) % len(gear)]
+        low, top = (
+            float(self.modes[n].goals[self.factory.axes[n].index(lift)])
+            if lift in self.factory.axes[n]
+            else self.layout.strokes[robot]
+            for n in (number, after)
+        )
+        return low, top
 
     def _adjusted(self, robot: int, number: int) -> int:
         """The ticks in which the lift of a robot that is at home is set for its next tour."""

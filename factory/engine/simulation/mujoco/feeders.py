@@ -54,6 +54,7 @@ class Feeders:
         back: withdrawn parts.
         lacking: labels of parts that robots wait for.
         due: the time by which such a part must come to be in time [s].
+        clear_from: no robot for which an empty slider waits is out of its way before this [s].
     """
 
     def __init__(
@@ -72,7 +73,7 @@ class Feeders:
         self._stations = [_station(outlet, codes[outlet.robot]) for outlet in outlets]
         self.back = TakenBack()
         self.lacking = set[str]()
-        self.due = NEVER
+        self.due = self.clear_from = NEVER
         self._spent = dict[int, int]()
         self._number = {station.label: n for n, station in enumerate(self._stations)}
         operations, rising = model.factory.operations, coordinated(model.layout).rising
@@ -163,9 +164,13 @@ class Feeders:
         self._sliders.settle()
         if self.back.numbers:
             self._take_back()
-        vacant = np.array(self._vacant(), np.intp)
-        clear = vacant[self._passing.clear()[vacant]] if len(vacant) else vacant
-        free = [number for number in clear.tolist() if not self._is_busy(number)]
+        idle = [number for number in self._vacant() if not self._is_busy(number)]
+        is_clear = self._passing.clear() if idle else ()
+        free = [number for number in idle if is_clear[number]]
+        waiting = [number for number in idle if not is_clear[number]]
+        self.clear_from = NEVER
+        if waiting:
+            self.clear_from = self._sliders.now + self._passing.until_clear(waiting)
         if free:
             late = self._obstructed()
             free = [number for number in free if number not in late]

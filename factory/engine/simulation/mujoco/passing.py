@@ -109,6 +109,13 @@ class Passing:
         self._lifts.narrow(home, self._d)
         return np.asarray(np.where(self._first, home, ~self.holds | (at <= self._clear)))
 
+    def until_clear(self, numbers: Sequence[int]) -> float:
+        """No robot of some outlets that is in the way is out of it before so long [s]."""
+        at = self._at()[0][numbers]
+        home = self._home[numbers] - HOME - at
+        ways = np.where(self._first[numbers], home, at - self._clear[numbers])
+        return float(np.maximum(ways, 0.0).min()) / self._fastest.speed
+
     def soonest(self, number: int) -> float:
         """Least time in which a robot can be at its feeder [s]; 0 for a hand from above: the part
         has to be down before."""

@@ -192,7 +192,8 @@ class MujocoWorld:
             motion.plan_robots(bundle)
         if until:
             ticks = 1 if self.d.ncon else min(ticks, max(1, min(map(motion.robots.until, until))))
-        due = min(self.parts.feeders.due, motion.sliders.up)
+        feeders = self.parts.feeders
+        due = min(feeders.due, feeders.clear_from, motion.sliders.up)
         left = (due - self.time) / self.model.settings.tick
         if left < ticks:
             ticks = max(1, ceil(left - ROUNDED))
@@ -235,7 +236,7 @@ class MujocoWorld:
         outfeed, unit, feeders = self.motion.outfeed, self.parts.on_tray, self.parts.feeders
         if feeders.due <= self.motion.sliders.now:
             feeders.due, self.supplied = NEVER, True
-        if self.motion.sliders.up <= self.motion.sliders.now:
+        if min(self.motion.sliders.up, feeders.clear_from) <= self.motion.sliders.now:
             self.supplied |= feeders.tend()
         if outfeed.busy and outfeed.rests():
             self.supplied = True
